@@ -1,0 +1,18 @@
+# The one list of what formingx needs. `fx` reads SUITE and PACKAGES from here too.
+ARG SUITE=trixie
+FROM debian:${SUITE}-slim
+ARG PACKAGES="\
+    python3-dolfinx \
+    python3-gmsh \
+    python3-matplotlib \
+    python3-pytest \
+    python3-pyvista \
+    python3-scipy \
+    python3-tqdm \
+    libopenblas0-pthread \
+    xauth \
+    xvfb"
+RUN apt-get update \
+ && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $PACKAGES \
+ && rm -rf /var/lib/apt/lists/*
+ENV FX_INSIDE=1
