@@ -1,0 +1,16 @@
+"""formingx: how polymers are formed, simulated with finite elements on FEniCSx."""
+
+from . import mesh
+from .errors import ConvergenceError, InputError
+from .physics.incompressibility import DisplacementPenalty, MixedPressure
+from .physics.kinematics import Axisymmetric, PlaneStrain
+from .physics.loads import Pressure
+from .physics.materials import Hyperelastic, MooneyRivlin, NeoHookean, Ogden
+from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Symmetry
+from .results.measures import displacement, enclosed_volume, pole_height, pole_stretch, pressure, travel
+from .results.path import Path, State
+from .results.profile import Profile
+from .scene import Scene
+from .solve.bordered import Tolerances
+from .solve.continuation import trace
+from .solve.stepping import StepControl

@@ -1,0 +1,178 @@
+"""Meshes of six-node triangles with named layers (cells) and named boundaries (facets)."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from . import _compat
+from .errors import InputError, count, positive
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A distributed mesh and the names of its parts.
+
+    Attributes:
+        domain: the `dolfinx.mesh.Mesh`; coordinates (R, Z) in the user's unit of length.
+        cells, facets: its `MeshTags`.
+        layers, boundaries: name to tag.
+    """
+
+    domain: Any
+    cells: Any
+    facets: Any
+    layers: dict[str, int]
+    boundaries: dict[str, int]
+
+    def facets_of(self, boundary: str) -> np.ndarray:
+        """Local facet indices of a boundary, shape (n,), ghosts included."""
+        return self.facets.find(self.boundaries[boundary])
+
+    def nodes_of(self, boundary: str) -> np.ndarray:
+        """Coordinates of all geometry nodes of a boundary, sorted by R, then Z, shape (n, 2); same on all ranks."""
+        from dolfinx.mesh import entities_to_geometry
+        domain = self.domain
+        facets = self.facets_of(boundary)
+        domain.topology.create_connectivity(1, 2)
+        nodes = np.unique(entities_to_geometry(domain, 1, facets)) if len(facets) else []
+        local = domain.geometry.x[nodes, :2].reshape(-1, 2)
+        points = np.concatenate(domain.comm.allgather(local))
+        scale = np.ptp(points, axis=0).max() if len(points) else 1.0
+        keys = np.round(points / (scale or 1.0), 12)
+        _, first = np.unique(keys, axis=0, return_index=True)
+        points = points[first]
+        return points[np.lexsort((points[:, 1], points[:, 0]))]
+
+
+def disc(*, radius: float, thickness: float | Mapping[str, float], elements: tuple = (40, 2),
+         grading: float = 1.0, inner_radius: float = 0.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
+    """A flat disc (or ring) in the (R, Z) plane, bottom face on Z = 0.
+
+    Boundaries: `axis` (R = inner_radius; called `inner` if that is above 0), `rim`, `bottom`, `top`.
+
+    Args:
+        radius, inner_radius: lengths.
+        thickness: a length (one layer, called `sheet`), or {layer name: its thickness} from bottom to top.
+        elements: (along the radius, through each layer); the latter may be a tuple, one count per layer. Each
+            rectangle is two triangles.
+        grading: size of the last element at the rim over that of the first at the axis.
+
+    Raises:
+        InputError: a size that is not positive, or a count that is not a whole number of at least 1.
+    """
+    radius = positive("disc: radius", radius)
+    grading = positive("disc: grading", grading)
+    if not 0 <= inner_radius < radius:
+        raise InputError(f"disc: inner_radius = {inner_radius!r}: must be at least 0 and below radius = {radius!r}")
+    layers = dict(thickness) if isinstance(thickness, Mapping) else {"sheet": thickness}
+    if not layers:
+        raise InputError("disc: thickness = {}: must name at least one layer")
+    heights = [positive(f"disc: thickness of {name!r}", h) for name, h in layers.items()]
+    if not (hasattr(elements, "__len__") and len(elements) == 2):
+        raise InputError(f"disc: elements = {elements!r}: must be (along the radius, through each layer)")
+    along = count("disc: elements along the radius", elements[0])
+    through = elements[1] if hasattr(elements[1], "__len__") else [elements[1]] * len(layers)
+    if len(through) != len(layers):
+        raise InputError(f"disc: elements through the layers = {through!r}: {len(layers)} layers need as many counts")
+    through = [count("disc: elements through a layer", n) for n in through]
+    ratio = grading ** (1 / (along - 1)) if along > 1 else 1.0
+
+    def build(model):
+        geo = model.geo
+        levels = np.concatenate([[0.0], np.cumsum(heights)])
+        points = [[geo.addPoint(r, z, 0) for r in (inner_radius, radius)] for z in levels]
+        across = [geo.addLine(*p) for p in points]
+        inner = [geo.addLine(a[0], b[0]) for a, b in zip(points, points[1:])]
+        outer = [geo.addLine(a[1], b[1]) for a, b in zip(points, points[1:])]
+        for line in across:
+            geo.mesh.setTransfiniteCurve(line, along + 1, "Progression", ratio)
+        faces = []
+        for k, n in enumerate(through):
+            for line in (inner[k], outer[k]):
+                geo.mesh.setTransfiniteCurve(line, n + 1)
+            faces.append(geo.addPlaneSurface([geo.addCurveLoop([across[k], outer[k], -across[k + 1], -inner[k]])]))
+            geo.mesh.setTransfiniteSurface(faces[-1], "AlternateLeft")
+        geo.synchronize()
+        for name, face in zip(layers, faces):
+            model.addPhysicalGroup(2, [face], name=name)
+        boundaries = {"axis" if inner_radius == 0 else "inner": inner, "rim": outer, "bottom": across[:1],
+                      "top": across[-1:]}
+        for name, lines in boundaries.items():
+            model.addPhysicalGroup(1, lines, name=name)
+        model.mesh.generate(2)
+        model.mesh.setOrder(2)
+
+    return _from_gmsh(build, comm)
+
+
+def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
+    """A mesh of triangles from a gmsh file whose physical groups name the layers (2-D) and the boundaries (1-D).
+
+    Raises:
+        InputError: the file is not there, cannot be read, or has no named 2-D group.
+    """
+    file = os.fspath(file)
+
+    def build(model):
+        import gmsh
+        if not os.path.isfile(file):
+            raise InputError(f"mesh file {file!r} is not there")
+        try:
+            gmsh.merge(file)
+        except Exception as error:
+            raise InputError(f"mesh file {file!r} cannot be read: {error}") from None
+        if not model.getPhysicalGroups(2):
+            raise InputError(f"mesh file {file!r} has no physical group of dimension 2: name its layers")
+
+    return _from_gmsh(build, comm)
+
+
+def write_disc(file: str | os.PathLike, **arguments: Any) -> None:
+    """Write the mesh that `disc(**arguments)` builds as a gmsh file (MSH 2.2 ASCII); for other solvers."""
+    raise NotImplementedError
+
+
+def _from_gmsh(build: Any, comm: MPI.Comm) -> Mesh:
+    """Run `build(model)` on rank 0 and distribute the model; an InputError there is raised on all ranks."""
+    with _gmsh_model(comm) as model:
+        error, names = None, None
+        if comm.rank == 0:
+            try:
+                build(model)
+                names = [{model.getPhysicalName(d, t) or str(t): t for d, t in model.getPhysicalGroups(d)}
+                         for d in (2, 1)]
+            except InputError as e:
+                error = e
+        error, names = comm.bcast((error, names), root=0)
+        if error is not None:
+            raise error
+        domain, cells, facets = _compat.gmsh_to_mesh(model, comm)
+    if domain.topology.cell_name() != "triangle":
+        raise InputError(f"the mesh is made of {domain.topology.cell_name()}s: formingx needs triangles")
+    return Mesh(domain, cells, facets, *names)
+
+
+@contextlib.contextmanager
+def _gmsh_model(comm: MPI.Comm) -> Iterator[Any]:
+    import gmsh
+    if comm.rank != 0:
+        yield None
+        return
+    ours = not gmsh.isInitialized()
+    if ours:
+        gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.model.add("formingx")
+    try:
+        yield gmsh.model
+    finally:
+        gmsh.model.remove()
+        if ours:
+            gmsh.finalize()

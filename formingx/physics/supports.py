@@ -1,0 +1,115 @@
+"""Supports: each says which displacement components are held, where, and how."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ..errors import InputError, finite
+
+R, Z = 0, 1
+
+
+class Held(NamedTuple):
+    """One displacement component held at 0 at every node of a boundary, or at the node at `point`.
+
+    `driven`: instead of 0 it follows the run's control.
+    """
+
+    component: int
+    on: str | None = None
+    point: tuple[float, float] | None = None
+    driven: bool = False
+
+
+class MeanHeld(NamedTuple):
+    """The mean of one displacement component over a boundary held at 0 (a Lagrange multiplier carries the force)."""
+
+    component: int
+    on: str
+
+
+class _On:
+    def __init__(self, on: str):
+        self.on = on
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.on!r})"
+
+
+class Symmetry(_On):
+    """No displacement across a symmetry line that lies along Z (an axis, `normal="r"`) or R (`normal="z"`)."""
+
+    def __init__(self, on: str, normal: str = "r"):
+        super().__init__(on)
+        self.component = _component(f"Symmetry({on!r}): normal", normal)
+
+    def constraints(self):
+        """What is held: a list of Held or MeanHeld."""
+        return [Held(self.component, on=self.on)]
+
+
+class Clamped(_On):
+    """All displacements of a boundary are 0.
+
+    The corner of a clamped rim is singular: see the README for the band that this leaves in a limit pressure.
+    """
+
+    def constraints(self):
+        """What is held: a list of Held or MeanHeld."""
+        return [Held(R, on=self.on), Held(Z, on=self.on)]
+
+
+class SimplySupported(_On):
+    """A hinge: the mean displacement of a rim face is 0, its rotation and its thinning are free.
+
+    (Holding one node instead is a point support, which has no limit under mesh refinement.)
+    """
+
+    def constraints(self):
+        """What is held: a list of Held or MeanHeld."""
+        return [MeanHeld(R, self.on), MeanHeld(Z, self.on)]
+
+
+class PinnedNode:
+    """The displacement of one mesh node is 0: the hinge of the thesis' coarse grids.
+
+    A point support in a solid: results drift with mesh refinement. Prefer `SimplySupported`.
+
+    Args:
+        r, z: the node's reference coordinates, unit of the mesh.
+    """
+
+    def __init__(self, r: float, z: float):
+        self.point = (finite("PinnedNode: r", r), finite("PinnedNode: z", z))
+
+    def constraints(self):
+        """What is held: a list of Held or MeanHeld."""
+        return [Held(R, point=self.point), Held(Z, point=self.point)]
+
+    def __repr__(self) -> str:
+        return f"PinnedNode({self.point[0]!r}, {self.point[1]!r})"
+
+
+class Displaced(_On):
+    """One displacement component of a boundary follows the run's control (a length).
+
+    Args:
+        on: name of the boundary.
+        component: "r" or "z".
+    """
+
+    driven = True
+
+    def __init__(self, on: str, component: str = "z"):
+        super().__init__(on)
+        self.component = _component(f"Displaced({on!r}): component", component)
+
+    def constraints(self):
+        """What is held: a list of Held or MeanHeld."""
+        return [Held(self.component, on=self.on, driven=True)]
+
+
+def _component(name: str, value: str) -> int:
+    if value not in ("r", "z"):
+        raise InputError(f"{name} = {value!r}: must be 'r' or 'z'")
+    return R if value == "r" else Z

@@ -1,0 +1,132 @@
+"""What the user declares, checked before anything is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from .errors import InputError, count, known
+from .mesh import Mesh
+from .physics.incompressibility import MixedPressure
+from .physics.kinematics import Axisymmetric
+from .physics.materials import Material
+from .physics.supports import Held
+
+
+class Scene:
+    """A body, what it is made of, how it is held and what loads it.
+
+    Args:
+        mesh: from `formingx.mesh`.
+        materials: {layer name: material}, or one material for all layers.
+        supports: see `formingx.physics.supports`.
+        loads: see `formingx.physics.loads`. At most one load or support is driven (controlled by the run).
+        incompressibility: how the volume is kept; default `MixedPressure()`.
+        kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
+        quadrature_degree: of the energy; 5 (seven points) is the thesis' rule.
+
+    Raises:
+        InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, more
+            than one driven object.
+    """
+
+    def __init__(self, *, mesh: Mesh, materials: Material | Mapping[str, Material], supports: Sequence[Any],
+                 loads: Sequence[Any] = (), incompressibility: Any = None, kinematics: Any = None,
+                 quadrature_degree: int = 5):
+        if not isinstance(mesh, Mesh):
+            raise InputError(f"Scene: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")
+        if isinstance(materials, Material):
+            materials = dict.fromkeys(mesh.layers, materials)
+        self.mesh = mesh
+        self.materials = dict(materials)
+        self.supports = list(supports)
+        self.loads = list(loads)
+        self.incompressibility = incompressibility if incompressibility is not None else MixedPressure()
+        self.kinematics = kinematics if kinematics is not None else Axisymmetric()
+        self.quadrature_degree = count("Scene: quadrature_degree", quadrature_degree)
+        self._check_materials()
+        self._check_boundaries()
+        self._check_axis()
+        self._check_rigid_body()
+        driven = [x for x in (*self.loads, *self.supports) if getattr(x, "driven", False)]
+        if len(driven) > 1:
+            raise InputError(f"Scene: {', '.join(map(repr, driven))} are all driven: one control drives a run;"
+                             f" give the others a value")
+        self.driven = driven[0] if driven else None
+
+    def _check_materials(self) -> None:
+        layers = self.mesh.layers
+        for name, material in self.materials.items():
+            known("Scene: materials: layer", name, layers)
+            if not isinstance(material, Material):
+                raise InputError(f"Scene: materials[{name!r}] = {material!r}: must be a formingx material")
+            material.check()
+        missing = [name for name in layers if name not in self.materials]
+        if missing:
+            raise InputError(f"Scene: layer {', '.join(map(repr, missing))} has no material;"
+                             f" materials are given for {', '.join(map(repr, self.materials)) or 'none'}")
+
+    def _check_boundaries(self) -> None:
+        for thing in (*self.loads, *self.supports):
+            on = getattr(thing, "on", None)
+            if on is None:
+                continue
+            known(f"{thing!r}: boundary", on, self.mesh.boundaries)
+            if self.mesh.domain.comm.allreduce(len(self.mesh.facets_of(on)), MPI.SUM) == 0:
+                raise InputError(f"{thing!r}: boundary {on!r} is empty: no facet of the mesh carries it")
+
+    def _check_axis(self) -> None:
+        if not isinstance(self.kinematics, Axisymmetric):
+            return
+        geometry = self.mesh.domain.geometry
+        comm = self.mesh.domain.comm
+        low = comm.allreduce(geometry.x[:, 0].min(initial=np.inf), MPI.MIN)
+        size = comm.allreduce(np.abs(geometry.x).max(initial=0.0), MPI.MAX)
+        if low < -1e-12 * size:
+            raise InputError(f"Scene: the mesh crosses the axis: its smallest R is {low:.6g}, must be at least 0")
+        if low > 1e-12 * size:
+            return
+        for support in self.supports:
+            for held in support.constraints():
+                if isinstance(held, Held) and held.component == 0 and held.on is not None \
+                        and np.all(self.mesh.nodes_of(held.on)[:, 0] <= 1e-12 * size):
+                    return
+        raise InputError(f"Scene: the mesh touches the axis R = 0, but no support holds u_r there: add"
+                         f" Symmetry of one of {list(self.mesh.boundaries)}")
+
+    def _check_rigid_body(self) -> None:
+        """The supports must hold every rigid motion that the kinematics allows."""
+        if isinstance(self.kinematics, Axisymmetric):
+            names, modes = ["translation along Z"], [lambda X: np.stack([0 * X[:, 0], 1 + 0 * X[:, 0]], 1)]
+        else:
+            names = ["translation along R", "translation along Z", "rotation"]
+            modes = [lambda X: np.stack([1 + 0 * X[:, 0], 0 * X[:, 0]], 1),
+                     lambda X: np.stack([0 * X[:, 0], 1 + 0 * X[:, 0]], 1),
+                     lambda X: np.stack([-X[:, 1], X[:, 0]], 1)]
+        gram = np.zeros((len(modes), len(modes)))
+        size = max(self.extent)
+        for support in self.supports:
+            for held in support.constraints():
+                point = getattr(held, "point", None)
+                X = (np.array([point]) if point is not None else self.mesh.nodes_of(held.on)) / size
+                rows = np.stack([mode(X)[:, held.component] for mode in modes], 1)
+                if not isinstance(held, Held):
+                    rows = rows.mean(0, keepdims=True)
+                gram += rows.T @ rows / len(rows)
+        values, vectors = np.linalg.eigh(gram)
+        if values[0] < 1e-12:
+            free = names[int(np.argmax(np.abs(vectors[:, 0])))]
+            raise InputError(f"Scene: too little support: the body is free to move as a rigid body ({free});"
+                             f" supports are {self.supports!r}; hold that motion, with Clamped or SimplySupported"
+                             f" for one")
+
+    @property
+    def extent(self) -> np.ndarray:
+        """Size of the mesh along R and Z, shape (2,), all ranks."""
+        X, comm = self.mesh.domain.geometry.x[:, :2], self.mesh.domain.comm
+        high = np.array([comm.allreduce(X[:, i].max(initial=-np.inf), MPI.MAX) for i in (0, 1)])
+        low = np.array([comm.allreduce(X[:, i].min(initial=np.inf), MPI.MIN) for i in (0, 1)])
+        return high - low

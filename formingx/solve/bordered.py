@@ -1,0 +1,125 @@
+"""Newton's method for F(x, control) = 0 with one more equation, c(x, control) = 0: one factorisation, two solves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from petsc4py import PETSc
+
+from .direct import DirectSolver
+
+class Iteration(NamedTuple):
+    """One Newton iteration: what it found and what it did. The last entry of a history is the converged state.
+
+    residual: |F| before it, over the norm of the support forces; correction: |dx|/|x|, criterion (3.5.1);
+    work: |F . dx| over its first value, criterion (3.5.2).
+    """
+
+    residual: float
+    correction: float
+    work: float
+
+
+class Failure(Exception):
+    """Newton's method did not converge; `reason` says how, `history` holds the iterations."""
+
+    def __init__(self, reason: str, history: list[Iteration]):
+        super().__init__(reason)
+        self.reason, self.history = reason, history
+
+
+class Tolerances(NamedTuple):
+    """When a state counts as converged: all of these.
+
+    correction: the next correction that quadratic convergence predicts, over |x|.
+    residual: |F| over the norm of the support forces.
+    iterations: at most so many.
+    """
+
+    correction: float = 1e-10
+    residual: float = 1e-8
+    iterations: int = 12
+
+
+class BorderedNewton:
+    """Solves F(x, control) = 0 together with c(x, control) = 0.
+
+    `norm(x, control)` measures corrections. The constraint is called as c(x, control, gradient) and returns (c, dc/dcontrol), having put dc/dx into `gradient`.
+    """
+
+    def __init__(self, problem: Any, tolerances: Tolerances, norm: Callable[[PETSc.Vec, float], float]):
+        self.problem, self.tolerances, self._norm = problem, tolerances, norm
+        self.solver = DirectSolver(problem.matrix, problem.symmetric)
+        new = problem.x.duplicate
+        self.F, self.F_control, self.gradient, self.a, self.b = new(), new(), new(), new(), new()
+
+    def tangent(self, x: PETSc.Vec, control: float) -> bool:
+        """`self.b` = dx/dcontrol along the path at a solution; False if the tangent matrix is singular."""
+        self.problem.tangent(x, control)
+        if not self.solver.factorise():
+            return False
+        self.problem.control_derivative(x, control, self.F_control)
+        self.solver.solve(self.F_control, self.b)
+        self.b.scale(-1)
+        return bool(np.isfinite(self.b.norm()))
+
+    def correct(self, x: PETSc.Vec, control: float, constraint: Any) -> tuple[float, list[Iteration]]:
+        """Iterate x (in place) and control to convergence; returns the control and the history.
+
+        Afterwards `self.b` is dx/dcontrol at the solution (to the accuracy of the last correction).
+
+        Raises:
+            Failure: no convergence; x is then worthless.
+        """
+        problem, history = self.problem, []
+        problem.residual(x, control, self.F)
+        work0 = 0.0
+        while True:
+            residual = self.F.norm() / (problem.force_scale + 1e-12)
+            if not np.isfinite(residual):
+                raise Failure("an element turned inside out, or the material left its domain", history)
+            if history and self._converged(history, residual):
+                history.append(Iteration(residual, 0.0, 0.0))
+                return control, history
+            if len(history) >= 2 and history[-1].correction > 0.5 * max(1.0, history[-2].correction):
+                raise Failure("the iteration diverges", history)
+            if len(history) >= self.tolerances.iterations:
+                raise Failure(f"no convergence in {self.tolerances.iterations} iterations", history)
+            if not self.tangent(x, control):
+                raise Failure("the tangent matrix is singular", history)
+            c, c_control = constraint(x, control, self.gradient)
+            self.solver.solve(self.F, self.a)
+            self.a.scale(-1)
+            slope = self.gradient.dot(self.b) + c_control
+            if slope == 0 or not np.isfinite(slope):
+                raise Failure("the quantity that is aimed at does not change along the path here", history)
+            step = (-c - self.gradient.dot(self.a)) / slope
+            self.a.axpy(step, self.b)
+            work = abs(self.F.dot(self.a))
+            work0 = work0 or work or 1.0
+            x.axpy(1.0, self.a)
+            control += step
+            correction = self._norm(self.a, step) / (self._norm(x, control) + 1e-8)
+            if not np.isfinite(correction):
+                raise Failure("the tangent matrix is singular", history)
+            history.append(Iteration(residual, correction, work / work0))
+            problem.residual(x, control, self.F)
+
+    def _converged(self, history: list[Iteration], residual: float) -> bool:
+        """The correction ahead, from the last two and quadratic convergence, and the residual are small.
+
+        A correction that has stopped shrinking below 1e-7 has met round-off (thin flat sheets: near 1e-8).
+        """
+        last = history[-1].correction
+        before = history[-2].correction if len(history) > 1 else 1.0
+        ahead = last * min(1.0, last / before) ** 2
+        at_round_off = last < 1e-7 and last > 0.3 * before
+        return residual < self.tolerances.residual and (ahead < self.tolerances.correction or at_round_off)
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        self.solver.destroy()
+        for vector in (self.F, self.F_control, self.gradient, self.a, self.b):
+            vector.destroy()

@@ -1,0 +1,149 @@
+"""A branch of solutions (x, control): its metric, its tangents, and solving for single states on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..errors import ConvergenceError
+from ..results.path import Counts, State
+from .bordered import BorderedNewton, Failure, Tolerances
+
+CONTROL_WEIGHT = 0.1
+"""Weight of the squared control against the mean squared displacement in arc length (both dimensionless)."""
+
+
+class Branch:
+    """Solves for states of a problem and knows how far apart they are.
+
+    Attributes:
+        counts: Newton iterations spent, whether they led to a state or not.
+    """
+
+    def __init__(self, problem: Any, tolerances: Tolerances):
+        self.problem = problem
+        self.newton = BorderedNewton(problem, tolerances, self.norm)
+        self.counts = Counts()
+        self._x, self._a, self._b = (problem.x.duplicate() for _ in range(3))
+
+    def norm(self, x: Any, control: float) -> float:
+        """Arc length of a straight piece (x, control) of path."""
+        return float(np.sqrt(self.problem.inner(x, x) + CONTROL_WEIGHT * control**2))
+
+    def start(self) -> State:
+        """The unloaded body, with the tangent there."""
+        self._x.set(0)
+        if not self.newton.tangent(self._x, 0.0):
+            raise ConvergenceError("the unloaded body has a singular tangent: something in it is not held, or has no"
+                                   " stiffness")
+        return self._state(0.0, [], "start", None)
+
+    def solve(self, x: np.ndarray, control: float, constraint: Callable, kind: str, before: State) -> State:
+        """The solution of F = 0 and of the constraint, from a guess; raises `Failure`."""
+        self._x.array_w[:] = x
+        try:
+            control, history = self.newton.correct(self._x, control, constraint)
+        except Failure as failure:
+            self.counts.iterations += len(failure.history)
+            raise
+        self.counts.iterations += len(history) - 1
+        return self._state(control, history, kind, before)
+
+    def step(self, old: State, length: float) -> State:
+        """One step: predict along the tangent, correct in the plane normal to it at that distance (4.14 to 4.31)."""
+        x, control = old.x + length * old.direction, old.control + length * old.slope
+        return self.solve(x, control, self._plane(old, x, control), "step", old)
+
+    def step_to(self, old: State, length: float, equation: Callable) -> State:
+        """Predict along the tangent, correct to where an equation such as "measure = target" holds."""
+        return self.solve(old.x + length * old.direction, old.control + length * old.slope, equation, "target", old)
+
+    def progress(self, old: State, new: State) -> float:
+        """Distance from old to new along the tangent of old."""
+        return self._inner(old.direction, old.slope, new.x - old.x, new.control - old.control)
+
+    def value(self, bound: Any, x: np.ndarray, control: float) -> float:
+        """A bound measure at (x, control)."""
+        self._b.array_w[:] = x
+        return bound.value(self._b, control)
+
+    def between(self, a: State, b: State, bound: Any, target: float) -> State:
+        """The state between two where a measure has a target value that lies between theirs; raises `Failure`."""
+        low, high = 0.0, 1.0
+        sign = self.value(bound, a.x, a.control) - target
+        for _ in range(40):
+            middle = (low + high) / 2
+            if (self.value(bound, *self._interpolate(a, b, middle)) - target) * sign > 0:
+                low = middle
+            else:
+                high = middle
+        return self.solve(*self._interpolate(a, b, low), bound.equation(target), "target", a)
+
+    def limit_point(self, a: State, b: State) -> State:
+        """The state between two where the control is stationary; raises `Failure`.
+
+        The root of the derivative of the cubic through both ends, solved for and repeated on the smaller bracket until
+        the control differs from its extremum by less than 1e-12 of itself, as slope and curvature tell.
+        """
+        for _ in range(8):
+            chord = self._chord(a, b)
+            x, control = self._interpolate(a, b, _stationary(a, b, chord))
+            found = self.solve(x, control, self._plane(a, x, control), "limit point", a)
+            curvature = abs(a.slope - b.slope) / chord
+            if found.slope**2 < 2e-12 * curvature * abs(found.control):
+                break
+            a, b = (found, b) if found.slope * a.slope > 0 else (a, found)
+        return found
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        self.newton.destroy()
+        for vector in (self._x, self._a, self._b):
+            vector.destroy()
+
+    def _state(self, control: float, history: list, kind: str, before: State | None) -> State:
+        """The state at (self._x, control); its tangent, from the last factorisation, points away from `before`."""
+        b = self.newton.b
+        size = self.norm(b, 1.0)
+        state = State(self._x.array_r.copy(), control, b.array_r / size, 1 / size, history=history, kind=kind)
+        if before is not None and self._inner(state.direction, state.slope, state.x - before.x,
+                                              control - before.control) < 0:
+            state.direction, state.slope = -state.direction, -state.slope
+        return state
+
+    def _inner(self, x: np.ndarray, control: float, y: np.ndarray, other: float) -> float:
+        self._a.array_w[:] = x
+        self._b.array_w[:] = y
+        return self.problem.inner(self._a, self._b) + CONTROL_WEIGHT * control * other
+
+    def _chord(self, a: State, b: State) -> float:
+        return float(np.sqrt(self._inner(b.x - a.x, b.control - a.control, b.x - a.x, b.control - a.control)))
+
+    def _plane(self, old: State, x0: np.ndarray, control0: float) -> Callable:
+        """The plane through (x0, control0) normal to the tangent of `old`, as a constraint."""
+        def c(x, control, gradient):
+            self._a.array_w[:] = old.direction
+            self.problem.metric_times(self._a, gradient)
+            self._b.array_w[:] = x.array_r - x0
+            weight = CONTROL_WEIGHT * old.slope
+            return gradient.dot(self._b) + weight * (control - control0), weight
+        return c
+
+    def _interpolate(self, a: State, b: State, fraction: float) -> tuple[np.ndarray, float]:
+        """(x, control) on the cubic through two states and their tangents."""
+        s, h = fraction, self._chord(a, b)
+        weights = (1 - 3 * s**2 + 2 * s**3, 3 * s**2 - 2 * s**3, h * (s - 2 * s**2 + s**3), h * (s**3 - s**2))
+        x = weights[0] * a.x + weights[1] * b.x + weights[2] * a.direction + weights[3] * b.direction
+        control = weights[0] * a.control + weights[1] * b.control + weights[2] * a.slope + weights[3] * b.slope
+        return x, control
+
+
+def _stationary(a: State, b: State, chord: float) -> float:
+    """Fraction of the way from a to b at which the cubic of the control has no slope (slopes of opposite sign)."""
+    jump = (b.control - a.control) / chord
+    c2, c1, c0 = 3 * (a.slope + b.slope - 2 * jump), 6 * jump - 4 * a.slope - 2 * b.slope, a.slope
+    roots = np.roots([c2, c1, c0])
+    inside = [r.real for r in roots if abs(r.imag) < 1e-12 and 0 <= r.real <= 1]
+    return inside[0] if inside else a.slope / (a.slope - b.slope)

@@ -1,0 +1,187 @@
+"""Follows the path of a scene through limit points to a target (Riks 1979; Song 1993, eqs. 4.8 to 4.31).
+
+A step predicts along the tangent and corrects in the plane normal to it (Keller), in a norm that knows neither the
+mesh nor the units. Targets are hit exactly: within reach, the equation "measure = target" takes the plane's place.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import ConvergenceError, InputError, count
+from ..problem import Problem
+from ..results import measures
+from ..results.path import Path, State
+from ..results.profile import Profiles
+from ..scene import Scene
+from .bordered import Failure, Tolerances
+from .branch import Branch
+from .stepping import StepControl
+
+log = logging.getLogger("formingx")
+
+
+def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Target] = (),
+          step: StepControl | None = None, tolerances: Tolerances | None = None, max_steps: int = 200,
+          progress: bool = True) -> Path:
+    """Follow the equilibrium path from the unloaded body until a target is reached, through limit points.
+
+    Args:
+        scene: with one driven load or support.
+        until: the target that ends the run, e.g. `pole_stretch(8.5)`; hit exactly.
+        through: more targets to hit exactly on the way; those that are not met are left out.
+        step: step control; default `StepControl()`.
+        tolerances: when a state counts as converged; default `Tolerances()`.
+        max_steps: accepted states before the run gives up.
+        progress: show a progress bar on runs of more than two seconds (rank 0).
+
+    Raises:
+        InputError: nothing is driven, or a target needs something that the scene does not have.
+        ConvergenceError: the target was not reached. It carries the path so far and says what to try.
+    """
+    if scene.driven is None:
+        raise InputError("trace: nothing is driven: give one load no value, Pressure('bottom'), or one Displaced support")
+    problem = Problem(scene)
+    run = _Run(problem, until, through, replace(step or StepControl()), tolerances or Tolerances())
+    return run.trace(count("trace: max_steps", max_steps), progress)
+
+
+class _Run:
+    """One run: the path that grows, and the targets still open."""
+
+    def __init__(self, problem: Problem, until: measures.Target, through: Sequence[measures.Target],
+                 step: StepControl, tolerances: Tolerances):
+        self.until, self.step = until, step
+        self.open = [(target, target.bind(problem)) for target in (*through, until)]
+        self.recorded = measures.standard(problem)
+        self.branch = Branch(problem, tolerances)
+        self.path = Path(problem, self.branch, Profiles(problem))
+
+    def trace(self, max_steps: int, progress: bool) -> Path:
+        path, began = self.path, time.perf_counter()
+        bar = _progress_bar(path.problem.comm, self.until, progress)
+        try:
+            self._record(self.branch.start())
+            self._aimed_at(path.last)
+            while self._is_open(self.until):
+                if path.counts.steps >= max_steps:
+                    self._give_up(f"{max_steps} states were accepted before it")
+                for state in self._sorted_into(path.last, self._next(path.last)):
+                    self._record(state)
+                    if not self._is_open(self.until) and state.met is self.until:
+                        break
+                _show(bar, path, self.until)
+        finally:
+            bar.close()
+            path.counts.seconds += time.perf_counter() - began
+        return path
+
+    def _next(self, old: State) -> State:
+        """The next state: at a target within reach, or one step ahead; failures halve the step."""
+        while True:
+            length = self.step.length
+            target, bound, reach = self._within_reach(old, length)
+            try:
+                if target is None:
+                    new = self.branch.step(old, length)
+                    self.step.accepted(len(new.history) - 1)
+                else:
+                    new = self.branch.step_to(old, reach, bound.equation(target.value))
+                    if not 0 < self.branch.progress(old, new) < 2 * length:
+                        raise Failure("the target was met on a far part of the path", [])
+                    new.met = target
+                return new
+            except Failure as failure:
+                self.path.counts.failures += 1
+                log.info("a step of length %.3g failed: %s", length, failure.reason)
+                if not self.step.failed():
+                    self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}")
+
+    def _within_reach(self, old: State, length: float) -> tuple:
+        """(target, its measure, distance) of the first open target that the tangent meets within `length`."""
+        best = (None, None, length)
+        for target, bound in self.open:
+            now = self.branch.value(bound, old.x, old.control)
+            ahead = self.branch.value(bound, old.x + length * old.direction, old.control + length * old.slope)
+            if (now - target.value) * (ahead - target.value) < 0:
+                reach = length * (target.value - now) / (ahead - now)
+                if reach < best[2]:
+                    best = (target, bound, reach)
+        return best
+
+    def _sorted_into(self, old: State, new: State) -> list[State]:
+        """The states from old to new in order: a limit point and targets inside the step, then new itself."""
+        found = []
+        if old.slope * new.slope < 0 and old.kind != "limit point":
+            try:
+                found.append(self.branch.limit_point(old, new))
+            except Failure as failure:
+                raise self._error(f"a limit point lies ahead but could not be located: {failure.reason}") from None
+        for target, bound in self.open:
+            if target is new.met:
+                continue
+            a, b = (self.branch.value(bound, s.x, s.control) - target.value for s in (old, new))
+            if a * b < 0:
+                try:
+                    state = self.branch.between(old, new, bound, target.value)
+                except Failure as failure:
+                    raise self._error(f"{target} was passed but could not be solved for: {failure.reason}") from None
+                state.met = target
+                found.append(state)
+        found.sort(key=lambda state: self.branch.progress(old, state))
+        return [*found, new]
+
+    def _record(self, state: State) -> None:
+        state.measures = {name: self.branch.value(bound, state.x, state.control)
+                          for name, bound in self.recorded.items()}
+        path = self.path
+        path.states.append(state)
+        path.counts.iterations = self.branch.counts.iterations
+        self._aimed_at(state)
+        if state.kind != "start":
+            path.counts.steps += 1
+            log.info("state %d: %s, %d iterations", path.counts.steps, path.describe(state), len(state.history) - 1)
+
+    def _aimed_at(self, state: State) -> None:
+        """Close the target that a state meets."""
+        self.open = [(t, b) for t, b in self.open if t is not state.met]
+
+    def _is_open(self, target: measures.Target) -> bool:
+        return any(t is target for t, _ in self.open)
+
+    def _give_up(self, why: str) -> None:
+        raise self._error(f"{why}.") from None
+
+    def _error(self, why: str) -> ConvergenceError:
+        """What happened, what was met, what to try."""
+        path = self.path
+        bound = next(b for t, b in self.open if t is self.until)
+        values = [self.branch.value(bound, s.x, s.control) for s in path.states]
+        best = int(np.argmin([abs(v - self.until.value) for v in values]))
+        limits = "".join(f" A limit point was passed at {path.describe(s)}." for s in path.limit_points)
+        return ConvergenceError(
+            f"{self.until} was not reached: {why} The nearest met was {values[best]:.6g}, at"
+            f" {path.describe(path.states[best])}.{limits} The last good state is {path.describe(path.last)};"
+            f" it is kept in the error's `path`. Try a target within what was met, a smaller first step"
+            f" (step=StepControl(length=...)), more elements where the body deforms most, or more max_steps.", path)
+
+
+def _progress_bar(comm: Any, until: measures.Target, progress: bool) -> Any:
+    from tqdm import tqdm
+    return tqdm(total=1.0, desc=f"to {until}", delay=2, disable=not progress or comm.rank != 0, leave=False,
+                bar_format="{desc}: {percentage:3.0f}% |{bar}| {elapsed}{postfix}")
+
+
+def _show(bar: Any, path: Path, until: measures.Target) -> None:
+    now = path.last.measures.get(until.name)
+    if not bar.disable and now is not None:
+        first = path.states[0].measures[until.name]
+        bar.n = min(max((now - first) / ((until.value - first) or 1.0), 0.0), 1.0)
+        bar.set_postfix_str(f"state {path.counts.steps}", refresh=False)
+        bar.update(0)

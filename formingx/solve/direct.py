@@ -1,0 +1,52 @@
+"""A direct solver for a matrix that is refilled and factorised many times."""
+
+from __future__ import annotations
+
+import itertools
+
+from petsc4py import PETSc
+
+_prefixes = itertools.count()
+
+
+def configure(ksp: PETSc.KSP, symmetric: bool) -> None:
+    """Make `ksp` a single LU (LDL^T if symmetric) by MUMPS, with options of its own that leave nothing behind."""
+    prefix = f"formingx_{next(_prefixes)}_"
+    key = prefix + "mat_mumps_icntl_14"           # workspace over MUMPS' own estimate, percent
+    options = PETSc.Options()
+    options[key] = 100
+    ksp.setOptionsPrefix(prefix)
+    ksp.setType("preonly")
+    pc = ksp.getPC()
+    pc.setType("cholesky" if symmetric else "lu")
+    pc.setFactorSolverType("mumps")
+    ksp.setFromOptions()
+    pc.setFactorSetUpSolverType()
+    del options[key]
+
+
+class DirectSolver:
+    """Factorise, then solve as often as needed."""
+
+    def __init__(self, matrix: PETSc.Mat, symmetric: bool):
+        self._matrix = matrix
+        self._ksp = PETSc.KSP().create(matrix.comm)
+        self._ksp.setOperators(matrix)
+        configure(self._ksp, symmetric)
+
+    def factorise(self) -> bool:
+        """Factorise the matrix as it is now; False if it is singular to working precision."""
+        self._ksp.setOperators(self._matrix)
+        try:
+            self._ksp.setUp()
+        except PETSc.Error:
+            return False
+        return self._ksp.getPC().getFailedReason() == 0
+
+    def solve(self, rhs: PETSc.Vec, out: PETSc.Vec) -> None:
+        """out = matrix^-1 rhs."""
+        self._ksp.solve(rhs, out)
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        self._ksp.destroy()
