@@ -1,0 +1,83 @@
+"""A sparse matrix with a few dense rows and columns at the end: tangent and Lagrange multipliers in one.
+
+[K  C^T]   K: compiled form; rows of C: constraints. The multipliers' rows and columns stand at the end of the last
+[C   0 ]   rank's part, so the global numbers of all fields are those of DOLFINx.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from dolfinx.fem import petsc as fem_petsc
+from petsc4py import PETSc
+
+
+class ExtendedMatrix:
+    """Created once, refilled for every tangent.
+
+    Args:
+        form: compiled bilinear form of K; index_map: of its space (block size 1); bcs: held unknowns (their rows and
+            columns become those of the identity).
+        rows: the rows of C, each the owned part, shape (n,).
+    """
+
+    def __init__(self, form: Any, index_map: Any, bcs: list, rows: list[np.ndarray], comm: Any, symmetric: bool):
+        self._form, self._bcs = form, bcs
+        self._first = index_map.size_global
+        self._last_rank = comm.rank == comm.size - 1
+        offset = index_map.local_range[0]
+        self._entries = []              # (own numbers, own weights, all numbers, all weights) of each row of C
+        for row in rows:
+            mine = np.flatnonzero(row)
+            parts = comm.allgather((mine + offset, row[mine]))
+            self._entries.append((mine + offset, row[mine], np.concatenate([n for n, _ in parts]),
+                                  np.concatenate([w for _, w in parts])))
+        n, m = index_map.size_local, len(rows)
+        size = n + (m if self._last_rank else 0)
+        indptr, columns = self._pattern(rows, m)
+        self.mat = PETSc.Mat().createAIJ(((size, None), (size, None)), csr=(indptr, columns, np.zeros(len(columns))),
+                                         comm=comm)
+        ghosted = index_map.local_to_global(np.arange(n + index_map.num_ghosts, dtype=np.int32))
+        mapping = PETSc.LGMap().create(ghosted.astype(PETSc.IntType), comm=comm)
+        self.mat.setLGMap(mapping, mapping)
+        mapping.destroy()
+        if symmetric:
+            self.mat.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+
+    def fill(self) -> PETSc.Mat:
+        """The matrix at the state that the form's functions hold now."""
+        A, add = self.mat, PETSc.InsertMode.ADD_VALUES
+        A.zeroEntries()
+        fem_petsc.assemble_matrix(A, self._form, bcs=self._bcs)
+        A.assemble(PETSc.Mat.AssemblyType.FLUSH)
+        for k, (mine, weights, everyone, all_weights) in enumerate(self._entries):
+            if len(mine):
+                A.setValues(mine.astype(PETSc.IntType), [self._first + k], weights, addv=add)
+            if self._last_rank:
+                A.setValues([self._first + k], everyone.astype(PETSc.IntType), all_weights, addv=add)
+        A.assemble()
+        return A
+
+    def _pattern(self, rows: list[np.ndarray], m: int) -> tuple[np.ndarray, np.ndarray]:
+        """Row pointers and global columns of all owned rows."""
+        plain = fem_petsc.create_matrix(self._form)
+        fem_petsc.assemble_matrix(plain, self._form, bcs=self._bcs)
+        plain.assemble()
+        indptr, indices, _ = plain.getValuesCSR()
+        plain.destroy()
+        parts = np.split(indices, indptr[1:-1])
+        for k, row in enumerate(rows):
+            for i in np.flatnonzero(row):
+                parts[i] = np.append(parts[i], self._first + k)
+        if self._last_rank:
+            tail = self._first + np.arange(m)
+            parts += [np.concatenate([everyone, tail]) for _, _, everyone, _ in self._entries]
+        lengths = [len(part) for part in parts]
+        pointers = np.concatenate([[0], np.cumsum(lengths)]).astype(PETSc.IntType)
+        columns = np.concatenate([np.sort(part) for part in parts]) if parts else np.zeros(0)
+        return pointers, columns.astype(PETSc.IntType)
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        self.mat.destroy()
