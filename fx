@@ -4,11 +4,14 @@
 #   3. docker or podman, if an engine answers            4. else build a Debian root, once, and use it
 # FX=native|docker|podman|root|copy forces one way; FX_SUITE=sid picks another Debian; FX_CACHE=DIR holds the roots.
 # The list of packages is the Dockerfile's.
+# shellcheck disable=SC2016,SC2064,SC2086  # $ns, $alone, $tty and $keep are several words or none
 set -eu
 
 here=$(CDPATH='' cd -- "$(dirname -- "$0")" && pwd -P)
 say() { printf 'fx: %s\n' "$*" >&2; }
 die() { say "$*"; exit 125; }
+on_signals() { pid=; for s in HUP INT QUIT TERM; do trap "$1 $s" "$s"; done; }
+die_of() { trap - "$1"; kill -s "$1" $$; }
 [ $# -gt 0 ] || { sed -n '2,6s/^# //p' "$here/fx" >&2; exit 2; }
 
 export PYTHONPATH="$here${PYTHONPATH:+:$PYTHONPATH}"
@@ -30,8 +33,8 @@ cache=${FX_CACHE:-${XDG_DATA_HOME:-${HOME:-/root}/.local/share}/formingx}
 root=$cache/$key
 clean_path=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 if [ "$(id -u)" = 0 ]; then ns='--mount'; else ns='--mount --map-root-user --map-auto'; fi
-# shellcheck disable=SC2086  # $ns is several words on purpose
-namespaces() { unshare $ns true 2>/dev/null; }
+# unshare alone may be let through, and mount not
+namespaces() { unshare $ns sh -c 'mount -t tmpfs fx /tmp && mount --rbind /proc /proc' 2>/dev/null; }
 
 native_python() {    # a Python that imports everything, if there is one
     for p in python3 /usr/bin/python3; do
@@ -54,7 +57,11 @@ engine() {           # a container engine that answers (a client without a daemo
 image() {
     "$1" image inspect "formingx:$key" >/dev/null 2>&1 && return 0
     say "building the image formingx:$key with $1, once (about 700 packages, 4 GB; several minutes)"
-    "$1" build --build-arg SUITE="$suite" -t "formingx:$key" - < "$here/Dockerfile" >&2
+    "$1" build --build-arg SUITE="$suite" -t "formingx:$key" - < "$here/Dockerfile" >&2 &&
+        "$1" run --rm --security-opt label=disable -v "$here:$here" "formingx:$key" test -e "$here/fx" >&2 && return 0
+    say "$1 cannot build the image, or run it here"      # an engine on another machine does not see the checkout
+    "$1" image rm "formingx:$key" >/dev/null 2>&1 || :
+    return 1
 }
 
 build_root() {
@@ -81,87 +88,115 @@ build_root() {
     done
     for p in libc_nonshared.a 'libgcc*.a'; do set -- "$@" --dpkgopt="path-include=/usr/lib/*/$p"; done
     # in an ordinary container nothing can be mounted; dpkg and apt do without
-    if [ "$way" = copy ]; then set -- "$@" --mode=root --skip=check/canmount; fi
+    alone=
+    if [ "$way" = copy ]; then set -- "$@" --mode=root --skip=check/canmount
+    elif [ "$(id -u)" = 0 ]; then alone='unshare --mount'; fi     # its mounts end with it
     [ "$suite" = trixie ] || set -- "$@" --aptopt='Acquire::Check-Valid-Until "false"'
-    mmdebstrap --variant=minbase --dpkgopt=force-unsafe-io "$@" \
-        --include="$(printf %s "$packages" | tr ' ' ,)" "$suite" "$root.part" >"$root.log" 2>&1 </dev/null & pid=$!
-    trap 'say "interrupted: removing the unfinished root"; kill "$pid"; wait "$pid"; remove "$root.part"; exit 130' \
-        INT TERM HUP
-    shown=0
+    set -- --variant=minbase --dpkgopt=force-unsafe-io "$@" --include="$(printf %s "$packages" | tr ' ' ,)"
+    on_signals unbuild
+    # mmdebstrap ignores TERM and INT: it gets a process group, to be killed as a whole, also when this shell is killed
+    setsid sh -c '(while kill -0 $0; do sleep 1; done; kill -s KILL 0) & exec "$@"' $$ \
+        $alone mmdebstrap "$@" "$suite" "$root.part" >"$root.log" 2>&1 </dev/null & pid=$!
+    shown=0 tick=20
     while kill -0 "$pid" 2>/dev/null; do
         sleep 1
         lines=$(grep -c '^I: ' "$root.log" || true)
         [ "$lines" -eq "$shown" ] || grep '^I: ' "$root.log" | tail -n +$((shown + 1)) | sed 's/^I:/fx:  /' >&2
         shown=$lines
-        [ $((($(date +%s) - began) % 20)) -ne 0 ] ||
-            say "  $(($(date +%s) - began)) s"
+        spent=$(($(date +%s) - began))
+        [ "$spent" -lt "$tick" ] || { say "  $spent s"; tick=$((spent + 20)); }
     done
-    wait "$pid" || {
+    rc=0; wait "$pid" || rc=$?
+    kill -s KILL -- "-$pid" || :                          # the loop above
+    [ "$rc" = 0 ] || {
         remove "$root.part"; tail -n 20 "$root.log" >&2
         die "the root could not be built; nothing was left behind; the whole record is in $root.log"
     }
     rm -f "$root.log"
-    trap - INT TERM HUP
     mv "$root.part" "$root"
+    trap - HUP INT QUIT TERM
     say "built in $(($(date +%s) - began)) s"
 }
 
+unbuild() {
+    trap '' HUP INT QUIT TERM
+    say "interrupted: removing the unfinished root"
+    [ -z "$pid" ] || { kill -s KILL -- "-$pid" || :; wait "$pid" || :; sleep 1; } 2>/dev/null
+    remove "$root.part"
+    rm -f "$root.log"
+    die_of "$1"
+}
+
 remove() {
-    # shellcheck disable=SC2086
     [ ! -e "$1" ] || unshare $ns rm -rf --one-file-system "$1" 2>/dev/null || rm -rf --one-file-system "$1"
 }
 
 run_mounted() {      # own mount namespace: nothing to unmount; exec all the way: one process
-    case $PWD/ in
-        "$here"/*|//|/bin/*|/dev/*|/etc/*|/lib*|/proc/*|/run/*|/sbin/*|/sys/*|/usr/*|/var/*) also=$here ;;
-        *) also=$PWD ;;
-    esac
-    # shellcheck disable=SC2086,SC2016
     exec unshare $ns sh -c '
-        root=$1 here=$2 also=$3 cwd=$4 path=$5; shift 5
+        root=$1 here=$2 also=$3; shift 3
         for d in proc sys dev; do mount --rbind /$d "$root/$d" || exit 125; done
         mount -t tmpfs -o mode=1777 tmp "$root/tmp" || exit 125
         for d in "$here" "$also"; do
             [ -d "$root$d" ] || mkdir -p "$root$d"
             mount --rbind "$d" "$root$d" || exit 125
         done
-        exec chroot "$root" /usr/bin/env -C "$cwd" HOME=/tmp FX_INSIDE=1 PATH="$path" "$@"' \
-        fx "$root" "$here" "$also" "$PWD" "$clean_path" "$@"
+        exec chroot "$root" "$@"' fx "$root" "$here" "$also" /usr/bin/env -C "$PWD" "$@"
 }
 
 device() { [ -c "$root/dev/$1" ] || { rm -f "$root/dev/$1"; mknod -m 666 "$root/dev/$1" c "$2" "$3"; }; }
+empty() { find "$@" -xdev -mindepth 1 -delete; }      # the folders stay: a mount may be on one
+
+# every path in the copy, in order; for a file with what changes when it is written, renamed or replaced
+list() {
+    (cd "$root$here" && find . -path ./.git -prune -o -type d -printf '- - %p\0' -o -printf '%i %C@ %p\0') >"$1" &&
+        LC_ALL=C sort -z -o "$1" "$1"
+}
 
 run_copied() {       # plain chroot: the checkout goes in, what changed comes back out
     exec 8>"$root.use"
     flock -n 8 || { say "waiting for another fx to finish"; flock 8; }
+    say "nothing can be mounted: running on a copy of $here; what changes comes back when the command ends"
+    cwd=$(pwd -P)
+    case $cwd/ in "$here"/*) ;; *) say "$cwd is not in the checkout, so not copied: using $here"; cwd=$here ;; esac
+    on_signals pass
     mkdir -p "$root/dev/shm" "$root/tmp"
-    chmod 1777 "$root/dev/shm" "$root/tmp"
     device null 1 3; device zero 1 5; device random 1 8; device urandom 1 9
-    rm -rf "${root:?}$here"
+    empty "$root/dev/shm" "$root/tmp"
     mkdir -p "$root$here"
+    empty "$root$here"
     tar -C "$here" --exclude=./.git -cf - . | tar -C "$root$here" -xf -
-    case $PWD/ in "$here"/*) cwd=$PWD ;; *) cwd=$here ;; esac
-    stamp=$root.stamp
-    touch "$stamp"; sleep 0.01
+    list "$root.before"
+    sleep 0.02       # the clock of file times is coarse
     exec 7<&0
-    env --default-signal=INT,QUIT chroot "$root" /usr/bin/env -C "$cwd" HOME=/tmp FX_INSIDE=1 PATH="$clean_path" \
-        "$@" <&7 & pid=$!
-    for s in INT TERM HUP; do
-        # shellcheck disable=SC2064
-        trap "kill -$s $pid 2>/dev/null" "$s"
-    done
-    while :; do
-        if wait "$pid"; then rc=0; else rc=$?; fi
-        kill -0 "$pid" 2>/dev/null || break
-    done
-    (cd "$root$here" && find . -type f -newer "$stamp" -print0 | tar --null -T - -cf -) | tar -C "$here" -xf -
-    rm -rf "${root:?}$here"
+    export UCX_LOG_LEVEL=fatal HWLOC_HIDE_ERRORS=2       # they would complain that /proc and /sys are empty
+    # its own session, or Ctrl-C would reach it twice
+    setsid setpriv --pdeathsig TERM chroot "$root" /usr/bin/env --default-signal=INT,QUIT -C "$cwd" "$@" \
+        <&7 7<&- 8>&- & pid=$!
+    while rc=0; wait "$pid" 2>/dev/null || rc=$?; kill -0 "$pid" 2>/dev/null; do :; done
+    trap '' HUP INT QUIT TERM
+    kill -s KILL -- "-$pid" 2>/dev/null || :               # what it left running, as a container would
+    # a list cut short, or a copy gone, must not pass for files removed
+    { [ -e "$root$here/fx" ] && list "$root.after"; } || die "cannot read $root$here: nothing is copied back"
+    cut -z -d' ' -f3- "$root.before" | LC_ALL=C sort -zr | (cd "$here" && copy=$root$here xargs -0r sh -c \
+        'for f; do [ -e "$copy/$f" ] || [ -L "$copy/$f" ] || rm -df -- "$f"; done' sh) || :
+    LC_ALL=C comm -z -13 "$root.before" "$root.after" | cut -z -d' ' -f3- |
+        tar -C "$root$here" --no-recursion --null -T - -cf - | tar -C "$here" -xf - ||
+        die "could not copy the new files back; they are in $root$here"
+    empty "$root$here"
+    rm -f "$root.before" "$root.after"
     exit "$rc"
 }
 
-case $way in
-    ''|native|docker|podman|root|copy) ;;
-    *) die "FX=$way is not known; use native, docker, podman, root or copy" ;;
+pass() {
+    [ -n "$pid" ] || die_of "$1"
+    kill -s "$1" -- "-$pid" 2>/dev/null || kill -s "$1" "$pid" 2>/dev/null || :
+}
+
+case $way in ''|native|docker|podman|root|copy) ;; *) die "FX=$way: use native, docker, podman, root or copy" ;; esac
+also=$PWD            # the working folder is mounted too, unless it would hide what the root has there
+case $PWD/ in
+    "$here"/*|//|/bin/*|/dev/*|/etc/*|/lib*|/proc/*|/run/*|/sbin/*|/sys/*|/usr/*|/var/|/var/cache/*|/var/lib/*)
+        also=$here ;;
 esac
 if [ -z "$way" ]; then
     if [ -d "$root" ]; then way=root
@@ -176,20 +211,19 @@ case $way in
         exec "$@" ;;
     docker|podman)
         engine "$way" >/dev/null || die "$way does not answer"
-        image "$way" || die "$way could not build the image"
+        image "$way" || exit 125
         tty=; user="$(id -u):$(id -g)"
         [ -t 0 ] && [ -t 1 ] && tty=-t
         [ "$way" = podman ] && [ "$(id -u)" != 0 ] && keep=--userns=keep-id || keep=
-        # shellcheck disable=SC2086
-        exec "$way" run --rm -i $tty $keep --init --shm-size=1g --user "$user" -e HOME=/tmp -v "$here:$here" -w "$PWD" \
-            -e PYTHONPATH -e XDG_CACHE_HOME -e MPLCONFIGDIR -e OMP_NUM_THREADS -e OMPI_MCA_btl \
-            -e OMPI_ALLOW_RUN_AS_ROOT -e OMPI_ALLOW_RUN_AS_ROOT_CONFIRM -e PRTE_MCA_rmaps_default_mapping_policy \
-            "formingx:$key" "$@" ;;
+        set -- "formingx:$key" "$@"
+        [ "$also" = "$here" ] || set -- -v "$also:$also" "$@"
+        exec "$way" run --rm -i $tty $keep --init --shm-size=1g --user "$user" --security-opt label=disable \
+            -v "$here:$here" -w "$PWD" -e HOME=/tmp -e PYTHONPATH -e XDG_CACHE_HOME -e MPLCONFIGDIR -e OMP_NUM_THREADS \
+            -e OMPI_MCA_btl -e OMPI_ALLOW_RUN_AS_ROOT -e OMPI_ALLOW_RUN_AS_ROOT_CONFIRM \
+            -e PRTE_MCA_rmaps_default_mapping_policy "$@" ;;
 esac
-if [ "$way" = root ] && ! namespaces; then
-    [ "$(id -u)" = 0 ] || die "cannot make a mount namespace here: run as root, or install docker or podman"
-    way=copy
-fi
+[ "$way" != root ] || namespaces || way=copy
+[ "$way" != copy ] || [ "$(id -u)" = 0 ] || die "cannot mount here: run as root, or install docker or podman"
 mkdir -p "$cache"
 if [ ! -d "$root" ]; then      # under a lock, beside its place, then renamed: never half-built
     exec 9>"$root.lock"
@@ -197,4 +231,6 @@ if [ ! -d "$root" ]; then      # under a lock, beside its place, then renamed: n
     [ -d "$root" ] || build_root
     exec 9>&-
 fi
+# this machine's libraries and temporary folder are not those in there
+set -- -u LD_LIBRARY_PATH -u LD_PRELOAD -u PYTHONHOME HOME=/tmp TMPDIR=/tmp FX_INSIDE=1 PATH="$clean_path" "$@"
 if [ "$way" = copy ]; then run_copied "$@"; else run_mounted "$@"; fi

@@ -13,4 +13,5 @@ from .results.profile import Profile
 from .scene import Scene
 from .solve.bordered import Tolerances
 from .solve.continuation import trace
+from .solve.newton import solve
 from .solve.stepping import StepControl

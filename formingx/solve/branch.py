@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ConvergenceError
-from ..results.path import Counts, State
+from ..results.path import State
 from .bordered import BorderedNewton, Failure, Tolerances
 
 CONTROL_WEIGHT = 0.1
@@ -19,13 +19,13 @@ class Branch:
     """Solves for states of a problem and knows how far apart they are.
 
     Attributes:
-        counts: Newton iterations spent, whether they led to a state or not.
+        iterations: Newton iterations spent, whether they led to a state or not.
     """
 
     def __init__(self, problem: Any, tolerances: Tolerances):
         self.problem = problem
         self.newton = BorderedNewton(problem, tolerances, self.norm)
-        self.counts = Counts()
+        self.iterations = 0
         self._x, self._a, self._b = (problem.x.duplicate() for _ in range(3))
 
     def norm(self, x: Any, control: float) -> float:
@@ -46,10 +46,16 @@ class Branch:
         try:
             control, history = self.newton.correct(self._x, control, constraint)
         except Failure as failure:
-            self.counts.iterations += len(failure.history)
+            self.iterations += len(failure.history)
             raise
-        self.counts.iterations += len(history) - 1
+        self.iterations += len(history) - 1
         return self._state(control, history, kind, before)
+
+    def adopt(self, x: Any, control: float, history: list, before: State) -> State:
+        """A solution found elsewhere as a state, with the tangent there."""
+        x.copy(self._x)
+        self.newton.tangent(x, control)
+        return self._state(control, history, "step", before)
 
     def step(self, old: State, length: float) -> State:
         """One step: predict along the tangent, correct in the plane normal to it at that distance (4.14 to 4.31)."""

@@ -18,7 +18,6 @@ from ..errors import ConvergenceError, InputError, count
 from ..problem import Problem
 from ..results import measures
 from ..results.path import Path, State
-from ..results.profile import Profiles
 from ..scene import Scene
 from .bordered import Failure, Tolerances
 from .branch import Branch
@@ -59,16 +58,14 @@ class _Run:
                  step: StepControl, tolerances: Tolerances):
         self.until, self.step = until, step
         self.open = [(target, target.bind(problem)) for target in (*through, until)]
-        self.recorded = measures.standard(problem)
         self.branch = Branch(problem, tolerances)
-        self.path = Path(problem, self.branch, Profiles(problem))
+        self.path = Path(problem, self.branch)
 
     def trace(self, max_steps: int, progress: bool) -> Path:
         path, began = self.path, time.perf_counter()
         bar = _progress_bar(path.problem.comm, self.until, progress)
         try:
             self._record(self.branch.start())
-            self._aimed_at(path.last)
             while self._is_open(self.until):
                 if path.counts.steps >= max_steps:
                     self._give_up(f"{max_steps} states were accepted before it")
@@ -138,19 +135,12 @@ class _Run:
         return [*found, new]
 
     def _record(self, state: State) -> None:
-        state.measures = {name: self.branch.value(bound, state.x, state.control)
-                          for name, bound in self.recorded.items()}
+        """Take up a state and close the target that it meets."""
         path = self.path
-        path.states.append(state)
-        path.counts.iterations = self.branch.counts.iterations
-        self._aimed_at(state)
-        if state.kind != "start":
-            path.counts.steps += 1
-            log.info("state %d: %s, %d iterations", path.counts.steps, path.describe(state), len(state.history) - 1)
-
-    def _aimed_at(self, state: State) -> None:
-        """Close the target that a state meets."""
+        path.record(state)
+        path.counts.iterations = self.branch.iterations
         self.open = [(t, b) for t, b in self.open if t is not state.met]
+        log.info("state %d: %s, %d iterations", path.counts.steps, path.describe(state), len(state.history) - 1)
 
     def _is_open(self, target: measures.Target) -> bool:
         return any(t is target for t, _ in self.open)

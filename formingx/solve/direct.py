@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import itertools
-
 from petsc4py import PETSc
 
-_prefixes = itertools.count()
 
-
-def configure(ksp: PETSc.KSP, symmetric: bool) -> None:
-    """Make `ksp` a single LU (LDL^T if symmetric) by MUMPS, with options of its own that leave nothing behind."""
-    prefix = f"formingx_{next(_prefixes)}_"
-    key = prefix + "mat_mumps_icntl_14"           # workspace over MUMPS' own estimate, percent
-    options = PETSc.Options()
-    options[key] = 100
-    ksp.setOptionsPrefix(prefix)
+def configure(ksp: PETSc.KSP, matrix: PETSc.Mat, symmetric: bool) -> None:
+    """Make `ksp` a single LU (LDL^T if symmetric) of the matrix by MUMPS."""
+    ksp.setOperators(matrix)
     ksp.setType("preonly")
     pc = ksp.getPC()
     pc.setType("cholesky" if symmetric else "lu")
     pc.setFactorSolverType("mumps")
-    ksp.setFromOptions()
     pc.setFactorSetUpSolverType()
-    del options[key]
+    pc.getFactorMatrix().setMumpsIcntl(14, 100)      # workspace over MUMPS' own estimate, percent
 
 
 class DirectSolver:
@@ -31,8 +22,7 @@ class DirectSolver:
     def __init__(self, matrix: PETSc.Mat, symmetric: bool):
         self._matrix = matrix
         self._ksp = PETSc.KSP().create(matrix.comm)
-        self._ksp.setOperators(matrix)
-        configure(self._ksp, symmetric)
+        configure(self._ksp, matrix, symmetric)
 
     def factorise(self) -> bool:
         """Factorise the matrix as it is now; False if it is singular to working precision."""

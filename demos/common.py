@@ -1,0 +1,38 @@
+"""What every demo needs: its options, its folder, rank-0 output."""
+
+import argparse
+from pathlib import Path
+
+from mpi4py import MPI
+
+from formingx.results import files
+
+COMM = MPI.COMM_WORLD
+
+
+def parser(name: str, description: str) -> argparse.ArgumentParser:
+    """Options that all demos share: --out, --quick."""
+    options = argparse.ArgumentParser(prog=f"demos/{name}.py", description=description,
+                                      formatter_class=argparse.ArgumentDefaultsHelpFormatter)
+    options.add_argument("--out", type=Path, default=Path("results") / name, help="folder for results")
+    options.add_argument("--quick", action="store_true", help="coarse mesh, no 3-D view: seconds")
+    return options
+
+
+def say(*lines: str) -> None:
+    """Print on rank 0."""
+    if COMM.rank == 0:
+        print(*lines, sep="\n", flush=True)
+
+
+def save(figure, file: Path) -> None:
+    """Save a matplotlib figure as PNG on rank 0."""
+    if COMM.rank == 0:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(file, dpi=150)
+
+
+def summarise(out: Path, summary: dict) -> None:
+    """Write OUT/summary.json and say where the results are."""
+    files.write_summary(out / "summary.json", summary, COMM)
+    say(f"Results are in {out}/: " + ", ".join(sorted(f.name for f in out.iterdir())) if COMM.rank == 0 else "")

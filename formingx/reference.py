@@ -1,0 +1,94 @@
+"""Membrane theory of free inflation, to compare with: Adkins & Rivlin, Phil. Trans. R. Soc. A 244 (1952) 505-531.
+
+A flat circular membrane, rim held, under a pressure. With stretches l1 (meridional), l2 = r/R, l3 = 1/(l1 l2) and the
+Mooney energy, tensions per deformed length are T1 = 2 h0 l3 (l1^2 - l3^2)(c10 + c01 l2^2), T2 likewise; equilibrium:
+d(T1 r)/dr = T2 and dtheta/ds T1 + sin(theta)/r T2 = p, theta the slope of the meridian. Integrated from the pole until l2 = 1:
+only the product p R counts, so no shooting is needed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import InputError, non_negative, positive
+
+
+@dataclass(frozen=True)
+class MembraneState:
+    """A membrane inflated to a pole stretch, in the units of what was given.
+
+    Attributes:
+        pressure: stress. height: of the pole, length.
+        R, r, z: reference radius and deformed meridian, shape (n,), length.
+        thickness_ratio: l3 at those R, shape (n,).
+    """
+
+    pressure: float
+    height: float
+    R: np.ndarray
+    r: np.ndarray
+    z: np.ndarray
+    thickness_ratio: np.ndarray
+
+
+def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float, c10: float,
+                       c01: float = 0.0) -> MembraneState:
+    """The inflated membrane whose stretch at the pole is `pole_stretch` (above 1).
+
+    Raises:
+        InputError: a size or constant that is not allowed.
+    """
+    from scipy.integrate import solve_ivp
+    radius, thickness = positive("radius", radius), positive("thickness", thickness)
+    c10, c01 = positive("c10", c10), non_negative("c01", c01)
+    if not positive("pole_stretch", pole_stretch) > 1:
+        raise InputError(f"pole_stretch = {pole_stretch!r}: must be above 1")
+    k = c01 / c10
+
+    def slopes(R, y):                         # lengths over R0 p/(c10 h0), tensions over c10 h0: pressure is 1
+        l1, r, _, theta = y
+        l2 = r / R
+        l3 = 1 / (l1 * l2)
+        a1, a2 = 1 + k * l2**2, 1 + k * l1**2
+        T1, T2 = 2 * l3 * (l1**2 - l3**2) * a1, 2 * l3 * (l2**2 - l3**2) * a2
+        dr = l1 * np.cos(theta)
+        T1_1 = 2 / l2 * (1 + 3 / (l1**4 * l2**2)) * a1
+        T1_2 = 2 * (-l1 / l2**2 + 3 / (l1**3 * l2**4)) * a1 + 4 * k * l2 * l3 * (l1**2 - l3**2)
+        dl1 = ((T2 - T1) * dr / r - T1_2 * (dr - l2) / R) / T1_1
+        return [dl1, dr, -l1 * np.sin(theta), l1 * (1 - T2 * np.sin(theta) / r) / T1]
+
+    def rim(R, y):
+        return y[1] / R - 1
+
+    rim.terminal, rim.direction = True, -1
+    start, l3 = 1e-6, pole_stretch**-2        # a spherical cap at the pole: curvature 1/(2 T)
+    T = 2 * l3 * (pole_stretch**2 - l3**2) * (1 + k * pole_stretch**2)
+    r0 = pole_stretch * start
+    solution = solve_ivp(slopes, (start, 1e3), [pole_stretch, r0, 0.0, r0 / (2 * T)], events=rim, rtol=1e-10,
+                         atol=1e-12, method="DOP853", dense_output=True, max_step=0.5)
+    end = solution.t_events[0][0]
+    R = np.linspace(start, end, 400)
+    l1, r, z, _ = solution.sol(R)
+    scale = radius / end
+    return MembraneState(end * c10 * thickness / radius, -z[-1] * scale, R * scale, r * scale, (z - z[-1]) * scale,
+                         R / (l1 * r))
+
+
+def membrane_limit_point(*, radius: float, thickness: float, c10: float,
+                         c01: float = 0.0) -> tuple[float, MembraneState] | None:
+    """(pole stretch, state) of the first pressure maximum below a pole stretch of 12, or None if there is none."""
+    from scipy.optimize import minimize_scalar
+
+    def state(stretch):
+        return membrane_inflation(stretch, radius=radius, thickness=thickness, c10=c10, c01=c01)
+
+    stretches = np.geomspace(1.2, 12, 40)
+    pressures = [state(s).pressure for s in stretches]
+    i = next((i for i in range(1, 39) if pressures[i - 1] < pressures[i] > pressures[i + 1]), None)
+    if i is None:
+        return None
+    found = minimize_scalar(lambda s: -state(s).pressure, bounds=(stretches[i - 1], stretches[i + 1]),
+                            method="bounded", options={"xatol": 1e-8})
+    return float(found.x), state(found.x)
