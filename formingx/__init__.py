@@ -2,11 +2,14 @@
 
 from . import mesh
 from .errors import ConvergenceError, InputError
+from .physics.contact import Contact
 from .physics.incompressibility import DisplacementPenalty, MixedPressure
 from .physics.kinematics import Axisymmetric, PlaneStrain
 from .physics.loads import Pressure
 from .physics.materials import Hyperelastic, MooneyRivlin, NeoHookean, Ogden
 from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Symmetry
+from .physics import tools
+from .physics.tools import Tool
 from .results.measures import displacement, enclosed_volume, pole_height, pole_stretch, pressure, travel
 from .results.path import Path, State
 from .results.profile import Profile

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,9 @@ class ExtendedMatrix:
     def __init__(self, form: Any, index_map: Any, bcs: list, rows: list[np.ndarray], comm: Any, symmetric: bool):
         self._form, self._bcs = form, bcs
         self._first = index_map.size_global
+        self._held = np.zeros(index_map.size_local + index_map.num_ghosts, dtype=bool)
+        for bc in bcs:
+            self._held[bc.dof_indices()[0]] = True
         self._last_rank = comm.rank == comm.size - 1
         offset = index_map.local_range[0]
         self._entries = []              # (own numbers, own weights, all numbers, all weights) of each row of C
@@ -45,12 +49,20 @@ class ExtendedMatrix:
         if symmetric:
             self.mat.setOption(PETSc.Mat.Option.SYMMETRIC, True)
 
-    def fill(self) -> PETSc.Mat:
-        """The matrix at the state that the form's functions hold now."""
+    def fill(self, blocks: Sequence[tuple[np.ndarray, np.ndarray]] = ()) -> PETSc.Mat:
+        """The matrix at the state that the form's functions hold now.
+
+        blocks: (local owned dofs (n, m), values (n, m, m)) to be added to K; the dofs of a block must share a cell.
+        """
         A, add = self.mat, PETSc.InsertMode.ADD_VALUES
         A.zeroEntries()
         fem_petsc.assemble_matrix(A, self._form, bcs=self._bcs)
         A.assemble(PETSc.Mat.AssemblyType.FLUSH)
+        for dofs, values in blocks:
+            free = ~self._held[dofs]
+            values = values * free[:, :, None] * free[:, None, :]
+            for numbers, block in zip(dofs, values):
+                A.setValuesLocal(numbers, numbers, block, addv=add)
         for k, (mine, weights, everyone, all_weights) in enumerate(self._entries):
             if len(mine):
                 A.setValues(mine.astype(PETSc.IntType), [self._first + k], weights, addv=add)

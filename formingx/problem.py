@@ -16,6 +16,7 @@ from petsc4py import PETSc
 
 from .errors import InputError
 from .extended import ExtendedMatrix
+from .nodal import NodalContact
 from .physics.supports import Held
 from .scene import Scene
 from .solid import Solid
@@ -30,6 +31,7 @@ class Problem:
         comm: communicator.
         x: a vector of unknowns to duplicate.
         matrix: the tangent, refilled by `tangent`.
+        contacts: the nodal forces of the scene's contacts (`NodalContact`).
         force_scale: norm of all support forces at the state whose residual was last computed.
     """
 
@@ -43,6 +45,7 @@ class Problem:
         tangent = ufl.derivative(forms.residual, forms.w, ufl.TrialFunction(forms.space))
         self._residual = forms.compile(forms.residual)
         self._by_control = [forms.compile(f) for f in (forms.control_derivative,) if f is not None]
+        self.contacts = [NodalContact(forms, contact, self.assemble) for contact in scene.contacts]
         self._hold(tangent)
         self._matrix = ExtendedMatrix(forms.compile(tangent), index_map, self._bcs, self._rows, self.comm,
                                       self.symmetric)
@@ -59,14 +62,25 @@ class Problem:
     @property
     def symmetric(self) -> bool:
         """True if the tangent is symmetric: no follower load in the scene."""
-        return all(getattr(load, "symmetric", False) for load in self.scene.loads)
+        return all(getattr(x, "symmetric", False) for x in (*self.scene.loads, *self.scene.contacts))
+
+    @property
+    def memory(self) -> list[Any]:
+        """What F depends on besides x and control: of every contact with friction, its last accepted state."""
+        return [contact.memory for contact in self.contacts if contact.memory is not None]
+
+    @memory.setter
+    def memory(self, memory: list[Any]) -> None:
+        for contact, touch in zip([c for c in self.contacts if c.memory is not None], memory, strict=True):
+            contact.memory = touch
 
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         """out = F(x, control); sets `force_scale`."""
         multipliers = self.set_state(x, control)
-        values = self.assemble(self._residual)
+        values, fields = self.assemble(self._residual), x.array_r[: self._n]
+        for contact in self.contacts:
+            contact.add_residual(values, fields, control)
         self.force_scale = np.sqrt(self._dot(values, values))
-        fields = x.array_r[: self._n]
         for multiplier, row in zip(multipliers, self._rows, strict=True):
             values += multiplier * row
         values[self._held] = fields[self._held] - self._motion * control
@@ -75,14 +89,32 @@ class Problem:
     def tangent(self, x: PETSc.Vec, control: float) -> PETSc.Mat:
         """dF/dx at (x, control): `matrix`, refilled."""
         self.set_state(x, control)
-        return self._matrix.fill()
+        fields = x.array_r[: self._n]
+        return self._matrix.fill([(c.dofs, c.stiffness(fields, control)) for c in self.contacts])
 
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         """out = dF/dcontrol at (x, control)."""
         self.set_state(x, control)
         values = sum((self.assemble(form) for form in self._by_control), np.zeros(self._n))
+        for contact in self.contacts:
+            contact.add_control_derivative(values, x.array_r[: self._n], control)
         values[self._held] = -self._motion
         self.fill(out, values)
+
+    def advance(self, x: np.ndarray, control: float) -> None:
+        """A state is accepted: what has a history takes it up. x: own part, shape (n,)."""
+        for contact in self.contacts:
+            contact.advance(x[: self._n], control)
+
+    def reach(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
+        """How long a step of at most `length` from x along (direction, slope) may be. Arrays: own part."""
+        n = self._n
+        return min([c.reach(x[:n], control, direction[:n], slope, length) for c in self.contacts], default=length)
+
+    def too_far(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+        """True if more happened between two states than one step may bring. Arrays: own part."""
+        n = self._n
+        return any([c.grew_too_much(old[:n], old_control, new[:n], control) for c in self.contacts])
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
         """Mean over the reference volume of the product of two displacement fields: no mesh, no unit in it."""

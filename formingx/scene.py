@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from .errors import InputError, count, known
 from .mesh import Mesh
+from .physics.contact import Contact
 from .physics.incompressibility import MixedPressure
 from .physics.kinematics import Axisymmetric
 from .physics.materials import Material
@@ -23,7 +24,8 @@ class Scene:
         mesh: from `formingx.mesh`.
         materials: {layer name: material}, or one material for all layers.
         supports: see `formingx.physics.supports`.
-        loads: see `formingx.physics.loads`. At most one load or support is driven (controlled by the run).
+        loads: see `formingx.physics.loads`. At most one load, support or tool is driven (controlled by the run).
+        contacts: faces of the body that rigid tools stop, see `formingx.Contact`.
         incompressibility: how the volume is kept; default `MixedPressure()`.
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
         quadrature_degree: of the energy; 5 (seven points) is the thesis' rule.
@@ -34,8 +36,8 @@ class Scene:
     """
 
     def __init__(self, *, mesh: Mesh, materials: Material | Mapping[str, Material], supports: Sequence[Any],
-                 loads: Sequence[Any] = (), incompressibility: Any = None, kinematics: Any = None,
-                 quadrature_degree: int = 5):
+                 loads: Sequence[Any] = (), contacts: Sequence[Contact] = (), incompressibility: Any = None,
+                 kinematics: Any = None, quadrature_degree: int = 5):
         if not isinstance(mesh, Mesh):
             raise InputError(f"Scene: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")
         if isinstance(materials, Material):
@@ -44,6 +46,7 @@ class Scene:
         self.materials = dict(materials)
         self.supports = list(supports)
         self.loads = list(loads)
+        self.contacts = list(contacts)
         self.incompressibility = incompressibility if incompressibility is not None else MixedPressure()
         self.kinematics = kinematics if kinematics is not None else Axisymmetric()
         self.quadrature_degree = count("Scene: quadrature_degree", quadrature_degree)
@@ -51,7 +54,9 @@ class Scene:
         self._check_boundaries()
         self._check_axis()
         self._check_rigid_body()
-        driven = [x for x in (*self.loads, *self.supports) if getattr(x, "driven", False)]
+        for contact in self.contacts:
+            self._check_contact(contact)
+        driven = [x for x in (*self.loads, *self.supports, *self.contacts) if getattr(x, "driven", False)]
         if len(driven) > 1:
             raise InputError(f"Scene: {', '.join(map(repr, driven))} are all driven: one control drives a run;"
                              f" give the others a value")
@@ -70,13 +75,31 @@ class Scene:
                              f" materials are given for {', '.join(map(repr, self.materials)) or 'none'}")
 
     def _check_boundaries(self) -> None:
-        for thing in (*self.loads, *self.supports):
+        for thing in (*self.loads, *self.supports, *self.contacts):
             on = getattr(thing, "on", None)
             if on is None:
                 continue
             known(f"{thing!r}: boundary", on, self.mesh.boundaries)
             if self.mesh.domain.comm.allreduce(len(self.mesh.facets_of(on)), MPI.SUM) == 0:
                 raise InputError(f"{thing!r}: boundary {on!r} is empty: no facet of the mesh carries it")
+
+    def _check_contact(self, contact: Contact) -> None:
+        """The body starts outside the tool, the face looks at it, and the pressure does not push away from it."""
+        mesh, near = self.mesh, 1e-6 * max(self.extent)
+        face = mesh.nodes_of(contact.on)
+        comm = mesh.domain.comm
+        points = np.concatenate(comm.allgather(mesh.domain.geometry.x[:, :2]))
+        depth = contact.tool.signed_distance(points)
+        worst = int(np.argmax(depth))
+        if depth[worst] > near:
+            raise InputError(f"{contact!r}: the body starts inside the tool: {depth[worst]:.6g} deep at (R, Z) ="
+                             f" ({points[worst, 0]:.6g}, {points[worst, 1]:.6g})")
+        if depth[worst] > contact.tool.signed_distance(face).max() + near:
+            raise InputError(f"{contact!r}: the tool is behind this face of the body: another face is closer to it;"
+                             f" boundaries are {list(mesh.boundaries)}")
+        if any(load.driven and load.on == contact.on for load in self.loads):
+            raise InputError(f"{contact!r}: the driven pressure acts on the same face and pushes it away from the tool:"
+                             f" no tool faces the pressure")
 
     def _check_axis(self) -> None:
         if not isinstance(self.kinematics, Axisymmetric):

@@ -84,6 +84,11 @@ class Solid:
         v = ufl.split(self.test_function())[0][component]
         return v * self.weight / self.constant(self.integral(self.weight * ds)) * ds
 
+    def length_row(self, boundary: str) -> Any:
+        """Linear form whose vector is, at the first component of a node, the length of boundary that belongs to it."""
+        metadata = {"quadrature_rule": "GLL", "quadrature_degree": 3}
+        return ufl.split(self.test_function())[0][0] * self.ds(self.scene.mesh.boundaries[boundary], metadata=metadata)
+
     def metric_row(self) -> Any:
         """Linear form whose vector is the lumped mass of the displacement, over the volume."""
         v = ufl.split(self.test_function())[0]
@@ -114,8 +119,11 @@ class Solid:
         driven = self.scene.driven
         if driven is None or not hasattr(driven, "virtual_work"):
             return self.length
-        area = self.integral(self.weight * self.boundary(driven.on, 2))
-        return self.stress * self.volume / (area * self.length)
+        return self.stress * self.thickness(driven.on) / self.length
+
+    def thickness(self, boundary: str) -> float:
+        """Volume of the body over the area of a boundary, length."""
+        return self.volume / self.integral(self.weight * self.boundary(boundary, 2))
 
     def _energy(self) -> Any:
         scene = self.scene

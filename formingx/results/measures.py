@@ -252,12 +252,23 @@ class _Scalar(Bound):
         return self._of(self._problem.assemble_scalar(self._form))
 
 
+class _Nodal(Bound):
+    """A number of every contact, put together by `over`; recorded only."""
+
+    def __init__(self, problem, of, over):
+        self._contacts, self._of, self._over = problem.contacts, of, over
+
+    def value(self, x, control):
+        return float(self._over([self._of(contact, x.array_r, control) for contact in self._contacts]))
+
+
 def standard(problem: Any) -> dict[str, Bound]:
     """The measures that every run records, by column name.
 
     pressure (or travel: a length), pole_height (length), pole_stretch, enclosed_volume (length^3), strain_energy
     (stress length^3), mass_error (volume over its original value, minus 1), volume_error (root mean square of
-    J - 1). Pole and volume are there where the scene has an axis and a driven pressure.
+    J - 1). Pole and volume are there where the scene has an axis and a driven pressure. With contacts: contact_length
+    (reference length in touch), penetration (of the deepest node, length), tool_force (along Z, of the body on all tools).
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
     pressure_driven = hasattr(scene.driven, "virtual_work")
@@ -272,4 +283,8 @@ def standard(problem: Any) -> dict[str, Bound]:
     found["mass_error"] = _Scalar(problem, change * forms.weight * forms.dx, lambda v: v / volume)
     found["volume_error"] = _Scalar(problem, change**2 * forms.weight * forms.dx,
                                     lambda v: (v / volume) ** 0.5)
+    if problem.contacts:
+        found["contact_length"] = _Nodal(problem, lambda c, *at: c.contact_length(*at), sum)
+        found["penetration"] = _Nodal(problem, lambda c, *at: c.largest_penetration(*at), max)
+        found["tool_force"] = _Nodal(problem, lambda c, *at: c.force(*at)[1], sum)
     return found

@@ -25,6 +25,7 @@ class State:
         history: the Newton iterations that led to it (`formingx.solve.bordered.Iteration`).
         kind: "start", "step", "target" or "limit point".
         met: the target that it hits, or None.
+        memory: what the problem remembers from here on (friction).
     """
 
     x: np.ndarray
@@ -35,6 +36,7 @@ class State:
     history: list = field(default_factory=list)
     kind: str = "step"
     met: Target | None = None
+    memory: list = field(default_factory=list)
 
 
 @dataclass
@@ -92,7 +94,9 @@ class Path:
         return next((state for state in self.states if state.met == target), None)
 
     def record(self, state: State) -> None:
-        """Take up a state: evaluate the measures there."""
+        """Take up a state: what has a history goes on from it; evaluate the measures there."""
+        self.problem.advance(state.x, state.control)
+        state.memory = self.problem.memory
         state.measures = {name: self.value(bound, state) for name, bound in self._recorded.items()}
         self.states.append(state)
         self.counts.steps += state.kind != "start"
@@ -116,7 +120,11 @@ class Path:
         values = [self.value(bound, state) - target.value for state in states]
         for a, b, left, right in zip(values, values[1:], states, states[1:]):
             if b == 0 or a * b < 0:
-                found = self._branch.between(left, right, bound, target.value)
+                now, self.problem.memory = self.problem.memory, left.memory
+                try:
+                    found = self._branch.between(left, right, bound, target.value)
+                finally:
+                    self.problem.memory = now
                 found.measures = {name: self.value(m, found) for name, m in self._recorded.items()}
                 return found
         raise InputError(f"the path does not pass {target}: its values lie between"

@@ -71,8 +71,8 @@ class _Run:
                     self._give_up(f"{max_steps} states were accepted before it")
                 for state in self._sorted_into(path.last, self._next(path.last)):
                     self._record(state)
-                    if not self._is_open(self.until) and state.met is self.until:
-                        break
+                    if path.problem.memory or not self._is_open(self.until) and state.met is self.until:
+                        break                           # with a history, the rest of the step starts from here
                 _show(bar, path, self.until)
         finally:
             bar.close()
@@ -81,21 +81,27 @@ class _Run:
 
     def _next(self, old: State) -> State:
         """The next state: at a target within reach, or one step ahead; failures halve the step."""
+        problem = self.path.problem
         while True:
-            length = self.step.length
+            length = problem.reach(old.x, old.control, old.direction, old.slope, self.step.length)
+            limited = length < self.step.length
             target, bound, reach = self._within_reach(old, length)
             try:
                 if target is None:
                     new = self.branch.step(old, length)
-                    self.step.accepted(len(new.history) - 1)
                 else:
                     new = self.branch.step_to(old, reach, bound.equation(target.value))
                     if not 0 < self.branch.progress(old, new) < 2 * length:
                         raise Failure("the target was met on a far part of the path", [])
                     new.met = target
+                if problem.too_far(old.x, old.control, new.x, new.control):
+                    raise Failure("too much came into contact in one step", [])
+                if target is None and not limited:
+                    self.step.accepted(len(new.history) - 1)
                 return new
             except Failure as failure:
                 self.path.counts.failures += 1
+                self.step.length = length
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 if not self.step.failed():
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}")

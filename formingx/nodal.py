@@ -1,0 +1,118 @@
+"""Contact of one face as forces at its nodes: where `problem` meets `physics.contact`. No form is compiled per tool."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from .physics.contact import Contact, Touch, Tractions
+
+
+class NodalContact:
+    """Residual, tangent and history of one contact, at the nodes of its face that this rank owns.
+
+    Args:
+        solid: the scene's `Solid`; contact: the `Contact`; assemble: makes the owned part of a linear form.
+
+    Attributes:
+        dofs: local numbers of (u_r, u_z), shape (n, 2); points: reference positions, shape (n, 2), length.
+        lengths, area: reference length and area that belong to each node, shape (n,) (area: 0 on the axis).
+        memory: what the nodes remember of the last accepted state; None without friction.
+    """
+
+    def __init__(self, solid: Any, contact: Contact, assemble: Any):
+        self.solid, self.contact = solid, contact
+        space, comm = solid.space, solid.comm
+        vectors, numbers = space.sub(0).collapse()
+        facets = solid.scene.mesh.facets_of(contact.on)
+        nodes = np.sort(fem.locate_dofs_topological(vectors, 1, facets))
+        dofs = np.asarray(numbers, dtype=np.int32).reshape(-1, 2)[nodes]
+        own = dofs[:, 0] < space.dofmap.index_map.size_local
+        self.dofs, self.points = dofs[own], vectors.tabulate_dof_coordinates()[nodes[own], :2].copy()
+        self.lengths = assemble(solid.compile(solid.length_row(contact.on)))[self.dofs[:, 0]]
+        self.area = self.lengths * solid.scene.kinematics.weight(self.points.T)
+        self._comm, self._length = comm, solid.length
+        self.thickness = solid.thickness(contact.on)
+        self.law = contact.law(contact.penalty * solid.stress / self.thickness, contact.ramp * self.thickness)
+        self._scale = solid.length / (solid.stress * solid.volume) * self.area
+        self._motion = solid.control_scale * np.array(contact.moves or (0.0, 0.0))
+        self.memory = None if contact.mu == 0 else self.law.start(self.points)
+        self._allowed = 2 * contact.edges_per_step          # new nodes in a step
+
+    def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Nodes seen from the tool, shape (n, 2), length; `fields`: owned unknowns."""
+        return self.points + self._length * fields[self.dofs] - control * self._motion
+
+    def tractions(self, fields: np.ndarray, control: float) -> Tractions:
+        """What the law gives at a state."""
+        return self.law.tractions(self.positions(fields, control), self.memory)
+
+    def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
+        """Add the nodal forces to the owned residual."""
+        values[self.dofs] += self._scale[:, None] * self.tractions(fields, control).force
+
+    def stiffness(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Derivative of the nodal forces by the nodes' own unknowns, shape (n, 2, 2)."""
+        return (self._scale * self._length)[:, None, None] * self.tractions(fields, control).stiffness
+
+    def add_control_derivative(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
+        """Add the derivative of the nodal forces by the control: the tool moves."""
+        if self.contact.driven:
+            by_position = self._scale[:, None, None] * self.tractions(fields, control).stiffness
+            values[self.dofs] -= by_position @ self._motion
+
+    def advance(self, fields: np.ndarray, control: float) -> None:
+        """A state is accepted: remember it."""
+        if self.memory is not None:
+            self.memory = self.tractions(fields, control).touch
+
+    def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
+        """How long a step along a tangent may be: to the first touch, or until enough new nodes touch.
+
+        A step that would bring a whole region into contact at once would decide by its own length where it sticks.
+        """
+        start = self.positions(fields, control)
+        velocity = self._length * direction[self.dofs] - slope * self._motion
+        gap = -self.law.theta - self.law.tool.signed_distance(start)
+        free = gap > 0
+        times = np.full(len(start), np.inf)
+        before, at = gap, 0.0
+        for s in length * np.linspace(0, 1, 9)[1:]:
+            now = -self.law.theta - self.law.tool.signed_distance(start + s * velocity)
+            hit = free & (now <= 0) & np.isinf(times)
+            times[hit] = at + (s - at) * before[hit] / (before[hit] - now[hit])
+            before, at = now, s
+        times = np.sort(np.concatenate(self._comm.allgather(times[np.isfinite(times)])))
+        touching = self._comm.allreduce(int(np.sum(~free & (self.area > 0))), MPI.SUM)
+        if len(times) == 0:
+            return length
+        if touching <= 1:
+            return min(length, max(times[0] * 1.001, 1e-6 * length))
+        return min(length, times[self._allowed - 1]) if len(times) >= self._allowed else length
+
+    def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+        """More than twice the new nodes that a step is meant to bring into contact."""
+        a, b = (self.law.tool.signed_distance(self.positions(f, c)) for f, c in ((old, old_control), (new, control)))
+        found = int(np.sum((a <= -self.law.theta) & (b > -self.law.theta)))
+        return self._comm.allreduce(found, MPI.SUM) > 2 * self._allowed
+
+    def largest_penetration(self, fields: np.ndarray, control: float) -> float:
+        """Depth of the deepest node inside the tool, 0 if none is, length, all ranks."""
+        d = self.law.tool.signed_distance(self.positions(fields, control))
+        return self._comm.allreduce(max(float(d.max(initial=0.0)), 0.0), MPI.MAX)
+
+    def contact_length(self, fields: np.ndarray, control: float) -> float:
+        """Reference length of the face that is in touch, all ranks."""
+        d = self.law.tool.signed_distance(self.positions(fields, control))
+        return self._comm.allreduce(float(self.lengths[d > -self.law.theta].sum()), MPI.SUM)
+
+    def force(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Total force of the body on the tool (r, z), shape (2,), stress length^2 (per depth: length), all ranks.
+
+        Axisymmetric: the r entry is the radial traction summed around, not a resultant (which is 0).
+        """
+        total = (self.area[:, None] * self.tractions(fields, control).force).sum(0)
+        return self._comm.allreduce(total, MPI.SUM)

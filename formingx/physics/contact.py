@@ -1,0 +1,162 @@
+"""Contact of a face of the body with a rigid tool: a penalty with a regularised ramp, and three laws of friction.
+
+Song (1993), eqs. (5.7) to (5.14), per unit reference area, at a point whose signed distance to the tool is d:
+
+    normal traction      N = k F(d),  F the ramp (5.13) of half-width theta: 0 below -theta, d above theta, C1 between;
+    tangential traction  T = k F'(d) g, not more than mu N,
+
+g being the elastic slip: the tangential motion since the point touched (entered the ramp), less what has slid. Stick is mu = inf,
+frictionless mu = 0. A touch counts from where it happens inside the step: of the motion x - x_n of a point that was out
+of touch at the last accepted state only the share s = (d + theta)/(d - d_n) counts.
+
+Contact acts at the nodes of six-node triangles, which are the points of the Gauss-Lobatto rule on a facet (exact
+for the lumped area): there history is read where it lives.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError, count, finite, non_negative, positive
+from .tools import Nearest, Tool
+
+
+class Contact:
+    """A face of the body that a rigid tool stops.
+
+    Args:
+        on: name of the boundary that faces the tool.
+        tool: a `Tool`, see `formingx.tools`.
+        friction: "stick" (a point that touches stays where it touched), "none", or the coefficient mu of Coulomb's
+            law (5.9), from 0 (none).
+        penalty: k over shear modulus / thickness of the sheet.
+        ramp: theta over thickness of the sheet.
+        edges_per_step: contact spreads by about so many element edges in a step; what sticks depends on where it touched.
+        moves: (r, z) of the tool's motion per unit of travel: the tool is what the run controls; None: it stays.
+
+    Raises:
+        InputError: an argument that is not allowed.
+    """
+
+    def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float = 1e5,
+                 ramp: float = 1e-3, edges_per_step: int = 2, moves: tuple[float, float] | None = None):
+        name = f"Contact({on!r})"
+        if not isinstance(tool, Tool):
+            raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
+        words = {"none": 0.0, "stick": math.inf}
+        if isinstance(friction, str) and friction not in words:
+            raise InputError(f"{name}: friction = {friction!r}: must be 'stick', 'none' or a coefficient of friction")
+        self.on, self.tool, self.friction = on, tool, friction
+        self.mu = words[friction] if isinstance(friction, str) else non_negative(f"{name}: friction", friction)
+        self.penalty, self.ramp = positive(f"{name}: penalty", penalty), positive(f"{name}: ramp", ramp)
+        self.edges_per_step = count(f"{name}: edges_per_step", edges_per_step)
+        self.moves = None if moves is None else tuple(finite(f"{name}: moves", m) for m in moves)
+        if self.moves == (0.0, 0.0):
+            raise InputError(f"{name}: moves = (0, 0): must name a direction, or be None")
+
+    @property
+    def driven(self) -> bool:
+        """True if the run controls the motion of the tool."""
+        return self.moves is not None
+
+    @property
+    def symmetric(self) -> bool:
+        """True if contact has an energy: without friction."""
+        return self.mu == 0
+
+    def law(self, k: float, theta: float) -> Law:
+        """Tractions for a penalty k (stress/length) and a ramp theta (length)."""
+        return Law(self.tool, self.mu, k, theta)
+
+    def __repr__(self) -> str:
+        return f"Contact({self.on!r}, {self.tool!r}, {self.friction!r})"
+
+
+class Touch(NamedTuple):
+    """What n points remember of the last accepted state, seen from the tool.
+
+    position: shape (n, 2), length; distance: signed, shape (n,), length; slip: elastic slip g, shape (n,), length.
+    """
+
+    position: np.ndarray
+    distance: np.ndarray
+    slip: np.ndarray
+
+
+class Tractions(NamedTuple):
+    """Tractions at n points per unit reference area, as the residual wants them (what the body does to the tool).
+
+    force: shape (n, 2), stress; stiffness: its derivative, shape (n, 2, 2), stress/length; touch: what to remember;
+    normal, tangential: N and T, shape (n,), stress.
+    """
+
+    force: np.ndarray
+    stiffness: np.ndarray
+    touch: Touch
+    normal: np.ndarray
+    tangential: np.ndarray
+
+
+class Law:
+    """Tractions at points, a function of their positions and of what they remember."""
+
+    def __init__(self, tool: Tool, mu: float, k: float, theta: float):
+        self.tool, self.mu, self.k, self.theta = tool, mu, k, theta
+
+    def ramp(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """F(d), eq. (5.13), and its derivative."""
+        slope = np.clip((d + self.theta) / (2 * self.theta), 0.0, 1.0)
+        return np.where(d < self.theta, self.theta * slope**2, d), slope
+
+    def energy(self, x: np.ndarray) -> np.ndarray:
+        """Energy of the normal traction per unit reference area at points x, shape (n,), stress times length."""
+        d, theta = self.tool.signed_distance(x), self.theta
+        inside = np.clip(d + theta, 0.0, 2 * theta)
+        return self.k * np.where(d < theta, inside**3 / (12 * theta), d**2 / 2 + theta**2 / 6)
+
+    def start(self, x: np.ndarray) -> Touch:
+        """What points at x remember before anything has happened."""
+        return Touch(x.copy(), self.tool.signed_distance(x), np.zeros(len(x)))
+
+    def tractions(self, x: np.ndarray, old: Touch | None) -> Tractions:
+        """At points x, shape (n, 2), which remember `old` (not used without friction)."""
+        near, k = self.tool.nearest(x), self.k
+        d, n, t, bend = near.distance, near.normal, near.tangent, near.curvature
+        F, slope = self.ramp(d)
+        N = k * F
+        force = N[:, None] * n
+        stiffness = _outer(k * slope, n, n) + _outer(N * bend, t, t)
+        zero = np.zeros(len(x))
+        if self.mu == 0:
+            return Tractions(force, stiffness, Touch(x, d, zero), N, zero)
+        g, dg = self._slip(x, d, near, old)
+        T, dT = k * slope * g, (k * slope)[:, None] * dg
+        rising = (np.abs(d) < self.theta) * k / (2 * self.theta)
+        dT += (rising * g)[:, None] * n
+        if math.isfinite(self.mu):
+            sliding, limit = np.abs(T) > self.mu * N, np.sign(T) * self.mu
+            T = np.where(sliding, limit * N, T)
+            dT = np.where(sliding[:, None], (limit * k * slope)[:, None] * n, dT)
+        force = force + T[:, None] * t
+        stiffness = stiffness + np.einsum("ni,nj->nij", t, dT) - _outer(T * bend, n, t)
+        kept = np.divide(T, k * slope, out=zero.copy(), where=slope > 0)
+        return Tractions(force, stiffness, Touch(x, d, kept), N, T)
+
+    def _slip(self, x: np.ndarray, d: np.ndarray, near: Nearest, old: Touch) -> tuple[np.ndarray, np.ndarray]:
+        """Elastic slip g of points, shape (n,), if none slides, and its gradient, shape (n, 2)."""
+        motion = x - old.position
+        along = np.einsum("ni,ni->n", near.tangent, motion)
+        d_along = near.tangent * (1 - near.curvature * np.einsum("ni,ni->n", near.normal, motion))[:, None]
+        was, now = old.distance > -self.theta, d > -self.theta
+        arriving = now & ~was
+        span = np.where(arriving, d - old.distance, 1.0)
+        share = np.where(was, 1.0, np.where(arriving, (d + self.theta) / span, 0.0))
+        d_share = np.where(arriving, -(old.distance + self.theta) / span**2, 0.0)
+        return old.slip + share * along, share[:, None] * d_along + (along * d_share)[:, None] * near.normal
+
+
+def _outer(c: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("n,ni,nj->nij", c, a, b)
