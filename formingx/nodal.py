@@ -20,7 +20,6 @@ class NodalContact:
     Attributes:
         dofs: local numbers of (u_r, u_z), shape (n, 2); points: reference positions, shape (n, 2), length.
         lengths, area: reference length and area that belong to each node, shape (n,) (area: 0 on the axis).
-        memory: what the nodes remember of the last accepted state; None without friction.
     """
 
     def __init__(self, solid: Any, contact: Contact, assemble: Any):
@@ -47,8 +46,11 @@ class NodalContact:
         return self.points + self._length * fields[self.dofs] - control * self._motion
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
-        """What the law gives at a state."""
-        return self.law.tractions(self.positions(fields, control), self.memory)
+        """What the law gives at a state, computed once for it."""
+        x = self.positions(fields, control)
+        if self._last is None or not np.array_equal(x, self._last[0]):
+            self._last = x, self.law.tractions(x, self.memory, self._last and self._last[1].sense)
+        return self._last[1]
 
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Add the nodal forces to the owned residual."""
@@ -66,8 +68,17 @@ class NodalContact:
 
     def advance(self, fields: np.ndarray, control: float) -> None:
         """A state is accepted: remember it."""
-        if self.memory is not None:
-            self.memory = self.tractions(fields, control).touch
+        if self._memory is not None:
+            self.memory = self.law.tractions(self.positions(fields, control), self._memory).touch
+
+    @property
+    def memory(self) -> Touch | None:
+        """What the nodes remember of the last accepted state; None without friction."""
+        return self._memory
+
+    @memory.setter
+    def memory(self, memory: Touch | None) -> None:
+        self._memory, self._last = memory, None
 
     def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step along a tangent may be: to the first touch, or until enough new nodes touch.

@@ -41,8 +41,8 @@ class Contact:
         InputError: an argument that is not allowed.
     """
 
-    def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float = 1e5,
-                 ramp: float = 1e-3, edges_per_step: int = 2, moves: tuple[float, float] | None = None):
+    def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float = 1e4,
+                 ramp: float = 3e-3, edges_per_step: int = 2, moves: tuple[float, float] | None = None):
         name = f"Contact({on!r})"
         if not isinstance(tool, Tool):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
@@ -90,7 +90,7 @@ class Tractions(NamedTuple):
     """Tractions at n points per unit reference area, as the residual wants them (what the body does to the tool).
 
     force: shape (n, 2), stress; stiffness: its derivative, shape (n, 2, 2), stress/length; touch: what to remember;
-    normal, tangential: N and T, shape (n,), stress.
+    normal, tangential: N and T, shape (n,), stress; sense: of sliding, 1 or -1 along the tangent, 0 if stuck, shape (n,).
     """
 
     force: np.ndarray
@@ -98,6 +98,7 @@ class Tractions(NamedTuple):
     touch: Touch
     normal: np.ndarray
     tangential: np.ndarray
+    sense: np.ndarray
 
 
 class Law:
@@ -121,8 +122,12 @@ class Law:
         """What points at x remember before anything has happened."""
         return Touch(x.copy(), self.tool.signed_distance(x), np.zeros(len(x)))
 
-    def tractions(self, x: np.ndarray, old: Touch | None) -> Tractions:
-        """At points x, shape (n, 2), which remember `old` (not used without friction)."""
+    def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None) -> Tractions:
+        """At points x, shape (n, 2), which remember `old` (not used without friction).
+
+        `sense`: that of the iteration before. A point that would turn from sliding one way to sliding the other is taken as
+        stuck for this one iteration: Newton's method would send it to and fro across the narrow range of stick.
+        """
         near, k = self.tool.nearest(x), self.k
         d, n, t, bend = near.distance, near.normal, near.tangent, near.curvature
         F, slope = self.ramp(d)
@@ -131,19 +136,22 @@ class Law:
         stiffness = _outer(k * slope, n, n) + _outer(N * bend, t, t)
         zero = np.zeros(len(x))
         if self.mu == 0:
-            return Tractions(force, stiffness, Touch(x, d, zero), N, zero)
+            return Tractions(force, stiffness, Touch(x, d, zero), N, zero, zero)
         g, dg = self._slip(x, d, near, old)
         T, dT = k * slope * g, (k * slope)[:, None] * dg
         rising = (np.abs(d) < self.theta) * k / (2 * self.theta)
         dT += (rising * g)[:, None] * n
+        sense_now = zero
         if math.isfinite(self.mu):
-            sliding, limit = np.abs(T) > self.mu * N, np.sign(T) * self.mu
+            turned = False if sense is None else np.sign(T) * sense < 0
+            sliding, limit = (np.abs(T) > self.mu * N) & ~np.asarray(turned), np.sign(T) * self.mu
+            sense_now = np.where(sliding, np.sign(T), 0.0)
             T = np.where(sliding, limit * N, T)
             dT = np.where(sliding[:, None], (limit * k * slope)[:, None] * n, dT)
         force = force + T[:, None] * t
         stiffness = stiffness + np.einsum("ni,nj->nij", t, dT) - _outer(T * bend, n, t)
         kept = np.divide(T, k * slope, out=zero.copy(), where=slope > 0)
-        return Tractions(force, stiffness, Touch(x, d, kept), N, T)
+        return Tractions(force, stiffness, Touch(x, d, kept), N, T, sense_now)
 
     def _slip(self, x: np.ndarray, d: np.ndarray, near: Nearest, old: Touch) -> tuple[np.ndarray, np.ndarray]:
         """Elastic slip g of points, shape (n,), if none slides, and its gradient, shape (n, 2)."""

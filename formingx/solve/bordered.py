@@ -83,7 +83,7 @@ class BorderedNewton:
             if history and self._converged(history, residual):
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
-            if len(history) >= 2 and history[-1].correction > (history[0].correction if len(history) > 2 else 0.5):
+            if len(history) >= 2 and history[-1].correction > (max(history[0].correction, 1e-3) if len(history) > 2 else 0.5):
                 raise Failure("the iteration diverges", history)
             if len(history) >= self.tolerances.iterations:
                 raise Failure(f"no convergence in {self.tolerances.iterations} iterations", history)
