@@ -39,7 +39,7 @@ class NodalContact:
         self._scale = solid.length / (solid.stress * solid.volume) * self.area
         self._motion = solid.control_scale * np.array(contact.moves or (0.0, 0.0))
         self.memory = None if contact.mu == 0 else self.law.start(self.points)
-        self._allowed = 2 * contact.edges_per_step          # new nodes in a step
+        self._allowed = contact.nodes_per_step
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Nodes seen from the tool, shape (n, 2), length; `fields`: owned unknowns."""
@@ -108,7 +108,7 @@ class NodalContact:
         """More than twice the new nodes that a step is meant to bring into contact."""
         a, b = (self.law.tool.signed_distance(self.positions(f, c)) for f, c in ((old, old_control), (new, control)))
         found = int(np.sum((a <= -self.law.theta) & (b > -self.law.theta)))
-        return self._comm.allreduce(found, MPI.SUM) > 2 * self._allowed
+        return self._comm.allreduce(found, MPI.SUM) > 2 * self._allowed + 2
 
     def largest_penetration(self, fields: np.ndarray, control: float) -> float:
         """Depth of the deepest node inside the tool, 0 if none is, length, all ranks."""

@@ -34,7 +34,7 @@ class Contact:
             law (5.9), from 0 (none).
         penalty: k over shear modulus / thickness of the sheet.
         ramp: theta over thickness of the sheet.
-        edges_per_step: contact spreads by about so many element edges in a step; what sticks depends on where it touched.
+        nodes_per_step: so many nodes may come into contact in a step (there are two to an element edge); what sticks depends on.
         moves: (r, z) of the tool's motion per unit of travel: the tool is what the run controls; None: it stays.
 
     Raises:
@@ -42,7 +42,7 @@ class Contact:
     """
 
     def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float = 1e4,
-                 ramp: float = 3e-3, edges_per_step: int = 2, moves: tuple[float, float] | None = None):
+                 ramp: float = 3e-3, nodes_per_step: int = 2, moves: tuple[float, float] | None = None):
         name = f"Contact({on!r})"
         if not isinstance(tool, Tool):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
@@ -52,7 +52,7 @@ class Contact:
         self.on, self.tool, self.friction = on, tool, friction
         self.mu = words[friction] if isinstance(friction, str) else non_negative(f"{name}: friction", friction)
         self.penalty, self.ramp = positive(f"{name}: penalty", penalty), positive(f"{name}: ramp", ramp)
-        self.edges_per_step = count(f"{name}: edges_per_step", edges_per_step)
+        self.nodes_per_step = count(f"{name}: nodes_per_step", nodes_per_step)
         self.moves = None if moves is None else tuple(finite(f"{name}: moves", m) for m in moves)
         if self.moves == (0.0, 0.0):
             raise InputError(f"{name}: moves = (0, 0): must name a direction, or be None")

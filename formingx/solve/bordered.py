@@ -40,7 +40,7 @@ class Tolerances(NamedTuple):
 
     correction: float = 1e-10
     residual: float = 1e-8
-    iterations: int = 12
+    iterations: int = 20
 
 
 class BorderedNewton:
@@ -104,6 +104,9 @@ class BorderedNewton:
             correction = self._norm(self.a, step) / (self._norm(x, control) + 1e-8)
             if not np.isfinite(correction):
                 raise Failure("the tangent matrix is singular", history)
+            if len(history) > 2 and correction > 0.8 * max(history[-1].correction, history[-2].correction):
+                x.axpy(-0.5, self.a)                # to and fro between two states: halfway ends it
+                control -= 0.5 * step
             history.append(Iteration(residual, correction, work / work0))
             problem.residual(x, control, self.F)
 
