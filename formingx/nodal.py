@@ -87,22 +87,32 @@ class NodalContact:
         """
         start = self.positions(fields, control)
         velocity = self._length * direction[self.dofs] - slope * self._motion
-        gap = -self.law.theta - self.law.tool.signed_distance(start)
-        free = gap > 0
-        times = np.full(len(start), np.inf)
-        before, at = gap, 0.0
-        for s in length * np.linspace(0, 1, 9)[1:]:
-            now = -self.law.theta - self.law.tool.signed_distance(start + s * velocity)
-            hit = free & (now <= 0) & np.isinf(times)
-            times[hit] = at + (s - at) * before[hit] / (before[hit] - now[hit])
-            before, at = now, s
-        times = np.sort(np.concatenate(self._comm.allgather(times[np.isfinite(times)])))
+        free = self.law.tool.signed_distance(start) <= -self.law.theta
+        times = self._arrivals(start, velocity, length)
+        times = np.sort(np.concatenate(self._comm.allgather(times[times < length])))
         touching = self._comm.allreduce(int(np.sum(~free & (self.area > 0))), MPI.SUM)
-        if len(times) == 0:
-            return length
-        if touching <= 1:
-            return min(length, max(times[0] * 1.001, 1e-6 * length))
-        return min(length, times[self._allowed - 1]) if len(times) >= self._allowed else length
+        if len(times) and touching <= 1:
+            return max(times[0] * 1.001, 1e-6 * length)
+        return times[self._allowed - 1] if len(times) >= self._allowed else length
+
+    def prepare(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> None:
+        """A step of this length along a tangent is about to be taken: foretell where nodes arrive."""
+        if self._memory is not None:
+            start = self.positions(fields, control)
+            velocity = self._length * direction[self.dofs] - slope * self._motion
+            times = self._arrivals(start, velocity, length)
+            self.memory = self._memory._replace(arrival=start + times[:, None] * velocity)
+
+    def _arrivals(self, start: np.ndarray, velocity: np.ndarray, length: float) -> np.ndarray:
+        """Arc length at which free nodes meet the ramp, `length` if they do not before, shape (n,)."""
+        before = -self.law.theta - self.law.tool.signed_distance(start)
+        free, at, times = before > 0, 0.0, np.full(len(start), length)
+        for s in length * np.linspace(0, 1, 17)[1:]:
+            now = -self.law.theta - self.law.tool.signed_distance(start + s * velocity)
+            hit = free & (now <= 0)
+            times[hit] = at + (s - at) * before[hit] / (before[hit] - now[hit])
+            free, before, at = free & ~hit, now, s
+        return times
 
     def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """More than twice the new nodes that a step is meant to bring into contact."""

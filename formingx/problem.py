@@ -111,6 +111,12 @@ class Problem:
         n = self._n
         return min([c.reach(x[:n], control, direction[:n], slope, length) for c in self.contacts], default=length)
 
+    def prepare(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> None:
+        """A step of this length from x along (direction, slope) is about to be taken. Arrays: own part."""
+        n = self._n
+        for contact in self.contacts:
+            contact.prepare(x[:n], control, direction[:n], slope, length)
+
     def too_far(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """True if more happened between two states than one step may bring. Arrays: own part."""
         n = self._n

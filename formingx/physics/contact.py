@@ -6,8 +6,8 @@ Song (1993), eqs. (5.7) to (5.14), per unit reference area, at a point whose sig
     tangential traction  T = k F'(d) g, not more than mu N,
 
 g being the elastic slip: the tangential motion since the point touched (entered the ramp), less what has slid. Stick is mu = inf,
-frictionless mu = 0. A touch counts from where it happens inside the step: of the motion x - x_n of a point that was out
-of touch at the last accepted state only the share s = (d + theta)/(d - d_n) counts.
+frictionless mu = 0. A point that was out of touch at the last accepted state slips from where it arrives inside the
+step, which the tangent of the path foretells: taken from the end of the step, the slip would depend on its length.
 
 Contact acts at the nodes of six-node triangles, which are the points of the Gauss-Lobatto rule on a facet (exact
 for the lumped area): there history is read where it lives.
@@ -78,12 +78,14 @@ class Contact:
 class Touch(NamedTuple):
     """What n points remember of the last accepted state, seen from the tool.
 
-    position: shape (n, 2), length; distance: signed, shape (n,), length; slip: elastic slip g, shape (n,), length.
+    position: shape (n, 2), length; distance: signed, shape (n,), length; slip: elastic slip g, shape (n,), length; arrival:
+    where the point will be when it touches, if it does in the step ahead, shape (n, 2), length.
     """
 
     position: np.ndarray
     distance: np.ndarray
     slip: np.ndarray
+    arrival: np.ndarray
 
 
 class Tractions(NamedTuple):
@@ -120,7 +122,7 @@ class Law:
 
     def start(self, x: np.ndarray) -> Touch:
         """What points at x remember before anything has happened."""
-        return Touch(x.copy(), self.tool.signed_distance(x), np.zeros(len(x)))
+        return _touch(x.copy(), self.tool.signed_distance(x), np.zeros(len(x)))
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None) -> Tractions:
         """At points x, shape (n, 2), which remember `old` (not used without friction).
@@ -136,8 +138,8 @@ class Law:
         stiffness = _outer(k * slope, n, n) + _outer(N * bend, t, t)
         zero = np.zeros(len(x))
         if self.mu == 0:
-            return Tractions(force, stiffness, Touch(x, d, zero), N, zero, zero)
-        g, dg = self._slip(x, d, near, old)
+            return Tractions(force, stiffness, _touch(x, d, zero), N, zero, zero)
+        g, dg = self._slip(x, near, old)
         T, dT = k * slope * g, (k * slope)[:, None] * dg
         rising = (np.abs(d) < self.theta) * k / (2 * self.theta)
         dT += (rising * g)[:, None] * n
@@ -151,19 +153,19 @@ class Law:
         force = force + T[:, None] * t
         stiffness = stiffness + np.einsum("ni,nj->nij", t, dT) - _outer(T * bend, n, t)
         kept = np.divide(T, k * slope, out=zero.copy(), where=slope > 0)
-        return Tractions(force, stiffness, Touch(x, d, kept), N, T, sense_now)
+        return Tractions(force, stiffness, _touch(x, d, kept), N, T, sense_now)
 
-    def _slip(self, x: np.ndarray, d: np.ndarray, near: Nearest, old: Touch) -> tuple[np.ndarray, np.ndarray]:
+    def _slip(self, x: np.ndarray, near: Nearest, old: Touch) -> tuple[np.ndarray, np.ndarray]:
         """Elastic slip g of points, shape (n,), if none slides, and its gradient, shape (n, 2)."""
-        motion = x - old.position
+        touched = old.distance > -self.theta
+        motion = x - np.where(touched[:, None], old.position, old.arrival)
         along = np.einsum("ni,ni->n", near.tangent, motion)
-        d_along = near.tangent * (1 - near.curvature * np.einsum("ni,ni->n", near.normal, motion))[:, None]
-        was, now = old.distance > -self.theta, d > -self.theta
-        arriving = now & ~was
-        span = np.where(arriving, d - old.distance, 1.0)
-        share = np.where(was, 1.0, np.where(arriving, (d + self.theta) / span, 0.0))
-        d_share = np.where(arriving, -(old.distance + self.theta) / span**2, 0.0)
-        return old.slip + share * along, share[:, None] * d_along + (along * d_share)[:, None] * near.normal
+        across = np.einsum("ni,ni->n", near.normal, motion)
+        return old.slip + along, near.tangent * (1 - near.curvature * across)[:, None]
+
+
+def _touch(x: np.ndarray, d: np.ndarray, slip: np.ndarray) -> Touch:
+    return Touch(x, d, slip, x)
 
 
 def _outer(c: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:

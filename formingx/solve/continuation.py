@@ -86,6 +86,7 @@ class _Run:
             length = problem.reach(old.x, old.control, old.direction, old.slope, self.step.length)
             limited = length < self.step.length
             target, bound, reach = self._within_reach(old, length)
+            problem.prepare(old.x, old.control, old.direction, old.slope, reach)
             try:
                 if target is None:
                     new = self.branch.step(old, length)
