@@ -1,7 +1,7 @@
 """The discrete equations of a scene, F(x, control) = 0: what `solve` sees. Everything in it is created once.
 
-x holds the fields (dimensionless, see `solid`) and, at the end of the last rank's part, one Lagrange multiplier for each
-`MeanHeld` support.
+x holds the fields (dimensionless, see `solid`) and, at the end of the last rank's part, one Lagrange multiplier for
+each `MeanHeld` support.
 """
 
 from __future__ import annotations
@@ -167,9 +167,9 @@ class Problem:
     def _dofs_of(self, support: Any, sub: Any, item: Held) -> np.ndarray:
         if item.on is not None:
             return fem.locate_dofs_topological(sub, 1, self.scene.mesh.facets_of(item.on))
-        near, (r, z) = 1e-8 * self.forms.length, item.point
+        near, point = 1e-8 * self.forms.length, np.array(item.point)[:, None]
         found = fem.locate_dofs_geometrical((sub, sub.collapse()[0]),
-                                            lambda X: np.hypot(X[0] - r, X[1] - z) < near)[0]
+                                            lambda X: np.hypot(*(X[:2] - point)) < near)[0]
         if self.comm.allreduce(len(found), MPI.MAX) == 0:
             raise InputError(f"{support!r}: the mesh has no node at this place")
         return found

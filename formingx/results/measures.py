@@ -65,7 +65,7 @@ class Probe:
         """c with c . x = sum over points and components of factors (n, 2) times u over length; owned unknowns."""
         problem = self._problem
         index_map = problem.forms.space.dofmap.index_map
-        triples = [[], []]
+        triples: list[list] = [[], []]
         for k, i in enumerate(self._mine):
             for component in (0, 1):
                 triples[0].append(index_map.local_to_global(self._dofs[k, component].astype(np.int32)))
