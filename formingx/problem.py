@@ -1,7 +1,7 @@
 """The discrete equations of a scene, F(x, control) = 0: what `solve` sees. Everything in it is created once.
 
-x holds the fields (dimensionless, see `solid`) and, at the end of the last rank's part, one Lagrange multiplier for each
-`MeanHeld` support.
+x holds the fields (dimensionless, see `solid`) and, at the end of the last rank's part, one Lagrange multiplier for
+each `MeanHeld` support.
 """
 
 from __future__ import annotations
@@ -122,6 +122,12 @@ class Problem:
         n = self._n
         return any([c.grew_too_much(old[:n], old_control, new[:n], control) for c in self.contacts])
 
+    def motion(self, control: float) -> np.ndarray:
+        """The held unknowns at their values for a control, all else 0, shape (owned part of x,)."""
+        values = np.zeros(self.x.getLocalSize())
+        values[self._held] = self._motion * control
+        return values
+
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
         """Mean over the reference volume of the product of two displacement fields: no mesh, no unit in it."""
         return self._dot(self._metric * a.array_r[: self._n], b.array_r[: self._n])
@@ -167,11 +173,11 @@ class Problem:
     def _hold(self, tangent: Any) -> None:
         """Collect what is held: `_held` (owned dofs), `_motion` (their value per control), `_bcs`, `_rows`."""
         forms, zero = self.forms, PETSc.ScalarType(0)
-        self._bcs, dofs, motion, means = [], [], [], []
+        self._bcs, dofs, motion, means = [], [np.zeros(0, dtype=np.int32)], [np.zeros(0)], []
         for support in self.scene.supports:
             for item in support.constraints():
                 if not isinstance(item, Held):
-                    means.append(forms.compile(forms.mean_row(item.component, item.on)))
+                    means.append(forms.compile(forms.mean_row(item)))
                     continue
                 sub = forms.space.sub(0).sub(item.component)
                 found = self._dofs_of(support, sub, item)
@@ -199,9 +205,9 @@ class Problem:
     def _dofs_of(self, support: Any, sub: Any, item: Held) -> np.ndarray:
         if item.on is not None:
             return fem.locate_dofs_topological(sub, 1, self.scene.mesh.facets_of(item.on))
-        near, (r, z) = 1e-8 * self.forms.length, item.point
+        near, point = 1e-8 * self.forms.length, np.array(item.point)[:, None]
         found = fem.locate_dofs_geometrical((sub, sub.collapse()[0]),
-                                            lambda X: np.hypot(X[0] - r, X[1] - z) < near)[0]
+                                            lambda X: np.hypot(*(X[:2] - point)) < near)[0]
         if self.comm.allreduce(len(found), MPI.MAX) == 0:
             raise InputError(f"{support!r}: the mesh has no node at this place")
         return found

@@ -65,7 +65,7 @@ class Probe:
         """c with c . x = sum over points and components of factors (n, 2) times u over length; owned unknowns."""
         problem = self._problem
         index_map = problem.forms.space.dofmap.index_map
-        triples = [[], []]
+        triples: list[list] = [[], []]
         for k, i in enumerate(self._mine):
             for component in (0, 1):
                 triples[0].append(index_map.local_to_global(self._dofs[k, component].astype(np.int32)))
@@ -153,11 +153,12 @@ class _Form(Bound):
 
 
 class Target(NamedTuple):
-    """What a run aims at: a measure (by name) and its value."""
+    """What a run aims at: a measure (by name), its value, and whether it changes sign with the control."""
 
     name: str
     value: float
     bind: Any
+    signed: bool = True
 
     def __str__(self) -> str:
         return f"{self.name.replace('_', ' ')} = {self.value:g}"
@@ -180,7 +181,7 @@ def pole_height(value: float) -> Target:
 
 def pole_stretch(value: float) -> Target:
     """The in-plane stretch at the pole, (thickness/original)^(-1/2), reaches `value`."""
-    return Target("pole_stretch", positive("pole_stretch", value), bind_pole_stretch)
+    return Target("pole_stretch", positive("pole_stretch", value), bind_pole_stretch, signed=False)
 
 
 def enclosed_volume(value: float) -> Target:

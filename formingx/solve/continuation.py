@@ -45,7 +45,8 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
         ConvergenceError: the target was not reached. It carries the path so far and says what to try.
     """
     if scene.driven is None:
-        raise InputError("trace: nothing is driven: give one load no value, Pressure('bottom'), or one Displaced support")
+        raise InputError("trace: nothing is driven: give one load no value, as Pressure('bottom'), or"
+                         " add a Displaced support")
     problem = Problem(scene)
     run = _Run(problem, until, through, replace(step or StepControl()), tolerances or Tolerances())
     return run.trace(count("trace: max_steps", max_steps), progress)
@@ -56,7 +57,7 @@ class _Run:
 
     def __init__(self, problem: Problem, until: measures.Target, through: Sequence[measures.Target],
                  step: StepControl, tolerances: Tolerances):
-        self.until, self.step = until, step
+        self.until, self.step, self._best = until, step, 0.0
         self.open = [(target, target.bind(problem)) for target in (*through, until)]
         self.branch = Branch(problem, tolerances)
         self.path = Path(problem, self.branch)
@@ -65,7 +66,7 @@ class _Run:
         path, began = self.path, time.perf_counter()
         bar = _progress_bar(path.problem.comm, self.until, progress)
         try:
-            self._record(self.branch.start())
+            self._record(self._facing_target(self.branch.start()))
             while self._is_open(self.until):
                 if path.counts.steps >= max_steps:
                     self._give_up(f"{max_steps} states were accepted before it")
@@ -73,11 +74,22 @@ class _Run:
                     self._record(state)
                     if path.problem.memory or not self._is_open(self.until) and state.met is self.until:
                         break                           # with a history, the rest of the step starts from here
+                self._check_direction()
                 _show(bar, path, self.until)
         finally:
             bar.close()
             path.counts.seconds += time.perf_counter() - began
         return path
+
+    def _facing_target(self, start: State) -> State:
+        """The start, its tangent turned if a target that changes sign with the control lies the other way."""
+        if self.until.signed:
+            bound = next(b for t, b in self.open if t is self.until)
+            now = self.branch.value(bound, start.x, start.control)
+            ahead = self.branch.value(bound, start.x + start.direction, start.control + start.slope)
+            if (ahead - now) * (self.until.value - now) < 0:
+                start.direction, start.slope = -start.direction, -start.slope
+        return start
 
     def _next(self, old: State) -> State:
         """The next state: at a target within reach, or one step ahead; failures halve the step."""
@@ -107,9 +119,25 @@ class _Run:
                 if not self.step.failed():
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}")
 
+    def _check_direction(self) -> None:
+        """Stop if the path has turned back: its target further away than half of what had been gained.
+
+        (A control may fall again after a limit point, but not below where it started.)
+        """
+        if not self._is_open(self.until):
+            return
+        bound = next(b for t, b in self.open if t is self.until)
+        start = self.path.value(bound, self.path.states[0])
+        gained = (self.path.value(bound, self.path.last) - start) / (self.until.value - start)
+        self._best = max(self._best, gained)
+        kept = 0.0 if self.until.bind is measures.bind_control else 0.5
+        if self._best > 0.05 and gained < kept * self._best:
+            self._give_up("the path turned back, which a crease at a singular corner (a clamped rim on a fine mesh) can"
+                          " cause")
+
     def _within_reach(self, old: State, length: float) -> tuple:
         """(target, its measure, distance) of the first open target that the tangent meets within `length`."""
-        best = (None, None, length)
+        best: tuple = (None, None, length)
         for target, bound in self.open:
             now = self.branch.value(bound, old.x, old.control)
             ahead = self.branch.value(bound, old.x + length * old.direction, old.control + length * old.slope)
@@ -153,7 +181,7 @@ class _Run:
         return any(t is target for t, _ in self.open)
 
     def _give_up(self, why: str) -> None:
-        raise self._error(f"{why}.") from None
+        raise self._error(f"{why}.")
 
     def _error(self, why: str) -> ConvergenceError:
         """What happened, what was met, what to try."""

@@ -13,11 +13,10 @@ from ..errors import ConvergenceError, InputError, count, finite
 from ..problem import Problem
 from ..results.path import Path
 from ..scene import Scene
-from .bordered import Iteration, Tolerances
+from .bordered import UNLOADED, Iteration, Tolerances
 from .branch import Branch
 from .direct import configure
 from .stepping import StepControl
-
 
 _prefixes = itertools.count()
 
@@ -30,7 +29,8 @@ class FixedControl:
 
     def __init__(self, problem: Any, tolerances: Tolerances):
         self._problem, self._tolerances = problem, tolerances
-        self._control, self._work, self.history = 0.0, 0.0, []
+        self._control, self._work = 0.0, 0.0
+        self.history: list[Iteration] = []
         self._snes = PETSc.SNES().create(problem.comm)
         self._snes.setType("newtonls")
         self._snes.setFunction(self._function, problem.x.duplicate())
@@ -62,16 +62,14 @@ class FixedControl:
 
     def _test(self, snes: Any, iteration: int, norms: tuple) -> int:
         size, step, residual = norms
-        relative = residual / (self._problem.force_scale + 1e-12)
+        relative = residual / (self._problem.force_scale + UNLOADED)
         correction = step / (size + 1e-8) if iteration else 1.0
         work = abs(snes.getFunction()[0].dot(snes.getSolutionUpdate())) if iteration else 0.0
         self._work = self._work or work
         self.history.append(Iteration(relative, correction, work / self._work if self._work else 1.0))
         if not np.isfinite(relative):
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
-        before = self.history[-2].correction if iteration > 1 else 1.0
-        ahead = correction * min(1.0, correction / before) ** 2
-        if iteration and relative < self._tolerances.residual and ahead < self._tolerances.correction:
+        if self._tolerances.met([i.correction for i in self.history[1:]], relative):
             return PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE
         return PETSc.SNES.ConvergedReason.ITERATING
 
@@ -91,7 +89,8 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
         ConvergenceError: an increment did not converge; it carries the path so far.
     """
     if scene.driven is None:
-        raise InputError("solve: nothing is driven: give one load no value, Pressure('bottom'), or one Displaced support")
+        raise InputError("solve: nothing is driven: give one load no value, as Pressure('bottom'), or"
+                         " add a Displaced support")
     to, increments = finite("solve: to", to), count("solve: increments", increments)
     problem, began = Problem(scene), time.perf_counter()
     tolerances = tolerances or Tolerances()
@@ -105,9 +104,9 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
         if 1 - fraction < 1e-9:
             fraction = 1.0
         control = fraction * to / problem.forms.control_scale
-        lead = (control - old.control) / old.slope if old.kind != "start" else 0.0
+        lead = (control - old.control) / old.slope           # along the tangent, as far as the control asks
         problem.prepare(old.x, old.control, old.direction, old.slope, lead)
-        x.array_w[:] = old.x + lead * old.direction          # along the tangent, as far as the control asks
+        x.array_w[:] = old.x + (lead * old.direction if old.kind != "start" else problem.motion(control))
         converged = newton.solve(x, control)
         path.counts.iterations += len(newton.history) - 1
         if converged:
