@@ -91,9 +91,8 @@ class NodalContact:
         times = self._arrivals(start, velocity, length)
         times = np.sort(np.concatenate(self._comm.allgather(times[times < length])))
         touching = self._comm.allreduce(int(np.sum(~free & (self.area > 0))), MPI.SUM)
-        if len(times) and touching <= 1:
-            return max(times[0] * 1.001, 1e-6 * length)
-        return times[self._allowed - 1] if len(times) >= self._allowed else length
+        allowed = self._allowed if touching > 1 else 1
+        return max(1.001 * times[allowed - 1], 0.02 * length) if len(times) >= allowed else length
 
     def prepare(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> None:
         """A step of this length along a tangent is about to be taken: foretell where nodes arrive."""

@@ -115,7 +115,7 @@ class _Run:
             except Failure as failure:
                 self.path.counts.failures += 1
                 self.step.length = length
-                log.info("a step of length %.3g failed: %s %s", length, failure.reason, [f"{i.correction:.1e}" for i in failure.history])
+                log.info("a step of length %.3g failed: %s", length, failure.reason)
                 if not self.step.failed():
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}")
 
@@ -175,7 +175,7 @@ class _Run:
         path.record(state)
         path.counts.iterations = self.branch.iterations
         self.open = [(t, b) for t, b in self.open if t is not state.met]
-        log.info("state %d: %s, %d iterations", path.counts.steps, path.describe(state), len(state.history) - 1, );log.info("   %s",[f"{i.correction:.1e}" for i in state.history])
+        log.info("state %d: %s, %d iterations", path.counts.steps, path.describe(state), len(state.history) - 1)
 
     def _is_open(self, target: measures.Target) -> bool:
         return any(t is target for t, _ in self.open)
