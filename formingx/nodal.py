@@ -56,9 +56,12 @@ class NodalContact:
         """Add the nodal forces to the owned residual."""
         values[self.dofs] += self._scale[:, None] * self.tractions(fields, control).force
 
-    def stiffness(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Derivative of the nodal forces by the nodes' own unknowns, shape (n, 2, 2)."""
-        return (self._scale * self._length)[:, None, None] * self.tractions(fields, control).stiffness
+    def stiffness(self, fields: np.ndarray, control: float, ahead: bool = False) -> np.ndarray:
+        """Derivative of the nodal forces by the nodes' own unknowns, shape (n, 2, 2); `ahead`: see `Law.stiffness_ahead`."""
+        values = self.tractions(fields, control).stiffness
+        if ahead and self._memory is not None:
+            values = self.law.stiffness_ahead(self.positions(fields, control), self._memory)
+        return (self._scale * self._length)[:, None, None] * values
 
     def add_control_derivative(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Add the derivative of the nodal forces by the control: the tool moves."""

@@ -86,11 +86,14 @@ class Problem:
         values[self._held] = fields[self._held] - self._motion * control
         self.fill(out, values, [self._dot(row, fields) for row in self._rows])
 
-    def tangent(self, x: PETSc.Vec, control: float) -> PETSc.Mat:
-        """dF/dx at (x, control): `matrix`, refilled."""
+    def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> PETSc.Mat:
+        """dF/dx at (x, control): `matrix`, refilled.
+
+        `ahead`: as it will be in the step ahead of an accepted state, where F has a kink there.
+        """
         self.set_state(x, control)
         fields = x.array_r[: self._n]
-        return self._matrix.fill([(c.dofs, c.stiffness(fields, control)) for c in self.contacts])
+        return self._matrix.fill([(c.dofs, c.stiffness(fields, control, ahead)) for c in self.contacts])
 
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         """out = dF/dcontrol at (x, control)."""

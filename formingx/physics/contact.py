@@ -41,8 +41,8 @@ class Contact:
         InputError: an argument that is not allowed.
     """
 
-    def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float = 1e4,
-                 ramp: float = 3e-3, nodes_per_step: int = 2, moves: tuple[float, float] | None = None):
+    def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float = 2e4,
+                 ramp: float = 1e-3, nodes_per_step: int = 2, moves: tuple[float, float] | None = None):
         name = f"Contact({on!r})"
         if not isinstance(tool, Tool):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
@@ -153,7 +153,19 @@ class Law:
         force = force + T[:, None] * t
         stiffness = stiffness + np.einsum("ni,nj->nij", t, dT) - _outer(T * bend, n, t)
         kept = np.divide(T, k * slope, out=zero.copy(), where=slope > 0)
+        kept *= 1 + 1e-9 * np.abs(sense_now)                 # what slides goes on sliding, whatever round-off says
         return Tractions(force, stiffness, _touch(x, d, kept), N, T, sense_now)
+
+    def stiffness_ahead(self, x: np.ndarray, old: Touch) -> np.ndarray:
+        """The stiffness with points that have just touched, or are about to, pressed halfway into the ramp.
+
+        At the foot of the ramp they have none, and the tangent of the path would let them slip where they will stick.
+        """
+        near, now = self.tool.nearest(x), self.tractions(x, old)
+        touching = (near.distance > -1.05 * self.theta) & (now.sense == 0)
+        press = np.where(touching, np.maximum(-0.5 * self.theta - near.distance, 0.0), 0.0)
+        pressed = self.tractions(x + press[:, None] * near.normal, old._replace(distance=near.distance + press, position=x))
+        return np.where((press > 0)[:, None, None], pressed.stiffness, now.stiffness)
 
     def _slip(self, x: np.ndarray, near: Nearest, old: Touch) -> tuple[np.ndarray, np.ndarray]:
         """Elastic slip g of points, shape (n,), if none slides, and its gradient, shape (n, 2)."""

@@ -74,9 +74,12 @@ class BorderedNewton:
         new = problem.x.duplicate
         self.F, self.F_control, self.gradient, self.a, self.b = new(), new(), new(), new(), new()
 
-    def tangent(self, x: PETSc.Vec, control: float) -> bool:
-        """`self.b` = dx/dcontrol along the path at a solution; False if the tangent matrix is singular."""
-        self.problem.tangent(x, control)
+    def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> bool:
+        """`self.b` = dx/dcontrol along the path at a solution; False if the tangent matrix is singular.
+
+        `ahead`: see `Problem.tangent`.
+        """
+        self.problem.tangent(x, control, ahead)
         if not self.solver.factorise():
             return False
         self.problem.control_derivative(x, control, self.F_control)

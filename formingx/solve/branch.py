@@ -57,6 +57,15 @@ class Branch:
         self.newton.tangent(x, control)
         return self._state(control, history, "step", before)
 
+    def look_ahead(self, state: State) -> None:
+        """The tangent of an accepted state once more: the problem remembers the state now."""
+        self._x.array_w[:] = state.x
+        if self.newton.tangent(self._x, state.control, ahead=True):
+            size = self.norm(self.newton.b, 1.0)
+            direction, slope = self.newton.b.array_r / size, 1 / size
+            sense = np.sign(self._inner(direction, slope, state.direction, state.slope)) or 1.0
+            state.direction, state.slope = sense * direction, sense * slope
+
     def step(self, old: State, length: float) -> State:
         """One step: predict along the tangent, correct in the plane normal to it at that distance (4.14 to 4.31)."""
         x, control = old.x + length * old.direction, old.control + length * old.slope
