@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import basix.ufl
 import numpy as np
@@ -35,7 +35,10 @@ class Response:
         inputs = [ufl.Constant(mesh) for _ in range(3 + len(names))]
         l = [ufl.variable(c) for c in inputs[:3]]
         F = ufl.as_tensor([[l[0], 0, 0], [0, l[1], 0], [0, 0, l[2]]])
-        W = expand_indices(expand_derivatives(ufl.as_ufl(energy(F, **dict(zip(names, inputs[3:], strict=True))))))
+        W = ufl.as_ufl(energy(F, **dict(zip(names, inputs[3:], strict=True))))
+        if W.ufl_shape != ():
+            raise InputError(f"a strain energy must be a scalar, this one has the shape {W.ufl_shape}")
+        W = expand_indices(expand_derivatives(W))
         first = [expand_derivatives(ufl.diff(W, x)) for x in l]
         second = [expand_derivatives(ufl.diff(first[i], l[j])) for i in range(3) for j in range(i, 3)]
         self._first, self._all = _Program(inputs, first), _Program(inputs, first + second)
@@ -80,6 +83,64 @@ def along(mode: str, stretches: Any) -> np.ndarray:
 def _three(stretches: Any) -> np.ndarray:
     l1, l2 = np.asarray(stretches, float)
     return np.stack([l1, l2, 1 / (l1 * l2)])
+
+
+class Stability(NamedTuple):
+    """Where a material is stable.
+
+    stretches: the range that was asked for.
+    load, drucker: {mode: (lowest, highest)}, the part of it around l = 1 where each criterion holds.
+    """
+
+    stretches: tuple[float, float]
+    load: dict[str, tuple[float, float]]
+    drucker: dict[str, tuple[float, float]]
+
+    @property
+    def stable(self) -> bool:
+        """True if both criteria hold in the whole range in every test."""
+        return all(part == self.stretches for parts in (self.load, self.drucker) for part in parts.values())
+
+    def __str__(self) -> str:
+        low, high = self.stretches
+        if self.stable:
+            return f"stable at stretches from {low:g} to {high:g} in {', '.join(self.load)} tension"
+        bounds: dict[tuple, list[str]] = {}
+        for what, parts in (("the force rises", self.load), ("Drucker's criterion holds", self.drucker)):
+            for mode, part in parts.items():
+                if part != self.stretches:
+                    bounds.setdefault((mode, *part), []).append(what)
+        return "; ".join(f"{mode}: {' and '.join(what)} only at stretches from {a:.5g} to {b:.5g}"
+                         for (mode, a, b), what in bounds.items())
+
+
+def stability(response: Response, constants: Any, low: float, high: float) -> Stability:
+    """See `Material.check_stability`. Bounds are searched for in 400 steps of equal ratio and then bisected."""
+    constants = list(constants)
+
+    def margins(mode: str, l: np.ndarray) -> np.ndarray:
+        """l^2 dP/dl and the smaller eigenvalue of the Hessian, over the size of their terms, shape (2, n)."""
+        tau, K = response.logarithmic(along(mode, l), constants)
+        size = np.abs(K).max((0, 1)) + np.abs(tau).max(0)
+        slope = K[0, 0] + MODES[mode] * K[0, 1] - tau[0]
+        smaller = (K[0, 0] + K[1, 1]) / 2 - np.hypot((K[0, 0] - K[1, 1]) / 2, K[0, 1])
+        return np.stack([slope, smaller]) / size
+
+    def end(mode: str, criterion: int, far: float) -> float:
+        def holds(l: np.ndarray) -> np.ndarray:
+            return margins(mode, l)[criterion] > -1e-14       # round-off; not a number counts as unstable
+        l = np.geomspace(1, far, 400)
+        bad = np.flatnonzero(~holds(l))
+        if not len(bad):
+            return far
+        a, b = l[max(bad[0] - 1, 0)], l[bad[0]]
+        for _ in range(50):
+            middle = (a + b) / 2
+            a, b = (middle, b) if holds(np.array([middle]))[0] else (a, middle)
+        return float(a)
+
+    parts = [{mode: (end(mode, criterion, low), end(mode, criterion, high)) for mode in MODES} for criterion in (0, 1)]
+    return Stability((low, high), *parts)
 
 
 class _Program:
