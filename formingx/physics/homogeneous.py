@@ -43,6 +43,7 @@ class Response:
         second = [expand_derivatives(ufl.diff(first[i], l[j])) for i in range(3) for j in range(i, 3)]
         self._first, self._all = _Program(inputs, first), _Program(inputs, first + second)
 
+    @np.errstate(all="ignore")
     def stress(self, stretches: Any, constants: Any) -> np.ndarray:
         """Nominal stresses P_i, shape (2, n), in directions 1 and 2 of a sheet free of stress in direction 3.
 
@@ -61,6 +62,7 @@ class Response:
         values = self._all(np.asarray(stretches, float), constants)
         return values[:3], values[3:][[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
 
+    @np.errstate(all="ignore")
     def logarithmic(self, stretches: Any, constants: Any) -> tuple[np.ndarray, np.ndarray]:
         """Gradient (2, n) and Hessian (2, 2, n) of W in the strains ln l1, ln l2 with l1 l2 l3 = 1.
 
@@ -160,12 +162,12 @@ class _Program:
                 place[node] = len(inputs) + len(self._steps) - 1
         self._outputs = [place[x] for x in outputs]
 
+    @np.errstate(all="ignore")
     def __call__(self, stretches: np.ndarray, constants: Any) -> np.ndarray:
         """The outputs, shape (number of outputs, n)."""
         values = [*stretches, *constants]
-        with np.errstate(all="ignore"):
-            for operation, operands in self._steps:
-                values.append(operation(*[values[i] for i in operands]))
+        for operation, operands in self._steps:
+            values.append(operation(*[values[i] for i in operands]))
         return np.stack([np.broadcast_to(values[i], stretches.shape[1:]) for i in self._outputs]).astype(float)
 
 
