@@ -53,34 +53,35 @@ def fit(material: type[Material] | Material, data: dict[str, Any], terms: int | 
 
     stretches, measured, parts = _checked(data)
     guesses = _guesses(material, stretches, measured, terms)
-    first = guesses[0]
-    response, n = first.response, len(first.parameters)
+    response, n = guesses[0].response, len(guesses[0].parameters)
     if len(measured) < n:
-        raise InputError(f"fit: {len(measured)} points cannot fix the {n} constants of {type(first).__name__}")
+        raise InputError(f"fit: {len(measured)} points cannot fix the {n} constants of {type(guesses[0]).__name__}")
     scale = np.abs(measured).max()
 
-    def refined(guess: Material, evaluations: int) -> tuple[float, Material] | None:
-        """(cost, material) after so many evaluations; None if the guess has no finite stress at some stretch."""
-        start, low, high = np.array(guess.coordinates()).T
+    def refined(guess: Material, start: Any, evaluations: int) -> tuple[float, Material, np.ndarray]:
+        """(cost, guess, coordinates) after so many evaluations; the cost is infinite where the stress is."""
+        low, high = np.array([bounds for _, *bounds in guess.coordinates()]).T
 
         def residual(x):
             return (response.stress(stretches, guess.constants_at(x))[0] - measured) / scale
 
         start = np.clip(start, low + 1e-9 * np.abs(start), high - 1e-9 * np.abs(start))
         if not np.all(np.isfinite(residual(start))):
-            return None
+            return np.inf, guess, start
         # a step to where the stress is not finite is shortened by least_squares itself
         found = least_squares(residual, start, bounds=(low, high), x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12,
                               max_nfev=evaluations)
-        return found.cost, guess.with_constants(guess.constants_at(found.x))
+        return found.cost, guess, found.x
 
-    for evaluations, kept in ((_FIRST, 3), (_LAST, 1)):
-        results = [r for r in (refined(guess, evaluations) for guess in guesses) if r is not None]
-        guesses = [m for _, m in sorted(results, key=lambda r: r[0])[:kept]]
-    if not guesses:
-        raise InputError(f"fit: {first} has no finite stress at some stretch of the data: start with constants whose"
+    def cost(trial: tuple) -> float:
+        return trial[0]
+
+    trials = sorted((refined(g, [x for x, *_ in g.coordinates()], _FIRST) for g in guesses), key=cost)
+    least, guess, x = min((refined(g, x, _LAST) for _, g, x in trials[:3]), key=cost)
+    if not np.isfinite(least):
+        raise InputError(f"fit: {guess} has no finite stress at some stretch of the data: start with constants whose"
                          f" limit lies beyond them")
-    best = guesses[0]
+    best = guess.with_constants(guess.constants_at(x))
     misfit = response.stress(stretches, best.parameters.values())[0] - measured
     rms = {mode: _rms(misfit[part]) for mode, part in parts.items()}
     return Fit(best, rms, _rms(misfit))

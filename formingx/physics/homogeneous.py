@@ -91,10 +91,12 @@ class Stability(NamedTuple):
     """Where a material is stable.
 
     stretches: the range that was asked for.
-    load, drucker: {mode: (lowest, highest)}, the part of it around l = 1 where each criterion holds.
+    finite, load, drucker: {mode: (lowest, highest)}, the part of it around l = 1 where the stress is finite, and where
+        each criterion holds.
     """
 
     stretches: tuple[float, float]
+    finite: dict[str, tuple[float, float]]
     load: dict[str, tuple[float, float]]
     drucker: dict[str, tuple[float, float]]
 
@@ -108,11 +110,12 @@ class Stability(NamedTuple):
         if self.stable:
             return f"stable at stretches from {low:g} to {high:g} in {', '.join(self.load)} tension"
         bounds: dict[tuple, list[str]] = {}
-        for what, parts in (("the force rises", self.load), ("Drucker's criterion holds", self.drucker)):
+        for what, parts in (("the stress is finite", self.finite), ("the force rises", self.load),
+                            ("Drucker's criterion holds", self.drucker)):
             for mode, part in parts.items():
                 if part != self.stretches:
                     bounds.setdefault((mode, *part), []).append(what)
-        return "; ".join(f"{mode}: {' and '.join(what)} only at stretches from {a:.5g} to {b:.5g}"
+        return "; ".join(f"{mode}: {', '.join(what)} only at stretches from {a:.5g} to {b:.5g}"
                          for (mode, a, b), what in bounds.items())
 
 
@@ -120,13 +123,14 @@ def stability(response: Response, constants: Any, low: float, high: float) -> St
     """See `Material.check_stability`. Bounds are searched for in 400 steps of equal ratio and then bisected."""
     constants = list(constants)
 
+    @np.errstate(all="ignore")
     def margins(mode: str, l: np.ndarray) -> np.ndarray:
-        """l^2 dP/dl and the smaller eigenvalue of the Hessian, over the size of their terms, shape (2, n)."""
+        """1, l^2 dP/dl and the smaller eigenvalue of the Hessian, over the size of their terms, shape (3, n)."""
         tau, K = response.logarithmic(along(mode, l), constants)
         size = np.abs(K).max((0, 1)) + np.abs(tau).max(0)
         slope = K[0, 0] + MODES[mode] * K[0, 1] - tau[0]
         smaller = (K[0, 0] + K[1, 1]) / 2 - np.hypot((K[0, 0] - K[1, 1]) / 2, K[0, 1])
-        return np.stack([slope, smaller]) / size
+        return np.stack([size, slope, smaller]) / size
 
     def end(mode: str, criterion: int, far: float) -> float:
         def holds(l: np.ndarray) -> np.ndarray:
@@ -141,7 +145,8 @@ def stability(response: Response, constants: Any, low: float, high: float) -> St
             a, b = (middle, b) if holds(np.array([middle]))[0] else (a, middle)
         return float(a)
 
-    parts = [{mode: (end(mode, criterion, low), end(mode, criterion, high)) for mode in MODES} for criterion in (0, 1)]
+    parts = [{mode: (end(mode, criterion, low), end(mode, criterion, high)) for mode in MODES}
+             for criterion in range(3)]
     return Stability((low, high), *parts)
 
 

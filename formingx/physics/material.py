@@ -7,6 +7,7 @@ with that form than with the isochoric part of F: see the notes on incompressibi
 
 from __future__ import annotations
 
+import copy
 import functools
 import math
 from typing import Any
@@ -125,7 +126,7 @@ class Material:
         return axes
 
     def check(self) -> None:
-        """Raise an InputError unless constants are finite and the material has a positive stiffness at rest."""
+        """Raise an InputError unless the constants are admissible: finite, with a positive stiffness at rest."""
         for name, value in self.parameters.items():
             finite(f"{self}: {name}", value)
         mu = self.shear_modulus
@@ -148,7 +149,10 @@ class Material:
 
     def with_constants(self, constants: Any) -> Material:
         """The same kind of material with other constants, in the order of `parameters`."""
-        return type(self)(**dict(zip(self.parameters, map(float, constants), strict=True)))
+        other = copy.copy(self)                             # with its `response`, which holds for any constants
+        other.parameters = dict(zip(self.parameters, map(float, constants), strict=True))
+        other.check()
+        return other
 
     def _check_isotropic(self) -> None:
         """Turning the stretches round must turn the stresses round."""

@@ -47,11 +47,14 @@ class MooneyRivlin(Material):
 
     def __init__(self, *, c10: float, c01: float):
         self.parameters = {"c10": c10, "c01": c01}
+        self.check()
+
+    def check(self):
         for name, value in self.parameters.items():
             if finite(f"{self}: {name}", value) < 0:
                 raise InputError(f"{self} is not stable: with {name} < 0 the energy falls without bound at large"
                                  f" stretch; {name} must be at least 0")
-        self.check()
+        super().check()
 
     def strain_energy(self, F, c10, c01):
         I1, I2 = kinematics.invariants(F)
@@ -76,13 +79,17 @@ class Yeoh(Material):
 
     def __init__(self, *, c10: float, c20: float, c30: float):
         self.parameters = {"c10": c10, "c20": c20, "c30": c30}
+        self.check()
+
+    def check(self):
         for name, value in self.parameters.items():
             finite(f"{self}: {name}", value)
+        c10, c20, c30 = self.parameters.values()
         positive(f"{self}: c10", c10)
         if c30 < 0 or c20 < 0 and c20**2 >= 3 * c10 * c30:
             raise InputError(f"{self} is not stable: its energy does not grow with I1 everywhere; c30 must be at least 0"
                              f" and c20 greater than -sqrt(3 c10 c30) = {-math.sqrt(max(3 * c10 * c30, 0)):.6g}")
-        self.check()
+        super().check()
 
     def strain_energy(self, F, c10, c20, c30):
         x = ufl.inner(F, F) - 3
@@ -93,13 +100,13 @@ class Yeoh(Material):
         return [cls(c10=modulus / 2, c20=0, c30=0.1 * modulus / I1**2)]
 
     def coordinates(self):
-        """c10, c20 + sqrt(3 c10 c30) and sqrt(c30): admissible where none is negative."""
+        """c10, c20 + 0.99 sqrt(3 c10 c30) and sqrt(c30): admissible, with 1 % to spare, where none is negative."""
         c10, c20, c30 = self.parameters.values()
-        return [(x, 0, math.inf) for x in (c10, c20 + math.sqrt(3 * c10 * c30), math.sqrt(c30))]
+        return [(x, 0, math.inf) for x in (c10, c20 + 0.99 * math.sqrt(3 * c10 * c30), math.sqrt(c30))]
 
     def constants_at(self, coordinates):
         c10, above, root = coordinates
-        return [c10, above - root * math.sqrt(3 * c10), root**2]
+        return [c10, above - 0.99 * root * math.sqrt(3 * c10), root**2]
 
 
 class Gent(Material):
@@ -112,9 +119,12 @@ class Gent(Material):
 
     def __init__(self, *, mu: float, Jm: float):
         self.parameters = {"mu": mu, "Jm": Jm}
+        self.check()
+
+    def check(self):
         for name, value in self.parameters.items():
             positive(f"{self}: {name}", value)
-        self.check()
+        super().check()
 
     @property
     def largest_I1(self):
@@ -146,10 +156,14 @@ class ArrudaBoyce(Material):
 
     def __init__(self, *, mu: float, N: float):
         self.parameters = {"mu": mu, "N": N}
+        self.check()
+
+    def check(self):
+        mu, N = self.parameters.values()
         positive(f"{self}: mu", mu)
         if finite(f"{self}: N", N) <= 1:
             raise InputError(f"{self}: N = {N!r}: must be greater than 1, or the chains are fully stretched at rest")
-        self.check()
+        super().check()
 
     @property
     def largest_I1(self):
@@ -182,15 +196,21 @@ class Ogden(Material):
         if len(mu) != len(alpha) or not mu:
             raise InputError(f"Ogden: mu = {mu!r} and alpha = {alpha!r} must be as many, and at least one each")
         self.parameters = {f"mu{k}": m for k, m in enumerate(mu, 1)} | {f"alpha{k}": a for k, a in enumerate(alpha, 1)}
-        for m, a in zip(mu, alpha, strict=True):
+        self.check()
+
+    def check(self):
+        for m, a in self._pairs(self.parameters):
             if not finite(f"{self}: mu", m) * finite(f"{self}: alpha", a) > 0:
                 raise InputError(f"{self} is not stable: the pair mu = {m!r}, alpha = {a!r} has mu alpha <= 0;"
                                  f" every pair must have mu alpha > 0")
-        self.check()
+        super().check()
 
     def strain_energy(self, F, **constants):
-        pairs = [(constants[f"mu{k}"], constants[f"alpha{k}"]) for k in range(1, len(constants) // 2 + 1)]
-        return sum(m / a * (kinematics.sum_of_powers(F, a) - 3) for m, a in pairs)
+        return sum(m / a * (kinematics.sum_of_powers(F, a) - 3) for m, a in self._pairs(constants))
+
+    @staticmethod
+    def _pairs(constants):
+        return [(constants[f"mu{k}"], constants[f"alpha{k}"]) for k in range(1, len(constants) // 2 + 1)]
 
     @classmethod
     def guesses(cls, modulus, I1, terms):
@@ -199,7 +219,8 @@ class Ogden(Material):
         n = count("fit: terms", 3 if terms is None else terms)
         if n > len(exponents):
             raise InputError(f"fit: terms = {terms!r}: Ogden can be fitted with at most {len(exponents)}")
-        return [cls(mu=[2 * modulus / n / a / 4 ** max(abs(a) - 2, 0) for a in some], alpha=some)
+        first = cls(mu=[modulus] * n, alpha=[2.0] * n)
+        return [first.with_constants([2 * modulus / n / a / 4 ** max(abs(a) - 2, 0) for a in some] + list(some))
                 for some in itertools.combinations(exponents, n)]
 
     def coordinates(self):
@@ -207,10 +228,6 @@ class Ogden(Material):
         values = list(self.parameters.values())
         largest = [math.inf] * (len(values) // 2) + [30.0] * (len(values) // 2)
         return [(x, 0, top) if x > 0 else (x, -top, 0) for x, top in zip(values, largest, strict=True)]
-
-    def with_constants(self, constants):
-        values = [float(c) for c in constants]
-        return Ogden(mu=values[: len(values) // 2], alpha=values[len(values) // 2:])
 
 
 class Hyperelastic(Material):
@@ -237,9 +254,6 @@ class Hyperelastic(Material):
     def strain_energy(self, F, **constants):
         arguments = kinematics.invariants(F) if self._of == "invariants" else (F,)
         return self._energy(*arguments, **constants)
-
-    def with_constants(self, constants):
-        return Hyperelastic(self._energy, self._of, **dict(zip(self.parameters, map(float, constants), strict=True)))
 
 
 def _ln(x: Any) -> Any:
