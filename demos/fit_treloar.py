@@ -15,7 +15,7 @@ TITLES = {"uniaxial": "uniaxial tension", "pure_shear": "pure shear (planar tens
 
 
 def gent_gent(I1, I2, mu, Jm, c2):
-    """A user's own energy: Gent's, and a term in I2 (Pucci and Saccomandi, 2002). The root makes it end at its limit."""
+    """A user's own energy: Gent's and a term in I2 (Pucci and Saccomandi, 2002). The root ends it at its limit."""
     return -mu * Jm * ufl.ln(ufl.sqrt(1 - (I1 - 3) / Jm)) + c2 * ufl.ln(I2 / 3)
 
 
@@ -83,7 +83,9 @@ def main():
         "data": "Treloar 1944, vulcanised rubber, digitised; nominal stress in MPa; unweighted joint least squares",
         "points": {mode: len(stretch) for mode, (stretch, _) in fx.treloar1944().items()},
         "fits": {name: {
-            "constants_MPa": dict(result.material.parameters), "rms_MPa": result.rms_total, "rms_by_test_MPa": result.rms,
+            "constants_MPa": dict(result.material.parameters),
+            "rms_MPa": result.rms_total,
+            "rms_by_test_MPa": result.rms,
             "shear_modulus_MPa": result.material.shear_modulus,
             "stable_0.5_to_7.6": result.material.check_stability((0.5, 7.6)).stable,
         } for name, result in found.items()},

@@ -10,7 +10,6 @@ from .errors import InputError, known
 from .physics import homogeneous
 from .physics.material import Material
 
-
 _FIRST, _LAST = 20, 400
 """Evaluations for every first guess, and then for the best three."""
 
@@ -118,11 +117,11 @@ def _checked(data: Any) -> tuple[np.ndarray, np.ndarray, dict[str, slice]]:
         except (TypeError, ValueError):
             raise InputError(f"fit: data[{mode!r}]: must be (stretch, nominal stress), numbers") from None
         if l.ndim != 1 or l.shape != P.shape or not len(l):
-            raise InputError(f"fit: data[{mode!r}]: stretch has the shape {l.shape}, stress {P.shape}: must be (n,), the"
-                             f" same for both")
+            raise InputError(f"fit: data[{mode!r}]: stretch has the shape {l.shape}, stress {P.shape}: must be (n,),"
+                             f" the same for both")
         for i in np.flatnonzero(~(np.isfinite(l) & np.isfinite(P) & (l > 0)))[:1]:
-            raise InputError(f"fit: data[{mode!r}], point {i}: stretch = {l[i]}, stress = {P[i]}: must be finite, and the"
-                             f" stretch greater than 0")
+            raise InputError(f"fit: data[{mode!r}], point {i}: stretch = {l[i]}, stress = {P[i]}: must be finite,"
+                             f" and the stretch greater than 0")
         stretches.append(homogeneous.along(mode, l))
         stresses.append(P)
         parts[mode] = slice(n, n := n + len(l))

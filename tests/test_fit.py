@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from conftest import run
 
 import formingx as fx
 from formingx.physics.homogeneous import MODES
@@ -133,14 +134,8 @@ def test_bad_input(arguments, words):
 
 
 def test_demo(tmp_path):
-    import subprocess
-    import sys
-    from pathlib import Path
-    root = Path(__file__).parents[1]
-    done = subprocess.run([sys.executable, root / "demos/fit_treloar.py", "--quick", "--out", tmp_path], cwd=root,
-                          capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
+    printed = run("demos/fit_treloar.py", "--quick", "--out", tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["fits"]["Gent"]["rms_MPa"] == pytest.approx(0.138, abs=5e-4)
     assert summary["points"] == {"uniaxial": 24, "pure_shear": 13, "equibiaxial": 16}
-    assert (tmp_path / "fit_treloar.png").stat().st_size > 50_000 and "Gent-Gent" in done.stdout
+    assert (tmp_path / "fit_treloar.png").stat().st_size > 50_000 and "Gent-Gent" in printed

@@ -199,6 +199,11 @@ def test_inflation_to_the_limit(material, caplog):
     assert path.counts.steps < 40 and path.last.measures["pole_stretch"] == pytest.approx(0.9999 * limit, rel=1e-8)
 
 
+    with pytest.raises(fx.InputError, match=rf"pole_stretch = {limit:g}: must be less than {limit:.6g}, where I1 comes"
+                                            rf" to the limit {material.largest_I1:g} of {type(material).__name__}"):
+        fx.trace(scene, until=fx.pole_stretch(limit))
+
+
 def test_stability_bounds_are_the_closed_ones():
     # P = mu (l^(a-1) - l^(-a/2-1)) with a = -1, mu < 0: dP/dl = 0 at l^(3/2) = 4; sums of exponentials are convex
     found = fx.Ogden(mu=-1.0, alpha=-1.0).check_stability((0.2, 8.0))

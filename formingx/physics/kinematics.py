@@ -66,10 +66,11 @@ def invariants(F):
 def sum_of_powers(F, alpha):
     """lambda_1^alpha + lambda_2^alpha + lambda_3^alpha, smooth where in-plane stretches coincide.
 
-    With m and d >= 0 the mean and half difference of the in-plane eigenvalues of C, and a = alpha/2, the in-plane part
-    is even in d. Near d = 0 its series in x = (d/m)^2 replaces it, so that value and derivatives have no 0/0; beyond, the
-    small eigenvalue is det C / (m + d), which unlike m - d loses no digits in a thin sheet. At the switch, x = 1e-4,
-    five terms and round-off both leave second derivatives exact to some 1e-14 of their norm (alpha from -5 to 10).
+    With m and d >= 0 the mean and half difference of the in-plane eigenvalues of C, and a = alpha/2, the in-plane
+    part is even in d. Near d = 0 its series in x = (d/m)^2 replaces it, so that value and derivatives have no 0/0;
+    beyond, the small eigenvalue is det C / (m + d), which unlike m - d loses no digits in a thin sheet. At the switch,
+    x = 1e-4, five terms and round-off both leave second derivatives exact to some 1e-14 of their norm (alpha from -5
+    to 10).
     """
     C = F.T * F
     a = alpha / 2

@@ -27,12 +27,15 @@ class Material:
     """
 
     parameters: dict[str, float]
-    largest_I1: float = math.inf
-    """The value of I1 at which the energy is infinite."""
 
     def strain_energy(self, F: Any, *args: Any, **constants: Any) -> Any:
         """Energy per reference volume of F, shape (3, 3); a UFL scalar, zero at F = I."""
         raise NotImplementedError
+
+    @property
+    def largest_I1(self) -> float:
+        """The value of I1 at which the energy is infinite; infinity if there is none."""
+        return math.inf
 
     @property
     def shear_modulus(self) -> float:
@@ -165,8 +168,8 @@ class Material:
         k = MODES[mode]
         if math.isfinite(self.largest_I1):
             I1 = stretch**2 + stretch**(2 * k) + stretch**(-2 - 2 * k)
-            return (f"{self}: a stretch of {stretch:.6g} in {mode} tension is beyond its limit: I1 = {I1:.6g} must be less"
-                    f" than {self.largest_I1:.6g}, stretches less than {self.largest_stretch(mode):.6g}")
+            return (f"{self}: a stretch of {stretch:.6g} in {mode} tension is beyond its limit: I1 = {I1:.6g} must be"
+                    f" less than {self.largest_I1:.6g}, stretches less than {self.largest_stretch(mode):.6g}")
         return f"{self}: the stress at a stretch of {stretch:.6g} in {mode} tension is not a finite number"
 
     def __str__(self) -> str:

@@ -87,8 +87,8 @@ class Yeoh(Material):
         c10, c20, c30 = self.parameters.values()
         positive(f"{self}: c10", c10)
         if c30 < 0 or c20 < 0 and c20**2 >= 3 * c10 * c30:
-            raise InputError(f"{self} is not stable: its energy does not grow with I1 everywhere; c30 must be at least 0"
-                             f" and c20 greater than -sqrt(3 c10 c30) = {-math.sqrt(max(3 * c10 * c30, 0)):.6g}")
+            raise InputError(f"{self} is not stable: its energy does not grow with I1 everywhere; c30 must be at least"
+                             f" 0 and c20 greater than -sqrt(3 c10 c30) = {-math.sqrt(max(3 * c10 * c30, 0)):.6g}")
         super().check()
 
     def strain_energy(self, F, c10, c20, c30):
@@ -257,7 +257,7 @@ class Hyperelastic(Material):
 
 
 def _ln(x: Any) -> Any:
-    """ln x, which is not a number where x < 0, and neither are its derivatives: those of ln x itself are finite there."""
+    """ln x, not a number where x < 0, and so are its derivatives (those of ln x itself are finite there)."""
     return 2 * ufl.ln(ufl.sqrt(x))
 
 
