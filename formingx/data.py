@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 # L. R. G. Treloar, "Stress-strain data for vulcanised rubber under various types of deformation", Trans. Faraday Soc.
-# 40 (1944) 59-70: 8 % sulphur natural rubber, 20 C. Read off the published curves (digitised), not tabulated by the
-# author; points as in data/Treloar_1944 of github.com/Chongran-Zhao/Calibration-Hyperelasticity.
+# 40 (1944) 59-70. Read off the published curves (digitised), not tabulated by the author; points as in
+# data/Treloar_1944 of github.com/Chongran-Zhao/Calibration-Hyperelasticity.
 _TRELOAR_1944 = {
     "uniaxial": """1.02 .0255  1.125 .1344  1.24 .2256  1.39 .3169  1.585 .4081  1.9 .5003  2.18 .5886  2.42 .6769
         3.02 .8633  3.57 1.0497  4.03 1.2263  4.76 1.5892  5.36 1.9522  5.75 2.3152  6.15 2.6879  6.4 3.0411
