@@ -1,7 +1,8 @@
 """Constants of every material from Treloar's (1944) tests of vulcanised rubber, and how well each fits.
 
 Uniaxial, pure-shear and equibiaxial tension, fitted together: least squares of the nominal stress (MPa), every point
-with the same weight. The points were digitised from Treloar's published curves. With --quick, Ogden gets one term instead of three.
+with the same weight. The points were digitised from Treloar's published curves.
+With --quick, Ogden gets one term instead of three.
 """
 
 import numpy as np
