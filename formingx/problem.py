@@ -74,6 +74,13 @@ class Problem:
         for contact, touch in zip([c for c in self.contacts if c.memory is not None], memory, strict=True):
             contact.memory = touch
 
+    @property
+    def why_not_finite(self) -> str:
+        """What makes a residual infinite or not a number in this scene."""
+        limits = {f"{m} came to its limit, I1 < {m.largest_I1:.6g}": None
+                  for m in self.scene.materials.values() if m.largest_I1 < np.inf}
+        return ", or ".join(["an element turned inside out", *(limits or ["the material left its domain"])])
+
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         """out = F(x, control); sets `force_scale`."""
         multipliers = self.set_state(x, control)
