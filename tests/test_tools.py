@@ -27,7 +27,7 @@ SHAPES = {
 
 def polygon(tool):
     """The solid as a fine polygon, and points along its profile; open ends go on far."""
-    line = tool.outline(4000)
+    line = tool.outline(8000 if len(tool.pieces) == 1 else 4000)       # sagitta of a chord below 1e-7
     if tool.closed:
         return line, line
     left = []
@@ -78,7 +78,7 @@ def test_distance_against_brute_force(name):
 def test_normal_and_curvature_are_derivatives_of_distance(name):
     tool, h = SHAPES[name], 1e-5
     outline = tool.outline(7)
-    middle = (outline[1:] + outline[:-1]) / 2                  # no joint: there the curvature jumps
+    middle = np.repeat((outline[1:] + outline[:-1]) / 2, 9, axis=0)        # no joint: there the curvature jumps
     rng = np.random.default_rng(4)
     points = middle + 0.02 * tool.size * rng.uniform(-1, 1, middle.shape) * (middle[:, :1] > 0)
     near = tool.nearest(points)

@@ -1,0 +1,221 @@
+"""Contact: laws against differences, balances, closed forms of stick and of sliding, independence of the step."""
+
+import numpy as np
+import pytest
+
+import formingx as fx
+from formingx.physics.contact import Law, Touch
+from formingx.problem import Problem
+
+tools = fx.tools
+THETA, K = 0.02, 300.0
+TOOL = tools.cup(radius=2.0, depth=1.0, fillet=0.4, lip=0.3)
+
+
+def points_near(tool, depths, seed=0):
+    """Points of given signed distances around the middle of every piece and beyond, and the tangents there."""
+    outline = tool.outline(5)
+    middle = (outline[1:] + outline[:-1]) / 2
+    near = tool.nearest(middle)
+    middle = middle - near.distance[:, None] * near.normal
+    return np.vstack([middle + d * near.normal for d in depths]), np.vstack([near.tangent for _ in depths])
+
+
+SIDES = [side * THETA for kink in (-1, 1) for side in (kink * (1 - 1e-3), kink * (1 + 1e-3))] + [-0.5 * THETA, 3 * THETA]
+
+
+def derivative(f, x, h):
+    return np.stack([(f(x + h * e) - f(x - h * e)) / (2 * h) for e in np.eye(2)], -1)
+
+
+def test_force_is_derivative_of_energy():
+    law = Law(TOOL, 0.0, K, THETA)
+    x, _ = points_near(TOOL, SIDES)
+    force = law.tractions(x, None).force
+    np.testing.assert_allclose(derivative(law.energy, x, 1e-6), force, atol=1e-7 * K)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3, 5.0, np.inf])
+@pytest.mark.parametrize("slip", [0.0, 1e-4, -0.01, 0.2])
+@pytest.mark.parametrize("touched", [True, False])
+def test_stiffness_is_derivative_of_force(mu, slip, touched):
+    law = Law(TOOL, mu, K, THETA)
+    x, tangent = points_near(TOOL, SIDES)
+    before = x - slip * tangent
+    old = Touch(before, np.full(len(x), -0.5 * THETA if touched else -2 * THETA), np.full(len(x), 1e-4), before)
+    found = law.tractions(x, old)
+    exact = derivative(lambda y: law.tractions(y, old).force, x, 1e-7)
+    np.testing.assert_allclose(exact, found.stiffness, atol=1e-5 * K)
+    assert np.all(np.abs(found.tangential) <= mu * found.normal + 1e-12 if np.isfinite(mu) else True)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3, np.inf])
+def test_force_is_continuous(mu):
+    law, step = Law(TOOL, mu, K, THETA), 1e-9
+    x, tangent = points_near(TOOL, (-THETA, THETA))
+    normal = TOOL.nearest(x).normal
+    old = Touch(x, np.full(len(x), -2 * THETA), np.zeros(len(x)), x + 0.05 * tangent)
+    a, b = (law.tractions(x + side * step * normal, old).force for side in (-1, 1))
+    assert np.abs(a - b).max() < 10 * K * step
+
+
+@pytest.mark.parametrize("mu", [0.3, np.inf])
+def test_an_accepted_state_keeps_its_forces(mu):
+    law = Law(TOOL, mu, K, THETA)
+    x, tangent = points_near(TOOL, SIDES)
+    first = law.tractions(x, Touch(x, np.full(len(x), -2 * THETA), np.zeros(len(x)), x + 0.03 * tangent))
+    again = law.tractions(x, first.touch)
+    np.testing.assert_allclose(again.force, first.force, atol=1e-12 * K)
+
+
+def cup(friction, elements=(20, 2), depth=5.0, thickness=0.3, fillet=1.0, **options):
+    mesh = fx.mesh.disc(radius=10.0, thickness=thickness, elements=elements)
+    mould = tools.cup(radius=10, depth=depth, mouth=thickness, fillet=fillet)
+    return fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50, c01=15), loads=[fx.Pressure("bottom")],
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                    contacts=[fx.Contact("top", mould, friction, **options)])
+
+
+def form(scene, *pressures, **step):
+    targets = [fx.pressure(p) for p in pressures]
+    return fx.trace(scene, until=targets[-1], through=targets[:-1], step=fx.StepControl(target=8, **step), progress=False,
+                    max_steps=600)
+
+
+def support_force(problem, state, component):
+    """Total force of all supports on the body, in the user's units."""
+    x = problem.x.duplicate()
+    x.setArray(state.x)
+    problem.set_state(x, state.control)
+    values = problem.assemble(problem._residual)
+    for contact in problem.contacts:
+        contact.add_residual(values, state.x[: problem._n], state.control)
+    dofs = np.intersect1d(problem.forms.space.sub(0).sub(component).collapse()[1], problem._held)
+    forms = problem.forms
+    return values[dofs].sum() * forms.stress * forms.volume / forms.length
+
+
+@pytest.mark.parametrize("friction", ["none", "stick", 0.3])
+def test_forces_balance(friction):
+    path = form(cup(friction), 8.0)
+    state = path.last
+    support = support_force(path.problem, state, 1)
+    pressure = 8.0 * np.pi * 10.0**2                        # of a follower pressure inside a clamped rim, along Z
+    assert state.measures["tool_force"] > 0.05 * pressure
+    # the residual holds (internal - external) forces: at the rim that is the support's force on the body
+    assert support + pressure - state.measures["tool_force"] == pytest.approx(0, abs=1e-8 * pressure)
+
+
+def test_work_of_the_pressure_is_stored():
+    path = form(cup("none"), 8.0, largest=0.02, length=0.02)
+    contact = path.problem.contacts[0]
+    p, V = path.curve("pressure", "enclosed_volume", points=40)
+    work = np.sum((p[1:] + p[:-1]) / 2 * np.diff(V))
+    stored = float(np.dot(contact.area, contact.law.energy(contact.positions(path.last.x, path.last.control))))
+    assert work == pytest.approx(path.last.measures["strain_energy"] + stored, rel=1e-5)
+
+
+def test_penetration_is_in_proportion_to_the_penalty():
+    depths = [form(cup("none", penalty=k, ramp=1e-6), 8.0).last.measures["penetration"] for k in (300, 1200, 4800)]
+    assert depths[0] / depths[1] == pytest.approx(4, rel=0.05) and depths[1] / depths[2] == pytest.approx(4, rel=0.05)
+
+
+def test_default_penetration_is_small():
+    path = form(cup("stick", (40, 2)), 160.0)
+    assert path.last.measures["penetration"] < 1e-3 * path.profile().thickness.min()
+
+
+def trough_error(thickness, elements):
+    """Largest relative error of the wall thickness against the membrane law, half-width 1, depth 2."""
+    mesh = fx.mesh.disc(radius=1.0, thickness=thickness, elements=(elements, 1))
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), kinematics=fx.PlaneStrain(),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")],
+                     contacts=[fx.Contact("top", tools.cup(radius=1, depth=2, mouth=thickness), "stick")])
+    path = fx.trace(scene, until=fx.pole_height(1.7), step=fx.StepControl(target=8), max_steps=500, progress=False)
+    profile = path.profile()
+    z = profile.top[:, 1] - thickness
+    wall = (z > 0.15) & (z < 0.55)
+    assert wall.sum() > 10
+    return np.abs(profile.thickness_ratio[wall] / (2 / np.pi * np.exp(-2 * z[wall] / np.pi)) - 1).max()
+
+
+@pytest.mark.slow
+def test_stick_in_a_trough_follows_the_membrane_law():
+    """Wall t/t0 = (2/pi) exp(-2 z/(pi a)), z down from the rim: the thinner the sheet, the closer."""
+    errors = [trough_error(h, n) for h, n in ((0.04, 60), (0.02, 80), (0.01, 120))]
+    print("trough", errors)
+    assert errors[1] < 0.65 * errors[0] and errors[2] < 0.65 * errors[1] and errors[2] < 0.02
+
+
+def test_capstan():
+    """Tension over a round bar grows as exp(mu angle) (with the lever arms of a strip of finite thickness)."""
+    mu, radius, h = 0.3, 1.0, 0.02
+    mesh = fx.mesh.disc(radius=3.0, thickness=h, elements=(120, 1))
+    bar = tools.sphere(radius=radius).mirrored()
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), kinematics=fx.PlaneStrain(),
+                     supports=[fx.Symmetry("axis"), fx.Displaced("rim")], contacts=[fx.Contact("bottom", bar, mu)])
+    path = fx.trace(scene, until=fx.travel(-3.0), step=fx.StepControl(target=8), max_steps=500, progress=False)
+    top, end = (abs(support_force(path.problem, path.last, i)) for i in (0, 1))
+    assert end / top == pytest.approx(np.exp(mu * np.pi / 2 / (1 + h / 2 / radius)), rel=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", ["stick", 0.3])
+def test_thickness_does_not_depend_on_the_step(friction):
+    a, b = (form(cup(friction, (40, 2), nodes_per_step=n), 30.0, 160.0).profile().thickness for n in (2, 1))
+    assert np.abs(a / b - 1).max() < 2e-3
+
+
+def test_coulomb_goes_over_into_free_and_stick():
+    pole = {f: form(cup(f), 15.0).profile().thickness_ratio[0] for f in ("none", 0, 1e-3, 0.05, 0.3, 10, "stick")}
+    assert pole[0] == pole["none"]
+    assert pole[1e-3] == pytest.approx(pole["none"], rel=5e-3)
+    assert pole["none"] < pole[0.05] < pole[0.3] < pole[10] * 1.001
+    assert pole[10] == pytest.approx(pole["stick"], rel=1e-3)
+
+
+def test_a_scene_pays_for_what_is_in_it():
+    free = Problem(fx.Scene(mesh=fx.mesh.disc(radius=1, thickness=0.1, elements=(4, 1)), materials=fx.NeoHookean(c10=1.0),
+                            supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")]))
+    assert free.contacts == [] and free.memory == []
+    assert Problem(cup("none", (4, 1))).memory == []
+    assert len(Problem(cup("stick", (4, 1))).memory) == 1
+
+
+def test_a_moving_tool():
+    """A flat plug pushes a clamped disc; the derivative by the control is that of the residual."""
+    mesh = fx.mesh.disc(radius=10.0, thickness=0.5, elements=(20, 2))
+    plug = tools.cylinder(radius=3, z=0.5, fillet=1.0)
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", plug, 0.2, moves=(0, -1))])
+    path = fx.trace(scene, until=fx.travel(3.0), step=fx.StepControl(target=8), progress=False)
+    assert path.last.measures["pole_height"] == pytest.approx(-3.0, abs=0.02)
+    assert path.last.measures["tool_force"] == pytest.approx(support_force(path.problem, path.last, 1), rel=1e-7)
+    problem, state, h = path.problem, path.last, 1e-7
+    x, plus, minus, exact = (problem.x.duplicate() for _ in range(4))
+    x.setArray(state.x)
+    problem.residual(x, state.control + h, plus)
+    problem.residual(x, state.control - h, minus)
+    problem.control_derivative(x, state.control, exact)
+    np.testing.assert_allclose((plus.array - minus.array) / (2 * h), exact.array, atol=1e-5 * np.abs(exact.array).max())
+
+
+@pytest.mark.parametrize("change, message", [
+    (lambda: fx.Contact("top", TOOL, -0.1), "must not be negative"),
+    (lambda: fx.Contact("top", TOOL, "glue"), "must be 'stick', 'none' or a coefficient"),
+    (lambda: fx.Contact("top", "cup"), "must be a tool"),
+    (lambda: fx.Contact("top", TOOL, penalty=0), "must be greater than 0"),
+    (lambda: fx.Contact("top", TOOL, moves=(0, 0)), "must name a direction"),
+    (lambda: scene_with(fx.Contact("top", tools.plane(0.05))), r"0\.05 deep at"),
+    (lambda: scene_with(fx.Contact("bottom", tools.plane(0.2))), "behind this face"),
+    (lambda: scene_with(fx.Contact("top", tools.plane(0.2)), "top"), "no tool faces the pressure"),
+    (lambda: scene_with(fx.Contact("lid", tools.plane(0.2))), "not known"),
+])
+def test_bad_contacts(change, message):
+    with pytest.raises(fx.InputError, match=message):
+        change()
+
+
+def scene_with(contact, pressed="bottom"):
+    return fx.Scene(mesh=fx.mesh.disc(radius=1, thickness=0.1, elements=(4, 1)), materials=fx.NeoHookean(c10=1.0),
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure(pressed)], contacts=[contact])
