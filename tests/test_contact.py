@@ -107,12 +107,19 @@ def test_forces_balance(friction):
 
 
 def test_work_of_the_pressure_is_stored():
-    path = form(cup("none"), 8.0, largest=0.02, length=0.02)
+    errors = [work_error(largest) for largest in (0.04, 0.02, 0.01)]
+    assert errors[2] < 1e-5, errors
+
+
+def work_error(largest):
+    path = form(cup("none"), 8.0, largest=largest, length=largest)
     contact = path.problem.contacts[0]
     p, V = path.curve("pressure", "enclosed_volume", points=40)
     work = np.sum((p[1:] + p[:-1]) / 2 * np.diff(V))
-    stored = float(np.dot(contact.area, contact.law.energy(contact.positions(path.last.x, path.last.control))))
-    assert work == pytest.approx(path.last.measures["strain_energy"] + stored, rel=1e-5)
+    energies = [contact.area @ contact.law.energy(contact.positions(s.x, s.control))
+                for s in (path.states[0], path.last)]                    # the rim touches from the start
+    stored = energies[1] - energies[0]
+    return abs(work / (path.last.measures["strain_energy"] + stored) - 1)
 
 
 def test_penetration_is_in_proportion_to_the_penalty():
@@ -147,15 +154,27 @@ def test_stick_in_a_trough_follows_the_membrane_law():
     assert errors[1] < 0.65 * errors[0] and errors[2] < 0.65 * errors[1] and errors[2] < 0.02
 
 
+def bent_strip(radius, thickness, tail, elements):
+    """A strip that lies around a quarter of a bar and hangs down beyond."""
+    quarter = radius * np.pi / 2
+    mesh = fx.mesh.disc(radius=quarter + tail, thickness=thickness, elements=(elements, 1))
+    s, h = mesh.domain.geometry.x[:, :2].T.copy()
+    angle = np.minimum(s, quarter) / radius
+    mesh.domain.geometry.x[:, 0] = (radius + h) * np.sin(angle)
+    mesh.domain.geometry.x[:, 1] = (radius + h) * np.cos(angle) - np.maximum(s - quarter, 0)
+    return mesh
+
+
 def test_capstan():
     """Tension over a round bar grows as exp(mu angle) (with the lever arms of a strip of finite thickness)."""
     mu, radius, h = 0.3, 1.0, 0.02
-    mesh = fx.mesh.disc(radius=3.0, thickness=h, elements=(120, 1))
-    bar = tools.sphere(radius=radius).mirrored()
-    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), kinematics=fx.PlaneStrain(),
-                     supports=[fx.Symmetry("axis"), fx.Displaced("rim")], contacts=[fx.Contact("bottom", bar, mu)])
-    path = fx.trace(scene, until=fx.travel(-3.0), step=fx.StepControl(target=8), max_steps=500, progress=False)
+    bar = tools.sphere(radius=radius - 1e-4).mirrored().moved(z=radius - 1e-4)
+    scene = fx.Scene(mesh=bent_strip(radius, h, 0.4, 60), materials=fx.NeoHookean(c10=1.0), kinematics=fx.PlaneStrain(),
+                     supports=[fx.Symmetry("axis"), fx.Displaced("rim")],
+                     contacts=[fx.Contact("bottom", bar, mu, nodes_per_step=200)])
+    path = fx.trace(scene, until=fx.travel(-0.05), step=fx.StepControl(length=0.01, target=8), progress=False)
     top, end = (abs(support_force(path.problem, path.last, i)) for i in (0, 1))
+    assert path.last.measures["contact_length"] > 1.5
     assert end / top == pytest.approx(np.exp(mu * np.pi / 2 / (1 + h / 2 / radius)), rel=0.02)
 
 
@@ -187,9 +206,9 @@ def test_a_moving_tool():
     mesh = fx.mesh.disc(radius=10.0, thickness=0.5, elements=(20, 2))
     plug = tools.cylinder(radius=3, z=0.5, fillet=1.0)
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                     contacts=[fx.Contact("top", plug, 0.2, moves=(0, -1))])
+                     contacts=[fx.Contact("top", plug, "stick", moves=(0, -1))])
     path = fx.trace(scene, until=fx.travel(3.0), step=fx.StepControl(target=8), progress=False)
-    assert path.last.measures["pole_height"] == pytest.approx(-3.0, abs=0.02)
+    assert path.last.measures["penetration"] < 5e-4 and path.last.measures["contact_length"] > 0.2
     assert path.last.measures["tool_force"] == pytest.approx(support_force(path.problem, path.last, 1), rel=1e-7)
     problem, state, h = path.problem, path.last, 1e-7
     x, plus, minus, exact = (problem.x.duplicate() for _ in range(4))
