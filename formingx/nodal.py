@@ -132,6 +132,14 @@ class NodalContact:
         d = self.law.tool.signed_distance(self.positions(fields, control))
         return self._comm.allreduce(float(self.lengths[d > -self.law.theta].sum()), MPI.SUM)
 
+    def traction(self, fields: np.ndarray, control: float) -> tuple[np.ndarray, np.ndarray]:
+        """(reference points (m, 2), normal and tangential traction per reference area (m, 2)) of all ranks, by R."""
+        found = self.tractions(fields, control)
+        rows = np.column_stack([self.points, found.normal, found.tangential])
+        rows = np.concatenate(self._comm.allgather(rows))
+        rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+        return rows[:, :2], rows[:, 2:]
+
     def force(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Total force of the body on the tool (r, z), shape (2,), stress length^2 (per depth: length), all ranks.
 

@@ -1,0 +1,79 @@
+"""Pressure forming of a sheet into a shallow cup, with three friction laws (Song 1993, section 5.3, figs. 5.2 to 5.4).
+
+Mooney, I1 constant 50 psi, I2 constant 15 psi (chapter 5 prints C01 = 50, C10 = 15: its C01 is the I1 constant);
+r0 = 10 cm, h0 = 0.3 cm, clamped; cup radius 10 cm, depth 5 cm, bottom fillet 1 cm. Lengths in cm, stresses in psi.
+"""
+
+import numpy as np
+from common import COMM, parser, say, summarise
+from moulding import at_pressures, cost, draw_forming, filled_at, name_of
+
+import formingx as fx
+from formingx.results import files
+
+RADIUS, THICKNESS, DEPTH, FILLET = 10.0, 0.3, 5.0, 1.0
+I1_CONSTANT, I2_CONSTANT = 50.0, 15.0
+PRESSURES = (2.0, 4.0, 8.0, 15.0, 30.0, 60.0, 160.0)
+LAWS = ("stick", "none", 0.3)
+
+
+def form(friction, elements, pressures=PRESSURES, **options):
+    """The path to the last pressure, and the mould."""
+    mesh = fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=elements)
+    mould = fx.tools.cup(radius=RADIUS, depth=DEPTH, mouth=THICKNESS, fillet=FILLET)
+    scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=I1_CONSTANT, c01=I2_CONSTANT),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")],
+                     contacts=[fx.Contact("top", mould, friction, **options)])
+    targets = [fx.pressure(p) for p in pressures]
+    path = fx.trace(scene, until=targets[-1], through=targets[:-1], step=fx.StepControl(target=8), max_steps=1000)
+    return path, mould
+
+
+def key_numbers(path, mould):
+    """What the summary holds of one path."""
+    corner = mould.pieces[1]
+    angles = corner.start + corner.sweep * np.linspace(0, 1, 41)
+    fillet = corner.centre + corner.radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    ramp = path.problem.contacts[0].law.theta
+    touch = path.at(fx.displacement(DEPTH - ramp, at=(0.0, THICKNESS)))
+    return {
+        **at_pressures(path, PRESSURES, "psi"),
+        "first_contact_pressure_psi": touch.measures["pressure"],
+        "filled_pressure_psi": filled_at(path, fillet, THICKNESS / 2),
+        "max_penetration_over_h0": path["penetration"].max() / THICKNESS,
+        "mass_error": abs(path.last.measures["mass_error"]),
+        **cost(path),
+    }
+
+
+def main():
+    options = parser("cup", __doc__.splitlines()[0])
+    options.add_argument("--elements", type=int, default=60, help="elements along the radius")
+    options.add_argument("--layers", type=int, default=2, help="elements through the thickness")
+    args = options.parse_args()
+    elements = (20, 1) if args.quick else (args.elements, args.layers)
+    summary = {}
+    say(f"Forming into a shallow cup, {elements[0]} x {elements[1]} x 2 triangles")
+    for friction in LAWS:
+        name = name_of(friction)
+        path, mould = form(friction, elements)
+        summary[name] = n = key_numbers(path, mould)
+        filled = "not filled" if n["filled_pressure_psi"] is None else f"filled at {n['filled_pressure_psi']:.4g} psi"
+        say(f"{name}: first contact {n['first_contact_pressure_psi']:.5g} psi, {filled}, penetration"
+            f" {n['max_penetration_over_h0']:.1e} h0; {n['steps']} states, {n['newton_iterations']} Newton iterations,"
+            f" {n['cutbacks']} cut back, {n['solve_seconds']:.1f} s",
+            f"  {'psi':>6}{'pole t/t0':>12}{'least t/t0':>12}{'at R, cm':>10}")
+        for p in (f"{p:g}" for p in PRESSURES):
+            say(f"  {p:>6}" + "".join(f"{n[f'{key}_at_psi'][p]:{width}}" for key, width in (
+                ("pole_thickness_ratio", "12.5f"), ("min_thickness_ratio", "12.5f"), ("min_thickness_at_R_cm", "10.3f"))))
+        path.to_csv(args.out / f"{name}.csv")
+        files.write_profile(path.profile(), args.out / f"{name}_profile.csv", COMM)
+        draw_forming(path, [path.met(fx.pressure(p)) for p in PRESSURES[:-1]] + [path.last], mould, args.out, name)
+        if not args.quick and friction == LAWS[0]:
+            path.view3d(args.out / "cup_3d.png")
+    summarise(args.out, {**summary, "mesh": {"radius_elements": elements[0], "thickness_elements": elements[1]},
+                         "versions": files.versions()})
+
+
+if __name__ == "__main__":
+    main()
