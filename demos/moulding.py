@@ -68,7 +68,8 @@ def draw_forming(path, states, tool, out, name: str, unit: str = "psi") -> None:
     left.set(xlabel="r, cm", ylabel="z, cm", title=name.replace("_", " "), xlim=(0, 1.15 * size),
              ylim=(span[:, 1].min() - 0.05 * size, max(span[:, 1].max(), outline[:, 1].max()) + 0.1 * size))
     middle.set(xlabel="reference radius R, cm", ylabel="thickness / original", title="thickness", ylim=(0, 1.02))
-    right.set(xlabel="reference radius R, cm", ylabel=f"contact pressure, {unit}", title="contact pressure", ylim=(0, None))
+    right.set(xlabel="reference radius R, cm", ylabel=f"contact pressure, {unit}", title="contact pressure",
+              ylim=(0, 1.4 * states[-1].measures["pressure"]))
     middle.legend(frameon=False)
     save(figure, out / f"{name}.png")
 
@@ -81,4 +82,5 @@ def contact_pressure(path, state, profile) -> tuple[np.ndarray, np.ndarray]:
     along = np.hypot(*np.gradient(facing, points[:, 0], axis=0).T)
     axisymmetric = path.problem.scene.kinematics.dimension_of_volume == 3
     hoop = np.divide(facing[:, 0], points[:, 0], out=along.copy(), where=points[:, 0] > 0) if axisymmetric else 1.0
-    return points[:, 0], traction[:, 0] / (along * hoop)
+    off_axis = slice(int(points[0, 0] == 0), None)          # the node on the axis carries no area
+    return points[off_axis, 0], (traction[:, 0] / (along * hoop))[off_axis]

@@ -44,3 +44,23 @@ def test_errors_come_on_all_ranks():
     lines = run("-c", BAD, ranks=2)
     for words in ("not there", "too little support"):
         assert lines.count(words) == 2
+
+
+CONTACT = """
+import sys, json
+sys.path.insert(0, "tests")
+from test_contact import cup, form
+found = []
+for friction in ("none", "stick", 0.3):
+    path = form(cup(friction), 8.0)
+    found += [path.counts.steps, path.counts.iterations, float(path.profile().thickness_ratio.min())]
+    found += [path.last.measures[k] for k in ("pole_height", "tool_force", "contact_length")]
+if path.problem.comm.rank == 0:
+    print(json.dumps(found))
+"""
+
+
+def test_ranks_agree_on_contact():
+    serial, *others = [run_json(CONTACT, ranks) for ranks in (1, 2, 3)]
+    for other in others:
+        assert other == pytest.approx(serial, rel=1e-8)
