@@ -52,7 +52,7 @@ def cost(path) -> dict:
             "solve_seconds": counts.seconds}
 
 
-def draw_forming(path, states, tool, out, name: str, unit: str = "psi") -> None:
+def draw_forming(path, states, tool, out, name: str, unit: str = "psi", side: str = "top") -> None:
     """Profiles in the mould, thickness against reference radius, contact pressure: one picture."""
     figure, (left, middle, right) = plots.figure(3, width=4.6)
     outline = tool.outline()
@@ -62,11 +62,11 @@ def draw_forming(path, states, tool, out, name: str, unit: str = "psi") -> None:
         profile, p, color = path.profile(state), state.measures["pressure"], f"C{k}"
         plots.outline(profile, left, color=color)
         middle.plot(profile.reference_radius, profile.thickness_ratio, color=color, label=f"{p:.3g} {unit}")
-        points, stretch = contact_pressure(path, state, profile)
-        right.plot(points, stretch, color=color)
-    span = np.vstack([path.profile(states[-1]).top, path.profile(states[0]).bottom])
+        points, pressure = contact_pressure(path, state, profile, side)
+        right.plot(points, pressure, color=color)
+    span = np.vstack([getattr(path.profile(s), face) for s in states for face in ("bottom", "top")])
     left.set(xlabel="r, cm", ylabel="z, cm", title=name.replace("_", " "), xlim=(0, 1.15 * size),
-             ylim=(span[:, 1].min() - 0.05 * size, max(span[:, 1].max(), outline[:, 1].max()) + 0.1 * size))
+             ylim=(span[:, 1].min() - 0.05 * size, max(span[:, 1].max(), min(outline[:, 1].max(), 2 * size)) + 0.1 * size))
     middle.set(xlabel="reference radius R, cm", ylabel="thickness / original", title="thickness", ylim=(0, 1.02))
     right.set(xlabel="reference radius R, cm", ylabel=f"contact pressure, {unit}", title="contact pressure",
               ylim=(0, 1.4 * states[-1].measures["pressure"]))
@@ -74,13 +74,13 @@ def draw_forming(path, states, tool, out, name: str, unit: str = "psi") -> None:
     save(figure, out / f"{name}.png")
 
 
-def contact_pressure(path, state, profile) -> tuple[np.ndarray, np.ndarray]:
+def contact_pressure(path, state, profile, side: str = "top") -> tuple[np.ndarray, np.ndarray]:
     """(R, contact pressure per current area) on the facing side at a state."""
     contact = path.problem.contacts[0]
     points, traction = contact.traction(state.x, state.control)
-    facing = np.column_stack([np.interp(points[:, 0], profile.reference_radius, c) for c in profile.top.T])
+    facing = np.column_stack([np.interp(points[:, 0], profile.reference_radius, c) for c in getattr(profile, side).T])
     along = np.hypot(*np.gradient(facing, points[:, 0], axis=0).T)
     axisymmetric = path.problem.scene.kinematics.dimension_of_volume == 3
     hoop = np.divide(facing[:, 0], points[:, 0], out=along.copy(), where=points[:, 0] > 0) if axisymmetric else 1.0
-    off_axis = slice(int(points[0, 0] == 0), None)          # the node on the axis carries no area
+    off_axis = slice(int(points[0, 0] < 1e-9 * points[-1, 0]), None)          # the node on the axis carries no area
     return points[off_axis, 0], (traction[:, 0] / (along * hoop))[off_axis]
