@@ -22,7 +22,8 @@ def main():
     args = options.parse_args()
     friction = args.friction if args.friction in ("stick", "none") else float(args.friction)
     path, _ = cup.form(friction, (20, 1) if args.quick else (args.elements, 2), (8.0,))
-    after = path.states.index(first_touch(path))
+    touch = first_touch(path)
+    after = next(i for i, state in enumerate(path.states) if state is touch)
     shown = {"before contact": path.states[after - 1], "first touch": path.states[after],
              "contact grows": path.states[after + 3]}
     figure, axes = plots.figure(len(shown), width=4.4)

@@ -35,7 +35,8 @@ class NodalContact:
         self.area = self.lengths * solid.scene.kinematics.weight(self.points.T)
         self._comm, self._length = comm, solid.length
         self.thickness = solid.thickness(contact.on)
-        self.law = contact.law(contact.penalty * solid.stress / self.thickness, contact.ramp * self.thickness)
+        self.law = contact.law(contact.penalty * solid.stress / self.thickness, contact.ramp * self.thickness,
+                               self.points)
         self._scale = solid.length / (solid.stress * solid.volume) * self.area
         self._motion = solid.control_scale * np.array(contact.moves or (0.0, 0.0))
         self.memory = None if contact.mu == 0 else self.law.start(self.points)
@@ -59,7 +60,7 @@ class NodalContact:
     def stiffness(self, fields: np.ndarray, control: float, ahead: bool = False) -> np.ndarray:
         """Derivative of the nodal forces by the nodes' own unknowns, shape (n, 2, 2); `ahead`: see `Law.stiffness_ahead`."""
         values = self.tractions(fields, control).stiffness
-        if ahead and self._memory is not None:
+        if ahead:
             values = self.law.stiffness_ahead(self.positions(fields, control), self._memory)
         return (self._scale * self._length)[:, None, None] * values
 
@@ -90,7 +91,7 @@ class NodalContact:
         """
         start = self.positions(fields, control)
         velocity = self._length * direction[self.dofs] - slope * self._motion
-        free = self.law.tool.signed_distance(start) <= -self.law.theta
+        free = self.law.distance(start) <= -self.law.theta
         times = self._arrivals(start, velocity, length)
         times = np.sort(np.concatenate(self._comm.allgather(times[times < length])))
         touching = self._comm.allreduce(int(np.sum(~free & (self.area > 0))), MPI.SUM)
@@ -107,10 +108,10 @@ class NodalContact:
 
     def _arrivals(self, start: np.ndarray, velocity: np.ndarray, length: float) -> np.ndarray:
         """Arc length at which free nodes meet the ramp, `length` if they do not before, shape (n,)."""
-        before = -self.law.theta - self.law.tool.signed_distance(start)
-        free, at, times = before > 0, 0.0, np.full(len(start), length)
+        before = -self.law.theta - self.law.distance(start)
+        free, at, times = (before > 0) & (self.area > 0), 0.0, np.full(len(start), length)
         for s in length * np.linspace(0, 1, 17)[1:]:
-            now = -self.law.theta - self.law.tool.signed_distance(start + s * velocity)
+            now = -self.law.theta - self.law.distance(start + s * velocity)
             hit = free & (now <= 0)
             times[hit] = at + (s - at) * before[hit] / (before[hit] - now[hit])
             free, before, at = free & ~hit, now, s
@@ -118,18 +119,18 @@ class NodalContact:
 
     def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """More than twice the new nodes that a step is meant to bring into contact."""
-        a, b = (self.law.tool.signed_distance(self.positions(f, c)) for f, c in ((old, old_control), (new, control)))
+        a, b = (self.law.distance(self.positions(f, c)) for f, c in ((old, old_control), (new, control)))
         found = int(np.sum((a <= -self.law.theta) & (b > -self.law.theta)))
         return self._comm.allreduce(found, MPI.SUM) > 2 * self._allowed + 2
 
     def largest_penetration(self, fields: np.ndarray, control: float) -> float:
         """Depth of the deepest node inside the tool, 0 if none is, length, all ranks."""
-        d = self.law.tool.signed_distance(self.positions(fields, control))
+        d = self.contact.tool.signed_distance(self.positions(fields, control))
         return self._comm.allreduce(max(float(d.max(initial=0.0)), 0.0), MPI.MAX)
 
     def contact_length(self, fields: np.ndarray, control: float) -> float:
         """Reference length of the face that is in touch, all ranks."""
-        d = self.law.tool.signed_distance(self.positions(fields, control))
+        d = self.law.distance(self.positions(fields, control))
         return self._comm.allreduce(float(self.lengths[d > -self.law.theta].sum()), MPI.SUM)
 
     def traction(self, fields: np.ndarray, control: float) -> tuple[np.ndarray, np.ndarray]:

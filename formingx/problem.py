@@ -65,6 +65,11 @@ class Problem:
         return all(getattr(x, "symmetric", False) for x in (*self.scene.loads, *self.scene.contacts))
 
     @property
+    def has_kinks(self) -> bool:
+        """True if F has kinks, where the tangent ahead of a state differs from that behind it (`tangent`)."""
+        return bool(self.contacts)
+
+    @property
     def memory(self) -> list[Any]:
         """What F depends on besides x and control: of every contact with friction, its last accepted state."""
         return [contact.memory for contact in self.contacts if contact.memory is not None]

@@ -68,9 +68,9 @@ class Contact:
         """True if contact has an energy: without friction."""
         return self.mu == 0
 
-    def law(self, k: float, theta: float) -> Law:
-        """Tractions for a penalty k (stress/length) and a ramp theta (length)."""
-        return Law(self.tool, self.mu, k, theta)
+    def law(self, k: float, theta: float, points: np.ndarray) -> Law:
+        """Tractions for a penalty k (stress/length) and a ramp theta (length), at points that start there, shape (n, 2)."""
+        return Law(self.tool, self.mu, k, theta, np.maximum(self.tool.signed_distance(points) + theta, 0.0))
 
     def __repr__(self) -> str:
         return f"Contact({self.on!r}, {self.tool!r}, {self.friction!r})"
@@ -105,10 +105,22 @@ class Tractions(NamedTuple):
 
 
 class Law:
-    """Tractions at points, a function of their positions and of what they remember."""
+    """Tractions at points, a function of their positions and of what they remember.
 
-    def __init__(self, tool: Tool, mu: float, k: float, theta: float):
-        self.tool, self.mu, self.k, self.theta = tool, mu, k, theta
+    Distances are less by `shift`, shape (n,), length: a point that touches from the start begins at the foot of the ramp, free
+    of stress.
+    """
+
+    def __init__(self, tool: Tool, mu: float, k: float, theta: float, shift: np.ndarray | float = 0.0):
+        self.tool, self.mu, self.k, self.theta, self.shift = tool, mu, k, theta, shift
+
+    def distance(self, x: np.ndarray) -> np.ndarray:
+        """Signed distance less the shift of points x, shape (n,), length."""
+        return self.tool.signed_distance(x) - self.shift
+
+    def _nearest(self, x: np.ndarray) -> Nearest:
+        near = self.tool.nearest(x)
+        return near._replace(distance=near.distance - self.shift)
 
     def ramp(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """F(d), eq. (5.13), and its derivative."""
@@ -117,13 +129,13 @@ class Law:
 
     def energy(self, x: np.ndarray) -> np.ndarray:
         """Energy of the normal traction per unit reference area at points x, shape (n,), stress times length."""
-        d, theta = self.tool.signed_distance(x), self.theta
+        d, theta = self.distance(x), self.theta
         inside = np.clip(d + theta, 0.0, 2 * theta)
         return self.k * np.where(d < theta, inside**3 / (12 * theta), d**2 / 2 + theta**2 / 6)
 
     def start(self, x: np.ndarray) -> Touch:
         """What points at x remember before anything has happened."""
-        return _touch(x.copy(), self.tool.signed_distance(x), np.zeros(len(x)))
+        return _touch(x.copy(), self.distance(x), np.zeros(len(x)))
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None) -> Tractions:
         """At points x, shape (n, 2), which remember `old` (not used without friction).
@@ -131,7 +143,7 @@ class Law:
         `sense`: that of the iteration before. A point that would turn from sliding one way to sliding the other is taken as
         stuck for this one iteration: Newton's method would send it to and fro across the narrow range of stick.
         """
-        near, k = self.tool.nearest(x), self.k
+        near, k = self._nearest(x), self.k
         d, n, t, bend = near.distance, near.normal, near.tangent, near.curvature
         F, slope = self.ramp(d)
         N = k * F
@@ -157,15 +169,16 @@ class Law:
         kept *= 1 + 1e-9 * np.abs(sense_now)                 # what slides goes on sliding, whatever round-off says
         return Tractions(force, stiffness, _touch(x, d, kept), N, T, sense_now)
 
-    def stiffness_ahead(self, x: np.ndarray, old: Touch) -> np.ndarray:
+    def stiffness_ahead(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
         """The stiffness with points that have just touched, or are about to, pressed halfway into the ramp.
 
         At the foot of the ramp they have none, and the tangent of the path would let them slip where they will stick.
         """
-        near, now = self.tool.nearest(x), self.tractions(x, old)
+        near, now = self._nearest(x), self.tractions(x, old)
         touching = (near.distance > -1.05 * self.theta) & (now.sense == 0)
         press = np.where(touching, np.maximum(-0.5 * self.theta - near.distance, 0.0), 0.0)
-        pressed = self.tractions(x + press[:, None] * near.normal, old._replace(distance=near.distance + press, position=x))
+        old = old and old._replace(distance=near.distance + press, position=x)
+        pressed = self.tractions(x + press[:, None] * near.normal, old)
         return np.where((press > 0)[:, None, None], pressed.stiffness, now.stiffness)
 
     def _slip(self, x: np.ndarray, near: Nearest, old: Touch) -> tuple[np.ndarray, np.ndarray]:

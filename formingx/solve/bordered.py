@@ -13,6 +13,9 @@ from .direct import DirectSolver
 UNLOADED = 1e-5
 """Support forces (over stress times volume over length) below which a body counts as unloaded."""
 
+SMALL = 1e-3
+"""Corrections (dimensionless displacement) below which growth is no sign of divergence: points touch and let go."""
+
 
 class Iteration(NamedTuple):
     """One Newton iteration: what it found and what it did. The last entry of a history is the converged state.
@@ -98,7 +101,7 @@ class BorderedNewton:
         problem = self.problem
         history: list[Iteration] = []
         problem.residual(x, control, self.F)
-        work0 = 0.0
+        work0 = moved = 0.0
         while True:
             residual = self.F.norm() / (problem.force_scale + UNLOADED)
             if not np.isfinite(residual):
@@ -106,7 +109,8 @@ class BorderedNewton:
             if self.tolerances.met([i.correction for i in history], residual):
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
-            if len(history) >= 2 and history[-1].correction > (max(history[0].correction, 1e-3) if len(history) > 2 else 0.5):
+            if len(history) >= 2 and moved > SMALL and history[-1].correction > (
+                    history[0].correction if len(history) > 2 else 0.5):
                 raise Failure("the iteration diverges", history)
             if len(history) >= self.tolerances.iterations:
                 raise Failure(f"no convergence in {self.tolerances.iterations} iterations", history)
@@ -124,7 +128,8 @@ class BorderedNewton:
             work0 = work0 or work or 1.0
             x.axpy(1.0, self.a)
             control += step
-            correction = self._norm(self.a, step) / (self._norm(x, control) + 1e-8)
+            moved = self._norm(self.a, step)
+            correction = moved / (self._norm(x, control) + 1e-8)
             if not np.isfinite(correction):
                 raise Failure("the tangent matrix is singular", history)
             if len(history) > 2 and correction > 0.8 * max(history[-1].correction, history[-2].correction):

@@ -173,7 +173,7 @@ class _Run:
         """Take up a state and close the target that it meets."""
         path = self.path
         path.record(state)
-        if path.problem.memory and state.kind != "start":
+        if path.problem.has_kinks:
             self.branch.look_ahead(state)
         path.counts.iterations = self.branch.iterations
         self.open = [(t, b) for t, b in self.open if t is not state.met]
