@@ -24,7 +24,7 @@ class Scene:
         materials: {layer name: material}, or one material for all layers.
         supports: see `formingx.physics.supports`.
         loads: see `formingx.physics.loads`. At most one load or support is driven (controlled by the run).
-        incompressibility: how the volume is kept; default `MixedPressure()`.
+        model: how the scene is modelled: `MixedPressure()` (default) or `DisplacementPenalty()`, a solid; `Membrane()`.
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
         quadrature_degree: of the energy; 5 (seven points) is the thesis' rule.
 
@@ -34,7 +34,7 @@ class Scene:
     """
 
     def __init__(self, *, mesh: Mesh, materials: Material | Mapping[str, Material], supports: Sequence[Any],
-                 loads: Sequence[Any] = (), incompressibility: Any = None, kinematics: Any = None,
+                 loads: Sequence[Any] = (), model: Any = None, kinematics: Any = None,
                  quadrature_degree: int = 5):
         if not isinstance(mesh, Mesh):
             raise InputError(f"Scene: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")
@@ -44,7 +44,7 @@ class Scene:
         self.materials = dict(materials)
         self.supports = list(supports)
         self.loads = list(loads)
-        self.incompressibility = incompressibility if incompressibility is not None else MixedPressure()
+        self.model = model if model is not None else MixedPressure()
         self.kinematics = kinematics if kinematics is not None else Axisymmetric()
         self.quadrature_degree = count("Scene: quadrature_degree", quadrature_degree)
         self._check_materials()

@@ -33,6 +33,7 @@ class Solid:
         control: the `Constant` of the dimensionless control; control_scale times it is the user's.
         residual: dPi/dw - external virtual work (UFL, rank 1); control_derivative: its derivative by the control,
             or None.
+        displacement_element: the scalar element of a displacement component.
         energy: strain energy over stress times volume (UFL, rank 0).
     """
 
@@ -42,7 +43,7 @@ class Solid:
         self.comm = self.domain.comm
         self._moduli = {id(m): m.shear_modulus for m in scene.materials.values()}
         self.length, self.stress = float(max(scene.extent)), max(self._moduli.values())
-        self._colours = _colour(scene) if scene.incompressibility.pressure_degree is not None else {}
+        self._colours = _colour(scene) if scene.model.pressure else {}
         self.space = self._make_space()
         self.w = fem.Function(self.space, name="w")
         self.control = self.constant(0.0)
@@ -103,10 +104,15 @@ class Solid:
 
     def _make_space(self) -> Any:
         cell = self.domain.basix_cell()
-        elements = [basix.ufl.element("Lagrange", cell, 2, shape=(2,))]
-        if self._colours:
-            degree = self.scene.incompressibility.pressure_degree
-            elements += [basix.ufl.element("Lagrange", cell, degree)] * (max(self._colours.values()) + 1)
+        pressure = self.scene.model.pressure
+        element = basix.ufl.element("Lagrange", cell, 2)
+        if pressure and pressure.bubble:
+            element = basix.ufl.enriched_element([element, basix.ufl.element("Bubble", cell, 3)])
+        elements = [basix.ufl.blocked_element(element, shape=(2,))]
+        if pressure:
+            field = basix.ufl.element(pressure.family, cell, pressure.degree)
+            elements += [field] * (max(self._colours.values()) + 1)
+        self.displacement_element = element
         return fem.functionspace(self.domain, basix.ufl.mixed_element(elements))
 
     def _scale_of_control(self) -> float:
@@ -121,19 +127,19 @@ class Solid:
         scene = self.scene
         fields = ufl.split(self.w)
         self._scale = self.constant(1 / (self.stress * self.volume))
-        eps = self.constant(scene.incompressibility.eps)
+        eps = self.constant(scene.model.eps)
         F = scene.kinematics.deformation_gradient(self.u, self.X)
         energy = 0
         for material, names in _by_material(scene):
             tags = tuple(scene.mesh.layers[n] for n in names)
             dx = self.dx if len(tags) == len(scene.mesh.layers) else self.dx(tags)
             W = material.strain_energy(F, **{k: self.constant(c) for k, c in material.parameters.items()})
-            if scene.incompressibility.stress_free:
+            if scene.model.stress_free:
                 W -= self.constant(material.rest_stress) * ufl.ln(self.J)
             energy += self._scale * W * self.weight * dx
             modulus = self.constant(self._moduli[id(material)])
             p = self.constant(self.stress) * fields[1 + self._colours[names[0]]] if self._colours else None
-            for density, metadata in scene.incompressibility.terms(self.J, p, modulus, eps):
+            for density, metadata in scene.model.terms(self.J, p, modulus, eps):
                 energy += self._scale * density * self.weight * dx(metadata=metadata)
         return energy
 
@@ -164,6 +170,8 @@ def _by_material(scene: Any) -> list[tuple[Any, list[str]]]:
 def _colour(scene: Any) -> dict[str, int]:
     """{layer: number of its pressure field}: bodies of different materials that touch get different fields."""
     mesh = scene.mesh
+    if not scene.model.pressure.continuous:
+        return dict.fromkeys(mesh.layers, 0)
     topology = mesh.domain.topology
     topology.create_connectivity(2, 0)
     groups = [names for _, names in _by_material(scene)]
