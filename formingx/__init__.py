@@ -2,7 +2,7 @@
 
 from . import mesh
 from .errors import ConvergenceError, InputError
-from .physics.incompressibility import DisplacementPenalty, MixedPressure
+from .physics.incompressibility import DisplacementPenalty, Membrane, MixedPressure
 from .physics.kinematics import Axisymmetric, PlaneStrain
 from .physics.loads import Pressure
 from .physics.materials import Hyperelastic, MooneyRivlin, NeoHookean, Ogden

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from .errors import InputError, count, known
 from .mesh import Mesh
-from .physics.incompressibility import MixedPressure
+from .physics.incompressibility import DisplacementPenalty, Membrane, MixedPressure
 from .physics.kinematics import Axisymmetric
 from .physics.materials import Material
 from .physics.supports import Held
@@ -45,12 +45,16 @@ class Scene:
         self.supports = list(supports)
         self.loads = list(loads)
         self.model = model if model is not None else MixedPressure()
+        if not isinstance(self.model, MixedPressure | DisplacementPenalty | Membrane):
+            raise InputError(f"Scene: model = {model!r}: must be a MixedPressure, a DisplacementPenalty or a Membrane")
         self.kinematics = kinematics if kinematics is not None else Axisymmetric()
         self.quadrature_degree = count("Scene: quadrature_degree", quadrature_degree)
         self._check_materials()
         self._check_boundaries()
         self._check_axis()
         self._check_rigid_body()
+        if isinstance(self.model, Membrane):
+            self.model.check(self)
         driven = [x for x in (*self.loads, *self.supports) if getattr(x, "driven", False)]
         if len(driven) > 1:
             raise InputError(f"Scene: {', '.join(map(repr, driven))} are all driven: one control drives a run;"

@@ -21,51 +21,72 @@ from . import _compat
 from .physics import kinematics as kin
 
 
-class Solid:
-    """The forms of a scene.
+class Formulation:
+    """The forms of a scene: what a solid and a membrane have in common.
 
     Attributes:
         scene: the scene.
-        domain, comm: its `dolfinx.mesh.Mesh` and communicator.
+        mesh: the `Mesh` that the fields live on; domain, comm: its `dolfinx.mesh.Mesh` and communicator.
         length, stress, volume: scales L and mu, and the reference volume, in the user's units.
         space, w: the mixed `FunctionSpace` and the `Function` of all fields (dimensionless), displacement first.
+        displacement_element: the scalar element of a displacement component.
         u, X: displacement and reference position (UFL, user's unit of length, shape (2,)).
+        F, J: deformation gradient (UFL, shape (3, 3)) and its determinant.
+        dx, weight: weight * dx is the element of reference volume.
         control: the `Constant` of the dimensionless control; control_scale times it is the user's.
         residual: dPi/dw - external virtual work (UFL, rank 1); control_derivative: its derivative by the control,
             or None.
-        displacement_element: the scalar element of a displacement component.
         energy: strain energy over stress times volume (UFL, rank 0).
     """
 
     def __init__(self, scene: Any):
         self.scene = scene
-        self.domain = scene.mesh.domain
-        self.comm = self.domain.comm
         self._moduli = {id(m): m.shear_modulus for m in scene.materials.values()}
         self.length, self.stress = float(max(scene.extent)), max(self._moduli.values())
-        self._colours = _colour(scene) if scene.model.pressure else {}
-        self.space = self._make_space()
+        self.mesh = self._make_mesh()
+        self.domain = self.mesh.domain
+        self.comm = self.domain.comm
+        self.displacement_element, elements = self._elements(self.domain.basix_cell())
+        self.space = fem.functionspace(self.domain, basix.ufl.mixed_element(elements))
         self.w = fem.Function(self.space, name="w")
         self.control = self.constant(0.0)
         self.u = self.constant(self.length) * ufl.split(self.w)[0]
         self.X = ufl.SpatialCoordinate(self.domain)
-        self.dx = ufl.Measure("dx", self.domain, subdomain_data=scene.mesh.cells,
+        self.dx = ufl.Measure("dx", self.domain, subdomain_data=self.mesh.cells,
                               metadata={"quadrature_degree": scene.quadrature_degree})
-        self.ds = ufl.Measure("ds", self.domain, subdomain_data=scene.mesh.facets)
-        self.weight = scene.kinematics.weight(self.X)
+        self.ds = ufl.Measure("ds", self.domain, subdomain_data=self.mesh.facets)
+        self.weight = self._weight()
         self.volume = self.integral(self.weight * self.dx)
+        self._scale = self.constant(1 / (self.stress * self.volume))
         self.control_scale = self._scale_of_control()
-        self.J = kin.volume_ratio(scene.kinematics.deformation_gradient(self.u, self.X))
+        self.F = self._deformation_gradient()
+        self.J = kin.volume_ratio(self.F)
         self.energy = self._energy()
         self.residual, self.control_derivative = self._residual()
+
+    def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
+        """(outward normal, measure) of a boundary that a load acts on."""
+        raise NotImplementedError
+
+    def constraints(self, support: Any) -> list[Any]:
+        """What a support holds: a list of Held or MeanHeld."""
+        raise NotImplementedError
+
+    def nearest(self, points: np.ndarray) -> np.ndarray:
+        """The points of `mesh` that stand for points of the body, shape (n, 2)."""
+        raise NotImplementedError
+
+    def idle_unknowns(self) -> list[tuple[Any, np.ndarray]]:
+        """[(sub space, local dofs)] of unknowns that no equation holds: they stay 0."""
+        return []
+
+    def set_stiff(self) -> None:
+        """Put `w` to a state near rest whose tangent is regular: its tangent gives a path its first direction."""
+        self.w.x.array[:] = 0
 
     def constant(self, value: float) -> fem.Constant:
         """A number in a form that can be changed without compiling it again."""
         return fem.Constant(self.domain, PETSc.ScalarType(value))
-
-    def boundary(self, name: str, quadrature_degree: int) -> ufl.Measure:
-        """The measure of a named boundary."""
-        return self.ds(self.scene.mesh.boundaries[name], metadata={"quadrature_degree": quadrature_degree})
 
     def compile(self, form: Any) -> Any:
         """A compiled form."""
@@ -79,17 +100,56 @@ class Solid:
         """The test function of all fields (dimensionless)."""
         return ufl.TestFunction(self.space)
 
+    def metric_row(self) -> Any:
+        """Linear form whose vector is the lumped mass of the displacement, over the volume."""
+        v = ufl.split(self.test_function())[0]
+        dx = ufl.dx(self.domain, metadata={"quadrature_degree": 4})
+        return (v[0] + v[1]) * self.weight / self.constant(self.volume) * dx
+
+    def _scale_of_control(self) -> float:
+        """Pressure: stress times thickness over length, thickness being volume over loaded area. Motion: length."""
+        driven = self.scene.driven
+        if driven is None or not hasattr(driven, "virtual_work"):
+            return self.length
+        area = self.integral(self.scene.kinematics.weight(self.X) * self.face(driven.on, 2)[1])
+        return self.stress * self.volume / (area * self.length)
+
+    def _residual(self) -> tuple[Any, Any]:
+        v = self.test_function()
+        residual = ufl.derivative(self.energy, self.w, v)
+        du = self.constant(self.length) * ufl.split(v)[0]
+        control, driven = ufl.variable(self.control), None
+        for load in self.scene.loads:
+            value = self.constant(self.control_scale) * control if load.driven else self.constant(load.value)
+            N, ds = self.face(load.on, load.quadrature_degree)
+            work = load.virtual_work(self.scene.kinematics, self.u, du, self.X, N, value)
+            residual -= self._scale * work * ds
+            if load.driven:
+                driven = -self._scale * ufl.diff(work, control) * ds
+        return residual, driven
+
+
+class Solid(Formulation):
+    """A scene as an incompressible solid; the fields are displacement and, if the model has them, pressures."""
+
+    def boundary(self, name: str, quadrature_degree: int) -> ufl.Measure:
+        """The measure of a named boundary."""
+        return self.ds(self.scene.mesh.boundaries[name], metadata={"quadrature_degree": quadrature_degree})
+
+    def face(self, name, quadrature_degree):
+        return ufl.FacetNormal(self.domain), self.boundary(name, quadrature_degree)
+
+    def constraints(self, support):
+        return support.constraints()
+
+    def nearest(self, points):
+        return points
+
     def mean_row(self, component: int, boundary: str) -> Any:
         """Linear form: mean of a displacement component (dimensionless) over a boundary."""
         ds = self.boundary(boundary, 3)
         v = ufl.split(self.test_function())[0][component]
         return v * self.weight / self.constant(self.integral(self.weight * ds)) * ds
-
-    def metric_row(self) -> Any:
-        """Linear form whose vector is the lumped mass of the displacement, over the volume."""
-        v = ufl.split(self.test_function())[0]
-        dx = ufl.dx(self.domain, metadata={"quadrature_degree": 3})
-        return (v[0] + v[1]) * self.weight / self.constant(self.volume) * dx
 
     def idle_unknowns(self) -> list[tuple[Any, np.ndarray]]:
         """[(sub space, local dofs)] of pressures that belong to no cell of their layers."""
@@ -102,38 +162,38 @@ class Solid:
             found.append((sub, np.setdiff1d(dofs, dofs[cells]).astype(np.int32)))
         return found
 
-    def _make_space(self) -> Any:
-        cell = self.domain.basix_cell()
+    def _make_mesh(self) -> Any:
+        scene = self.scene
+        self._colours = _colour(scene) if scene.model.pressure else {}
+        return scene.mesh
+
+    def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
+        """The scalar element of the displacement, and those of all fields."""
         pressure = self.scene.model.pressure
         element = basix.ufl.element("Lagrange", cell, 2)
         if pressure and pressure.bubble:
             element = basix.ufl.enriched_element([element, basix.ufl.element("Bubble", cell, 3)])
-        elements = [basix.ufl.blocked_element(element, shape=(2,))]
+        fields = [basix.ufl.blocked_element(element, shape=(2,))]
         if pressure:
             field = basix.ufl.element(pressure.family, cell, pressure.degree)
-            elements += [field] * (max(self._colours.values()) + 1)
-        self.displacement_element = element
-        return fem.functionspace(self.domain, basix.ufl.mixed_element(elements))
+            fields += [field] * (max(self._colours.values()) + 1)
+        return element, fields
 
-    def _scale_of_control(self) -> float:
-        """Pressure: stress times thickness over length, thickness being volume over loaded area. Motion: length."""
-        driven = self.scene.driven
-        if driven is None or not hasattr(driven, "virtual_work"):
-            return self.length
-        area = self.integral(self.weight * self.boundary(driven.on, 2))
-        return self.stress * self.volume / (area * self.length)
+    def _weight(self) -> Any:
+        return self.scene.kinematics.weight(self.X)
+
+    def _deformation_gradient(self) -> Any:
+        return self.scene.kinematics.deformation_gradient(self.u, self.X)
 
     def _energy(self) -> Any:
         scene = self.scene
         fields = ufl.split(self.w)
-        self._scale = self.constant(1 / (self.stress * self.volume))
         eps = self.constant(scene.model.eps)
-        F = scene.kinematics.deformation_gradient(self.u, self.X)
         energy = 0
         for material, names in _by_material(scene):
             tags = tuple(scene.mesh.layers[n] for n in names)
             dx = self.dx if len(tags) == len(scene.mesh.layers) else self.dx(tags)
-            W = material.strain_energy(F, **{k: self.constant(c) for k, c in material.parameters.items()})
+            W = material.strain_energy(self.F, **{k: self.constant(c) for k, c in material.parameters.items()})
             if scene.model.stress_free:
                 W -= self.constant(material.rest_stress) * ufl.ln(self.J)
             energy += self._scale * W * self.weight * dx
@@ -142,20 +202,6 @@ class Solid:
             for density, metadata in scene.model.terms(self.J, p, modulus, eps):
                 energy += self._scale * density * self.weight * dx(metadata=metadata)
         return energy
-
-    def _residual(self) -> tuple[Any, Any]:
-        v = self.test_function()
-        residual = ufl.derivative(self.energy, self.w, v)
-        du = self.constant(self.length) * ufl.split(v)[0]
-        control, driven = ufl.variable(self.control), None
-        for load in self.scene.loads:
-            value = self.constant(self.control_scale) * control if load.driven else self.constant(load.value)
-            work = load.virtual_work(self.scene.kinematics, self.u, du, self.X, ufl.FacetNormal(self.domain), value)
-            ds = self.boundary(load.on, load.quadrature_degree)
-            residual -= self._scale * work * ds
-            if load.driven:
-                driven = -self._scale * ufl.diff(work, control) * ds
-        return residual, driven
 
 
 def _by_material(scene: Any) -> list[tuple[Any, list[str]]]:

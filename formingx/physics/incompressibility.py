@@ -15,6 +15,23 @@ import numpy as np
 from ..errors import InputError, finite, known, non_negative, positive
 
 
+class Membrane:
+    """A membrane: the sheet's mid-surface, its thickness as data, for thin sheets (Adkins and Rivlin 1952).
+
+    The stretch through the thickness is 1/(l1 l2), so the volume is kept exactly; layers are bonded and their energies
+    add up. It has no bending, so a rim cannot be clamped, and knows no stress through the thickness.
+    """
+
+    body = "membrane"
+
+    def check(self, scene):
+        """Raise an InputError if the scene has what a membrane cannot have."""
+        for support in scene.supports:
+            if getattr(support, "holds_rotation", False):
+                raise InputError(f"Scene: {support!r} with model=Membrane(): a membrane has no bending stiffness, its rim"
+                                 f" cannot be clamped; use SimplySupported({support.on!r}), or a solid model")
+
+
 class PressureSpace(NamedTuple):
     """A pair of elements on triangles: the pressure's, and whether a cubic bubble enriches the P2 displacement."""
 

@@ -34,10 +34,11 @@ class Branch:
 
     def start(self) -> State:
         """The unloaded body, with the tangent there."""
-        self._x.set(0)
+        self.problem.stiff_state(self._x)
         if not self.newton.tangent(self._x, 0.0):
             raise ConvergenceError("the unloaded body has a singular tangent: something in it is not held, or has no"
                                    " stiffness")
+        self._x.set(0)
         return self._state(0.0, [], "start", None)
 
     def solve(self, x: np.ndarray, control: float, constraint: Callable, kind: str, before: State) -> State:
