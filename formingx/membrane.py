@@ -23,7 +23,7 @@ from .mesh import Mesh
 from .physics.supports import Held
 from .solid import Formulation
 
-_FIRST_STRETCH = 1e-3
+_FIRST_STRETCH = 1e-6
 """Stretch at which the first direction of a path is taken (a direction only: no state is solved for there)."""
 
 
