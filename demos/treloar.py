@@ -86,15 +86,15 @@ def draw(paths, out, quick):
     rising, falling = (0.126, 0.440), (0.436, 0.349)
     states = [path.at(fx.pressure(p)) for p in rising] + [limit]
     states += [path.at(fx.pressure(p), after=limit) for p in falling]
-    figure, (left, right) = plots.figure(2)
+    figure, (left, right) = plots.figure(2, width=6, ratios=(1, 1.6))
     for k, state in enumerate(states):
         profile, color = path.profile(state), f"C{k}"
         label = f"{state.measures['pressure']:.3f} kg/cm$^2$" + (" (maximum)" if state is limit else "")
         plots.outline(profile, left, 1 / RADIUS, color=color, label=label)
-        right.plot(profile.reference_radius / RADIUS, profile.thickness_ratio, color=color, label=label)
-    left.set(xlabel="r/r$_0$", ylabel="z/r$_0$", title="profiles, simply supported")
+        right.plot(profile.reference_radius / RADIUS, profile.thickness_ratio, color=color)
+    left.set(xlabel="r/r$_0$", ylabel="z/r$_0$", xlim=(0, None), title="profiles, simply supported")
     right.set(xlabel="reference radius R/r$_0$", ylabel="thickness/original", title="thickness", ylim=(0, 1.02))
-    right.legend(frameon=False, fontsize=8)
+    figure.legend(*left.get_legend_handles_labels(), frameon=False, loc="outside right center")
     save(figure, out / "profiles_and_thickness.png")
 
     figure, axes = plots.figure()

@@ -76,17 +76,25 @@ class Branch:
         self._b.array_w[:] = x
         return bound.value(self._b, control)
 
+    def interpolate(self, a: State, b: State, fraction: float) -> tuple[np.ndarray, float]:
+        """(x, control) on the cubic through two states and their tangents."""
+        s, h = fraction, self._chord(a, b)
+        weights = (1 - 3 * s**2 + 2 * s**3, 3 * s**2 - 2 * s**3, h * (s - 2 * s**2 + s**3), h * (s**3 - s**2))
+        x = weights[0] * a.x + weights[1] * b.x + weights[2] * a.direction + weights[3] * b.direction
+        control = weights[0] * a.control + weights[1] * b.control + weights[2] * a.slope + weights[3] * b.slope
+        return x, control
+
     def between(self, a: State, b: State, bound: Any, target: float) -> State:
         """The state between two where a measure has a target value that lies between theirs; raises `Failure`."""
         low, high = 0.0, 1.0
         sign = self.value(bound, a.x, a.control) - target
         for _ in range(40):
             middle = (low + high) / 2
-            if (self.value(bound, *self._interpolate(a, b, middle)) - target) * sign > 0:
+            if (self.value(bound, *self.interpolate(a, b, middle)) - target) * sign > 0:
                 low = middle
             else:
                 high = middle
-        return self.solve(*self._interpolate(a, b, low), bound.equation(target), "target", a)
+        return self.solve(*self.interpolate(a, b, low), bound.equation(target), "target", a)
 
     def limit_point(self, a: State, b: State) -> State:
         """The state between two where the control is stationary; raises `Failure`.
@@ -96,7 +104,7 @@ class Branch:
         """
         for _ in range(8):
             chord = self._chord(a, b)
-            x, control = self._interpolate(a, b, _stationary(a, b, chord))
+            x, control = self.interpolate(a, b, _stationary(a, b, chord))
             found = self.solve(x, control, self._plane(a, x, control), "limit point", a)
             curvature = abs(a.slope - b.slope) / chord
             if found.slope**2 < 2e-12 * curvature * abs(found.control):
@@ -137,14 +145,6 @@ class Branch:
             weight = CONTROL_WEIGHT * old.slope
             return gradient.dot(self._b) + weight * (control - control0), weight
         return c
-
-    def _interpolate(self, a: State, b: State, fraction: float) -> tuple[np.ndarray, float]:
-        """(x, control) on the cubic through two states and their tangents."""
-        s, h = fraction, self._chord(a, b)
-        weights = (1 - 3 * s**2 + 2 * s**3, 3 * s**2 - 2 * s**3, h * (s - 2 * s**2 + s**3), h * (s**3 - s**2))
-        x = weights[0] * a.x + weights[1] * b.x + weights[2] * a.direction + weights[3] * b.direction
-        control = weights[0] * a.control + weights[1] * b.control + weights[2] * a.slope + weights[3] * b.slope
-        return x, control
 
 
 def _stationary(a: State, b: State, chord: float) -> float:

@@ -1,0 +1,275 @@
+"""Numbers read off a state, which are also what a run can aim at: pole height, stretch, volume, pressure."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import geometry
+from mpi4py import MPI
+
+from .. import _compat
+from ..errors import InputError, finite, positive
+
+
+class Probe:
+    """Displacement at fixed reference points: rows of weights on the unknowns.
+
+    Args:
+        problem: the `Problem`.
+        points: reference coordinates (R, Z), shape (n, 2), the same on all ranks.
+
+    Raises:
+        InputError: a point outside the mesh.
+    """
+
+    def __init__(self, problem: Any, points: np.ndarray):
+        points = np.atleast_2d(np.asarray(points, dtype=float))
+        mesh, comm = problem.forms.domain, problem.comm
+        padded = np.zeros((len(points), 3))
+        padded[:, :2] = points
+        tree = _compat.tree_of_cells(mesh, 1e-10 * problem.forms.length)
+        found = geometry.compute_colliding_cells(mesh, geometry.compute_collisions_points(tree, padded), padded)
+        owned = mesh.topology.index_map(2).size_local
+        cells = [next((c for c in found.links(i) if c < owned), -1) for i in range(len(points))]
+        ranks = np.where(np.array(cells) >= 0, comm.rank, comm.size)
+        owner = np.empty_like(ranks)
+        comm.Allreduce(ranks, owner, MPI.MIN)
+        if np.any(owner == comm.size):
+            r, z = points[np.argmax(owner == comm.size)]
+            raise InputError(f"point (R, Z) = ({r:.6g}, {z:.6g}) is not in the mesh")
+        element = basix.ufl.element("Lagrange", mesh.basix_cell(), 2)
+        cmap, X = _compat.coordinate_map(mesh), mesh.geometry.x
+        subs = [problem.forms.space.sub(0).sub(i).dofmap for i in (0, 1)]
+        self._problem, self.points = problem, points
+        self._mine = np.flatnonzero(owner == comm.rank)
+        self._dofs = np.empty((len(self._mine), 2, element.dim), dtype=np.int64)
+        self._weights = np.empty((len(self._mine), element.dim))
+        for k, i in enumerate(self._mine):
+            reference = cmap.pull_back(padded[i:i + 1], X[mesh.geometry.dofmap[cells[i]]])
+            self._weights[k] = element.tabulate(0, reference)[0, 0, :]
+            for component in (0, 1):
+                self._dofs[k, component] = subs[component].cell_dofs(cells[i])
+
+    def displacement(self, x: Any) -> np.ndarray:
+        """u at the points in the user's unit, shape (n, 2), all ranks."""
+        self._problem.set_state(x, float(self._problem.forms.control.value))
+        w = self._problem.forms.w.x.array
+        values = np.zeros((len(self.points), 2))
+        values[self._mine] = np.einsum("kj,kij->ki", self._weights, w[self._dofs])
+        return self._problem.forms.length * self._problem.comm.allreduce(values, MPI.SUM)
+
+    def row(self, factors: np.ndarray) -> np.ndarray:
+        """c with c . x = sum over points and components of factors (n, 2) times u over length; owned unknowns."""
+        problem = self._problem
+        index_map = problem.forms.space.dofmap.index_map
+        triples = [[], []]
+        for k, i in enumerate(self._mine):
+            for component in (0, 1):
+                triples[0].append(index_map.local_to_global(self._dofs[k, component].astype(np.int32)))
+                triples[1].append(factors[i, component] * self._weights[k])
+        dofs = np.concatenate(triples[0]) if triples[0] else np.zeros(0, dtype=np.int64)
+        weights = np.concatenate(triples[1]) if triples[1] else np.zeros(0)
+        dofs = np.concatenate(problem.comm.allgather(dofs))
+        weights = np.concatenate(problem.comm.allgather(weights))
+        first, last = index_map.local_range
+        own = (dofs >= first) & (dofs < last)
+        row = np.zeros(last - first)
+        np.add.at(row, dofs[own] - first, weights[own])
+        return row
+
+
+class Bound:
+    """A measure of one problem: its value, and the equation measure = target for a run that aims at it."""
+
+    def value(self, x: Any, control: float) -> float:
+        """The measure at a state, in the user's units."""
+        raise NotImplementedError
+
+    def equation(self, target: float) -> Any:
+        """c(x, control, gradient) -> (c, dc/dcontrol), zero where the measure has the target value."""
+        raise NotImplementedError
+
+
+class _Control(Bound):
+    def __init__(self, problem):
+        self.scale = problem.forms.control_scale
+
+    def value(self, x, control):
+        return self.scale * control
+
+    def equation(self, target):
+        def c(x, control, gradient):
+            gradient.set(0)
+            return control - target / self.scale, 1.0
+        return c
+
+
+class _Linear(Bound):
+    """value = of(offset + row . x); `back` is the inverse of `of`."""
+
+    def __init__(self, problem, row, offset=0.0, of=lambda y: y, back=lambda v: v):
+        self._row, self._offset, self._of, self._back = problem.x.duplicate(), offset, of, back
+        problem.fill(self._row, row)
+
+    def value(self, x, control):
+        return self._of(self._offset + self._row.dot(x))
+
+    def equation(self, target):
+        y = self._back(target)
+
+        def c(x, control, gradient):
+            self._row.copy(gradient)
+            return self._offset + self._row.dot(x) - y, 0.0
+        return c
+
+
+class _Form(Bound):
+    """scale times the value of a scalar form (minus its value at rest)."""
+
+    def __init__(self, problem, form, scale):
+        self._problem, self._scale = problem, scale
+        self._value = problem.forms.compile(form)
+        self._derivative = problem.forms.compile(
+            ufl.derivative(form, problem.forms.w, problem.forms.test_function()))
+        at_rest = problem.x.duplicate()
+        at_rest.set(0)
+        self._rest = 0.0
+        self._rest = self.value(at_rest, 0.0)
+        at_rest.destroy()
+
+    def value(self, x, control):
+        self._problem.set_state(x, control)
+        return self._scale * self._problem.assemble_scalar(self._value) - self._rest
+
+    def equation(self, target):
+        def c(x, control, gradient):
+            value = self.value(x, control)
+            self._problem.fill(gradient, self._problem.assemble(self._derivative))
+            return (value - target) / self._scale, 0.0
+        return c
+
+
+class Target(NamedTuple):
+    """What a run aims at: a measure (by name) and its value."""
+
+    name: str
+    value: float
+    bind: Any
+
+    def __str__(self) -> str:
+        return f"{self.name.replace('_', ' ')} = {self.value:g}"
+
+
+def pressure(value: float) -> Target:
+    """The driven pressure reaches `value` (stress)."""
+    return Target("pressure", finite("pressure", value), bind_control)
+
+
+def travel(value: float) -> Target:
+    """The driven support has moved by `value` (a length)."""
+    return Target("travel", finite("travel", value), bind_control)
+
+
+def pole_height(value: float) -> Target:
+    """The displacement u_z of the mid-thickness point on the axis reaches `value` (a length)."""
+    return Target("pole_height", finite("pole_height", value), bind_pole_height)
+
+
+def pole_stretch(value: float) -> Target:
+    """The in-plane stretch at the pole, (thickness/original)^(-1/2), reaches `value`."""
+    return Target("pole_stretch", positive("pole_stretch", value), bind_pole_stretch)
+
+
+def enclosed_volume(value: float) -> Target:
+    """The volume swept by the driven face reaches `value` (length^3; per depth in plane strain)."""
+    return Target("enclosed_volume", finite("enclosed_volume", value), bind_volume)
+
+
+def displacement(value: float, *, at: tuple[float, float], component: str = "z") -> Target:
+    """The displacement component ("r" or "z") of the reference point `at` = (R, Z) reaches `value` (a length)."""
+    if component not in ("r", "z"):
+        raise InputError(f"displacement: component = {component!r}: must be 'r' or 'z'")
+
+    def bind(problem):
+        return _displacement(problem, [at], [[1.0, 0.0] if component == "r" else [0.0, 1.0]])
+    return Target(f"u_{component}_at_{at[0]:g}_{at[1]:g}", finite("displacement", value), bind)
+
+
+def bind_control(problem: Any) -> Bound:
+    """See `pressure` and `travel`."""
+    return _Control(problem)
+
+
+def bind_pole_height(problem: Any) -> Bound:
+    """See `pole_height`."""
+    low, high = _pole(problem)
+    return _displacement(problem, [(0.0, (low + high) / 2)], [[0.0, 1.0]])
+
+
+def bind_pole_stretch(problem: Any) -> Bound:
+    """See `pole_stretch`."""
+    low, high = _pole(problem)
+    row = Probe(problem, [(0.0, low), (0.0, high)]).row(np.array([[0.0, -1.0], [0.0, 1.0]]))
+    return _Linear(problem, row * problem.forms.length / (high - low), 1.0, lambda t: max(t, 1e-300) ** -0.5,
+                   lambda s: s**-2)
+
+
+def bind_volume(problem: Any) -> Bound:
+    """See `enclosed_volume`: minus the integral of (z - z_lowest) n_z da over the driven face."""
+    driven, kinematics, forms = problem.scene.driven, problem.scene.kinematics, problem.forms
+    z0 = forms.constant(problem.scene.mesh.nodes_of(driven.on)[:, 1].min())
+    area = kinematics.area_vector(forms.u, forms.X, ufl.FacetNormal(forms.domain))
+    scale = forms.length**kinematics.dimension_of_volume
+    height = forms.X[1] + forms.u[1] - z0
+    return _Form(problem, -height * area[1] / forms.constant(scale) * forms.boundary(driven.on, 5), scale)
+
+
+def _displacement(problem, points, factors):
+    row = Probe(problem, points).row(np.asarray(factors))
+    return _Linear(problem, row * problem.forms.length)
+
+
+def _pole(problem):
+    """Z of the bottom and the top of the axis."""
+    mesh = problem.scene.mesh
+    if "axis" not in mesh.boundaries:
+        raise InputError(f"the pole needs a boundary named 'axis'; the mesh has {list(mesh.boundaries)}")
+    nodes = mesh.nodes_of("axis")
+    return float(nodes[:, 1].min()), float(nodes[:, 1].max())
+
+
+class _Scalar(Bound):
+    """of(value of a scalar form); recorded only."""
+
+    def __init__(self, problem, form, of):
+        self._problem, self._form, self._of = problem, problem.forms.compile(form), of
+
+    def value(self, x, control):
+        self._problem.set_state(x, control)
+        return self._of(self._problem.assemble_scalar(self._form))
+
+
+def standard(problem: Any) -> dict[str, Bound]:
+    """The measures that every run records, by column name.
+
+    pressure (or travel: a length), pole_height (length), pole_stretch, enclosed_volume (length^3), strain_energy
+    (stress length^3), mass_error (volume over its original value, minus 1), volume_error (root mean square of
+    J - 1). Pole and volume are there where the scene has an axis and a driven pressure.
+    """
+    scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
+    pressure_driven = hasattr(scene.driven, "virtual_work")
+    found: dict[str, Bound] = {"pressure" if pressure_driven else "travel": bind_control(problem)}
+    if "axis" in scene.mesh.boundaries:
+        found["pole_height"] = bind_pole_height(problem)
+        found["pole_stretch"] = bind_pole_stretch(problem)
+    if pressure_driven:
+        found["enclosed_volume"] = bind_volume(problem)
+    change = forms.J - 1
+    found["strain_energy"] = _Scalar(problem, forms.energy, lambda v: v * forms.stress * volume)
+    found["mass_error"] = _Scalar(problem, change * forms.weight * forms.dx, lambda v: v / volume)
+    found["volume_error"] = _Scalar(problem, change**2 * forms.weight * forms.dx,
+                                    lambda v: (v / volume) ** 0.5)
+    return found

@@ -1,0 +1,165 @@
+"""What a run gives back: the accepted states in order, and what can be read off them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from . import measures
+from .measures import Target
+from .profile import Profile, Profiles
+
+
+@dataclass
+class State:
+    """One converged state.
+
+    Attributes:
+        x: the unknowns, this rank's part (dimensionless).
+        control: the dimensionless control.
+        direction, slope: dx and dcontrol by arc length: the unit tangent of the path.
+        measures: {name: value} in the user's units.
+        history: the Newton iterations that led to it (`formingx.solve.bordered.Iteration`).
+        kind: "start", "step", "target" or "limit point".
+        met: the target that it hits, or None.
+    """
+
+    x: np.ndarray
+    control: float
+    direction: np.ndarray
+    slope: float
+    measures: dict[str, float] = field(default_factory=dict)
+    history: list = field(default_factory=list)
+    kind: str = "step"
+    met: Target | None = None
+
+
+@dataclass
+class Counts:
+    """What a run cost: accepted states (without the start), failed attempts, all Newton iterations, seconds."""
+
+    steps: int = 0
+    failures: int = 0
+    iterations: int = 0
+    seconds: float = 0.0
+
+
+class Path:
+    """The states of a run, from the unloaded body to the target.
+
+    Attributes:
+        states: all accepted states, in order along the path.
+        counts: what the run cost (`Counts`).
+        problem: the `Problem`, for further evaluation.
+    """
+
+    def __init__(self, problem: Any, branch: Any):
+        self.problem, self._branch = problem, branch
+        self._recorded = measures.standard(problem)
+        self._profiles = Profiles(problem)
+        self.states: list[State] = []
+        self.counts = Counts()
+
+    def __len__(self) -> int:
+        return len(self.states)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """One measure over all states, shape (len(path),), in the user's units."""
+        if name not in self.columns:
+            raise InputError(f"Path: column {name!r} is not known; known: {', '.join(self.columns)}")
+        return np.array([state.measures[name] for state in self.states])
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of the recorded measures."""
+        return list(self.states[0].measures) if self.states else []
+
+    @property
+    def limit_points(self) -> list[State]:
+        """States at which the control has a maximum or a minimum along the path."""
+        return [state for state in self.states if state.kind == "limit point"]
+
+    @property
+    def last(self) -> State:
+        """The last accepted state."""
+        return self.states[-1]
+
+    def met(self, target: Target) -> State | None:
+        """The state that hit a target of the run, or None."""
+        return next((state for state in self.states if state.met == target), None)
+
+    def record(self, state: State) -> None:
+        """Take up a state: evaluate the measures there."""
+        state.measures = {name: self.value(bound, state) for name, bound in self._recorded.items()}
+        self.states.append(state)
+        self.counts.steps += state.kind != "start"
+
+    def value(self, bound: Any, state: State) -> float:
+        """A measure bound to this problem (`Target.bind`) at a state."""
+        return self._branch.value(bound, state.x, state.control)
+
+    def at(self, target: Target, after: State | None = None) -> State:
+        """The first state of the path that meets the target: solved for, not interpolated; the path stays as it is.
+
+        Args:
+            target: for example `pressure(0.4)`.
+            after: look only beyond this state of the path, for example beyond a limit point.
+
+        Raises:
+            InputError: the path does not pass through that value there.
+        """
+        bound = target.bind(self.problem)
+        states = self.states[next((i for i, s in enumerate(self.states) if s is after), 0):]
+        values = [self.value(bound, state) - target.value for state in states]
+        for a, b, left, right in zip(values, values[1:], states, states[1:]):
+            if b == 0 or a * b < 0:
+                found = self._branch.between(left, right, bound, target.value)
+                found.measures = {name: self.value(m, found) for name, m in self._recorded.items()}
+                return found
+        raise InputError(f"the path does not pass {target}: its values lie between"
+                         f" {min(values) + target.value:.6g} and {max(values) + target.value:.6g}")
+
+    def curve(self, *columns: str, points: int = 12) -> list[np.ndarray]:
+        """Columns along the smooth (cubic) path through the states, `points` to each piece; for drawing.
+
+        Values at the states themselves are theirs; between them they are interpolated, not solved for.
+        """
+        rows = [[self.states[0].measures[c] for c in columns]]
+        for a, b in zip(self.states, self.states[1:]):
+            for k in range(1, points):
+                at = self._branch.interpolate(a, b, k / points)
+                rows.append([self._branch.value(self._recorded[c], *at) for c in columns])
+            rows.append([b.measures[c] for c in columns])
+        return list(np.array(rows).T)
+
+    def profile(self, state: State | None = None) -> Profile:
+        """Deformed outline and thickness of a sheet at a state (default: the last)."""
+        return self._profiles.of(state or self.last)
+
+    def describe(self, state: State) -> str:
+        """A state's main numbers in one line."""
+        return ", ".join(f"{k.replace('_', ' ')} {state.measures[k]:.6g}"
+                         for k in ("pressure", "travel", "pole_height", "pole_stretch") if k in state.measures)
+
+    def to_csv(self, file: Any) -> None:
+        """Write one row per state: kind, iterations and every measure (rank 0 writes)."""
+        from . import files
+        files.write_path(self, file)
+
+    def plot(self, y: str, x: str, axes: Any = None, **style: Any) -> Any:
+        """Draw column `y` over column `x`; returns the matplotlib axes."""
+        from . import plots
+        return plots.curve(self, y, x, axes, **style)
+
+    def plot_convergence(self, axes: Any = None) -> Any:
+        """Draw the correction (3.5.1) of every Newton iteration of every state; returns the matplotlib axes."""
+        from . import plots
+        return plots.convergence(self, axes)
+
+    def view3d(self, file: Any, state: State | None = None) -> None:
+        """Draw the sheet of a state (default: the last) revolved about the axis, coloured by thickness, as PNG."""
+        from . import views
+        views.revolved(self.profile(state), file, self.problem.comm)

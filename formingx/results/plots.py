@@ -1,0 +1,54 @@
+"""Curves with matplotlib, drawn without a screen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: Any = None) -> tuple[Any, Any]:
+    """(figure, axes) with `columns` plots side by side, widths in `ratios`; saving needs no screen."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    drawing = Figure(figsize=(width * columns, height), layout="constrained")
+    FigureCanvasAgg(drawing)
+    axes = drawing.subplots(1, columns, squeeze=False, width_ratios=ratios)[0]
+    for a in axes:
+        a.grid(True, color="0.9", linewidth=0.7)
+        a.set_axisbelow(True)
+        a.spines[["top", "right"]].set_visible(False)
+    return drawing, axes[0] if columns == 1 else axes
+
+
+def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
+    """Column y over column x of a path: the states as dots, the path as a line, limit points ringed.
+
+    Returns the axes; `axes.figure.savefig` saves.
+    """
+    axes = axes if axes is not None else figure()[1]
+    line, = axes.plot(*path.curve(x, y), **style)
+    axes.plot(path[x], path[y], ".", color=line.get_color())
+    for state in path.limit_points:
+        axes.plot(state.measures[x], state.measures[y], "o", color=line.get_color(), fillstyle="none", markersize=9)
+    axes.set_xlabel(axes.get_xlabel() or x.replace("_", " "))
+    axes.set_ylabel(axes.get_ylabel() or y.replace("_", " "))
+    return axes
+
+
+def convergence(path: Any, axes: Any = None) -> Any:
+    """Correction (3.5.1) against iteration, one line per state (as thesis figures 3.2 and 5.7); returns the axes."""
+    axes = axes if axes is not None else figure()[1]
+    for state in path.states:
+        corrections = [i.correction for i in state.history if i.correction > 0]
+        axes.semilogy(range(1, len(corrections) + 1), corrections, ".-", color="tab:blue", alpha=0.5, linewidth=1)
+    axes.set_xlabel("Newton iteration")
+    axes.set_ylabel("correction $|\\Delta x|/|x|$")
+    axes.xaxis.get_major_locator().set_params(integer=True)
+    return axes
+
+
+def outline(profile: Any, axes: Any, scale: float = 1.0, **style: Any) -> None:
+    """The deformed sheet filled between its faces, r to the right, lengths times `scale`."""
+    import numpy as np
+    points = scale * np.vstack([profile.bottom, profile.top[::-1]])
+    axes.fill(*points.T, **{"linewidth": 0.8, "edgecolor": style.get("color"), **style})
+    axes.set_aspect("equal")
