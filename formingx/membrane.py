@@ -34,6 +34,8 @@ class MidSurface(Formulation):
         InputError: the sheet is not a graph over R, or a load or support is where a membrane has neither face nor end.
     """
 
+    slack_at_rest = True
+
     def face(self, name, quadrature_degree):
         """(normal of the mid-surface away from the loaded face, the whole mid-surface)."""
         nodes = self.scene.mesh.nodes_of(name)

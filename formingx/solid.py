@@ -37,7 +37,10 @@ class Formulation:
         residual: dPi/dw - external virtual work (UFL, rank 1); control_derivative: its derivative by the control,
             or None.
         energy: strain energy over stress times volume (UFL, rank 0).
+        slack_at_rest: True if the body at rest has no stiffness in some direction.
     """
+
+    slack_at_rest = False
 
     def __init__(self, scene: Any):
         self.scene = scene

@@ -58,6 +58,28 @@ class Branch:
         self.newton.tangent(x, control)
         return self._state(control, history, "step", before)
 
+    def lead_from_rest(self, rest: State, control: float) -> float:
+        """How far along the first direction to guess the state at a control: 0, for Newton's method to start at rest.
+
+        Where rest has no stiffness (a flat membrane) the guess is the state in that direction on which F does no work.
+        """
+        if not self.problem.forms.slack_at_rest or control == 0:
+            return 0.0
+        sign, low, high = np.sign(control), 0.0, 1e-6
+
+        def work(length):
+            self._x.array_w[:] = sign * length * rest.direction
+            self.problem.residual(self._x, control, self.newton.F)
+            self._b.array_w[:] = rest.direction
+            return sign * self.newton.F.dot(self._b)
+
+        while work(high) < 0 and high < 1:
+            low, high = high, 2 * high
+        for _ in range(10):
+            middle = (low + high) / 2
+            low, high = (middle, high) if work(middle) < 0 else (low, middle)
+        return float(sign * high)
+
     def step(self, old: State, length: float) -> State:
         """One step: predict along the tangent, correct in the plane normal to it at that distance (4.14 to 4.31)."""
         x, control = old.x + length * old.direction, old.control + length * old.slope

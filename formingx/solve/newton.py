@@ -105,7 +105,7 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
         if 1 - fraction < 1e-9:
             fraction = 1.0
         control = fraction * to / problem.forms.control_scale
-        lead = (control - old.control) / old.slope if old.kind != "start" else 0.0
+        lead = (control - old.control) / old.slope if old.kind != "start" else branch.lead_from_rest(old, control)
         x.array_w[:] = old.x + lead * old.direction          # along the tangent, as far as the control asks
         converged = newton.solve(x, control)
         path.counts.iterations += len(newton.history) - 1
