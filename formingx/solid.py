@@ -13,7 +13,7 @@ from typing import Any
 import basix.ufl
 import numpy as np
 import ufl
-from dolfinx import fem
+from dolfinx import fem, la
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -156,13 +156,16 @@ class Solid(Formulation):
 
     def idle_unknowns(self) -> list[tuple[Any, np.ndarray]]:
         """[(sub space, local dofs)] of pressures that belong to no cell of their layers."""
-        found = []
+        found, mesh, dofmap = [], self.mesh, self.space.dofmap
         for colour in sorted(set(self._colours.values())):
             sub = self.space.sub(1 + colour)
-            mesh = self.scene.mesh
             cells = np.concatenate([mesh.cells.find(mesh.layers[n]) for n, c in self._colours.items() if c == colour])
-            dofs = sub.dofmap.list
-            found.append((sub, np.setdiff1d(dofs, dofs[cells]).astype(np.int32)))
+            used = la.vector(dofmap.index_map, 1)              # the cells may all be on another rank
+            used.array[sub.dofmap.list[cells].ravel()] = 1
+            used.scatter_reverse(la.InsertMode.add)
+            used.scatter_forward()
+            dofs = np.unique(sub.dofmap.list)
+            found.append((sub, dofs[used.array[dofs] == 0].astype(np.int32)))
         return found
 
     def _make_mesh(self) -> Any:

@@ -42,7 +42,7 @@ class Probe:
         dim = forms.displacement_element.dim
         self._dofs = np.array([[sub.cell_dofs(c) for sub in subs] for c in cells[mine]],
                               dtype=np.int64).reshape(len(mine), 2, dim)
-        self._weights = forms.displacement_element.tabulate(0, reference[mine])[0].reshape(len(mine), dim)
+        self._weights = _basis(forms.displacement_element, 0, self._reference)
 
     def displacement(self, x: Any) -> np.ndarray:
         """u at the points in the user's unit, shape (n, 2), all ranks."""
@@ -104,14 +104,13 @@ class MidSurfaceProbe(Probe):
     def __init__(self, problem: Any, points: np.ndarray):
         super().__init__(problem, points)
         element, domain = problem.forms.displacement_element, problem.forms.domain
-        m, dofmap = len(self._mine), domain.geometry.dofmap
-        nodes = domain.geometry.x[dofmap[self._cells], :2].reshape(m, -1, 2)
-        shape = basix.ufl.element("Lagrange", "interval", nodes.shape[1] - 1).tabulate(1, self._reference)
-        self._middle = np.einsum("kj,kji->ki", shape[0].reshape(m, -1), nodes)
-        tangent = np.einsum("kj,kji->ki", shape[1].reshape(m, -1), nodes)      # dX/dxi, along growing R or against it
+        nodes = domain.geometry.x[domain.geometry.dofmap[self._cells], :2].reshape(len(self._cells), domain.geometry.dofmap.shape[1], 2)
+        geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(domain).degree, shape=())
+        self._middle = np.einsum("kj,kji->ki", _basis(geometry, 0, self._reference), nodes)
+        tangent = np.einsum("kj,kji->ki", _basis(geometry, 1, self._reference), nodes)       # dX/dxi
         speed = np.hypot(*tangent.T)[:, None] * np.where(tangent[:, :1] > 0, 1.0, -1.0)
-        self._tangent = tangent / speed
-        slopes = element.tabulate(1, self._reference)[1].reshape(m, 1, -1) / speed[:, None]      # d/dS of the basis
+        self._tangent = tangent / speed                                                     # towards growing R
+        slopes = (_basis(element, 1, self._reference) / speed)[:, None]                     # d/dS of the basis
         self._slopes = np.repeat(slopes, 2, axis=1)
         self._on_axis = (self._middle[:, 0] < 1e-12 * problem.forms.length) & ("axis" in problem.forms.mesh.boundaries)
         for k in np.flatnonzero(self._on_axis):
@@ -168,6 +167,13 @@ class MidSurfaceProbe(Probe):
         normal = np.column_stack([-t[:, 1], t[:, 0]]) / l1[:, None]
         lifted = (offset[:, 1] / (l1 * l2))[:, None] * normal
         return u + (lifted - offset) / forms.length
+
+
+def _basis(element: Any, derivative: int, reference: np.ndarray) -> np.ndarray:
+    """The scalar basis of an element, or its derivative on an interval, at m points of its cell, shape (m, dim)."""
+    if not len(reference):                             # basix does not take an empty set
+        return np.zeros((0, element.dim))
+    return element.tabulate(derivative, reference)[derivative].reshape(len(reference), element.dim)
 
 
 _PROBES = {"solid": Probe, "membrane": MidSurfaceProbe}
