@@ -110,13 +110,17 @@ class BorderedNewton:
     def _converged(self, history: list[Iteration], residual: float) -> bool:
         """The correction ahead, from the last two and quadratic convergence, and the residual are small.
 
-        A correction that has stopped shrinking below 1e-7 has met round-off (thin flat sheets: near 1e-8).
+        A correction that has stopped shrinking below 1e-7 has met round-off (thin flat sheets: near 1e-8). So has a
+        residual that no longer shrinks with corrections below the tolerance: a stiff penalty, 8 mu/eps in (3.4.1), times
+        the round-off of the displacements may well exceed the support forces of a thin sheet by then.
         """
         last = history[-1].correction
         before = history[-2].correction if len(history) > 1 else 1.0
         ahead = last * min(1.0, last / before) ** 2
         at_round_off = last < 1e-7 and last > 0.3 * before
-        return residual < self.tolerances.residual and (ahead < self.tolerances.correction or at_round_off)
+        balanced = residual < self.tolerances.residual or (
+            last < self.tolerances.correction and residual > 0.3 * history[-1].residual)
+        return balanced and (ahead < self.tolerances.correction or at_round_off)
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
