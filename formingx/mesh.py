@@ -134,9 +134,38 @@ def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     return _from_gmsh(build, comm)
 
 
-def write_disc(file: str | os.PathLike, **arguments: Any) -> None:
-    """Write the mesh that `disc(**arguments)` builds as a gmsh file (MSH 2.2 ASCII); for other solvers."""
-    raise NotImplementedError
+def write(mesh: Mesh, file: str | os.PathLike, shift: tuple[float, float] = (0.0, 0.0)) -> None:
+    """Write a mesh with its names as a gmsh file (MSH 2.2, text), for `read` and for other solvers.
+
+    Serial only. Nodes are numbered as in the mesh; `shift` is added to their coordinates.
+    """
+    import gmsh
+    from dolfinx.mesh import entities_to_geometry
+    domain = mesh.domain
+    if domain.comm.size > 1:
+        raise InputError("mesh.write: works on one rank")
+    domain.topology.create_connectivity(1, 2)
+    geometry = domain.geometry
+    triangles = np.asarray(geometry.dofmap)
+    order = 2 if triangles.shape[1] == 6 else 1
+    # gmsh's second-order triangle has its mid-edge nodes on edges 01, 12, 20; DOLFINx numbers the opposite corner
+    triangles = triangles[:, [0, 1, 2, 5, 3, 4]] if order == 2 else triangles
+    with _gmsh_model(domain.comm) as model:
+        nodes = geometry.x + np.array([*shift, 0.0])
+        model.addDiscreteEntity(2, 1)
+        model.mesh.addNodes(2, 1, np.arange(1, len(nodes) + 1), nodes.ravel())
+        kinds = ((2, mesh.layers, mesh.cells, 9 if order == 2 else 2, lambda e: triangles[e]),
+                 (1, mesh.boundaries, mesh.facets, 8 if order == 2 else 1,
+                  lambda e: entities_to_geometry(domain, 1, e)))
+        for dim, names, tags, kind, corners in kinds:
+            for name, tag in names.items():
+                entity = model.addDiscreteEntity(dim, tag + 100)
+                entities = tags.find(tag)
+                if len(entities):
+                    model.mesh.addElementsByType(entity, kind, [], (corners(entities) + 1).ravel())
+                model.addPhysicalGroup(dim, [entity], tag, name)
+        gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
+        gmsh.write(os.fspath(file))
 
 
 def _from_gmsh(build: Any, comm: MPI.Comm) -> Mesh:

@@ -87,6 +87,12 @@ class Problem:
         values[self._held] = -self._motion
         self.fill(out, values)
 
+    def motion(self, control: float) -> np.ndarray:
+        """The held unknowns at their values for a control, all else 0, shape (owned part of x,)."""
+        values = np.zeros(self.x.getLocalSize())
+        values[self._held] = self._motion * control
+        return values
+
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
         """Mean over the reference volume of the product of two displacement fields: no mesh, no unit in it."""
         return self._dot(self._metric * a.array_r[: self._n], b.array_r[: self._n])
@@ -137,7 +143,7 @@ class Problem:
     def _hold(self, tangent: Any) -> None:
         """Collect what is held: `_held` (owned dofs), `_motion` (their value per control), `_bcs`, `_rows`."""
         forms, zero = self.forms, PETSc.ScalarType(0)
-        self._bcs, dofs, motion, means = [], [], [], []
+        self._bcs, dofs, motion, means = [], [np.zeros(0, dtype=np.int32)], [np.zeros(0)], []
         for support in self.scene.supports:
             for item in forms.constraints(support):
                 if not isinstance(item, Held):

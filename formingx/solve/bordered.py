@@ -10,6 +10,10 @@ from petsc4py import PETSc
 
 from .direct import DirectSolver
 
+UNLOADED = 1e-5
+"""Support forces (over stress times volume over length) below which a body counts as unloaded."""
+
+
 class Iteration(NamedTuple):
     """One Newton iteration: what it found and what it did. The last entry of a history is the converged state.
 
@@ -41,6 +45,20 @@ class Tolerances(NamedTuple):
     correction: float = 1e-10
     residual: float = 1e-8
     iterations: int = 12
+
+    def met(self, corrections: list[float], residual: float) -> bool:
+        """True if a state with these corrections behind it, and this residual, has converged.
+
+        Corrections that no longer shrink, below 1e-7, or that are below 1e-11, have met round-off (a flat thin sheet:
+        near 1e-8): then nothing better is to be had, and the residual may be what round-off leaves.
+        """
+        if not corrections:
+            return False
+        last, before = corrections[-1], corrections[-2] if len(corrections) > 1 else 1.0
+        ahead = last * min(1.0, last / before) ** 2
+        if ahead < self.correction and residual < self.residual:
+            return True
+        return (last < 1e-11 or 0.3 * before < last < 1e-7) and residual < 1e3 * self.residual
 
 
 class BorderedNewton:
@@ -77,10 +95,10 @@ class BorderedNewton:
         problem.residual(x, control, self.F)
         work0 = 0.0
         while True:
-            residual = self.F.norm() / (problem.force_scale + 1e-12)
+            residual = self.F.norm() / (problem.force_scale + UNLOADED)
             if not np.isfinite(residual):
                 raise Failure("an element turned inside out, or the material left its domain", history)
-            if history and self._converged(history, residual):
+            if self.tolerances.met([i.correction for i in history], residual):
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
             if len(history) >= 2 and history[-1].correction > (history[0].correction if len(history) > 2 else 0.5):
@@ -106,21 +124,6 @@ class BorderedNewton:
                 raise Failure("the tangent matrix is singular", history)
             history.append(Iteration(residual, correction, work / work0))
             problem.residual(x, control, self.F)
-
-    def _converged(self, history: list[Iteration], residual: float) -> bool:
-        """The correction ahead, from the last two and quadratic convergence, and the residual are small.
-
-        A correction that has stopped shrinking below 1e-7 has met round-off (thin flat sheets: near 1e-8). So has a
-        residual that no longer shrinks with corrections below the tolerance: a stiff penalty, 8 mu/eps in (3.4.1), times
-        the round-off of the displacements may well exceed the support forces of a thin sheet by then.
-        """
-        last = history[-1].correction
-        before = history[-2].correction if len(history) > 1 else 1.0
-        ahead = last * min(1.0, last / before) ** 2
-        at_round_off = last < 1e-7 and last > 0.3 * before
-        balanced = residual < self.tolerances.residual or (
-            last < self.tolerances.correction and residual > 0.3 * history[-1].residual)
-        return balanced and (ahead < self.tolerances.correction or at_round_off)
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""

@@ -58,13 +58,13 @@ class Branch:
         self.newton.tangent(x, control)
         return self._state(control, history, "step", before)
 
-    def lead_from_rest(self, rest: State, control: float) -> float:
-        """How far along the first direction to guess the state at a control: 0, for Newton's method to start at rest.
+    def guess_from_rest(self, rest: State, control: float) -> np.ndarray:
+        """A guess of the state at a control, to correct at that control: rest, with what is held moved.
 
-        Where rest has no stiffness (a flat membrane) the guess is the state in that direction on which F does no work.
+        Where rest has no stiffness (a flat membrane) it is the state in the first direction on which F does no work.
         """
         if not self.problem.forms.slack_at_rest or control == 0:
-            return 0.0
+            return self.problem.motion(control)
         sign, low, high = np.sign(control), 0.0, 1e-6
 
         def work(length):
@@ -78,7 +78,7 @@ class Branch:
         for _ in range(10):
             middle = (low + high) / 2
             low, high = (middle, high) if work(middle) < 0 else (low, middle)
-        return float(sign * high)
+        return sign * high * rest.direction
 
     def step(self, old: State, length: float) -> State:
         """One step: predict along the tangent, correct in the plane normal to it at that distance (4.14 to 4.31)."""

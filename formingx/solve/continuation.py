@@ -65,7 +65,7 @@ class _Run:
         path, began = self.path, time.perf_counter()
         bar = _progress_bar(path.problem.comm, self.until, progress)
         try:
-            self._record(self.branch.start())
+            self._record(self._facing_target(self.branch.start()))
             while self._is_open(self.until):
                 if path.counts.steps >= max_steps:
                     self._give_up(f"{max_steps} states were accepted before it")
@@ -78,6 +78,16 @@ class _Run:
             bar.close()
             path.counts.seconds += time.perf_counter() - began
         return path
+
+    def _facing_target(self, start: State) -> State:
+        """The start, its tangent turned if the target lies the other way."""
+        bound = next(b for t, b in self.open if t is self.until)
+        now, length = self.branch.value(bound, start.x, start.control), self.step.length
+        ahead = self.branch.value(bound, start.x + length * start.direction, start.control + length * start.slope)
+        away = self.until.value - now
+        if (ahead - now) * away < -1e-6 * away**2:              # more than round-off in a flat sheet
+            start.direction, start.slope = -start.direction, -start.slope
+        return start
 
     def _next(self, old: State) -> State:
         """The next state: at a target within reach, or one step ahead; failures halve the step."""

@@ -13,7 +13,7 @@ from ..errors import ConvergenceError, InputError, count, finite
 from ..problem import Problem
 from ..results.path import Path
 from ..scene import Scene
-from .bordered import Iteration, Tolerances
+from .bordered import UNLOADED, Iteration, Tolerances
 from .branch import Branch
 from .direct import configure
 from .stepping import StepControl
@@ -62,16 +62,14 @@ class FixedControl:
 
     def _test(self, snes: Any, iteration: int, norms: tuple) -> int:
         size, step, residual = norms
-        relative = residual / (self._problem.force_scale + 1e-12)
+        relative = residual / (self._problem.force_scale + UNLOADED)
         correction = step / (size + 1e-8) if iteration else 1.0
         work = abs(snes.getFunction()[0].dot(snes.getSolutionUpdate())) if iteration else 0.0
         self._work = self._work or work
         self.history.append(Iteration(relative, correction, work / self._work if self._work else 1.0))
         if not np.isfinite(relative):
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
-        before = self.history[-2].correction if iteration > 1 else 1.0
-        ahead = correction * min(1.0, correction / before) ** 2
-        if iteration and relative < self._tolerances.residual and ahead < self._tolerances.correction:
+        if self._tolerances.met([i.correction for i in self.history[1:]], relative):
             return PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE
         return PETSc.SNES.ConvergedReason.ITERATING
 
@@ -105,8 +103,10 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
         if 1 - fraction < 1e-9:
             fraction = 1.0
         control = fraction * to / problem.forms.control_scale
-        lead = (control - old.control) / old.slope if old.kind != "start" else branch.lead_from_rest(old, control)
-        x.array_w[:] = old.x + lead * old.direction          # along the tangent, as far as the control asks
+        if old.kind == "start":
+            x.array_w[:] = branch.guess_from_rest(old, control)
+        else:                                                # along the tangent, as far as the control asks
+            x.array_w[:] = old.x + (control - old.control) / old.slope * old.direction
         converged = newton.solve(x, control)
         path.counts.iterations += len(newton.history) - 1
         if converged:

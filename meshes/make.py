@@ -1,0 +1,21 @@
+"""Writes the coarse grids of the thesis' examples (Song 1993), for comparison with other solvers.
+
+./fx python3 meshes/make.py    six-node triangles, MSH 2.2 text, coordinates (R, Z) in the thesis' units, groups named
+"""
+
+from pathlib import Path
+
+import formingx as fx
+
+GRIDS = {
+    "treloar_20": {"radius": 1.25, "thickness": 0.082, "elements": (10, 1)},                       # cm
+    "thick_plate_20": {"radius": 7.5, "thickness": 0.5, "elements": (10, 1)},                      # in
+    "two_layer_40": {"radius": 19.1, "thickness": {"lower": 0.635, "upper": 0.635}, "elements": (10, 1)},   # cm
+    "cylinder_6": {"radius": 18.625, "inner_radius": 7.0, "thickness": 4.0, "elements": (3, 1)},   # in
+    "cylinder_12": {"radius": 18.625, "inner_radius": 7.0, "thickness": 2.0, "elements": (6, 1)},  # in
+}
+
+if __name__ == "__main__":
+    for name, size in GRIDS.items():
+        fx.mesh.write(fx.mesh.disc(**size), Path(__file__).parent / f"{name}.msh")
+        print(f"{name}.msh")

@@ -1,0 +1,41 @@
+import gc
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+
+import formingx as fx
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(autouse=True)
+def collect_garbage():
+    """PETSc objects are freed collectively: free them between tests, not whenever Python likes."""
+    yield
+    gc.collect()
+    MPI.COMM_WORLD.Barrier()
+
+
+def treloar(elements=(10, 1), support=None, length=1.0, stress=1.0, comm=MPI.COMM_WORLD, **scene):
+    """Treloar's sheet in units of `length` cm and `stress` kg/cm2."""
+    mesh = fx.mesh.disc(radius=1.25 / length, thickness=0.082 / length, elements=elements, comm=comm)
+    return fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=2.0 / stress), loads=[fx.Pressure("bottom")],
+                    supports=[fx.Symmetry("axis"), support or fx.SimplySupported("rim")], **scene)
+
+
+def run(*command, ranks=None, timeout=600):
+    """Run a Python command of the checkout as a user does; returns what it printed."""
+    launcher = ["mpirun", "-n", str(ranks)] if ranks else []
+    done = subprocess.run([*launcher, sys.executable, *map(str, command)], cwd=ROOT, capture_output=True, text=True,
+                          timeout=timeout)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def run_json(script, ranks):
+    """The JSON that a Python script prints on rank 0."""
+    return json.loads(run("-c", script, ranks=ranks).strip().splitlines()[-1])

@@ -1,0 +1,38 @@
+"""Each demo as a user runs it, with its key numbers."""
+
+import json
+
+import pytest
+from conftest import run
+
+
+def summary(demo, out, *options, ranks=None):
+    run(f"demos/{demo}.py", "--out", out, *options, ranks=ranks)
+    return json.loads((out / "summary.json").read_text())
+
+
+def test_treloar(tmp_path):
+    found = summary("treloar", tmp_path)
+    simple, clamped = found["simply_supported"], found["clamped"]
+    assert simple["limit_pressure_kg_per_cm2"] == pytest.approx(0.493271, abs=2e-6)
+    assert simple["pressure_kg_per_cm2_at_stretch"]["8.5"] == pytest.approx(0.32877, rel=5e-4)
+    assert clamped["limit_pressure_kg_per_cm2"] == pytest.approx(0.5063, rel=6e-3)
+    for numbers in (simple, clamped):
+        assert numbers["steps"] <= 25 and numbers["newton_iterations"] <= 150
+        assert numbers["mass_error"] < 1e-9
+        assert numbers["pole_thickness_cm"] == pytest.approx(0.082 / 8.5**2, rel=1e-8)
+    for picture in ("loading_curve", "profiles_and_thickness", "convergence", "inflated_3d"):
+        assert (tmp_path / f"{picture}.png").stat().st_size > 10_000
+    rows = (tmp_path / "simply_supported.csv").read_text().splitlines()
+    assert rows[0].startswith("kind,iterations,pressure") and len(rows) == simple["steps"] + 2
+
+
+def test_treloar_quick_on_two_ranks(tmp_path):
+    found = summary("treloar", tmp_path, "--quick", ranks=2)
+    assert found["simply_supported"]["limit_pressure_kg_per_cm2"] == pytest.approx(0.49328, abs=1e-5)
+
+
+def test_help_names_every_option():
+    text = run("demos/treloar.py", "--help")
+    for option in ("--elements", "--layers", "--out", "--quick", "--help"):
+        assert option in text

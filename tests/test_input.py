@@ -1,0 +1,106 @@
+"""Bad input: an error that names the thing, its value and what is allowed, before any solve."""
+
+import math
+
+import pytest
+from conftest import treloar
+
+import formingx as fx
+
+MESH = {"radius": 1.0, "thickness": 0.1, "elements": (4, 1)}
+
+
+@pytest.mark.parametrize("change, words", [
+    ({"radius": 0.0}, "radius = 0.0.*greater than 0"),
+    ({"radius": math.nan}, "radius = nan.*finite"),
+    ({"radius": "wide"}, "radius = 'wide'.*number"),
+    ({"thickness": -0.1}, "thickness.*-0.1.*greater than 0"),
+    ({"thickness": {}}, "at least one layer"),
+    ({"elements": (0, 1)}, "elements along the radius = 0.*at least 1"),
+    ({"elements": (4, 1.5)}, "elements.*1.5.*whole number"),
+    ({"elements": 4}, "elements = 4.*along the radius"),
+    ({"grading": 0}, "grading = 0.*greater than 0"),
+    ({"inner_radius": 2.0}, "inner_radius = 2.0.*below radius"),
+    ({"thickness": {"a": 1, "b": 1}, "elements": (4, (1, 1, 1))}, "2 layers need as many"),
+])
+def test_mesh(change, words):
+    with pytest.raises(fx.InputError, match=words):
+        fx.mesh.disc(**{**MESH, **change})
+
+
+@pytest.mark.parametrize("make, words", [
+    (lambda: fx.NeoHookean(c10=0.0), "no stiffness"),
+    (lambda: fx.NeoHookean(c10=-1.0), "no stiffness"),
+    (lambda: fx.NeoHookean(c10=math.inf), "finite"),
+    (lambda: fx.MooneyRivlin(c10=1.0, c01=-0.1), "not stable.*c01"),
+    (lambda: fx.MooneyRivlin(c10=0.0, c01=0.0), "no stiffness"),
+    (lambda: fx.Ogden(mu=(1.0, 1.0), alpha=(2.0,)), "as many"),
+    (lambda: fx.Ogden(mu=(1.0, 0.1), alpha=(2.0, -2.0)), "not stable.*mu alpha > 0"),
+    (lambda: fx.Hyperelastic(lambda I1, I2, a: a * (3 - I1), a=1.0), "no stiffness"),
+    (lambda: fx.Hyperelastic(lambda I1, I2, a: a * I1, b=1.0), r"constants \['a'\]"),
+    (lambda: fx.MixedPressure(eps=-1e-3), "eps = -0.001.*negative"),
+    (lambda: fx.DisplacementPenalty(eps=0), "eps = 0.*greater than 0"),
+    (lambda: fx.DisplacementPenalty(points=5), "points = 5.*3, 4, 7"),
+    (lambda: fx.Pressure("bottom", math.nan), "Pressure.*nan.*finite"),
+    (lambda: fx.Symmetry("axis", normal="x"), "normal = 'x'.*'r' or 'z'"),
+    (lambda: fx.pole_stretch(-1), "pole_stretch = -1.*greater than 0"),
+    (lambda: fx.mesh.read("no such file.msh"), "not there"),
+])
+def test_objects(make, words):
+    with pytest.raises(fx.InputError, match=words):
+        make()
+
+
+def scene(**change):
+    arguments = {"mesh": fx.mesh.disc(**MESH), "materials": {"sheet": fx.NeoHookean(c10=1.0)},
+                 "supports": [fx.Symmetry("axis"), fx.Clamped("rim")], "loads": [fx.Pressure("bottom")]}
+    return fx.Scene(**{**arguments, **change})
+
+
+@pytest.mark.parametrize("change, words", [
+    ({"materials": {}}, "'sheet' has no material"),
+    ({"materials": {"sheet": fx.NeoHookean(c10=1.0), "skin": fx.NeoHookean(c10=1.0)}}, "layer 'skin'.*known: 'sheet'"),
+    ({"materials": {"sheet": 2.0}}, "must be a formingx material"),
+    ({"loads": [fx.Pressure("botom")]}, "'botom' is not known; known: 'axis', 'rim', 'bottom', 'top'"),
+    ({"supports": [fx.Symmetry("axis")]}, "too little support.*translation along Z"),
+    ({"supports": [fx.Clamped("rim")]}, "touches the axis"),
+    ({"loads": [fx.Pressure("bottom"), fx.Pressure("top")]}, "one control drives a run"),
+    ({"mesh": "disc"}, "mesh = 'disc'"),
+    ({"quadrature_degree": 0}, "quadrature_degree = 0"),
+])
+def test_scene(change, words):
+    with pytest.raises(fx.InputError, match=words):
+        scene(**change)
+
+
+def test_plane_strain_needs_three_motions_held():
+    with pytest.raises(fx.InputError, match="too little support.*translation along Z"):
+        scene(supports=[fx.Symmetry("axis")], kinematics=fx.PlaneStrain())
+    with pytest.raises(fx.InputError, match="too little support.*rotation"):
+        scene(supports=[fx.PinnedNode(0.0, 0.0)], kinematics=fx.PlaneStrain())
+
+
+def test_mesh_across_the_axis(tmp_path):
+    file = tmp_path / "crossing.msh"
+    fx.mesh.write(fx.mesh.disc(**MESH), file, shift=(-0.5, 0.0))
+    with pytest.raises(fx.InputError, match="crosses the axis: its smallest R is -0.5"):
+        scene(mesh=fx.mesh.read(file))
+
+
+def test_pinned_node_that_is_not_there():
+    with pytest.raises(fx.InputError, match="no node"):
+        fx.trace(scene(supports=[fx.Symmetry("axis"), fx.PinnedNode(0.123, 0.456)]), until=fx.pressure(0.1))
+
+
+def test_nothing_driven():
+    for run in (lambda s: fx.trace(s, until=fx.pressure(1.0)), lambda s: fx.solve(s, to=1.0)):
+        with pytest.raises(fx.InputError, match="nothing is driven"):
+            run(scene(loads=[fx.Pressure("bottom", 0.1)]))
+
+
+def test_column_and_value_that_a_path_does_not_have():
+    path = fx.trace(treloar(), until=fx.pressure(0.1))
+    with pytest.raises(fx.InputError, match="column 'height' is not known; known: pressure"):
+        path["height"]
+    with pytest.raises(fx.InputError, match="does not pass pressure = 0.3"):
+        path.at(fx.pressure(0.3))

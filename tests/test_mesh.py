@@ -1,0 +1,66 @@
+"""Meshes: names, layers, grading, files."""
+
+import numpy as np
+import pytest
+from conftest import ROOT, treloar
+
+import formingx as fx
+
+
+def test_disc_is_named_and_whole():
+    mesh = fx.mesh.disc(radius=2.0, thickness={"a": 0.1, "b": 0.3}, elements=(5, (1, 2)))
+    assert set(mesh.layers) == {"a", "b"} and set(mesh.boundaries) == {"axis", "rim", "bottom", "top"}
+    assert [len(mesh.cells.find(mesh.layers[n])) for n in "ab"] == [10, 20]
+    assert np.allclose(mesh.nodes_of("top")[:, 1], 0.4) and len(mesh.nodes_of("top")) == 11
+    assert np.allclose(mesh.nodes_of("rim")[:, 0], 2.0) and np.allclose(mesh.nodes_of("axis")[:, 0], 0.0)
+
+
+def test_grading():
+    R = fx.mesh.disc(radius=1.0, thickness=0.1, elements=(6, 1), grading=0.2).nodes_of("bottom")[::2, 0]
+    sizes = np.diff(R)
+    assert sizes[-1] / sizes[0] == pytest.approx(0.2) and np.all(np.diff(sizes) < 0)
+
+
+def test_file_and_back(tmp_path):
+    """A mesh written and read gives the same path; so does the coarse grid that is shipped."""
+    scene = treloar((10, 1))
+    fx.mesh.write(scene.mesh, tmp_path / "sheet.msh")
+    pressures = []
+    for mesh in (scene.mesh, fx.mesh.read(tmp_path / "sheet.msh"), fx.mesh.read(ROOT / "meshes" / "treloar_20.msh")):
+        assert mesh.layers == {"sheet": 1} and set(mesh.boundaries) == {"axis", "rim", "bottom", "top"}
+        again = fx.Scene(mesh=mesh, materials=scene.materials, supports=scene.supports, loads=scene.loads)
+        pressures.append(fx.trace(again, until=fx.pole_stretch(1.5)).last.measures["pressure"])
+    assert pressures == pytest.approx([pressures[0]] * 3, rel=1e-9)
+
+
+def test_file_without_names(tmp_path):
+    import gmsh
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.model.occ.addRectangle(0, 0, 0, 1, 1)
+    gmsh.model.occ.synchronize()
+    gmsh.model.mesh.generate(2)
+    gmsh.write(str(tmp_path / "plain.msh"))
+    gmsh.finalize()
+    with pytest.raises(fx.InputError, match="no physical group of dimension 2"):
+        fx.mesh.read(tmp_path / "plain.msh")
+
+
+def test_first_order_mesh_gives_the_same_numbers(tmp_path):
+    """The unknowns are six-node triangles whatever the order of the file."""
+    import gmsh
+    fx.mesh.write(treloar((10, 1)).mesh, tmp_path / "second.msh")
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.open(str(tmp_path / "second.msh"))
+    gmsh.model.mesh.setOrder(1)
+    gmsh.write(str(tmp_path / "first.msh"))
+    gmsh.finalize()
+    first = fx.mesh.read(tmp_path / "first.msh")
+    assert first.domain.geometry.cmap.degree == 1
+    pressures = []
+    for mesh in (first, treloar((10, 1)).mesh):
+        scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=2.0), loads=[fx.Pressure("bottom")],
+                         supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+        pressures.append(fx.trace(scene, until=fx.pole_stretch(1.5)).last.measures["pressure"])
+    assert pressures[0] == pytest.approx(pressures[1], rel=1e-9)

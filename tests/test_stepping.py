@@ -1,0 +1,31 @@
+"""Step control alone."""
+
+import pytest
+
+from formingx import StepControl, Tolerances
+
+
+def test_step_follows_target_over_actual():
+    step = StepControl(length=1.0, target=4, growth=2.0)
+    for iterations, length in ((4, 1.0), (8, 0.5), (100, 0.25), (1, 0.5), (2, 1.0)):
+        step.accepted(iterations)
+        assert step.length == pytest.approx(length)
+
+
+def test_step_halves_down_to_its_floor_and_keeps_its_ceiling():
+    step = StepControl(length=1.0, smallest=0.3, largest=1.5)
+    assert step.failed() and step.length == 0.5
+    assert not step.failed()
+    step = StepControl(length=1.0, largest=1.5)
+    step.accepted(1)
+    assert step.length == 1.5
+
+
+def test_convergence_needs_residual_and_correction():
+    met = Tolerances(correction=1e-10, residual=1e-8).met
+    assert met([1e-2, 1e-4, 1e-7], 1e-9)              # quadratic: the next would be 1e-13
+    assert not met([1e-2, 1e-4, 1e-7], 1e-7)          # residual too large
+    assert not met([1e-2, 1e-4], 1e-9)                # the next would be 1e-8
+    assert not met([], 0.0)
+    assert met([1e-4, 3e-8, 2e-8], 1e-7)              # round-off: no longer shrinking
+    assert not met([1e-4, 3e-5, 2e-5], 1e-9)          # stalled far from it
