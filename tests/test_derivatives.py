@@ -22,7 +22,7 @@ def scene(material=MATERIALS[1], keeping=None, kinematics=None, support=None, lo
     mesh = fx.mesh.disc(radius=2.0, thickness=layers, elements=(3, 1), inner_radius=0.5)
     materials = {"lower": material, "upper": fx.NeoHookean(c10=5.0)}
     return fx.Scene(mesh=mesh, materials=materials, supports=[support or fx.Clamped("rim")], loads=loads,
-                    incompressibility=keeping, kinematics=kinematics)
+                    model=keeping, kinematics=kinematics)
 
 
 def random_state(problem, seed=1, size=0.02):

@@ -69,7 +69,7 @@ class FixedControl:
         self.history.append(Iteration(relative, correction, work / self._work if self._work else 1.0))
         if not np.isfinite(relative):
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
-        if self._tolerances.met([i.correction for i in self.history[1:]], relative):
+        if self._tolerances.met([i.correction for i in self.history[1:]], [i.residual for i in self.history]):
             return PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE
         return PETSc.SNES.ConvergedReason.ITERATING
 
