@@ -22,21 +22,28 @@ def inflate(mesh, support):
     scene = fx.Scene(mesh=mesh, materials={"sheet": fx.NeoHookean(c10=C10)},
                      supports=[fx.Symmetry("axis"), support], loads=[fx.Pressure("bottom")])
     targets = [fx.pole_stretch(float(s)) for s in STRETCHES]
-    return fx.trace(scene, until=targets[-1], through=targets[:-1])
+    try:
+        return fx.trace(scene, until=targets[-1], through=targets[:-1])
+    except fx.ConvergenceError as error:      # a clamped corner on a fine mesh: what was reached is still of use
+        if not error.path.limit_points:
+            raise
+        say(f"WARNING, {support!r}: {error}", "")
+        return error.path
 
 
 def key_numbers(path):
     """What the summary holds of one path."""
     limit, profile = path.limit_points[0].measures, path.profile()
+    whole = path.met(fx.pole_stretch(float(STRETCHES[-1]))) is not None
     return {
         "limit_pressure_kg_per_cm2": limit["pressure"],
         "limit_pole_stretch": limit["pole_stretch"],
         "limit_pole_height_cm": limit["pole_height"],
         "pressure_kg_per_cm2_at_stretch": {
-            s: path.met(fx.pole_stretch(float(s))).measures["pressure"] for s in STRETCHES},
-        "pole_thickness_cm": profile.thickness[0],
-        "rim_thickness_ratio": profile.thickness_ratio[-1],
-        "thickness_ratio_one_thickness_from_rim": profile.thickness_ratio_at(RADIUS - THICKNESS),
+            s: met.measures["pressure"] if (met := path.met(fx.pole_stretch(float(s)))) else None for s in STRETCHES},
+        "pole_thickness_cm": profile.thickness[0] if whole else None,
+        "rim_thickness_ratio": profile.thickness_ratio[-1] if whole else None,
+        "thickness_ratio_one_thickness_from_rim": profile.thickness_ratio_at(RADIUS - THICKNESS) if whole else None,
         "mass_error": abs(path.last.measures["mass_error"]),
         "steps": path.counts.steps,
         "newton_iterations": path.counts.iterations,
@@ -64,7 +71,9 @@ def table(numbers):
     rows.append(("  one thickness from the rim", simple[key], clamped[key],
                  np.interp(near, at["8.5"].R, at["8.5"].thickness_ratio), THESIS["thickness ratio near the rim"]))
     head = f"{'':30}{'simply supp.':>14}{'clamped':>12}{'membrane':>12}{'thesis':>9}"
-    return [head] + [f"{name:30}{a:14.6g}{b:12.6g}{m:12.6g}" + (f"{t:9.4g}" if t else "") for name, a, b, m, t in rows]
+    cell = "{:.6g}".format
+    return [head] + [f"{name:30}{cell(a) if a else '-':>14}{cell(b) if b else '-':>12}{cell(m):>12}"
+                     f"{t or '':>9}" for name, a, b, m, t in rows]
 
 
 def draw(paths, out, quick):

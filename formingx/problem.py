@@ -1,7 +1,7 @@
 """The discrete equations of a scene, F(x, control) = 0: what `solve` sees. Everything in it is created once.
 
-x holds the fields (dimensionless, see `solid`) and, at the end of the last rank's part, one Lagrange multiplier for each
-`MeanHeld` support.
+x holds the fields (dimensionless, see `solid`) and, at the end of the last rank's part, one Lagrange multiplier for
+each `MeanHeld` support.
 """
 
 from __future__ import annotations
@@ -176,9 +176,9 @@ class Problem:
         if item.on is not None:
             mesh = self.forms.mesh
             return fem.locate_dofs_topological(sub, mesh.facets.dim, mesh.facets_of(item.on))
-        near, (r, z) = 1e-8 * self.forms.length, self.forms.nearest(np.array([item.point]))[0]
+        near, point = 1e-8 * self.forms.length, self.forms.nearest(np.array([item.point])).T
         found = fem.locate_dofs_geometrical((sub, sub.collapse()[0]),
-                                            lambda X: np.hypot(X[0] - r, X[1] - z) < near)[0]
+                                            lambda X: np.hypot(*(X[:2] - point)) < near)[0]
         if self.comm.allreduce(len(found), MPI.MAX) == 0:
             raise InputError(f"{support!r}: the mesh has no node at this place")
         return found

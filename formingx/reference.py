@@ -1,9 +1,9 @@
 """Membrane theory of free inflation, to compare with: Adkins & Rivlin, Phil. Trans. R. Soc. A 244 (1952) 505-531.
 
 A flat circular membrane, rim held, under a pressure. With stretches l1 (meridional), l2 = r/R, l3 = 1/(l1 l2) and the
-Mooney energy, tensions per deformed length are T1 = 2 h0 l3 (l1^2 - l3^2)(c10 + c01 l2^2), T2 likewise; equilibrium:
-d(T1 r)/dr = T2 and dtheta/ds T1 + sin(theta)/r T2 = p, theta the slope of the meridian. Integrated from the pole until l2 = 1:
-only the product p R counts, so no shooting is needed.
+Mooney energy, tensions per deformed length are T1 = 2 h0 l3 (l1^2 - l3^2)(c10 + c01 l2^2), T2 likewise. Equilibrium:
+d(T1 r)/dr = T2 and T1 dtheta/ds + T2 sin(theta)/r = p, theta the slope of the meridian. Integrated from the pole until
+l2 = 1: only the product p R counts, so no shooting is needed.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float, 
     def rim(R, y):
         return y[1] / R - 1
 
-    rim.terminal, rim.direction = True, -1
+    rim.terminal, rim.direction = True, -1          # type: ignore[attr-defined]
     start, l3 = 1e-6, pole_stretch**-2        # a spherical cap at the pole: curvature 1/(2 T)
     T = 2 * l3 * (pole_stretch**2 - l3**2) * (1 + k * pole_stretch**2)
     r0 = pole_stretch * start

@@ -147,3 +147,14 @@ def test_pressure_jumps_between_layers():
     w = path.problem.forms.w
     jumps = [w.sub(i).collapse().x.array for i in (1, 2)]
     assert abs(jumps[0]).max() > 0 and abs(jumps[1]).max() > 0
+
+
+@pytest.mark.slow
+def test_a_path_that_turns_back_is_not_followed():
+    """Clamped, on a mesh fine enough for the corner to crease: the run arrives, or stops and says so."""
+    try:
+        path = fx.trace(treloar((60, 3), fx.Clamped("rim")), until=fx.pole_stretch(8.5))
+    except fx.ConvergenceError as error:
+        assert "turned back" in str(error)
+        path = error.path
+    assert path["pressure"].min() >= 0 and path.limit_points[0].measures["pressure"] == pytest.approx(0.508, abs=2e-3)

@@ -28,7 +28,7 @@ class Material:
 
     parameters: dict[str, float]
 
-    def strain_energy(self, F: Any, **constants: Any) -> Any:
+    def strain_energy(self, F: Any, *args: Any, **constants: Any) -> Any:
         """Energy per reference volume of F, shape (3, 3); a UFL scalar, zero at F = I."""
         raise NotImplementedError
 

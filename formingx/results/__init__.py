@@ -1,0 +1,1 @@
+"""What a run gives back: measures, path, profile, files, plots, views."""

@@ -21,7 +21,8 @@ def write_path(path: Any, file: Any) -> None:
 
 def write_profile(profile: Any, file: Any, comm: Any) -> None:
     """One row per node of the bottom face: reference radius, arc length, both deformed faces, thickness, its ratio."""
-    columns = ["reference_radius", "arc_length", "r_bottom", "z_bottom", "r_top", "z_top", "thickness", "thickness_ratio"]
+    columns = ["reference_radius", "arc_length", "r_bottom", "z_bottom", "r_top", "z_top", "thickness",
+               "thickness_ratio"]
     table = np.column_stack([profile.reference_radius, profile.arc_length, profile.bottom, profile.top,
                              profile.thickness, profile.thickness_ratio])
     write_rows(file, columns, table.tolist(), comm)
@@ -43,7 +44,8 @@ def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], 
 def write_summary(file: Any, summary: dict[str, Any], comm: Any) -> None:
     """A JSON file of key numbers; NaN is refused."""
     if comm.rank == 0:
-        _replace(file, lambda stream: stream.write(json.dumps(summary, indent=2, allow_nan=False, default=float) + "\n"))
+        text = json.dumps(summary, indent=2, allow_nan=False, default=float) + "\n"
+        _replace(file, lambda stream: stream.write(text))
 
 
 def versions() -> dict[str, str]:

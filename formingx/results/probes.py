@@ -82,7 +82,7 @@ class Probe:
     def _row(self, factors: np.ndarray, point_weights: np.ndarray) -> np.ndarray:
         problem = self._problem
         index_map = problem.forms.space.dofmap.index_map
-        triples = [[], []]
+        triples: list[list] = [[], []]
         for k, i in enumerate(self._mine):
             for component in (0, 1):
                 triples[0].append(index_map.local_to_global(self._dofs[k, component].astype(np.int32)))

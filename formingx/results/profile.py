@@ -55,7 +55,8 @@ class Profiles:
     """Makes the `Profile` of a state; the mesh must have boundaries `bottom` and `top`, one above the other."""
 
     def __init__(self, problem: Any):
-        self._problem, self._probe = problem, None
+        self._problem = problem
+        self._probe: Probe | None = None
 
     def of(self, state: Any) -> Profile:
         """The profile of a state (collective)."""

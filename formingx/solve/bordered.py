@@ -68,7 +68,8 @@ class Tolerances(NamedTuple):
 class BorderedNewton:
     """Solves F(x, control) = 0 together with c(x, control) = 0.
 
-    `norm(x, control)` measures corrections. The constraint is called as c(x, control, gradient) and returns (c, dc/dcontrol), having put dc/dx into `gradient`.
+    `norm(x, control)` measures corrections. The constraint is called as c(x, control, gradient) and returns
+    (c, dc/dcontrol), having put dc/dx into `gradient`.
     """
 
     def __init__(self, problem: Any, tolerances: Tolerances, norm: Callable[[PETSc.Vec, float], float]):
@@ -95,7 +96,8 @@ class BorderedNewton:
         Raises:
             Failure: no convergence; x is then worthless.
         """
-        problem, history = self.problem, []
+        problem = self.problem
+        history: list[Iteration] = []
         problem.residual(x, control, self.F)
         work0 = 0.0
         while True:

@@ -45,7 +45,8 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
         ConvergenceError: the target was not reached. It carries the path so far and says what to try.
     """
     if scene.driven is None:
-        raise InputError("trace: nothing is driven: give one load no value, Pressure('bottom'), or one Displaced support")
+        raise InputError("trace: nothing is driven: give one load no value, as Pressure('bottom'), or"
+                         " add a Displaced support")
     problem = Problem(scene)
     run = _Run(problem, until, through, replace(step or StepControl()), tolerances or Tolerances())
     return run.trace(count("trace: max_steps", max_steps), progress)
@@ -56,7 +57,7 @@ class _Run:
 
     def __init__(self, problem: Problem, until: measures.Target, through: Sequence[measures.Target],
                  step: StepControl, tolerances: Tolerances):
-        self.until, self.step = until, step
+        self.until, self.step, self._best = until, step, 0.0
         self.open = [(target, target.bind(problem)) for target in (*through, until)]
         self.branch = Branch(problem, tolerances)
         self.path = Path(problem, self.branch)
@@ -73,6 +74,7 @@ class _Run:
                     self._record(state)
                     if not self._is_open(self.until) and state.met is self.until:
                         break
+                self._check_direction()
                 _show(bar, path, self.until)
         finally:
             bar.close()
@@ -110,9 +112,25 @@ class _Run:
                 if not self.step.failed():
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}")
 
+    def _check_direction(self) -> None:
+        """Stop if the path has turned back: its target further away than half of what had been gained.
+
+        (A control may fall again after a limit point, but not below where it started.)
+        """
+        if not self._is_open(self.until):
+            return
+        bound = next(b for t, b in self.open if t is self.until)
+        start = self.path.value(bound, self.path.states[0])
+        gained = (self.path.value(bound, self.path.last) - start) / (self.until.value - start)
+        self._best = max(self._best, gained)
+        kept = 0.0 if self.until.bind is measures.bind_control else 0.5
+        if self._best > 0.05 and gained < kept * self._best:
+            self._give_up("the path turned back, which a crease at a singular corner (a clamped rim on a fine mesh) can"
+                          " cause")
+
     def _within_reach(self, old: State, length: float) -> tuple:
         """(target, its measure, distance) of the first open target that the tangent meets within `length`."""
-        best = (None, None, length)
+        best: tuple = (None, None, length)
         for target, bound in self.open:
             now = self.branch.value(bound, old.x, old.control)
             ahead = self.branch.value(bound, old.x + length * old.direction, old.control + length * old.slope)
@@ -156,7 +174,7 @@ class _Run:
         return any(t is target for t, _ in self.open)
 
     def _give_up(self, why: str) -> None:
-        raise self._error(f"{why}.") from None
+        raise self._error(f"{why}.")
 
     def _error(self, why: str) -> ConvergenceError:
         """What happened, what was met, what to try."""

@@ -18,7 +18,6 @@ from .branch import Branch
 from .direct import configure
 from .stepping import StepControl
 
-
 _prefixes = itertools.count()
 
 
@@ -30,7 +29,8 @@ class FixedControl:
 
     def __init__(self, problem: Any, tolerances: Tolerances):
         self._problem, self._tolerances = problem, tolerances
-        self._control, self._work, self.history = 0.0, 0.0, []
+        self._control, self._work = 0.0, 0.0
+        self.history: list[Iteration] = []
         self._snes = PETSc.SNES().create(problem.comm)
         self._snes.setType("newtonls")
         self._snes.setFunction(self._function, problem.x.duplicate())
@@ -89,7 +89,8 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
         ConvergenceError: an increment did not converge; it carries the path so far.
     """
     if scene.driven is None:
-        raise InputError("solve: nothing is driven: give one load no value, Pressure('bottom'), or one Displaced support")
+        raise InputError("solve: nothing is driven: give one load no value, as Pressure('bottom'), or"
+                         " add a Displaced support")
     to, increments = finite("solve: to", to), count("solve: increments", increments)
     problem, began = Problem(scene), time.perf_counter()
     tolerances = tolerances or Tolerances()
