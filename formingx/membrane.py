@@ -1,10 +1,10 @@
 """A scene as a membrane: its mid-surface as a line, its thickness as data (Adkins and Rivlin 1952).
 
-With the meridional stretch l1 = |dx/dS| and the hoop stretch l2 (r/R, or 1 in plane strain), the energy per reference area
-of the mid-surface is the sum over the layers of h W(l1, l2, 1/(l1 l2)): the volume is kept exactly, and no pressure is
-needed. The follower pressure acts on the mid-surface. A flat membrane without stretch has no stiffness normal to itself:
-its pressure grows with the cube of the pole height, so a path leaves rest at constant pressure in the direction that a
-tension in all directions gives it.
+With the meridional stretch l1 = |dx/dS| and the hoop stretch l2 (r/R, or 1 in plane strain), the energy per reference
+area of the mid-surface is the sum over the layers of h W(l1, l2, 1/(l1 l2)): the volume is kept exactly, and no
+pressure is needed. The follower pressure acts on the mid-surface. A flat membrane without stretch has no stiffness
+normal to itself: its pressure grows with the cube of the pole height. So a path leaves rest along the deflection that
+the membrane has under a vanishing tension, at no pressure; every state on it is a solution of the unchanged equations.
 """
 
 from __future__ import annotations
@@ -45,7 +45,8 @@ class MidSurface(Formulation):
             if whole and np.abs(nodes[:, 1] - np.interp(nodes[:, 0], self._R, Z)).max() < near:
                 t = self._tangent
                 return side * ufl.as_vector([-t[1], t[0]]), self.dx(metadata={"quadrature_degree": quadrature_degree})
-        raise InputError(f"boundary {name!r}: a membrane takes loads on the whole of its lower or of its upper face only")
+        raise InputError(f"boundary {name!r}: a membrane takes loads on the whole of its lower or of its upper face"
+                         f" only")
 
     def constraints(self, support):
         """A mean over an end is the value at its point; a membrane is held at its ends only."""

@@ -1,7 +1,7 @@
 """How a scene is modelled: as a solid, and how its volume is kept there, or as a membrane.
 
-Both ways of the solid are the penalty of Song (1993), eq. (3.4.1), W + (mu/eps) (I3 - 1)^2, with eps dimensionless (mu is the
-layer's shear modulus). Where it keeps the pressure as an unknown p (tension positive), the same penalty reads
+Both ways of the solid are the penalty of Song (1993), eq. (3.4.1), W + (mu/eps) (I3 - 1)^2, with eps dimensionless (mu
+is the layer's shear modulus). Where it keeps the pressure as an unknown p (tension positive), the same penalty reads
 W + p (J - 1) - p^2/(2 k), k = 8 mu/eps: equal for small J - 1, and a Newton method that is far better behaved, as
 the linearised constraint carries no wrong stress k (J - 1).
 """
@@ -28,8 +28,8 @@ class Membrane:
         """Raise an InputError if the scene has what a membrane cannot have."""
         for support in scene.supports:
             if getattr(support, "holds_rotation", False):
-                raise InputError(f"Scene: {support!r} with model=Membrane(): a membrane has no bending stiffness, its rim"
-                                 f" cannot be clamped; use SimplySupported({support.on!r}), or a solid model")
+                raise InputError(f"Scene: {support!r} with model=Membrane(): a membrane has no bending stiffness, its"
+                                 f" rim cannot be clamped; use SimplySupported({support.on!r}), or a solid model")
 
 
 class PressureSpace(NamedTuple):
@@ -60,8 +60,8 @@ class MixedPressure:
     Args:
         eps: dimensionless penalty parameter; 0 keeps the volume exactly (weakly, in the pressure space).
         space: "P1": continuous in each layer (Taylor-Hood); "P0": one value in each element, cheap, displacements
-            converge with order 2 instead of 3; "P1dg": linear in each element, the P2 displacement enriched by a cubic bubble
-            (Crouzeix and Raviart 1973): the volume of each element is kept.
+            converge with order 2 instead of 3; "P1dg": linear in each element, the P2 displacement enriched by a cubic
+            bubble (Crouzeix and Raviart 1973). Both of these keep the volume of each element.
     """
 
     body = "solid"

@@ -104,7 +104,8 @@ class MidSurfaceProbe(Probe):
     def __init__(self, problem: Any, points: np.ndarray):
         super().__init__(problem, points)
         element, domain = problem.forms.displacement_element, problem.forms.domain
-        nodes = domain.geometry.x[domain.geometry.dofmap[self._cells], :2].reshape(len(self._cells), domain.geometry.dofmap.shape[1], 2)
+        nodes = domain.geometry.x[domain.geometry.dofmap[self._cells].ravel(), :2]
+        nodes = nodes.reshape(len(self._cells), domain.geometry.dofmap.shape[1], 2)
         geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(domain).degree, shape=())
         self._middle = np.einsum("kj,kji->ki", _basis(geometry, 0, self._reference), nodes)
         tangent = np.einsum("kj,kji->ki", _basis(geometry, 1, self._reference), nodes)       # dX/dxi
@@ -131,8 +132,8 @@ class MidSurfaceProbe(Probe):
         off = np.abs(self.points - middle).max(axis=1) > 1e-8 * self._problem.forms.length
         if np.any(off):
             r, z = self.points[np.argmax(off)]
-            raise InputError(f"point (R, Z) = ({r:.6g}, {z:.6g}) is not on the mid-surface, and a membrane knows no other:"
-                             f" there it is ({middle[np.argmax(off)][0]:.6g}, {middle[np.argmax(off)][1]:.6g})")
+            raise InputError(f"point (R, Z) = ({r:.6g}, {z:.6g}) is not on the mid-surface, and a membrane knows no"
+                             f" other: there it is ({middle[np.argmax(off)][0]:.6g}, {middle[np.argmax(off)][1]:.6g})")
         return super().row(factors)
 
     def _locate(self, forms, points):

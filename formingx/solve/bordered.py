@@ -51,8 +51,8 @@ class Tolerances(NamedTuple):
 
         Corrections that no longer shrink, below 1e-7, or that are below 1e-11, have met round-off (a flat thin sheet:
         near 1e-8): then nothing better is to be had, and the residual may be what round-off leaves. A
-        residual that no longer shrinks with corrections below the tolerance is at round-off, however large: a stiff penalty
-        (8 mu/eps) times the round-off of the displacements can well exceed the support forces of a thin sheet.
+        residual that no longer shrinks with corrections below the tolerance is at round-off, however large: a stiff
+        penalty (8 mu/eps) times the round-off of the displacements can well exceed the support forces of a thin sheet.
         """
         if not corrections:
             return False
