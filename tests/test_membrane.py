@@ -209,7 +209,8 @@ def test_reference_volume_of_an_uneven_sheet(tmp_path):
     exact = 2 * np.pi * (0.05 / 2 + 0.05 / 3)                 # of (h(0) + (h(1) - h(0)) R) R, h from 0.05 to 0.1
     assert path.problem.forms.volume == pytest.approx(exact, rel=1e-12)
     at_rest = path.profile(path.states[0])
-    assert at_rest.thickness_ratio == pytest.approx(np.ones_like(at_rest.reference_radius), rel=0.03)
+    assert at_rest.thickness_ratio == pytest.approx(np.ones_like(at_rest.reference_radius), rel=1e-12)
+    assert at_rest.bottom[:, 1] == pytest.approx(0.2 * (1 - at_rest.reference_radius), abs=1e-12)
 
 
 @pytest.mark.parametrize("supports, on, words", [

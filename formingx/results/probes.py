@@ -99,7 +99,7 @@ class Probe:
 
 
 class MidSurfaceProbe(Probe):
-    """The same on a membrane: a point off the mid-surface stays on its normal, at its distance times the thinning."""
+    """The same on a membrane: points off the mid-surface move with it, their distance changes as the thickness."""
 
     def __init__(self, problem: Any, points: np.ndarray):
         super().__init__(problem, points)
@@ -165,9 +165,15 @@ class MidSurfaceProbe(Probe):
             R, u_r = self._middle[:, 0], forms.length * u[:, 0]
             l2 = np.where(self._on_axis, 1 + forms.length * du[:, 0], 1 + u_r / np.where(self._on_axis, 1.0, R))
         offset = self.points[self._mine] - self._middle
-        normal = np.column_stack([-t[:, 1], t[:, 0]]) / l1[:, None]
-        lifted = (offset[:, 1] / (l1 * l2))[:, None] * normal
-        return u + (lifted - offset) / forms.length
+        along = np.sum(offset * self._tangent, axis=1)
+        above = np.sum(offset * _normal(self._tangent), axis=1)
+        carried = along[:, None] * t + (above / (l1**2 * l2))[:, None] * _normal(t)
+        return u + (carried - offset) / forms.length
+
+
+def _normal(tangents: np.ndarray) -> np.ndarray:
+    """Vectors turned by a right angle, upwards, shape (m, 2)."""
+    return np.column_stack([-tangents[:, 1], tangents[:, 0]])
 
 
 def _basis(element: Any, derivative: int, reference: np.ndarray) -> np.ndarray:
