@@ -147,7 +147,7 @@ class Problem:
         for support in self.scene.supports:
             for item in forms.constraints(support):
                 if not isinstance(item, Held):
-                    means.append(forms.compile(forms.mean_row(item.component, item.on)))
+                    means.append(forms.compile(forms.mean_row(item)))
                     continue
                 sub = forms.space.sub(0).sub(item.component)
                 found = self._dofs_of(support, sub, item)

@@ -55,6 +55,8 @@ class Scene:
         self._check_rigid_body()
         if isinstance(self.model, Membrane):
             self.model.check(self)
+        else:
+            self._check_hinges()
         driven = [x for x in (*self.loads, *self.supports) if getattr(x, "driven", False)]
         if len(driven) > 1:
             raise InputError(f"Scene: {', '.join(map(repr, driven))} are all driven: one control drives a run;"
@@ -126,6 +128,29 @@ class Scene:
             raise InputError(f"Scene: too little support: the body is free to move as a rigid body ({free});"
                              f" supports are {self.supports!r}; hold that motion, with Clamped or SimplySupported"
                              f" for one")
+
+    def _check_hinges(self) -> None:
+        """A plain mean pulls all layers with one traction: too much for one that is a hundred times softer."""
+        for support in self.supports:
+            for held in support.constraints():
+                if isinstance(held, Held) or held.by_stiffness:
+                    continue
+                tags = self._layers_at(held.on)
+                moduli = {name: self.materials[name].shear_modulus for name in self.mesh.layers
+                          if self.mesh.layers[name] in tags}
+                soft, hard = min(moduli, key=moduli.__getitem__), max(moduli, key=moduli.__getitem__)
+                if moduli[hard] > 100 * moduli[soft]:
+                    raise InputError(f"Scene: {support!r} pulls all layers with the same traction, but layer {soft!r} is"
+                                     f" {moduli[hard] / moduli[soft]:.3g} times softer than {hard!r}: use"
+                                     f" SimplySupported({held.on!r}, weight='stiffness')")
+
+    def _layers_at(self, boundary: str) -> set[int]:
+        """Tags of the layers whose cells have a facet on a boundary, all ranks."""
+        topology, cells = self.mesh.domain.topology, self.mesh.cells
+        topology.create_connectivity(1, 2)
+        touching = {topology.connectivity(1, 2).links(f)[0] for f in self.mesh.facets_of(boundary)}
+        mine = set(cells.values[np.isin(cells.indices, sorted(touching))].tolist())
+        return set().union(*self.mesh.domain.comm.allgather(mine))
 
     @property
     def extent(self) -> np.ndarray:

@@ -148,11 +148,17 @@ class Solid(Formulation):
     def nearest(self, points):
         return points
 
-    def mean_row(self, component: int, boundary: str) -> Any:
-        """Linear form: mean of a displacement component (dimensionless) over a boundary."""
-        ds = self.boundary(boundary, 3)
-        v = ufl.split(self.test_function())[0][component]
-        return v * self.weight / self.constant(self.integral(self.weight * ds)) * ds
+    def mean_row(self, held: Any) -> Any:
+        """Linear form: mean of a displacement component (dimensionless) over a boundary, as a `MeanHeld` asks."""
+        ds, weight = self.boundary(held.on, 3), self.weight
+        if held.by_stiffness:
+            stiffness = fem.Function(fem.functionspace(self.domain, ("DG", 0)))
+            for name, tag in self.scene.mesh.layers.items():
+                modulus = self._moduli[id(self.scene.materials[name])]
+                stiffness.x.array[self.scene.mesh.cells.find(tag)] = modulus / self.stress
+            weight = weight * stiffness
+        v = ufl.split(self.test_function())[0][held.component]
+        return v * weight / self.constant(self.integral(weight * ds)) * ds
 
     def idle_unknowns(self) -> list[tuple[Any, np.ndarray]]:
         """[(sub space, local dofs)] of pressures that belong to no cell of their layers."""

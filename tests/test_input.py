@@ -92,6 +92,20 @@ def test_pinned_node_that_is_not_there():
         fx.trace(scene(supports=[fx.Symmetry("axis"), fx.PinnedNode(0.123, 0.456)]), until=fx.pressure(0.1))
 
 
+def test_hinge_of_layers_too_different():
+    """The plain mean is refused beyond a stiffness ratio of 100; weighted by stiffness it runs."""
+    mesh = fx.mesh.disc(radius=1.0, thickness={"soft": 0.03, "hard": 0.03}, elements=(10, 1))
+    materials = {"soft": fx.NeoHookean(c10=1.0), "hard": fx.NeoHookean(c10=1e4)}
+    with pytest.raises(fx.InputError, match="'soft' is 1e.04 times softer than 'hard'.*weight='stiffness'"):
+        scene(mesh=mesh, materials=materials, supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    hinge = fx.SimplySupported("rim", weight="stiffness")
+    path = fx.trace(scene(mesh=mesh, materials=materials, supports=[fx.Symmetry("axis"), hinge]),
+                    until=fx.pole_stretch(2.5))
+    assert path.counts.iterations < 100
+    with pytest.raises(fx.InputError, match="weight = 'mass'"):
+        fx.SimplySupported("rim", weight="mass")
+
+
 def test_nothing_driven():
     for run in (lambda s: fx.trace(s, until=fx.pressure(1.0)), lambda s: fx.solve(s, to=1.0)):
         with pytest.raises(fx.InputError, match="nothing is driven"):

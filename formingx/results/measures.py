@@ -83,11 +83,12 @@ class _Form(Bound):
 
 
 class Target(NamedTuple):
-    """What a run aims at: a measure (by name) and its value."""
+    """What a run aims at: a measure (by name), its value, and whether it changes sign with the control."""
 
     name: str
     value: float
     bind: Any
+    signed: bool = True
 
     def __str__(self) -> str:
         return f"{self.name.replace('_', ' ')} = {self.value:g}"
@@ -110,7 +111,7 @@ def pole_height(value: float) -> Target:
 
 def pole_stretch(value: float) -> Target:
     """The in-plane stretch at the pole, (thickness/original)^(-1/2), reaches `value`."""
-    return Target("pole_stretch", positive("pole_stretch", value), bind_pole_stretch)
+    return Target("pole_stretch", positive("pole_stretch", value), bind_pole_stretch, signed=False)
 
 
 def enclosed_volume(value: float) -> Target:
