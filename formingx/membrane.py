@@ -16,7 +16,6 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx import mesh as dolfinx_mesh
-from mpi4py import MPI
 
 from .errors import InputError
 from .mesh import Mesh

@@ -8,6 +8,7 @@ user's units, and what `solve` sees are numbers of order one.
 from __future__ import annotations
 
 import itertools
+from abc import ABC, abstractmethod
 from typing import Any
 
 import basix.ufl
@@ -21,7 +22,7 @@ from . import _compat
 from .physics import kinematics as kin
 
 
-class Formulation:
+class Formulation(ABC):
     """The forms of a scene: what a solid and a membrane have in common.
 
     Attributes:
@@ -67,16 +68,40 @@ class Formulation:
         self.energy = self._energy()
         self.residual, self.control_derivative = self._residual()
 
+    @abstractmethod
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
         """(outward normal, measure) of a boundary that a load acts on."""
-        raise NotImplementedError
 
+    @abstractmethod
     def constraints(self, support: Any) -> list[Any]:
         """What a support holds: a list of Held or MeanHeld."""
-        raise NotImplementedError
 
+    @abstractmethod
     def nearest(self, points: np.ndarray) -> np.ndarray:
         """The points of `mesh` that stand for points of the body, shape (n, 2)."""
+
+    @abstractmethod
+    def _make_mesh(self) -> Any:
+        """The `Mesh` of the fields."""
+
+    @abstractmethod
+    def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
+        """The scalar element of the displacement, and those of all fields."""
+
+    @abstractmethod
+    def _weight(self) -> Any:
+        """See `weight`."""
+
+    @abstractmethod
+    def _deformation_gradient(self) -> Any:
+        """See `F`."""
+
+    @abstractmethod
+    def _energy(self) -> Any:
+        """See `energy`."""
+
+    def mean_row(self, held: Any) -> Any:
+        """Linear form: mean of a displacement component (dimensionless) over a boundary, as a `MeanHeld` asks."""
         raise NotImplementedError
 
     def idle_unknowns(self) -> list[tuple[Any, np.ndarray]]:
@@ -148,8 +173,7 @@ class Solid(Formulation):
     def nearest(self, points):
         return points
 
-    def mean_row(self, held: Any) -> Any:
-        """Linear form: mean of a displacement component (dimensionless) over a boundary, as a `MeanHeld` asks."""
+    def mean_row(self, held):
         ds, weight = self.boundary(held.on, 3), self.weight
         if held.by_stiffness:
             stiffness = fem.Function(fem.functionspace(self.domain, ("DG", 0)))
@@ -180,7 +204,6 @@ class Solid(Formulation):
         return scene.mesh
 
     def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
-        """The scalar element of the displacement, and those of all fields."""
         pressure = self.scene.model.pressure
         element = basix.ufl.element("Lagrange", cell, 2)
         if pressure and pressure.bubble:

@@ -25,7 +25,7 @@ class Probe:
         InputError: a point outside the mesh.
     """
 
-    def __init__(self, problem: Any, points: np.ndarray):
+    def __init__(self, problem: Any, points: Any):
         points = np.atleast_2d(np.asarray(points, dtype=float))
         forms, comm = problem.forms, problem.comm
         cells, reference = self._locate(forms, forms.nearest(points))
@@ -145,7 +145,7 @@ class MidSurfaceProbe(Probe):
         near = 1e-10 * forms.length
         for i, R in enumerate(points[:, 0]):
             ends = nodes[:owned, :2]
-            hit = np.flatnonzero((ends.min(axis=1) - near <= R) & (R <= ends.max(axis=1) + near))
+            hit = np.flatnonzero((ends.min(axis=1) - near <= R) & (ends.max(axis=1) + near >= R))
             if len(hit):
                 a, b = ends[hit[0]]
                 bulge = 4 * nodes[hit[0], 2] - 2 * (a + b) if nodes.shape[1] > 2 else 0.0
@@ -186,6 +186,6 @@ def _basis(element: Any, derivative: int, reference: np.ndarray) -> np.ndarray:
 _PROBES = {"solid": Probe, "membrane": MidSurfaceProbe}
 
 
-def probe(problem: Any, points: np.ndarray) -> Probe:
+def probe(problem: Any, points: Any) -> Probe:
     """Displacement at fixed reference points (see `Probe`), whatever the body is modelled as."""
     return _PROBES[problem.scene.model.body](problem, points)
