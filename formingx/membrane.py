@@ -35,6 +35,12 @@ class MidSurface(Formulation):
 
     slack_at_rest = True
 
+    @property
+    def bodies(self):
+        """Not there: raises an InputError."""
+        raise InputError("a membrane knows no stress through its thickness, nor between its layers: use a solid model,"
+                         " MixedPressure() for one")
+
     def face(self, name, quadrature_degree):
         """(normal of the mid-surface away from the loaded face, the whole mid-surface)."""
         nodes = self.scene.mesh.nodes_of(name)

@@ -158,7 +158,11 @@ class Formulation(ABC):
 
 
 class Solid(Formulation):
-    """A scene as an incompressible solid; the fields are displacement and, if the model has them, pressures."""
+    """A scene as an incompressible solid; the fields are displacement and, if the model has them, pressures.
+
+    Attributes:
+        bodies: [(material, its layers)]: layers of one material object are one body.
+    """
 
     def boundary(self, name: str, quadrature_degree: int) -> ufl.Measure:
         """The measure of a named boundary."""
@@ -200,6 +204,7 @@ class Solid(Formulation):
 
     def _make_mesh(self) -> Any:
         scene = self.scene
+        self.bodies = _by_material(scene)
         self._colours = _colour(scene) if scene.model.pressure else {}
         return scene.mesh
 
@@ -222,21 +227,27 @@ class Solid(Formulation):
 
     def _energy(self) -> Any:
         scene = self.scene
-        fields = ufl.split(self.w)
-        eps = self.constant(scene.model.eps)
+        self._eps = self.constant(scene.model.eps)
         energy = 0
-        for material, names in _by_material(scene):
+        for material, names in self.bodies:
             tags = tuple(scene.mesh.layers[n] for n in names)
             dx = self.dx if len(tags) == len(scene.mesh.layers) else self.dx(tags)
-            W = material.strain_energy(self.F, **{k: self.constant(c) for k, c in material.parameters.items()})
-            if scene.model.stress_free:
-                W -= self.constant(material.rest_stress) * ufl.ln(self.J)
-            energy += self._scale * W * self.weight * dx
-            modulus = self.constant(self._moduli[id(material)])
-            p = self.constant(self.stress) * fields[1 + self._colours[names[0]]] if self._colours else None
-            for density, metadata in scene.model.terms(self.J, p, modulus, eps):
-                energy += self._scale * density * self.weight * dx(metadata=metadata)
+            for density, metadata in self.energy_densities(material, names, self.F):
+                energy += self._scale * density * self.weight * (dx(metadata=metadata) if metadata else dx)
         return energy
+
+    def energy_densities(self, material: Any, names: list[str], F: Any) -> list[tuple[Any, dict]]:
+        """[(energy per reference volume (UFL, stress), quadrature metadata)] of a body for F, shape (3, 3).
+
+        The energy of the material, then what keeps the volume: W(F) - rest_stress ln J, and p (J - 1) or a penalty.
+        """
+        model, J = self.scene.model, kin.volume_ratio(F)
+        W = material.strain_energy(F, **{k: self.constant(c) for k, c in material.parameters.items()})
+        if model.stress_free:
+            W -= self.constant(material.rest_stress) * ufl.ln(J)
+        modulus = self.constant(self._moduli[id(material)])
+        p = self.constant(self.stress) * ufl.split(self.w)[1 + self._colours[names[0]]] if self._colours else None
+        return [(W, {}), *model.terms(J, p, modulus, self._eps)]
 
 
 def _by_material(scene: Any) -> list[tuple[Any, list[str]]]:

@@ -223,6 +223,11 @@ def test_what_a_membrane_cannot_have(supports, on, words):
         Problem(sheet(supports=supports, on=on))
 
 
+def test_no_stress_through_the_thickness():
+    with pytest.raises(fx.InputError, match="nor between its layers"):
+        Problem(sheet()).forms.bodies  # noqa: B018
+
+
 def test_off_the_mid_surface():
     with pytest.raises(fx.InputError, match="mid-surface"):
         trace(sheet(), fx.displacement(0.1, at=(0.5, 0.0)))
