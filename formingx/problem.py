@@ -64,6 +64,13 @@ class Problem:
         """True if the tangent is symmetric: no follower load in the scene."""
         return all(getattr(load, "symmetric", False) for load in self.scene.loads)
 
+    @property
+    def why_not_finite(self) -> str:
+        """What makes a residual infinite or not a number in this scene."""
+        limits = {f"{m} came to its limit, I1 < {m.largest_I1:.6g}": None
+                  for m in self.scene.materials.values() if m.largest_I1 < np.inf}
+        return ", or ".join(["an element turned inside out", *(limits or ["the material left its domain"])])
+
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         """out = F(x, control); sets `force_scale`."""
         multipliers = self.set_state(x, control)

@@ -10,6 +10,9 @@ MATERIALS = [
     fx.NeoHookean(c10=2.0),
     fx.MooneyRivlin(c10=1.5, c01=0.4),
     fx.Ogden(mu=(1.4, -0.3), alpha=(2.5, -2.0)),
+    fx.Yeoh(c10=1.0, c20=-0.02, c30=0.01),
+    fx.Gent(mu=2.0, Jm=5.0),
+    fx.ArrudaBoyce(mu=2.0, N=4.0),
     fx.Hyperelastic(lambda I1, I2, a, b: a * (I1 - 3) + b * (I1 - 3) ** 2, a=1.0, b=0.1),
 ]
 KEEPING = [fx.MixedPressure(), fx.MixedPressure(eps=1e-3),

@@ -103,7 +103,7 @@ class BorderedNewton:
         while True:
             residual = self.F.norm() / (problem.force_scale + UNLOADED)
             if not np.isfinite(residual):
-                raise Failure("an element turned inside out, or the material left its domain", history)
+                raise Failure(f"the forces are not finite: {problem.why_not_finite}", history)
             if self.tolerances.met([i.correction for i in history], [*(i.residual for i in history), residual]):
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
