@@ -67,7 +67,7 @@ class MixedPressure:
     body = "solid"
     stress_free = True
 
-    def __init__(self, *, eps: float = 0.0, space: str = "P1"):
+    def __init__(self, *, eps: float = 0.0, space: str = "P1dg"):
         self.eps = non_negative("MixedPressure: eps", eps)
         if self.eps > 1:
             raise InputError(f"MixedPressure: eps = {eps!r}: must be at most 1 (thesis: 2e-2 to 1e-7)")
