@@ -258,3 +258,16 @@ def test_ranks_agree():
     for other in others:
         assert other["counts"] == serial["counts"]
         assert other["numbers"] == pytest.approx(serial["numbers"], rel=1e-9)
+
+
+@pytest.mark.parametrize("alpha", [-5.0, -2.0])
+def test_negative_ogden_exponents(alpha):
+    """The solid with a negative exponent reaches the stretch of the membrane; with -2 it is the pure I2 solid."""
+    material = fx.Ogden(mu=-2.0, alpha=alpha)
+    solid, thin = (trace(sheet(40, material, thickness=0.05, model=model), fx.pole_stretch(2.5)).last.measures
+                   for model in (fx.MixedPressure(), fx.Membrane()))
+    assert solid["pressure"] == pytest.approx(thin["pressure"], rel=2e-3)
+    if alpha == -2.0:
+        mooney = trace(sheet(40, fx.MooneyRivlin(c10=0.0, c01=1.0), thickness=0.05, model=fx.MixedPressure()),
+                       fx.pole_stretch(2.5)).last.measures
+        assert solid["pressure"] == pytest.approx(mooney["pressure"], rel=1e-9)
