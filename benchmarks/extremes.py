@@ -1,7 +1,7 @@
 """The extremes: one table of what happens far from the ordinary, with outcome, deviation and cost.
 
-Every row inflates a sheet (radius 1, thickness 1/15.24 unless said otherwise) to a pole stretch and must end right, or with
-an error that says why not. "deviation" is that of the pressure (or the limit pressure) from what the row names.
+Every row inflates a sheet (radius 1, thickness 1/15.24 unless said otherwise) to a pole stretch and must end right,
+or with an error that says why not. "deviation" is that of the pressure (or the limit pressure) from what the row names.
 About 5 minutes (--quick: the subset that the tests run).
 """
 
@@ -71,7 +71,8 @@ def rows(quick):
         for support in (fx.SimplySupported("rim"), fx.Clamped("rim")):
             yield ("thickness", f"r0/h0 {ratio}, {type(support).__name__}",
                    {"ratio": ratio, "support": support, "until": 8.5}, limit,
-                   lambda r=ratio: membrane_limit_point(radius=1, thickness=1 / r, c10=1)[1].pressure, "membrane theory")
+                   lambda r=ratio: membrane_limit_point(radius=1, thickness=1 / r, c10=1)[1].pressure,
+                   "membrane theory")
     for stretch in (10,) if quick else (10, 20, 50, 100):
         yield ("stretch", f"pole stretch {stretch}", {"until": stretch, "elements": (80, 2)}, last,
                lambda s=stretch: membrane_inflation(s, radius=1, thickness=1 / RATIO, c10=1).pressure,

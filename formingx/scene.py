@@ -143,15 +143,15 @@ class Scene:
             hard = max(at_rim, key=moduli.__getitem__)
             soft = min(at_rim, key=moduli.__getitem__)
             if not held.by_stiffness and moduli[hard] > 100 * moduli[soft]:
-                raise InputError(f"Scene: SimplySupported({held.on!r}) pulls all layers with the same traction, but layer"
-                                 f" {soft!r} is {moduli[hard] / moduli[soft]:.3g} times softer than {hard!r}: use"
+                raise InputError(f"Scene: SimplySupported({held.on!r}) pulls all layers with the same traction, but"
+                                 f" layer {soft!r} is {moduli[hard] / moduli[soft]:.3g} times softer than {hard!r}: use"
                                  f" SimplySupported({held.on!r}, weight='stiffness')")
             pressed = {name for load in self.loads for name in self._layers_at(load.on)} & at_rim
             for name in pressed:
                 if moduli[hard] > 50 * moduli[name]:
                     raise InputError(f"Scene: the pressure that bends layer {hard!r} would squeeze layer {name!r},"
-                                     f" {moduli[hard] / moduli[name]:.3g} times softer, out of the free face of the hinge"
-                                     f" SimplySupported({held.on!r}): use Clamped({held.on!r})")
+                                     f" {moduli[hard] / moduli[name]:.3g} times softer, out of the free face of the"
+                                     f" hinge SimplySupported({held.on!r}): use Clamped({held.on!r})")
 
     def _layers_at(self, boundary: str) -> set[str]:
         """Names of the layers whose cells have a facet on a boundary, all ranks."""
