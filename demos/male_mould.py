@@ -1,6 +1,6 @@
-"""Vacuum forming over a male mould: a clamped sheet that lies on the mould is drawn down around it (Song 1993, section 5.1).
+"""Vacuum forming over a male mould: a clamped sheet above the mould is drawn down over it (Song 1993, section 5.1).
 
-Mooney, I1 constant 50 psi, I2 constant 15 psi; r0 = 10 cm, h0 = 0.3 cm, clamped at the level of the mould's top; mould
+Mooney, I1 constant 50 psi, I2 constant 15 psi; r0 = 10 cm, h0 = 0.3 cm, clamped 0.2 cm above the mould; mould
 5 cm radius at the top, 3 cm high, 10 degrees draft, fillets 0.8 cm. The pressure difference acts on the upper face.
 Lengths in cm, stresses in psi.
 """
@@ -18,7 +18,7 @@ PRESSURES = (2.0, 4.0, 8.0, 15.0)
 def form(friction, elements):
     """The path to the last pressure, and the mould."""
     mesh = fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=elements)
-    mould = fx.tools.male(radius=5.0, height=3.0, base=-3.0, draft=10.0, fillet=0.8, foot=0.8)
+    mould = fx.tools.male(radius=5.0, height=3.0, base=-3.2, draft=10.0, fillet=0.8, foot=0.8)
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("top")],
                      contacts=[fx.Contact("bottom", mould, friction)])

@@ -6,7 +6,7 @@ from .errors import ConvergenceError, InputError
 from .fit import Fit, fit
 from .physics import tools
 from .physics.contact import Contact
-from .physics.incompressibility import DisplacementPenalty, MixedPressure
+from .physics.incompressibility import DisplacementPenalty, Membrane, MixedPressure
 from .physics.kinematics import Axisymmetric, PlaneStrain
 from .physics.loads import Pressure
 from .physics.materials import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
