@@ -93,10 +93,11 @@ class NodalContact:
         velocity = self._length * direction[self.dofs] - slope * self._motion
         free = self.law.distance(start) <= -self.law.theta
         times = self._arrivals(start, velocity, length)
-        times = np.sort(np.concatenate(self._comm.allgather(times[times < length])))
+        ahead = (times > 0.02 * length) & (times < length)         # nearer ones are as good as in touch
+        times = np.sort(np.concatenate(self._comm.allgather(times[ahead])))
         touching = self._comm.allreduce(int(np.sum(~free & (self.area > 0))), MPI.SUM)
         allowed = self._allowed if touching > 1 else 1
-        return max(1.001 * times[allowed - 1], 0.02 * length) if len(times) >= allowed else length
+        return min(1.001 * times[allowed - 1], length) if len(times) >= allowed else length
 
     def prepare(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> None:
         """A step of this length along a tangent is about to be taken: foretell where nodes arrive."""
