@@ -40,6 +40,7 @@ class NodalContact:
         self._scale = solid.length / (solid.stress * solid.volume) * self.area
         self._motion = solid.control_scale * np.array(contact.moves or (0.0, 0.0))
         self.memory = None if contact.mu == 0 else self.law.start(self.points)
+        self._arrived = np.zeros(len(self.points), dtype=bool)     # in the step before the last accepted state
         self._allowed = contact.nodes_per_step
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
@@ -60,8 +61,8 @@ class NodalContact:
     def stiffness(self, fields: np.ndarray, control: float, ahead: bool = False) -> np.ndarray:
         """Derivative of the nodal forces by the nodes' own unknowns, shape (n, 2, 2); `ahead`: see `Law.stiffness_ahead`."""
         values = self.tractions(fields, control).stiffness
-        if ahead:
-            values = self.law.stiffness_ahead(self.positions(fields, control), self._memory)
+        if ahead and self._memory is not None:
+            values = self.law.stiffness_ahead(self.positions(fields, control), self._memory, self._arrived)
         return (self._scale * self._length)[:, None, None] * values
 
     def add_control_derivative(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
@@ -73,7 +74,9 @@ class NodalContact:
     def advance(self, fields: np.ndarray, control: float) -> None:
         """A state is accepted: remember it."""
         if self._memory is not None:
+            before, theta = self._memory.distance, self.law.theta
             self.memory = self.law.tractions(self.positions(fields, control), self._memory).touch
+            self._arrived = (before <= -theta) & (self._memory.distance > -theta)
 
     @property
     def memory(self) -> Touch | None:

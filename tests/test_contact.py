@@ -97,7 +97,8 @@ def support_force(problem, state, component):
 
 @pytest.mark.parametrize("friction", ["none", "stick", 0.3])
 def test_forces_balance(friction):
-    path = form(cup(friction), 8.0)
+    path = fx.trace(cup(friction), until=fx.pressure(8.0), step=fx.StepControl(target=8), progress=False,
+                    tolerances=fx.Tolerances(residual=1e-10))
     state = path.last
     support = support_force(path.problem, state, 1)
     pressure = 8.0 * np.pi * 10.0**2                        # of a follower pressure inside a clamped rim, along Z
@@ -208,7 +209,8 @@ def test_a_moving_tool():
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      contacts=[fx.Contact("top", plug, "stick", moves=(0, -1))])
     path = fx.trace(scene, until=fx.travel(3.0), step=fx.StepControl(target=8), progress=False)
-    assert path.last.measures["penetration"] < 5e-4 and path.last.measures["contact_length"] > 0.2
+    # the node on the axis carries no area, so nothing holds it: it may dip in by the sagitta of half an element
+    assert path.last.measures["penetration"] < 0.25**2 / (2 * 3) and path.last.measures["contact_length"] > 0.2
     assert path.last.measures["tool_force"] == pytest.approx(support_force(path.problem, path.last, 1), rel=1e-7)
     problem, state, h = path.problem, path.last, 1e-7
     x, plus, minus, exact = (problem.x.duplicate() for _ in range(4))

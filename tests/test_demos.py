@@ -36,3 +36,14 @@ def test_help_names_every_option():
     text = run("demos/treloar.py", "--help")
     for option in ("--elements", "--layers", "--out", "--quick", "--help"):
         assert option in text
+
+
+def test_cup_quick(tmp_path):
+    found = summary("cup", tmp_path, "--quick")
+    for name in ("stick", "frictionless", "coulomb_0.3"):
+        numbers = found[name]
+        assert numbers["first_contact_pressure_psi"] == pytest.approx(3.784, rel=5e-3)
+        assert set(numbers["pole_thickness_ratio_at_psi"]) == {"2", "4", "8", "15", "30", "60", "160"}
+        assert (tmp_path / f"{name}.png").stat().st_size > 10_000
+    assert found["stick"]["pole_thickness_ratio_at_psi"]["160"] == pytest.approx(0.7240, rel=1e-2)
+    assert found["frictionless"]["pole_thickness_ratio_at_psi"]["160"] == pytest.approx(0.4649, rel=2e-2)

@@ -169,15 +169,15 @@ class Law:
         kept *= 1 + 1e-9 * np.abs(sense_now)                 # what slides goes on sliding, whatever round-off says
         return Tractions(force, stiffness, _touch(x, d, kept), N, T, sense_now)
 
-    def stiffness_ahead(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
-        """The stiffness with points that have just touched, or are about to, pressed halfway into the ramp.
+    def stiffness_ahead(self, x: np.ndarray, old: Touch, arrived: np.ndarray) -> np.ndarray:
+        """The stiffness with points that have just touched (`arrived`), or are about to, pressed halfway into the ramp.
 
         At the foot of the ramp they have none, and the tangent of the path would let them slip where they will stick.
         """
         near, now = self._nearest(x), self.tractions(x, old)
-        touching = (near.distance > -1.05 * self.theta) & (now.sense == 0)
+        touching = (arrived | (np.abs(near.distance / self.theta + 1.025) < 0.025)) & (now.sense == 0)
         press = np.where(touching, np.maximum(-0.5 * self.theta - near.distance, 0.0), 0.0)
-        old = old and old._replace(distance=near.distance + press, position=x)
+        old = old._replace(distance=near.distance + press, position=x)
         pressed = self.tractions(x + press[:, None] * near.normal, old)
         return np.where((press > 0)[:, None, None], pressed.stiffness, now.stiffness)
 
