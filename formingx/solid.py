@@ -34,6 +34,7 @@ class Solid:
         residual: dPi/dw - external virtual work (UFL, rank 1); control_derivative: its derivative by the control,
             or None.
         energy: strain energy over stress times volume (UFL, rank 0).
+        bodies: [(material, its layers)]: layers of one material object are one body.
     """
 
     def __init__(self, scene: Any):
@@ -42,6 +43,7 @@ class Solid:
         self.comm = self.domain.comm
         self._moduli = {id(m): m.shear_modulus for m in scene.materials.values()}
         self.length, self.stress = float(max(scene.extent)), max(self._moduli.values())
+        self.bodies = _by_material(scene)
         self._colours = _colour(scene) if scene.incompressibility.pressure_degree is not None else {}
         self.space = self._make_space()
         self.w = fem.Function(self.space, name="w")
@@ -119,23 +121,29 @@ class Solid:
 
     def _energy(self) -> Any:
         scene = self.scene
-        fields = ufl.split(self.w)
         self._scale = self.constant(1 / (self.stress * self.volume))
-        eps = self.constant(scene.incompressibility.eps)
+        self._eps = self.constant(scene.incompressibility.eps)
         F = scene.kinematics.deformation_gradient(self.u, self.X)
         energy = 0
-        for material, names in _by_material(scene):
+        for material, names in self.bodies:
             tags = tuple(scene.mesh.layers[n] for n in names)
             dx = self.dx if len(tags) == len(scene.mesh.layers) else self.dx(tags)
-            W = material.strain_energy(F, **{k: self.constant(c) for k, c in material.parameters.items()})
-            if scene.incompressibility.stress_free:
-                W -= self.constant(material.rest_stress) * ufl.ln(self.J)
-            energy += self._scale * W * self.weight * dx
-            modulus = self.constant(self._moduli[id(material)])
-            p = self.constant(self.stress) * fields[1 + self._colours[names[0]]] if self._colours else None
-            for density, metadata in scene.incompressibility.terms(self.J, p, modulus, eps):
-                energy += self._scale * density * self.weight * dx(metadata=metadata)
+            for density, metadata in self.energy_densities(material, names, F):
+                energy += self._scale * density * self.weight * (dx(metadata=metadata) if metadata else dx)
         return energy
+
+    def energy_densities(self, material: Any, names: list[str], F: Any) -> list[tuple[Any, dict]]:
+        """[(energy per reference volume (UFL, stress), quadrature metadata)] of a body for F, shape (3, 3).
+
+        The energy of the material, then what keeps the volume: W(F) - rest_stress ln J, and p (J - 1) or a penalty.
+        """
+        keeping, J = self.scene.incompressibility, kin.volume_ratio(F)
+        W = material.strain_energy(F, **{k: self.constant(c) for k, c in material.parameters.items()})
+        if keeping.stress_free:
+            W -= self.constant(material.rest_stress) * ufl.ln(J)
+        modulus = self.constant(self._moduli[id(material)])
+        p = self.constant(self.stress) * ufl.split(self.w)[1 + self._colours[names[0]]] if self._colours else None
+        return [(W, {}), *keeping.terms(J, p, modulus, self._eps)]
 
     def _residual(self) -> tuple[Any, Any]:
         v = self.test_function()

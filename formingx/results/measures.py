@@ -7,11 +7,10 @@ from typing import Any, NamedTuple
 import basix.ufl
 import numpy as np
 import ufl
-from dolfinx import geometry
 from mpi4py import MPI
 
-from .. import _compat
 from ..errors import InputError, finite, positive
+from .locate import locate
 
 
 class Probe:
@@ -27,31 +26,16 @@ class Probe:
 
     def __init__(self, problem: Any, points: np.ndarray):
         points = np.atleast_2d(np.asarray(points, dtype=float))
-        mesh, comm = problem.forms.domain, problem.comm
-        padded = np.zeros((len(points), 3))
-        padded[:, :2] = points
-        tree = _compat.tree_of_cells(mesh, 1e-10 * problem.forms.length)
-        found = geometry.compute_colliding_cells(mesh, geometry.compute_collisions_points(tree, padded), padded)
-        owned = mesh.topology.index_map(2).size_local
-        cells = [next((c for c in found.links(i) if c < owned), -1) for i in range(len(points))]
-        ranks = np.where(np.array(cells) >= 0, comm.rank, comm.size)
-        owner = np.empty_like(ranks)
-        comm.Allreduce(ranks, owner, MPI.MIN)
-        if np.any(owner == comm.size):
-            r, z = points[np.argmax(owner == comm.size)]
-            raise InputError(f"point (R, Z) = ({r:.6g}, {z:.6g}) is not in the mesh")
+        mesh = problem.forms.domain
+        place = locate(mesh, points, problem.forms.length)
         element = basix.ufl.element("Lagrange", mesh.basix_cell(), 2)
-        cmap, X = _compat.coordinate_map(mesh), mesh.geometry.x
         subs = [problem.forms.space.sub(0).sub(i).dofmap for i in (0, 1)]
-        self._problem, self.points = problem, points
-        self._mine = np.flatnonzero(owner == comm.rank)
-        self._dofs = np.empty((len(self._mine), 2, element.dim), dtype=np.int64)
-        self._weights = np.empty((len(self._mine), element.dim))
-        for k, i in enumerate(self._mine):
-            reference = cmap.pull_back(padded[i:i + 1], X[mesh.geometry.dofmap[cells[i]]])
-            self._weights[k] = element.tabulate(0, reference)[0, 0, :]
+        self._problem, self.points, self._mine = problem, points, place.mine
+        self._dofs = np.empty((len(place.mine), 2, element.dim), dtype=np.int64)
+        self._weights = element.tabulate(0, place.reference)[0] if len(place.mine) else np.empty((0, element.dim))
+        for k, cell in enumerate(place.cells):
             for component in (0, 1):
-                self._dofs[k, component] = subs[component].cell_dofs(cells[i])
+                self._dofs[k, component] = subs[component].cell_dofs(cell)
 
     def displacement(self, x: Any) -> np.ndarray:
         """u at the points in the user's unit, shape (n, 2), all ranks."""
