@@ -1,8 +1,9 @@
 """Stresses and stretches of a state, layer by layer: nothing is smeared over an interface.
 
-Cauchy stress sigma = P F^T / J with P = d(energy density)/dF, the energy being that of `solid`: material and volume
-term. Deformation gradient and Cauchy stress are projected (L2) on piecewise linear fields, one for each layer; what
-is asked of them (Piola-Kirchhoff stresses, principal values, tractions) follows point by point.
+P = d(energy density)/dF, the energy being that of `solid`: material and volume term; S = F^-1 P; Cauchy stress
+sigma = F S F^T / J. F and S are projected (L2) on piecewise linear fields, one for each layer; all else follows from
+them point by point. (S does not turn with the sheet: projecting sigma instead would spoil the small stress normal to
+an inflated sheet with the large one along it.)
 """
 
 from __future__ import annotations
@@ -20,13 +21,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..errors import InputError, known
-from ..physics import kinematics as kin
 from .locate import locate
 
-# The entries of F and of sigma that are not zero, in the order (r, z, hoop; out of plane in plane strain).
+# The entries of F and of S that are not zero, in the order (r, z, hoop; out of plane in plane strain).
 _F = ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))
-_SIGMA = ((0, 0), (0, 1), (1, 1), (2, 2))
-_COUNT = len(_F) + len(_SIGMA)
+_S = ((0, 0), (0, 1), (1, 1), (2, 2))
+_COUNT = len(_F) + len(_S)
 
 
 class FaceStress(NamedTuple):
@@ -45,28 +45,28 @@ class Stress:
     Attributes:
         points: reference points (R, Z), shape (n, 2), length.
         deformation_gradient: F, shape (n, 3, 3).
-        cauchy: sigma, shape (n, 3, 3), stress, tension positive.
+        second_piola: S, shape (n, 3, 3), stress.
     """
 
     points: np.ndarray
     deformation_gradient: np.ndarray
-    cauchy: np.ndarray
+    second_piola: np.ndarray
+
+    @property
+    def first_piola(self) -> np.ndarray:
+        """P = F S, force per reference area (row: of the force, column: of the face), shape (n, 3, 3)."""
+        return self.deformation_gradient @ self.second_piola
+
+    @property
+    def cauchy(self) -> np.ndarray:
+        """sigma = P F^T / J, tension positive, shape (n, 3, 3), stress."""
+        F = self.deformation_gradient
+        return self.first_piola @ F.transpose(0, 2, 1) / np.linalg.det(F)[:, None, None]
 
     @property
     def hydrostatic_pressure(self) -> np.ndarray:
         """-tr(sigma)/3, shape (n,), stress."""
         return -np.trace(self.cauchy, axis1=1, axis2=2) / 3
-
-    @property
-    def first_piola(self) -> np.ndarray:
-        """P = J sigma F^-T, force per reference area (row: of the force, column: of the face), shape (n, 3, 3)."""
-        F = self.deformation_gradient
-        return np.linalg.det(F)[:, None, None] * self.cauchy @ np.linalg.inv(F).transpose(0, 2, 1)
-
-    @property
-    def second_piola(self) -> np.ndarray:
-        """S = F^-1 P, symmetric, shape (n, 3, 3), stress."""
-        return np.linalg.inv(self.deformation_gradient) @ self.first_piola
 
     @property
     def principal_stretches(self) -> np.ndarray:
@@ -151,7 +151,7 @@ class Stresses:
         return name
 
     def project(self, state: Any) -> np.ndarray:
-        """Nodal values of F and sigma, shape (nodes, layers, _COUNT), ghosts included."""
+        """Nodal values of F and S, shape (nodes, layers, _COUNT), ghosts included."""
         self._set(state)
         n = self.space.dofmap.index_map.size_local + self.space.dofmap.index_map.num_ghosts
         nodes = np.zeros((n, len(self.cells), _COUNT))
@@ -171,7 +171,7 @@ class Stresses:
         return nodes
 
     def raw(self, state: Any, layer: str) -> Stress:
-        """F and sigma at the quadrature points of a layer, all ranks."""
+        """F and S at the quadrature points of a layer, all ranks."""
         forms = self.problem.forms
         self._set(state)
         number = next(i for i, (_, names) in enumerate(forms.bodies) if layer in names)
@@ -182,7 +182,7 @@ class Stresses:
             if points is None:
                 cell = basix.CellType.triangle
                 points = basix.make_quadrature(cell, self.problem.scene.quadrature_degree)[0]
-            values = ufl.as_vector([*self._F, *(sum(part[k] for part, _ in parts) for k in range(len(_SIGMA)))])
+            values = ufl.as_vector([*self._F, *(sum(part[k] for part, _ in parts) for k in range(len(_S)))])
             where = ufl.as_vector([forms.X[0], forms.X[1]])
             self._raw[number] = tuple(fem.Expression(e, points) for e in (values, where))
         domain = forms.domain
@@ -197,12 +197,12 @@ class Stresses:
         self.problem.set_state(self.problem.x, state.control)
 
     def _parts(self, material: Any, names: list[str]) -> list[tuple[Any, dict]]:
-        """[(entries of sigma (UFL), quadrature metadata)] of a body: one of its material, one of what keeps its volume."""
+        """[(entries of S (UFL), quadrature metadata)] of a body: of its material, and of what keeps its volume."""
         F = ufl.variable(self.problem.scene.kinematics.deformation_gradient(self.problem.forms.u, self.problem.forms.X))
         parts = []
         for density, metadata in self.problem.forms.energy_densities(material, names, F):
-            sigma = ufl.diff(density, F) * F.T / kin.volume_ratio(F)
-            parts.append(([sigma[i] for i in _SIGMA], metadata))
+            S = ufl.inv(F) * ufl.diff(density, F)
+            parts.append(([S[i] for i in _S], metadata))
         return parts
 
     def _prepare(self) -> None:
@@ -225,8 +225,8 @@ class Stresses:
                 k, dx = column[name], forms.dx(mesh.layers[name])
                 mass += trial[k] * test[k] * dx
                 rhs += sum(self._selector[i] * f for i, f in enumerate(self._F)) * test[k] * dx
-                for sigma, metadata in parts:
-                    picked = sum(self._selector[len(_F) + i] * s for i, s in enumerate(sigma))
+                for S, metadata in parts:
+                    picked = sum(self._selector[len(_F) + i] * s for i, s in enumerate(S))
                     rhs += picked * test[k] * (dx(metadata=metadata) if metadata else dx)
         self._rhs = forms.compile(rhs)
         self._vector = la.vector(self.space.dofmap.index_map, len(self.cells))
@@ -259,9 +259,9 @@ class Stresses:
 
 
 def _unpack(points: np.ndarray, values: np.ndarray) -> Stress:
-    F, sigma = np.zeros((2, len(points), 3, 3))
+    F, S = np.zeros((2, len(points), 3, 3))
     for k, (i, j) in enumerate(_F):
         F[:, i, j] = values[:, k]
-    for k, (i, j) in enumerate(_SIGMA):
-        sigma[:, i, j] = sigma[:, j, i] = values[:, len(_F) + k]
-    return Stress(points, F, sigma)
+    for k, (i, j) in enumerate(_S):
+        S[:, i, j] = S[:, j, i] = values[:, len(_F) + k]
+    return Stress(points, F, S)
