@@ -13,7 +13,7 @@ from typing import Any
 import basix.ufl
 import numpy as np
 import ufl
-from dolfinx import fem
+from dolfinx import fem, la
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -99,8 +99,12 @@ class Solid:
             sub = self.space.sub(1 + colour)
             mesh = self.scene.mesh
             cells = np.concatenate([mesh.cells.find(mesh.layers[n]) for n, c in self._colours.items() if c == colour])
-            dofs = sub.dofmap.list
-            found.append((sub, np.setdiff1d(dofs, dofs[cells]).astype(np.int32)))
+            used = la.vector(sub.dofmap.index_map, sub.dofmap.index_map_bs)
+            used.array[sub.dofmap.list[cells].ravel()] = 1
+            used.scatter_reverse(la.InsertMode.add)        # a cell of another rank may use an unknown of ours
+            used.scatter_forward()
+            mine = np.unique(sub.dofmap.list)
+            found.append((sub, mine[used.array[mine] == 0].astype(np.int32)))
         return found
 
     def _make_space(self) -> Any:
