@@ -10,6 +10,7 @@ from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, S
 from .results.measures import displacement, enclosed_volume, pole_height, pole_stretch, pressure, travel
 from .results.path import Path, State
 from .results.profile import Profile
+from .results.stress import Stress, StressField
 from .scene import Scene
 from .solve.bordered import Tolerances
 from .solve.continuation import trace
