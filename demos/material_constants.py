@@ -98,8 +98,8 @@ def table(numbers, found):
         f" 25 psi it stands",
         f"  at {a['pole_height_in_at_25_psi']['rising']:.2f} in, and beyond the maximum at"
         f" {a['pole_height_in_at_25_psi']['falling']:.2f} in: the thesis' 9 in lies between the two.",
-        f"Pole thickness ratio at 1.5 r0 changes by {found['thickness_ratio_change_per_psi_of_c01']:+.2e} per psi of c01"
-        f" (case 2 to 3), {found['thickness_ratio_change_per_psi_of_c10']:+.2e} per psi of c10 (1 to 4).",
+        f"Pole thickness ratio at 1.5 r0 changes by {found['thickness_ratio_change_per_psi_of_c01']:+.2e} per psi of"
+        f" c01 (case 2 to 3), {found['thickness_ratio_change_per_psi_of_c10']:+.2e} per psi of c10 (1 to 4).",
         f"At {SAME_LOAD:g} psi the rim is {uneven['case5']['rim_over_pole_thickness']:.2f} times as thick as the pole"
         f" with r0/h0 = 28, {uneven['case4']['rim_over_pole_thickness']:.2f} times with 14.",
         f"A over B: pole height {found['A_over_B_initial_pole_height']:.5f} at first,"
@@ -141,8 +141,8 @@ def draw(paths, out, quick):
         path.plot("pole_height", "pressure", left, color=color, label=f"{name}: c10 = {c10:g}, c01 = {c01:g} psi")
         left.plot(26, THESIS[name]["26"], "^", color=color, markeredgecolor="k", label=f"thesis (text), {name}")
         state = path.at(fx.pressure(26.0)) if name == "B" else path.limit_points[0]
-        plots.outline(path.profile(state), right, color=color,
-                      label=f"{name} at {state.measures['pressure']:.4g} psi" + (" (its maximum)" if name == "A" else ""))
+        label = f"{name} at {state.measures['pressure']:.4g} psi" + (" (its maximum)" if name == "A" else "")
+        plots.outline(path.profile(state), right, color=color, label=label)
     left.set(xlabel="pressure, psi", ylabel="pole height, in", xlim=(0, 32), ylim=(0, None))
     left.legend(frameon=False, fontsize=9)
     right.set(xlabel="r, in", ylabel="z, in", xlim=(0, None))

@@ -208,7 +208,8 @@ def draw_curves(kind, path, targets, out, grids=None):
     runs[f"{path.problem.forms.domain.topology.index_map(2).size_global} triangles"] = (path, targets)
     for (name, (run, aims)), style in zip(reversed(runs.items()), ("C2.", "C0x", "C1+")):
         bound = aims["50"].bind(run.problem)
-        axes.plot([run.value(bound, s) * INCH for s in run.states], run["pressure"] * PSI, style, markersize=7, label=name)
+        displacement = [run.value(bound, s) * INCH for s in run.states]
+        axes.plot(displacement, run["pressure"] * PSI, style, markersize=7, label=name)
         for s in run.limit_points:
             axes.plot(run.value(bound, s) * INCH, s.measures["pressure"] * PSI, "o", color="C2", fillstyle="none",
                       markersize=11, label="limit point")
@@ -238,7 +239,8 @@ def main():
     outer, inside = geometry_of_the_thesis()
     cylinder |= {
         "pressure_MPa_at_inner_displacement_cm_on_grid": {
-            str(k): {d: p.met(t).measures["pressure"] * PSI for d, t in aims.items()} for k, (p, aims) in grids.items()},
+            str(k): {d: p.met(t).measures["pressure"] * PSI for d, t in aims.items()}
+            for k, (p, aims) in grids.items()},
         "hydrostatic_pressure_error": misses,
         "outer_radius_in_that_gives_1.26_MPa": outer, "inner_radius_in_that_gives_1.26_MPa": inside}
     summarise(args.out, {"cylinder": cylinder, "sphere": sphere, "versions": files.versions()})

@@ -33,14 +33,14 @@ def test_uniaxial_tension(material, true_stress):
         assert stress.principal_stretches == pytest.approx(np.tile([STRETCH, *[STRETCH**-0.5] * 2], (n, 1)), rel=1e-7)
 
 
-@pytest.mark.parametrize("keeping, allowed", [(fx.MixedPressure(eps=1e-6), 1e-5), (fx.DisplacementPenalty(eps=1e-6), 1e-5)],
+@pytest.mark.parametrize("keeping", [fx.MixedPressure(eps=1e-6), fx.DisplacementPenalty(eps=1e-6)],
                          ids=["mixed", "displacements only"])
-def test_penalties_have_a_pressure_too(keeping, allowed):
+def test_penalties_have_a_pressure_too(keeping):
     """The part of the stress that the penalty carries is taken where the penalty is integrated."""
     path = fx.trace(cylinder(fx.NeoHookean(c10=2.0), keeping), until=fx.travel(2.0 * (STRETCH - 1)))
     s = MATERIALS[0][1](STRETCH)
     for stress in (path.stress().at([(0.5, 0.5)]), path.stress().at_quadrature_points()):
-        assert np.abs(stress.cauchy - np.diag([0, s, 0])).max() < allowed * s
+        assert np.abs(stress.cauchy - np.diag([0, s, 0])).max() < 1e-5 * s
 
 
 def sphere(n, material=None):
@@ -74,6 +74,22 @@ def test_thick_wall_converges(kind):
     for errors in (raw, projected):
         orders = np.log2(errors[0] / errors[1])
         assert errors[1].max() < 5e-3 and orders.min() > 1.8, (errors, orders)
+
+
+def test_plane_strain_is_the_tube_too():
+    """A quarter of the cross-section in plane strain: curved edges, a stress out of plane, the same exact solution."""
+    mesh = fx.mesh.sphere(inner_radius=1.0, thickness=1.0, elements=(16, 8))
+    constants = {"c10": 1.0, "c01": 0.5}
+    scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(**constants), kinematics=fx.PlaneStrain(),
+                     supports=[fx.Symmetry("axis"), fx.Symmetry("equator", normal="z")], loads=[fx.Pressure("inner")])
+    path = fx.trace(scene, until=fx.displacement(0.5, at=(1.0, 0.0), component="r"))
+    stress = path.stress().at_quadrature_points()
+    R = np.hypot(*stress.points.T)
+    exact = thick_wall("tube", 1.5, inner_radius=1, outer_radius=2, R=R, **constants)
+    assert path.last.measures["pressure"] == pytest.approx(exact.pressure, rel=1e-4)
+    face = stress.on_face(stress.points)
+    for found, sought in ((face.normal, exact.radial), (face.meridional, exact.hoop), (face.hoop, exact.third)):
+        assert np.sqrt(np.mean((found - sought) ** 2)) < 5e-3 * np.abs(exact.hoop).max()
 
 
 def test_thick_sphere_through_its_limit_point():

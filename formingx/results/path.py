@@ -11,7 +11,7 @@ from ..errors import InputError
 from . import measures
 from .measures import Target
 from .profile import Profile, Profiles
-from .stress import StressField, Stresses
+from .stress import Stresses, StressField
 
 
 @dataclass
