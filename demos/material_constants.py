@@ -4,9 +4,9 @@ Mooney sheets, simply supported; inches and psi. Table 4.2 gives C10 as the I1 c
 plates A and B of the same section read the other way round: their C01 is the I1 constant (only so is A the softer one).
 Below c10 always belongs to I1. Pole height: of the mid-thickness point; K = 6 (c10 + c01).
 
-Plate A cannot carry the 26 psi at which the thesis has 9 in: its maximum is 25.065 psi on any mesh from 10 x 1 to 80 x 4,
-and 25.05 to 25.07 psi on 10 x 1 with the thesis' penalty (eps 2e-2 to 8e-2). Only a clamped rim on 10 x 1 elements carries
-26 psi (26.4 at most; 25.7 on finer meshes), at 7.7 and 10.3 in.
+Plate A cannot carry the 26 psi at which the thesis has 9 in: its maximum is 25.065 psi on any mesh from 10 x 1 to
+80 x 4, and 25.05 to 25.07 psi on 10 x 1 with the thesis' penalty (eps 2e-2 to 8e-2). Only a clamped rim on 10 x 1
+elements carries 26 psi (26.4 at most; 25.7 on finer meshes), at 7.7 and 10.3 in.
 """
 
 from common import COMM, parser, save, say, summarise
