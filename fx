@@ -219,8 +219,8 @@ case $way in
         set -- "formingx:$key" "$@"
         [ "$also" = "$here" ] || set -- -v "$also:$also" "$@"
         exec "$way" run --rm -i $tty $keep --init --shm-size=1g --user "$user" --security-opt label=disable \
-            -v "$here:$here" -w "$PWD" -e HOME=/tmp -e PYTHONPATH -e XDG_CACHE_HOME -e MPLCONFIGDIR -e OMP_NUM_THREADS -e PETSC_OPTIONS \
-            -e OMPI_MCA_btl -e OMPI_ALLOW_RUN_AS_ROOT -e OMPI_ALLOW_RUN_AS_ROOT_CONFIRM \
+            -v "$here:$here" -w "$PWD" -e HOME=/tmp -e PYTHONPATH -e XDG_CACHE_HOME -e MPLCONFIGDIR \
+            -e OMP_NUM_THREADS -e PETSC_OPTIONS -e OMPI_MCA_btl -e OMPI_ALLOW_RUN_AS_ROOT -e OMPI_ALLOW_RUN_AS_ROOT_CONFIRM \
             -e PRTE_MCA_rmaps_default_mapping_policy "$@" ;;
 esac
 [ "$way" != root ] || namespaces || way=copy

@@ -1,11 +1,13 @@
 """formingx: how polymers are formed, simulated with finite elements on FEniCSx."""
 
 from . import mesh
+from .data import treloar1944
 from .errors import ConvergenceError, InputError
-from .physics.incompressibility import DisplacementPenalty, MixedPressure
+from .fit import Fit, fit
+from .physics.incompressibility import DisplacementPenalty, Membrane, MixedPressure
 from .physics.kinematics import Axisymmetric, PlaneStrain
 from .physics.loads import Pressure
-from .physics.materials import Hyperelastic, MooneyRivlin, NeoHookean, Ogden
+from .physics.materials import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Symmetry
 from .results.measures import displacement, enclosed_volume, pole_height, pole_stretch, pressure, travel
 from .results.path import Path, State

@@ -92,6 +92,25 @@ def test_pinned_node_that_is_not_there():
         fx.trace(scene(supports=[fx.Symmetry("axis"), fx.PinnedNode(0.123, 0.456)]), until=fx.pressure(0.1))
 
 
+def test_hinge_of_layers_too_different():
+    """What a hinge would ask of a soft layer is refused; where the soft layer is on top, or clamped, it runs."""
+    hard, soft = fx.NeoHookean(c10=1e4), fx.NeoHookean(c10=1.0)
+    mesh = fx.mesh.disc(radius=1.0, thickness={"lower": 0.03, "upper": 0.03}, elements=(10, 1))
+
+    def layered(lower, upper, rim):
+        return scene(mesh=mesh, materials={"lower": lower, "upper": upper}, supports=[fx.Symmetry("axis"), rim])
+    weighted = fx.SimplySupported("rim", weight="stiffness")
+    with pytest.raises(fx.InputError, match="'upper' is 1e.04 times softer than 'lower'.*weight='stiffness'"):
+        layered(hard, soft, fx.SimplySupported("rim"))
+    with pytest.raises(fx.InputError, match="squeeze layer 'lower', 1e.04 times softer.*use Clamped"):
+        layered(soft, hard, weighted)
+    for lower, upper, rim in ((hard, soft, weighted), (soft, hard, fx.Clamped("rim"))):
+        path = fx.trace(layered(lower, upper, rim), until=fx.pole_stretch(2.5))
+        assert path.counts.iterations < 100
+    with pytest.raises(fx.InputError, match="weight = 'mass'"):
+        fx.SimplySupported("rim", weight="mass")
+
+
 def test_nothing_driven():
     for run in (lambda s: fx.trace(s, until=fx.pressure(1.0)), lambda s: fx.solve(s, to=1.0)):
         with pytest.raises(fx.InputError, match="nothing is driven"):

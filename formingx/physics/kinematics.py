@@ -66,22 +66,24 @@ def invariants(F):
 def sum_of_powers(F, alpha):
     """lambda_1^alpha + lambda_2^alpha + lambda_3^alpha, smooth where in-plane stretches coincide.
 
-    With m and d the mean and half difference of the in-plane eigenvalues of C, the in-plane part
-    (m + d)^a + (m - d)^a, a = alpha/2, is even in d: near d = 0 its series in (d/m)^2 replaces it, so that
-    value and derivatives have no 0/0. The switch is at (d/m)^2 = 1e-3, where five terms are exact to 1e-15.
+    With m and d >= 0 the mean and half difference of the in-plane eigenvalues of C, and a = alpha/2, the in-plane
+    part is even in d. Near d = 0 its series in x = (d/m)^2 replaces it, so that value and derivatives have no 0/0;
+    beyond, the small eigenvalue is det C / (m + d), which unlike m - d loses no digits in a thin sheet. At the switch,
+    x = 1e-4, five terms and round-off both leave second derivatives exact to some 1e-14 of their norm (alpha from -5
+    to 10).
     """
     C = F.T * F
     a = alpha / 2
     m = (C[0, 0] + C[1, 1]) / 2
-    d2 = ((C[0, 0] - C[1, 1]) / 2) ** 2 + C[0, 1] * C[1, 0]
-    x = d2 / m**2
-    near = ufl.lt(x, 1e-3)
-    term, series = 1, 1
+    x = (((C[0, 0] - C[1, 1]) / 2) ** 2 + C[0, 1] * C[1, 0]) / m**2
+    near = ufl.lt(x, 1e-4)
+    term, series = 2, 2
     for k in (2, 4, 6, 8):
         term = term * (a - k + 2) * (a - k + 1) / (k * (k - 1)) * x
         series = series + term
-    e = ufl.sqrt(ufl.conditional(near, 1e-3, x))
-    return m**a * ufl.conditional(near, 2 * series, (1 + e) ** a + (1 - e) ** a) + C[2, 2] ** a
+    large = 1 + ufl.sqrt(ufl.conditional(near, 1e-4, x))        # the branch not taken must be finite too
+    small = ((F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) / m) ** 2 / large
+    return m**a * ufl.conditional(near, series, large**a + small**a) + C[2, 2] ** a
 
 
 def _block(F2, F33):

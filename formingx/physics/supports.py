@@ -22,10 +22,14 @@ class Held(NamedTuple):
 
 
 class MeanHeld(NamedTuple):
-    """The mean of one displacement component over a boundary held at 0 (a Lagrange multiplier carries the force)."""
+    """The mean of one displacement component over a boundary held at 0 (a Lagrange multiplier carries the force).
+
+    `by_stiffness`: layers count in proportion to their shear modulus, and carry the force so.
+    """
 
     component: int
     on: str
+    by_stiffness: bool = False
 
 
 class _On:
@@ -54,6 +58,8 @@ class Clamped(_On):
     The corner of a clamped rim is singular: see the README for the band that this leaves in a limit pressure.
     """
 
+    holds_rotation = True
+
     def constraints(self):
         """What is held: a list of Held or MeanHeld."""
         return [Held(R, on=self.on), Held(Z, on=self.on)]
@@ -63,11 +69,22 @@ class SimplySupported(_On):
     """A hinge: the mean displacement of a rim face is 0, its rotation and its thinning are free.
 
     (Holding one node instead is a point support, which has no limit under mesh refinement.)
+
+    Args:
+        on: name of the boundary.
+        weight: "area": the plain mean, so that every layer is pulled with the same traction; "stiffness": layers count
+            by their shear modulus, for layers so different that the soft one could not carry that traction.
     """
+
+    def __init__(self, on: str, weight: str = "area"):
+        super().__init__(on)
+        if weight not in ("area", "stiffness"):
+            raise InputError(f"SimplySupported({on!r}): weight = {weight!r}: must be 'area' or 'stiffness'")
+        self.weight = weight
 
     def constraints(self):
         """What is held: a list of Held or MeanHeld."""
-        return [MeanHeld(R, self.on), MeanHeld(Z, self.on)]
+        return [MeanHeld(component, self.on, self.weight == "stiffness") for component in (R, Z)]
 
 
 class PinnedNode:

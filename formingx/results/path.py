@@ -90,7 +90,7 @@ class Path:
 
     def met(self, target: Target) -> State | None:
         """The state that hit a target of the run, or None."""
-        return next((state for state in self.states if state.met == target), None)
+        return next((state for state in self.states if state.met and state.met[:2] == target[:2]), None)
 
     def record(self, state: State) -> None:
         """Take up a state: evaluate the measures there."""

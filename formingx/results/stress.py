@@ -198,7 +198,7 @@ class Stresses:
 
     def _parts(self, material: Any, names: list[str]) -> list[tuple[Any, dict]]:
         """[(entries of S (UFL), quadrature metadata)] of a body: of its material, and of what keeps its volume."""
-        F = ufl.variable(self.problem.scene.kinematics.deformation_gradient(self.problem.forms.u, self.problem.forms.X))
+        F = ufl.variable(self.problem.forms.F)
         parts = []
         for density, metadata in self.problem.forms.energy_densities(material, names, F):
             S = ufl.inv(F) * ufl.diff(density, F)
@@ -207,19 +207,18 @@ class Stresses:
 
     def _prepare(self) -> None:
         problem, forms, mesh = self.problem, self.problem.forms, self.problem.scene.mesh
-        domain = forms.domain
+        bodies, domain = forms.bodies, forms.domain            # a membrane has none, and says so
         self.cells = {name: mesh.cells.find(tag) for name, tag in mesh.layers.items()}
         self.element = basix.ufl.element("Lagrange", domain.basix_cell(), 1)
         self.space = fem.functionspace(domain, basix.ufl.element("Lagrange", domain.basix_cell(), 1,
                                                                  shape=(len(self.cells),)))
-        F = problem.scene.kinematics.deformation_gradient(forms.u, forms.X)
-        self._F = [F[i] for i in _F]
+        self._F = [forms.F[i] for i in _F]
         self._selector = fem.Constant(domain, np.zeros(_COUNT, dtype=PETSc.ScalarType))
         trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         mass: Any = 0
         rhs: Any = 0
         column = {name: k for k, name in enumerate(self.cells)}
-        for body in forms.bodies:
+        for body in bodies:
             parts = self._parts(*body)
             for name in body[1]:
                 k, dx = column[name], forms.dx(mesh.layers[name])

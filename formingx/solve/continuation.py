@@ -82,13 +82,13 @@ class _Run:
         return path
 
     def _facing_target(self, start: State) -> State:
-        """The start, its tangent turned if the target lies the other way."""
-        bound = next(b for t, b in self.open if t is self.until)
-        now, length = self.branch.value(bound, start.x, start.control), self.step.length
-        ahead = self.branch.value(bound, start.x + length * start.direction, start.control + length * start.slope)
-        away = self.until.value - now
-        if (ahead - now) * away < -1e-6 * away**2:              # more than round-off in a flat sheet
-            start.direction, start.slope = -start.direction, -start.slope
+        """The start, its tangent turned if a target that changes sign with the control lies the other way."""
+        if self.until.signed:
+            bound = next(b for t, b in self.open if t is self.until)
+            now = self.branch.value(bound, start.x, start.control)
+            ahead = self.branch.value(bound, start.x + start.direction, start.control + start.slope)
+            if (ahead - now) * (self.until.value - now) < 0:
+                start.direction, start.slope = -start.direction, -start.slope
         return start
 
     def _next(self, old: State) -> State:

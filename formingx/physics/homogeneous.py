@@ -1,0 +1,201 @@
+"""Homogeneous deformations of a strain energy, F = diag(l1, l2, l3), evaluated at many stretches at once.
+
+UFL differentiates the energy once; numpy evaluates the derivatives, so that a fit of constants costs no compilation.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import basix.ufl
+import numpy as np
+import ufl
+from ufl import classes
+from ufl.algorithms import expand_derivatives, expand_indices
+from ufl.corealg.traversal import unique_post_traversal
+
+from ..errors import InputError
+
+MODES = {"uniaxial": -0.5, "pure_shear": 0.0, "equibiaxial": 1.0}
+"""Tests by name: the stretches are l, l^k and l^(-1-k), with k the value here; the last direction is free of stress."""
+
+
+class Response:
+    """First and second derivatives of an energy by the principal stretches.
+
+    Args:
+        energy: called as energy(F, **constants), F of shape (3, 3); returns a UFL scalar.
+        names: the names of its constants.
+    """
+
+    def __init__(self, energy: Callable, names: Any):
+        mesh = ufl.Mesh(basix.ufl.element("Lagrange", "triangle", 1, shape=(2,)))
+        inputs = [ufl.Constant(mesh) for _ in range(3 + len(names))]
+        l = [ufl.variable(c) for c in inputs[:3]]
+        F = ufl.as_tensor([[l[0], 0, 0], [0, l[1], 0], [0, 0, l[2]]])
+        W = ufl.as_ufl(energy(F, **dict(zip(names, inputs[3:], strict=True))))
+        if W.ufl_shape != ():
+            raise InputError(f"a strain energy must be a scalar, this one has the shape {W.ufl_shape}")
+        W = expand_indices(expand_derivatives(W))
+        first = [expand_derivatives(ufl.diff(W, x)) for x in l]
+        second = [expand_derivatives(ufl.diff(first[i], l[j])) for i in range(3) for j in range(i, 3)]
+        self._first, self._all = _Program(inputs, first), _Program(inputs, first + second)
+
+    @np.errstate(all="ignore")
+    def stress(self, stretches: Any, constants: Any) -> np.ndarray:
+        """Nominal stresses P_i, shape (2, n), in directions 1 and 2 of a sheet free of stress in direction 3.
+
+        P_i = W,i - (l3 / l_i) W,3: the pressure of incompressibility is eliminated.
+
+        Args:
+            stretches: (l1, l2), shape (2, n); l3 = 1/(l1 l2).
+            constants: the values of the constants, in the order of `names`.
+        """
+        l = _three(stretches)
+        g = self._first(l, constants)
+        return g[:2] - l[2] / l[:2] * g[2]
+
+    def derivatives(self, stretches: Any, constants: Any) -> tuple[np.ndarray, np.ndarray]:
+        """W,i, shape (3, n), and W,ij, shape (3, 3, n), at (l1, l2, l3) of shape (3, n), l3 free."""
+        values = self._all(np.asarray(stretches, float), constants)
+        return values[:3], values[3:][[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+
+    @np.errstate(all="ignore")
+    def logarithmic(self, stretches: Any, constants: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Gradient (2, n) and Hessian (2, 2, n) of W in the strains ln l1, ln l2 with l1 l2 l3 = 1.
+
+        The gradient holds the Kirchhoff stresses tau_i - tau_3.
+        """
+        l = _three(stretches)
+        g, h = self.derivatives(l, constants)
+        tau = l * g
+        K = l[:, None] * l * h + np.eye(3)[..., None] * tau
+        to_3 = np.array([[1.0, 0, -1], [0, 1, -1]])
+        return to_3 @ tau, np.einsum("ai,ijn,bj->abn", to_3, K, to_3)
+
+
+def along(mode: str, stretches: Any) -> np.ndarray:
+    """(l1, l2), shape (2, n), of a test at its stretches, shape (n,)."""
+    l = np.asarray(stretches, float)
+    return np.stack([l, l ** MODES[mode]])
+
+
+def _three(stretches: Any) -> np.ndarray:
+    l1, l2 = np.asarray(stretches, float)
+    return np.stack([l1, l2, 1 / (l1 * l2)])
+
+
+class Stability(NamedTuple):
+    """Where a material is stable.
+
+    stretches: the range that was asked for.
+    finite, load, drucker: {mode: (lowest, highest)}, the part of it around l = 1 where the stress is finite, and where
+        each criterion holds.
+    """
+
+    stretches: tuple[float, float]
+    finite: dict[str, tuple[float, float]]
+    load: dict[str, tuple[float, float]]
+    drucker: dict[str, tuple[float, float]]
+
+    @property
+    def stable(self) -> bool:
+        """True if both criteria hold in the whole range in every test."""
+        return all(part == self.stretches for parts in (self.load, self.drucker) for part in parts.values())
+
+    def __str__(self) -> str:
+        low, high = self.stretches
+        if self.stable:
+            return f"stable at stretches from {low:g} to {high:g} in {', '.join(self.load)} tension"
+        bounds: dict[tuple, list[str]] = {}
+        for what, parts in (("the stress is finite", self.finite), ("the force rises", self.load),
+                            ("Drucker's criterion holds", self.drucker)):
+            for mode, part in parts.items():
+                if part != self.stretches:
+                    bounds.setdefault((mode, *part), []).append(what)
+        return "; ".join(f"{mode}: {', '.join(what)} only at stretches from {a:.5g} to {b:.5g}"
+                         for (mode, a, b), what in bounds.items())
+
+
+def stability(response: Response, constants: Any, low: float, high: float) -> Stability:
+    """See `Material.check_stability`. Bounds are searched for in 400 steps of equal ratio and then bisected."""
+    constants = list(constants)
+
+    @np.errstate(all="ignore")
+    def margins(mode: str, l: np.ndarray) -> np.ndarray:
+        """1, l^2 dP/dl and the smaller eigenvalue of the Hessian, over the size of their terms, shape (3, n)."""
+        tau, K = response.logarithmic(along(mode, l), constants)
+        size = np.abs(K).max((0, 1)) + np.abs(tau).max(0)
+        slope = K[0, 0] + MODES[mode] * K[0, 1] - tau[0]
+        smaller = (K[0, 0] + K[1, 1]) / 2 - np.hypot((K[0, 0] - K[1, 1]) / 2, K[0, 1])
+        return np.stack([size, slope, smaller]) / size
+
+    def end(mode: str, criterion: int, far: float) -> float:
+        def holds(l: np.ndarray) -> np.ndarray:
+            return margins(mode, l)[criterion] > -1e-14       # round-off; not a number counts as unstable
+        l = np.geomspace(1, far, 400)
+        bad = np.flatnonzero(~holds(l))
+        if not len(bad):
+            return far
+        a, b = l[max(bad[0] - 1, 0)], l[bad[0]]
+        for _ in range(50):
+            middle = (a + b) / 2
+            a, b = (middle, b) if holds(np.array([middle]))[0] else (a, middle)
+        return float(a)
+
+    parts = [{mode: (end(mode, criterion, low), end(mode, criterion, high)) for mode in MODES}
+             for criterion in range(3)]
+    return Stability((low, high), *parts)
+
+
+class _Program:
+    """Scalar UFL expressions as a list of numpy operations, each common part done once."""
+
+    def __init__(self, inputs: list, outputs: list):
+        place: dict[Any, int] = {c: i for i, c in enumerate(inputs)}
+        self._steps: list[tuple[Callable, list[int]]] = []
+        for output in outputs:
+            for node in unique_post_traversal(output):
+                if node in place or isinstance(node, (classes.MultiIndex, classes.Label)):
+                    continue
+                if isinstance(node, classes.Variable):
+                    place[node] = place[node.ufl_operands[0]]
+                    continue
+                self._steps.append((_operation(node), [place[x] for x in node.ufl_operands]))
+                place[node] = len(inputs) + len(self._steps) - 1
+        self._outputs = [place[x] for x in outputs]
+
+    @np.errstate(all="ignore")
+    def __call__(self, stretches: np.ndarray, constants: Any) -> np.ndarray:
+        """The outputs, shape (number of outputs, n)."""
+        values = [*stretches, *constants]
+        for operation, operands in self._steps:
+            values.append(operation(*[values[i] for i in operands]))
+        return np.stack([np.broadcast_to(values[i], stretches.shape[1:]) for i in self._outputs]).astype(float)
+
+
+_OPERATIONS = {
+    classes.Sum: operator.add, classes.Product: operator.mul, classes.Division: operator.truediv,
+    classes.Power: np.float_power, classes.Abs: np.abs, classes.Conditional: np.where, classes.LT: operator.lt,
+    classes.LE: operator.le, classes.GT: operator.gt, classes.GE: operator.ge, classes.EQ: operator.eq,
+    classes.NE: operator.ne, classes.AndCondition: np.logical_and, classes.OrCondition: np.logical_or,
+    classes.NotCondition: np.logical_not, classes.MinValue: np.minimum, classes.MaxValue: np.maximum,
+    classes.Sqrt: np.sqrt, classes.Exp: np.exp, classes.Ln: np.log, classes.Cos: np.cos, classes.Sin: np.sin,
+    classes.Tan: np.tan, classes.Cosh: np.cosh, classes.Sinh: np.sinh, classes.Tanh: np.tanh, classes.Acos: np.arccos,
+    classes.Asin: np.arcsin, classes.Atan: np.arctan, classes.Atan2: np.arctan2, classes.Conj: operator.pos,
+    classes.Real: operator.pos,
+}
+
+
+def _operation(node: Any) -> Callable:
+    if isinstance(node, classes.Zero):
+        return lambda: 0.0
+    if isinstance(node, classes.ScalarValue):
+        value = float(node)
+        return lambda: value
+    if type(node) not in _OPERATIONS:
+        raise InputError(f"the strain energy contains {type(node).__name__} ({str(node)[:60]}), which is not a function"
+                         f" of F and the constants that formingx can evaluate")
+    return _OPERATIONS[type(node)]

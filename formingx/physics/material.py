@@ -1,0 +1,178 @@
+"""What every incompressible, isotropic, hyperelastic material can do; the materials are in `materials`.
+
+A material has named constants and one energy. What an energy of F leaves as stress at rest, an isotropic pressure,
+is removed where it is used: W(F) - rest_stress ln J. (On a thin sheet Newton's method takes half as many iterations
+with that form than with the isochoric part of F: see the notes on incompressibility.)
+"""
+
+from __future__ import annotations
+
+import copy
+import functools
+import math
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, finite, known, positive
+from . import homogeneous
+from .homogeneous import MODES, Response, Stability
+
+
+class Material:
+    """A strain energy with named constants.
+
+    Subclasses set `self.parameters` (name to value) and give `strain_energy`. The constants' unit of stress is
+    the user's own and fixes that of all pressures and stresses.
+    """
+
+    parameters: dict[str, float]
+
+    def strain_energy(self, F: Any, *args: Any, **constants: Any) -> Any:
+        """Energy per reference volume of F, shape (3, 3); a UFL scalar, zero at F = I."""
+        raise NotImplementedError
+
+    @property
+    def largest_I1(self) -> float:
+        """The value of I1 at which the energy is infinite; infinity if there is none."""
+        return math.inf
+
+    @property
+    def shear_modulus(self) -> float:
+        """Modulus of small shear, E/3. Unit: stress.
+
+        For any isotropic energy W = mu (e1^2 + e2^2 + e3^2) of small strains e = ln l with zero sum: W,11 = 4 mu.
+        """
+        return float(self.response.logarithmic(np.ones((2, 1)), self.parameters.values())[1][0, 0, 0] / 4)
+
+    @property
+    def rest_stress(self) -> float:
+        """dW/dF11 at F = I, stress: for the invariants, 2 (W,1 + 2 W,2)."""
+        return float(self.response.derivatives(np.ones((3, 1)), self.parameters.values())[0][0, 0])
+
+    @functools.cached_property
+    def response(self) -> Response:
+        """The energy's derivatives by the principal stretches, for any constants."""
+        return Response(self.strain_energy, list(self.parameters))
+
+    def stress(self, mode: str, stretches: Any) -> np.ndarray:
+        """Nominal stress, force over reference area, of a test. Unit: stress.
+
+        P = dW/dl / n along the test, with n = 1 direction pulled, or 2.
+
+        Args:
+            mode: "uniaxial" (l, l^-1/2, l^-1/2), "pure_shear" (l, 1, 1/l), also called planar tension, or
+                "equibiaxial" (l, l, l^-2).
+            stretches: l, any shape, each greater than 0; the result has this shape.
+
+        Raises:
+            InputError: unknown mode, a stretch that is not positive or beyond the material's limit.
+        """
+        known(f"{self}: stress: mode", mode, MODES)
+        try:
+            l = np.asarray(stretches, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"{self}: stress: stretches = {stretches!r}: must be numbers") from None
+        flat = l.ravel()
+        for bad in flat[~((flat > 0) & np.isfinite(flat))][:1]:
+            raise InputError(f"{self}: a stretch of {bad:.6g}: must be finite and greater than 0")
+        self._check_isotropic()
+        P = self.response.stress(homogeneous.along(mode, flat), self.parameters.values())[0]
+        for bad in flat[~np.isfinite(P)][:1]:
+            raise InputError(self._beyond(mode, bad))
+        return P.reshape(l.shape)[()]
+
+    def largest_stretch(self, mode: str) -> float:
+        """The stretch of a test at which the energy is infinite."""
+        known(f"{self}: largest_stretch: mode", mode, MODES)
+        if not math.isfinite(self.largest_I1):
+            return math.inf
+        from scipy.optimize import brentq
+        k = MODES[mode]
+        return brentq(lambda l: l**2 + l**(2 * k) + l**(-2 - 2 * k) - self.largest_I1, 1, math.sqrt(self.largest_I1))
+
+    def check_stability(self, stretches: Any) -> Stability:
+        """Where the material is stable, in each of the three tests.
+
+        Two criteria, each with the part of the range around l = 1 in which it holds:
+        "load": dP/dl > 0, a test under a growing force goes on (P nominal);
+        "Drucker": d tau : d(ln l) > 0 for every change of the three stretches that keeps the volume (tau Kirchhoff
+        stress): the Hessian of W in the logarithmic strains is positive definite at every stretch of the test.
+
+        Args:
+            stretches: the range: any number of stretches, of which the smallest and the largest (and 1) count.
+        """
+        try:
+            low, high = (positive(f"{self}: check_stability: stretch", f(stretches)) for f in (min, max))
+        except (TypeError, ValueError) as error:
+            raise error if isinstance(error, InputError) else InputError(
+                f"{self}: check_stability: stretches = {stretches!r}: must be a range such as (0.5, 6)") from None
+        return homogeneous.stability(self.response, self.parameters.values(), min(low, 1.0), max(high, 1.0))
+
+    def plot(self, axes: Any = None, stretches: Any = None, unit: str = "") -> Any:
+        """Draw nominal stress against stretch of the three tests; returns the matplotlib axes.
+
+        Args:
+            axes: where to draw; default a new figure.
+            stretches: the stretches, shape (n,); default 1 to 6, and to 95 % of the limit where there is one.
+            unit: the constants' unit of stress, for the label.
+        """
+        import matplotlib.pyplot as plt
+        if axes is None:
+            axes = plt.subplots(layout="constrained")[1]
+        for mode in MODES:
+            l = np.linspace(1, min(6.0, 0.95 * self.largest_stretch(mode)), 200) if stretches is None else stretches
+            axes.plot(l, self.stress(mode, l), label=mode.replace("_", " "))
+        axes.set(xlabel="stretch", ylabel="nominal stress" + f" ({unit})" * bool(unit), title=str(self))
+        axes.grid(alpha=0.3)
+        axes.legend()
+        return axes
+
+    def check(self) -> None:
+        """Raise an InputError unless the constants are admissible: finite, with a positive stiffness at rest."""
+        for name, value in self.parameters.items():
+            finite(f"{self}: {name}", value)
+        mu = self.shear_modulus
+        if not mu > 0 or not math.isfinite(mu):
+            raise InputError(f"{self} has no stiffness: its shear modulus at rest is {mu:.6g}, must be positive")
+
+    @classmethod
+    def guesses(cls, modulus: float, I1: float, terms: int | None) -> list[Material]:
+        """Materials from which a fit may start, for data with about this shear modulus and this largest I1."""
+        raise InputError(f"fit: {cls.__name__} has no first guess of its own: give a material with constants near the"
+                         f" wanted ones instead of the class")
+
+    def coordinates(self) -> list[tuple[float, float, float]]:
+        """[(value, lowest, highest)]: what a fit varies. All constants within are admissible."""
+        return [(float(value), -math.inf, math.inf) for value in self.parameters.values()]
+
+    def constants_at(self, coordinates: Any) -> list[float]:
+        """The constants at coordinates."""
+        return list(coordinates)
+
+    def with_constants(self, constants: Any) -> Material:
+        """The same kind of material with other constants, in the order of `parameters`."""
+        other = copy.copy(self)                             # with its `response`, which holds for any constants
+        other.parameters = dict(zip(self.parameters, map(float, constants), strict=True))
+        other.check()
+        return other
+
+    def _check_isotropic(self) -> None:
+        """Turning the stretches round must turn the stresses round."""
+        l = np.array([1.02, 0.99, 1 / 1.02 / 0.99])
+        g = self.response.derivatives(np.stack([l, np.roll(l, 1)], axis=1), self.parameters.values())[0]
+        if np.any(np.abs(np.roll(g[:, 0], 1) - g[:, 1]) > 1e-8 * np.abs(g).max()):
+            raise InputError(f"{self} is not isotropic: its stresses depend on the direction that is pulled")
+
+    def _beyond(self, mode: str, stretch: float) -> str:
+        k = MODES[mode]
+        if math.isfinite(self.largest_I1):
+            I1 = stretch**2 + stretch**(2 * k) + stretch**(-2 - 2 * k)
+            return (f"{self}: a stretch of {stretch:.6g} in {mode} tension is beyond its limit: I1 = {I1:.6g} must be"
+                    f" less than {self.largest_I1:.6g}, stretches less than {self.largest_stretch(mode):.6g}")
+        return f"{self}: the stress at a stretch of {stretch:.6g} in {mode} tension is not a finite number"
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{k}={v!r}' for k, v in self.parameters.items())})"
+
+    __repr__ = __str__
