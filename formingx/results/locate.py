@@ -16,7 +16,7 @@ OUTSIDE = 1e-3
 
 
 class Place(NamedTuple):
-    """Points of this rank: their numbers, shape (m,), cells, shape (m,), and places in them, shape (m, 2)."""
+    """Points of this rank: their numbers, shape (m,), cells, shape (m,), and places in them, shape (m, dimension)."""
 
     mine: np.ndarray
     cells: np.ndarray
@@ -33,13 +33,13 @@ def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None 
     Raises:
         InputError: a point that lies in none of the cells.
     """
-    comm, X, cmap = mesh.comm, mesh.geometry.x, _compat.coordinate_map(mesh)
-    owned = mesh.topology.index_map(2).size_local
+    comm, X, cmap, dim = mesh.comm, mesh.geometry.x, _compat.coordinate_map(mesh), mesh.topology.dim
+    owned = mesh.topology.index_map(dim).size_local
     cells = np.arange(owned, dtype=np.int32) if cells is None else cells[cells < owned]
     padded = np.zeros((len(points), 3))
     padded[:, :2] = points
     found = np.full(len(points), -1)
-    reference = np.zeros((len(points), 2))
+    reference = np.zeros((len(points), dim))
     depth = np.full(len(points), -OUTSIDE)
     if len(cells):
         tree = _compat.tree_of_cells(mesh, OUTSIDE * size, cells)
@@ -47,7 +47,7 @@ def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None 
         for i, point in enumerate(padded):
             for cell in candidates.links(i):
                 try:
-                    place = cmap.pull_back(point[None], X[mesh.geometry.dofmap[cell]])[0, :2]
+                    place = cmap.pull_back(point[None], X[mesh.geometry.dofmap[cell]])[0, :dim]
                 except RuntimeError:                 # a curved cell that the point is far from
                     continue
                 inside = min(*place, 1 - place.sum())
