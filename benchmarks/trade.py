@@ -149,7 +149,8 @@ def main():
     for scene in list(SCENES)[:1 if args.quick else None]:
         reference = measured(scene, {**REFERENCE, **({"along": 80, "through": 4} if args.quick else {})})
         say("", f"{scene}: reference {label(REFERENCE)}: " + ", ".join(f"{q} {reference[q]:.7g}" for q in QUANTITIES),
-            f"{'':44}{'unknowns':>9}{'solve s':>8}{'total s':>8}{'iter':>6}{'MB':>6}" + "".join(f"{q:>16}" for q in QUANTITIES))
+            f"{'':44}{'unknowns':>9}{'solve s':>8}{'total s':>8}{'iter':>6}{'MB':>6}"
+            + "".join(f"{q:>16}" for q in QUANTITIES))
         rows = results[scene] = {}
         for way in ways(args.quick):
             row = rows[label(way)] = {**way, **measured(scene, way)}
@@ -158,7 +159,8 @@ def main():
                 continue
             errors = {q: abs(row[q] / reference[q] - 1) for q in QUANTITIES if row[q] is not None}
             row["errors"], row["error"] = errors, max(errors["pressure"], errors["pole_thickness"])
-            say(f"{label(way):44}{row['unknowns']:9d}{row['seconds']:8.2f}{row['total_seconds']:8.2f}{row['iterations']:6d}{row['peak_MB']:6.0f}"
+            say(f"{label(way):44}{row['unknowns']:9d}{row['seconds']:8.2f}{row['total_seconds']:8.2f}"
+                f"{row['iterations']:6d}{row['peak_MB']:6.0f}"
                 + "".join(f"{errors[q]:16.1e}" if q in errors else f"{'-':>16}" for q in QUANTITIES))
         say("Pareto front: " + "; ".join(f"{p[2]} ({p[0]:.2f} s, {p[1]:.0e})" for p in pareto(
             [(r["seconds"], r["error"], n) for n, r in rows.items() if "error" in r])))

@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from . import _compat
-from .errors import InputError, count, positive
+from .errors import InputError, count, known, positive
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,13 @@ class Mesh:
         return points[np.lexsort((points[:, 1], points[:, 0]))]
 
 
-def disc(*, radius: float, thickness: float | Mapping[str, float], elements: tuple = (40, 2),
-         grading: float = 1.0, inner_radius: float = 0.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
+ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
+"""Elements (along the radius, through each layer) of a disc: see the README for the error that each promises."""
+
+
+def disc(*, radius: float, thickness: float | Mapping[str, float], accuracy: str = "standard",
+         elements: tuple | None = None, grading: float = 1.0, inner_radius: float = 0.0,
+         comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     """A flat disc (or ring) in the (R, Z) plane, bottom face on Z = 0.
 
     Boundaries: `axis` (R = inner_radius; called `inner` if that is above 0), `rim`, `bottom`, `top`.
@@ -60,8 +65,9 @@ def disc(*, radius: float, thickness: float | Mapping[str, float], elements: tup
     Args:
         radius, inner_radius: lengths.
         thickness: a length (one layer, called `sheet`), or {layer name: its thickness} from bottom to top.
-        elements: (along the radius, through each layer); the latter may be a tuple, one count per layer. Each
-            rectangle is two triangles.
+        accuracy: "draft", "standard" or "fine": how many elements.
+        elements: (along the radius, through each layer), in place of `accuracy`; the latter may be a tuple, one count
+            per layer. Each rectangle is two triangles.
         grading: size of the last element at the rim over that of the first at the axis.
 
     Raises:
@@ -107,6 +113,8 @@ def _layered(kind: str, ends: tuple, bottom: float, thickness: float | Mapping[s
     if not layers:
         raise InputError(f"{kind}: thickness = {{}}: must name at least one layer")
     heights = [positive(f"{kind}: thickness of {name!r}", h) for name, h in layers.items()]
+    known("disc: accuracy", accuracy, ACCURACY)
+    elements = ACCURACY[accuracy] if elements is None else elements
     if not (hasattr(elements, "__len__") and len(elements) == 2):
         raise InputError(f"{kind}: elements = {elements!r}: must be (along the {_ALONG[kind]}, through each layer)")
     along = count(f"{kind}: elements along the {_ALONG[kind]}", elements[0])
