@@ -78,6 +78,8 @@ def disc(*, radius: float, thickness: float | Mapping[str, float], accuracy: str
     if not 0 <= inner_radius < radius:
         raise InputError(f"disc: inner_radius = {inner_radius!r}: must be at least 0 and below radius = {radius!r}")
     sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
+    known("disc: accuracy", accuracy, ACCURACY)
+    elements = ACCURACY[accuracy] if elements is None else elements
     return _layered("disc", (inner_radius, radius), 0.0, thickness, elements, grading, sides, comm)
 
 
@@ -113,8 +115,6 @@ def _layered(kind: str, ends: tuple, bottom: float, thickness: float | Mapping[s
     if not layers:
         raise InputError(f"{kind}: thickness = {{}}: must name at least one layer")
     heights = [positive(f"{kind}: thickness of {name!r}", h) for name, h in layers.items()]
-    known("disc: accuracy", accuracy, ACCURACY)
-    elements = ACCURACY[accuracy] if elements is None else elements
     if not (hasattr(elements, "__len__") and len(elements) == 2):
         raise InputError(f"{kind}: elements = {elements!r}: must be (along the {_ALONG[kind]}, through each layer)")
     along = count(f"{kind}: elements along the {_ALONG[kind]}", elements[0])
