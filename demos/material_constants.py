@@ -6,7 +6,7 @@ Below c10 always belongs to I1. Pole height: of the mid-thickness point; K = 6 (
 
 Plate A cannot carry the 26 psi at which the thesis has 9 in: its maximum is 25.065 psi on any mesh from 10 x 1 to
 80 x 4, and 25.05 to 25.07 psi on 10 x 1 with the thesis' penalty (eps 2e-2 to 8e-2). Only a clamped rim on 10 x 1
-elements carries 26 psi (26.4 at most; 25.7 on finer meshes), at 7.7 and 10.3 in.
+elements carries 26 psi (26.3 at most; 25.8 on finer meshes).
 """
 
 from common import COMM, parser, save, say, summarise

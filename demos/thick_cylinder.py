@@ -224,7 +224,7 @@ def main():
     options = parser("thick_cylinder", __doc__.splitlines()[0])
     options.add_argument("--elements", type=int, default=16, help="elements through the wall; also a quarter, a half")
     args = options.parse_args()
-    n = 8 if args.quick else args.elements
+    n = 12 if args.quick else args.elements
     counts = [max(n // 4, 1), max(n // 2, 2), n]
     (tube, tube_targets, cylinder), (ball, ball_targets, sphere) = study("tube", counts), study("sphere", counts)
     grids = coarse()
