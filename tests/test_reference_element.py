@@ -1,0 +1,79 @@
+"""The forms against a hand-coded element (tests/reference): residual, tangent, and a whole inflation path."""
+
+import numpy as np
+import pytest
+from reference import element
+from reference.body import Body, follow, read
+
+import formingx as fx
+from formingx.problem import Problem
+
+MOONEY = fx.MooneyRivlin(c10=1.7, c01=0.35), element.Mooney(1.7, 0.35)
+OGDEN = (fx.Ogden(mu=(1.4, -0.3, 0.02), alpha=(2.5, -2.0, 5.0)),
+         element.Ogden((1.4, -0.3, 0.02), (2.5, -2.0, 5.0)))
+LAWS = pytest.mark.parametrize("material, law", [MOONEY, OGDEN], ids=["mooney", "ogden"])
+
+
+def pair(scene, law, folder):
+    """(problem of formingx, hand-coded body, dofs): dofs[2 n + i] is formingx' number of component i of node n."""
+    problem = Problem(scene)
+    fx.mesh.write(scene.mesh, folder / "mesh.txt")
+    nodes, triangles, boundaries = read(folder / "mesh.txt")
+    keeping = scene.incompressibility
+    penalty = element.Penalty(keeping.eps / problem.forms.stress)            # (3.4.1) has 1/eps, formingx mu/eps
+    edges = np.vstack([boundaries[load.on] for load in scene.loads])
+    body = Body(nodes, triangles, edges, law, penalty, keeping.points)
+    dofs = np.empty(nodes.size, dtype=int)
+    for i in (0, 1):
+        sub = problem.forms.space.sub(0).sub(i)
+        dofs[2 * np.asarray(scene.mesh.domain.geometry.dofmap) + i] = sub.dofmap.list
+    return problem, body, dofs
+
+
+@LAWS
+@pytest.mark.parametrize("points", [3, 4, 7])
+def test_residual_and_tangent(material, law, points, tmp_path):
+    """On curved elements, stretched up to twice, sheared, under a pressure that follows: equal to 1e-10."""
+    mesh = fx.mesh.disc(radius=2.0, inner_radius=0.3, thickness=0.6, elements=(4, 2))
+    rng = np.random.default_rng(5)
+    X = mesh.domain.geometry.x
+    X[:, :2] += 0.015 * rng.standard_normal((len(X), 2))
+    scene = fx.Scene(mesh=mesh, materials=material, supports=[fx.PinnedNode(*X[0, :2])], loads=[fx.Pressure("bottom")],
+                     incompressibility=fx.DisplacementPenalty(eps=0.05, points=points, stress_free=False))
+    problem, body, dofs = pair(scene, law, tmp_path)
+    R, Z = body.nodes.T
+    u = np.stack([0.6 * R + 0.3 * Z + 0.1 * R * Z, 0.5 * (4 - R**2) - 0.45 * Z], 1) + 0.02 * rng.standard_normal((len(R), 2))
+    q, forms = 0.8, problem.forms
+    hand, tangent, _ = body.residual(u, q)
+
+    x, out = problem.x.duplicate(), problem.x.duplicate()
+    values = np.zeros(u.size)
+    values[dofs] = u.ravel() / forms.length
+    x.setArray(values)
+    control = q / forms.control_scale
+    problem.residual(x, control, out)
+    force = forms.stress * forms.volume / forms.length                       # the scales of formingx/solid.py
+    free = np.setdiff1d(np.arange(u.size), np.flatnonzero(np.isin(dofs, problem._held)))
+    assert len(free) == u.size - 2
+    ours = force * out.array_r[dofs]
+    assert np.abs(ours - hand)[free].max() < 1e-10 * np.abs(hand).max()
+    ours = problem.tangent(x, control)[:, :][np.ix_(dofs, dofs)] * force / forms.length
+    assert np.abs(ours - tangent)[np.ix_(free, free)].max() < 1e-10 * np.abs(tangent).max()
+    problem.control_derivative(x, control, out)
+    by_pressure = -body.residual(u, q)[2]
+    assert np.abs(force / forms.control_scale * out.array_r[dofs] - by_pressure)[free].max() < 1e-10 * np.abs(
+        by_pressure).max()
+
+
+@LAWS
+def test_stiffness_by_hand_is_the_derivative(material, law):
+    """The hand-coded stiffness against central differences of its own forces: the referee is sound."""
+    nodes = np.array([[1.0, 0.0], [2.0, 0.1], [1.2, 1.0], [1.5, 0.0], [1.6, 0.6], [1.1, 0.5]])
+    body = Body(nodes, np.arange(6)[None], np.array([[0, 3, 1]]), law, element.Penalty(0.05), 4)
+    u = 0.05 * np.random.default_rng(1).standard_normal(nodes.shape)
+    _, K, _ = body.residual(u, 0.4)
+    h = 1e-5
+    for k in range(12):
+        d = h * (np.arange(12) == k).reshape(6, 2)
+        column = (body.residual(u + d, 0.4)[0] - body.residual(u - d, 0.4)[0]) / (2 * h)
+        assert np.abs(column - K[:, k]).max() < 1e-6 * np.abs(K).max()
