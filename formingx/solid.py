@@ -140,7 +140,7 @@ class Solid:
             modulus = self.constant(self._moduli[id(material)])
             p = self.constant(self.stress) * fields[1 + self._colours[names[0]]] if self._colours else None
             for density, metadata in scene.incompressibility.terms(self.J, p, modulus, eps):
-                energy += self._scale * density * self.weight * dx(metadata=metadata)
+                energy += self._scale * density * self.weight * dx(metadata={**dx.metadata(), **metadata})
         return energy
 
     def _residual(self) -> tuple[Any, Any]:
