@@ -39,12 +39,11 @@ class Body:
         """(f - q p, its derivative by u, p)."""
         n = u.size
         f, p, K = np.zeros(n), np.zeros(n), np.zeros((n, n))
-        for row in self.triangles:
-            dofs = np.stack([2 * row, 2 * row + 1], 1).ravel()
-            for law, points in self.parts:
-                fe, Ke = element.body(self.nodes[row], u[row], law, points)
-                f[dofs] += fe
-                K[np.ix_(dofs, dofs)] += Ke
+        every = np.stack([2 * self.triangles, 2 * self.triangles + 1], 2).reshape(-1, 12)
+        for law, points in self.parts:
+            fe, Ke = element.body(self.nodes[self.triangles], u[self.triangles], law, points)
+            np.add.at(f, every, fe)
+            np.add.at(K, (every[:, :, None], every[:, None, :]), Ke)
         for row in self.loaded:
             dofs = np.stack([2 * row, 2 * row + 1], 1).ravel()
             pe, Ke = element.load((self.nodes + u)[row])

@@ -1,7 +1,7 @@
 """The six-node axisymmetric element of Song (1993): residual and stiffness by hand, section by section.
 
-Nodes: corners counter-clockwise, then the middles of edges 1-2, 2-3, 3-1. Strains and stresses are held as (11, 22, 12, 33);
-the components 12 and 21 are equal and vary together.
+Nodes: corners counter-clockwise, then the middles of edges 1-2, 2-3, 3-1. Strains and stresses are held as (11, 22, 12, 33),
+shape (4, m) for m elements at once; the components 12 and 21 are equal and vary together.
 """
 
 import numpy as np
@@ -29,11 +29,11 @@ class Mooney:
         a, b = 2 * self.c10, 4 * self.c01
         S = np.array([a + b * (1 + g22 + g33), a + b * (1 + g33 + g11), -b * g12, a + b * (1 + g11 + g22)])
         D = b * np.array([[0, 1, 0, 1], [1, 0, 0, 1], [0, 0, -1, 0], [1, 1, 0, 0]])
-        return S, D
+        return S, D[:, :, None] * np.ones_like(g11)
 
 
 class Ogden:
-    """Stresses (4.4), with +1/2 for the -1 of S12 (a misprint: S12 must be half of d(S11 + S22 terms) as they rotate)."""
+    """Stresses (4.4) and their derivatives. S12 has the factor +1/2 where (4.4) prints -1, a misprint."""
 
     def __init__(self, mu, alpha):
         self.terms = list(zip(mu, alpha, strict=True))
@@ -42,25 +42,22 @@ class Ogden:
         g11, g22, g12, g33 = g
         m, e, t = 1 + g11 + g22, g11 - g22, 2 * g12                 # (2.2.29): lambda^2 = m +- phi1
         phi1 = np.hypot(e, t)
-        S, D = np.zeros(4), np.zeros((4, 4))
-        dm, de, dt = np.array([1, 1, 0, 0]), np.array([1, -1, 0, 0]), np.array([0, 0, 2, 0])
+        apart = phi1 > 1e-7                                         # else equal stretches: the limit
+        phi = np.where(apart, phi1, 1.0)
+        dm, de, dt = (np.array(d)[:, None] for d in ([1, 1, 0, 0], [1, -1, 0, 0], [0, 0, 2, 0]))
+        dphi = np.where(apart, (e * de + t * dt) / phi, 0)
+        S, D = np.zeros((4, *m.shape)), np.zeros((4, 4, *m.shape))
         for mu, alpha in self.terms:
             a = (alpha - 2) / 2
-
-            def f(x, mu=mu, a=a):                                   # mu lambda^(alpha - 2) and its slope, x = lambda^2
-                return mu * x**a, mu * a * x ** (a - 1)
-            (f1, s1), (f2, s2), (f3, s3) = f(m + phi1), f(m - phi1), f(1 + 2 * g33)
-            mean, mean_m, mean_phi = (f1 + f2) / 2, (s1 + s2) / 2, (s1 - s2) / 2
-            if phi1 > 1e-7:
-                dphi = (e * de + t * dt) / phi1
-                G = (f1 - f2) / (2 * phi1)
-                dG = (s1 - s2) / (2 * phi1) * dm + ((s1 + s2) / 2 - G) / phi1 * dphi
-            else:                                                   # equal stretches: the limit
-                dphi, G = np.zeros(4), s1
-                dG = mu * a * (a - 1) * m ** (a - 2) * dm
-            dmean = mean_m * dm + mean_phi * dphi
+            # mu lambda^(alpha - 2) and its slope, x = lambda^2
+            (f1, s1), (f2, s2), (f3, s3) = ((mu * x**a, mu * a * x ** (a - 1)) for x in (m + phi1, m - phi1, 1 + 2 * g33))
+            G = np.where(apart, (f1 - f2) / (2 * phi), s1)
+            dG = np.where(apart, (s1 - s2) / (2 * phi), mu * a * (a - 1) * m ** (a - 2)) * dm
+            dG = dG + ((s1 + s2) / 2 - G) / phi * dphi
+            mean, dmean = (f1 + f2) / 2, (s1 + s2) / 2 * dm + (s1 - s2) / 2 * dphi
             S += np.array([mean + G * e, mean - G * e, G * t, f3])
-            D += np.array([dmean + e * dG + G * de, dmean - e * dG - G * de, t * dG + G * dt, [0, 0, 0, 2 * s3]])
+            D[:3] += np.array([dmean + e * dG + G * de, dmean - e * dG - G * de, t * dG + G * dt])
+            D[3, 3] += 2 * s3
         return S, D
 
 
@@ -76,8 +73,9 @@ class Penalty:
         chi = 4 / self.eps * (psi * T - 1)                          # (3.4.5)
         q = np.array([B * T, A * T, -2 * T * h, psi])
         dI3 = 2 * np.array([B * T, A * T, -4 * h * T, psi])
-        dq = np.array([[0, 2 * T, 0, 2 * B], [2 * T, 0, 0, 2 * A], [0, 0, -2 * T, -4 * h], [2 * B, 2 * A, -8 * h, 0]])
-        return chi * q, 4 / self.eps * np.outer(q, dI3) + chi * dq
+        o = np.zeros_like(A)
+        dq = 2 * np.array([[o, T, o, B], [T, o, o, A], [o, o, -T, -2 * h], [B, A, -4 * h, o]])
+        return chi * q, 4 / self.eps * q[:, None] * dI3 + chi * dq
 
 
 def shape(L2, L3):
@@ -90,31 +88,35 @@ def shape(L2, L3):
 
 
 def body(X, u, law, points):
-    """Nodal forces (3.1.13) and stiffness (3.4.8) of one element, shapes (12,), (12, 12); X, u: (6, 2)."""
-    f, K = np.zeros(12), np.zeros((12, 12))
+    """Nodal forces (3.1.13) and stiffness (3.4.8) of m elements, shapes (m, 12), (m, 12, 12); X, u: (m, 6, 2)."""
+    n = len(X)
+    f, K = np.zeros((n, 12)), np.zeros((n, 12, 12))
     r, z = slice(0, 12, 2), slice(1, 12, 2)
     twice = np.array([1, 1, 2, 1])                                  # 12 and 21
     for L2, L3, weight in RULES[points]:
         psi, by = shape(L2, L3)
         jacobian = by @ X
-        pR, pZ = np.linalg.solve(jacobian, by)                      # derivatives by R and Z
-        R, ur = psi @ X[:, 0], psi @ u[:, 0]
-        (urR, uzR), (urZ, uzZ) = pR @ u, pZ @ u
+        pR, pZ = np.moveaxis(np.linalg.solve(jacobian, np.broadcast_to(by, (n, 2, 6))), 0, -1)   # by R and Z: (6, m)
+        R, ur = X[:, :, 0] @ psi, u[:, :, 0] @ psi
+        (urR, uzR), (urZ, uzZ) = (np.einsum("km,mkv->vm", p, u) for p in (pR, pZ))
         hoop = 1 + ur / R
         g = np.array([urR + (urR**2 + uzR**2) / 2, uzZ + (urZ**2 + uzZ**2) / 2,         # strains (2.2.28)
                       (urZ + uzR + urR * urZ + uzR * uzZ) / 2, (hoop**2 - 1) / 2])
-        B = np.zeros((4, 12))                                       # their first derivatives
+        B = np.zeros((4, 12, n))                                    # their first derivatives
         B[0, r], B[0, z] = (1 + urR) * pR, uzR * pR
         B[1, r], B[1, z] = urZ * pZ, (1 + uzZ) * pZ
         B[2, r], B[2, z] = ((1 + urR) * pZ + urZ * pR) / 2, ((1 + uzZ) * pR + uzR * pZ) / 2
-        B[3, r] = hoop * psi / R
+        B[3, r] = psi[:, None] * hoop / R
         S, D = law.stress(g)
         dV = 2 * np.pi * R * np.linalg.det(jacobian) * weight
-        f += dV * B.T @ (twice * S)
-        K += dV * B.T @ (twice[:, None] * D) @ B
-        second = S[0] * np.outer(pR, pR) + S[1] * np.outer(pZ, pZ) + S[2] * (np.outer(pR, pZ) + np.outer(pZ, pR))
-        K[r, r] += dV * (second + S[3] * np.outer(psi, psi) / R**2)
-        K[z, z] += dV * second
+        f += np.einsum("i,ikm,im,m->mk", twice, B, S, dV)
+        DB = np.einsum("i,ijm,jlm,m->ilm", twice, D, B, dV)
+        K += np.einsum("ikm,ilm->mkl", B, DB)
+        RR, ZZ, RZ = (np.einsum("km,lm,m->mkl", a, b, c * dV) for a, b, c in
+                      ((pR, pR, S[0]), (pZ, pZ, S[1]), (pR, pZ, S[2])))
+        second = RR + ZZ + RZ + RZ.transpose(0, 2, 1)
+        K[:, r, r] += second + (S[3] * dV / R**2)[:, None, None] * np.outer(psi, psi)
+        K[:, z, z] += second
     return f, K
 
 
