@@ -193,15 +193,19 @@ def _fill(model: Any, plain: grid.Grid, tags: Mapping[str, int] | None = None) -
     """Put a grid into an empty gmsh model; `tags` of the named parts (default: counted)."""
     names = [(2, name, rows) for name, rows in plain.layers.items()]
     names += [(1, name, rows) for name, rows in plain.boundaries.items()]
-    nodes = np.column_stack([plain.points, np.zeros(len(plain.points))])
+    # gmsh's readers want 1, 2, 3, ... and no node that belongs to nothing
+    used = np.unique(np.concatenate([rows.ravel() for rows in plain.layers.values()]))
+    number = np.zeros(len(plain.points), dtype=np.int64)
+    number[used] = np.arange(1, len(used) + 1)
+    nodes = np.column_stack([plain.points[used], np.zeros(len(used))])
     kinds = {(2, 6): 9, (2, 3): 2, (1, 3): 8, (1, 2): 1}
     model.addDiscreteEntity(2, 1)
-    model.mesh.addNodes(2, 1, plain.numbers, nodes.ravel())
+    model.mesh.addNodes(2, 1, np.arange(1, len(used) + 1), nodes.ravel())
     for k, (dim, name, rows) in enumerate(names, 1):
         tag = tags[name] if tags else k
         entity = model.addDiscreteEntity(dim, tag + 100)
         if len(rows):
-            model.mesh.addElementsByType(entity, kinds[dim, rows.shape[1]], [], plain.numbers[rows].ravel())
+            model.mesh.addElementsByType(entity, kinds[dim, rows.shape[1]], [], number[rows].ravel())
         model.addPhysicalGroup(dim, [entity], tag, name)
 
 
