@@ -15,6 +15,10 @@ from . import InputError, compare
 from .results import files
 
 
+_COMPARE = """Compare a run's CSV file with another program's curve: differences, limit points, a picture.
+The header of THEIRS names its columns and may state units: pressure [psi]."""
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit status: 0, or 2 if something that was given is not allowed."""
     words = sys.argv[1:] if arguments is None else list(arguments)
@@ -36,17 +40,16 @@ def _parser() -> argparse.ArgumentParser:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     commands.add_parser("demo", help="run a demo: demo NAME [its options]")
-    two = commands.add_parser("compare", help="compare two curves", formatter_class=argparse.RawDescriptionHelpFormatter,
-                              description="Compare a run's CSV file with another program's curve: differences, limit"
-                              " points, a picture.\nThe header of THEIRS names its columns and may state units:"
-                              " pressure [psi].")
+    two = commands.add_parser("compare", help="compare two curves",
+                              formatter_class=argparse.RawDescriptionHelpFormatter, description=_COMPARE)
     two.add_argument("ours", metavar="OURS", help="CSV file of a run (Path.to_csv)")
     two.add_argument("theirs", metavar="THEIRS", help="CSV file of the other program, rows in order along its path")
     two.add_argument("--columns", nargs="+", metavar="OURS=THEIRS", default=[],
                      help="columns that belong together, at least two (a bare NAME: the same on both sides)")
     two.add_argument("--units", nargs="+", metavar="OURS=UNIT", default=[],
                      help="for a column of ours: a factor for theirs, or our unit if their header states theirs")
-    two.add_argument("--out", type=Path, default=Path("results") / "compare", help="folder for curves.png and pairs.csv")
+    two.add_argument("--out", type=Path, default=Path("results") / "compare",
+                     help="folder for curves.png and pairs.csv (default: %(default)s)")
     return parser
 
 

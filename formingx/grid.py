@@ -1,6 +1,6 @@
 """A mesh as plain arrays, and its text file: nodes and six-node triangles, for other solvers.
 
-The file, line by line (blank lines count for nothing, nor does what follows a #); node numbers may be any whole numbers:
+The file, line by line (blank lines count for nothing, nor does what follows a #; node numbers are any whole numbers):
 
     six-node triangles 1                    the format and its version
     numbering corners                       of the six nodes, see below
@@ -11,10 +11,10 @@ The file, line by line (blank lines count for nothing, nor does what follows a #
     boundary 10 bottom                      then as many lines: first, middle and last node of an edge
     3 12 7
 
-`numbering corners`: the three corners counter-clockwise, then the middles of the edges 1-2, 2-3, 3-1 (the usual order of
-textbooks and of gmsh). `numbering around`: corner, middle, corner, ... counter-clockwise, so that every edge reads first,
-middle, last as in eq. (3.3.8) of Song (1993). Along an edge of a boundary the body is on the left, as in her
-eq. (3.3.4).
+`numbering corners`: the three corners counter-clockwise, then the middles of the edges 1-2, 2-3, 3-1 (the usual order
+of textbooks and of gmsh). `numbering around`: corner, middle, corner, ... counter-clockwise, so that every edge reads
+first, middle, last as in eq. (3.3.8) of Song (1993). Along an edge of a boundary the body is on the left, as in the
+thesis' eq. (3.3.4).
 """
 
 from __future__ import annotations
@@ -110,7 +110,8 @@ def read(file: str | os.PathLike) -> Grid:
             if order is None:
                 raise lines.error("'numbering corners' or 'numbering around' must come before the elements")
             rows = lines.block(words[1], (int,) * 7, "number and six nodes", index)
-            layers[_new(lines, words, layers)] = counter_clockwise(points, np.array([row[1:] for row in rows])[:, order])
+            triangles = np.array([row[1:] for row in rows])[:, order]
+            layers[_new(lines, words, layers)] = counter_clockwise(points, triangles)
         elif words[0] == "boundary" and len(words) > 2:
             rows = lines.block(words[1], (int,) * 3, "first, middle and last node", index, all_nodes=True)
             boundaries[_new(lines, words, boundaries)] = np.array(rows)[:, [0, 2, 1]]
@@ -130,8 +131,8 @@ def _check_edges(file: str, layers: dict, boundaries: dict, numbers: np.ndarray)
     for name, rows in boundaries.items():
         for a, b, middle in rows.tolist():
             if (frozenset((a, b)), middle) not in edges:
-                raise InputError(f"mesh file {file!r}: boundary {name!r}: {numbers[a]} {numbers[middle]} {numbers[b]} is"
-                                 f" not an edge of an element (first, middle and last node)")
+                raise InputError(f"mesh file {file!r}: boundary {name!r}: {numbers[a]} {numbers[middle]} {numbers[b]}"
+                                 f" is not an edge of an element (first, middle and last node)")
 
 
 def _known(numbering: str, lines: _Lines | None = None) -> str:

@@ -115,8 +115,8 @@ def disc(*, radius: float, thickness: float | Mapping[str, float], elements: tup
 def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     """A mesh of triangles from a file.
 
-    A gmsh file: physical groups name the layers (2-D) and the boundaries (1-D). A name that ends in .txt: the text format
-    of `formingx.grid`.
+    A gmsh file: physical groups name the layers (2-D) and the boundaries (1-D). A name that ends in .txt: the text
+    format of `formingx.grid`.
 
     Raises:
         InputError: the file is not there, cannot be read, or has no named 2-D group.

@@ -34,8 +34,8 @@ def test_compare(tmp_path, capsys):
     ours = table(tmp_path / "ours.csv", "pressure,pole_height", np.sin(t), t)
     theirs = table(tmp_path / "theirs.csv", "H [in],p [psi]", t / 2.54, np.sin(t) / 0.070306957964)
     out = tmp_path / "out"
-    assert main(["compare", ours, theirs, "--columns", "pressure=p", "pole_height=H", "--units", "pressure=0.070306957964",
-                 "pole_height=cm", "--out", str(out)]) == 0
+    assert main(["compare", ours, theirs, "--columns", "pressure=p", "pole_height=H", "--units",
+                 "pressure=0.070306957964", "pole_height=cm", "--out", str(out)]) == 0
     text = capsys.readouterr().out
     assert "40 of 40 points" in text and "1 ours" in text and "1 theirs" in text
     assert (out / "curves.png").stat().st_size > 10_000 and len((out / "pairs.csv").read_text().splitlines()) == 41

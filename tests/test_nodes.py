@@ -65,7 +65,7 @@ except fx.InputError:
 
 
 def test_textbook_element(tmp_path):
-    """Any node numbers, also unused ones; both numberings of one element are the same element; a clockwise one is turned."""
+    """Any node numbers, unused ones too; both numberings of one element are the same element, also clockwise."""
     for name, old, new in (("a", "", ""), ("b", "numbering corners", "numbering around"),
                            ("c", "1 10 20 30 40 50 60", "1 10 30 20 60 50 40")):
         text = ONE.replace(old, new) if old else ONE

@@ -84,7 +84,7 @@ def test_stiffness_by_hand_is_the_derivative(material, law):
     (fx.MooneyRivlin(c10=2.0, c01=0.05), element.Mooney(2.0, 0.05)),
     (fx.Ogden(mu=(4.0, -0.05), alpha=(1.8, -2.0)), element.Ogden((4.0, -0.05), (1.8, -2.0)))], ids=["mooney", "ogden"])
 def test_path_through_the_pressure_maximum(material, law, tmp_path):
-    """A sheet pinned at the middle of its rim, inflated by both to the same pole heights: pressures and all displacements to 1e-7."""
+    """Inflated by both to the same pole heights, rim pinned at one node: pressures and displacements to 1e-7."""
     mesh = fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1))
     scene = fx.Scene(mesh=mesh, materials=material, supports=[fx.Symmetry("axis"), fx.PinnedNode(1.25, 0.041)],
                      loads=[fx.Pressure("bottom")],

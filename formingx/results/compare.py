@@ -78,7 +78,8 @@ class Comparison:
         if not any(self.limit_points):
             lines.append("  none on either side")
         ours, theirs = self.resolution
-        lines.append(f"with every other point left out, our curve moves by {ours:.1e} of its range, theirs by {theirs:.1e}")
+        lines.append(f"with every other point left out, our curve moves by {ours:.1e} of its range, theirs by"
+                     f" {theirs:.1e}")
         return "\n".join(lines)
 
     def plot(self) -> Any:
@@ -112,9 +113,9 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     """Compare a run with another program's curve, also one that turns back.
 
     Each column is divided by its range, and a side is a curve in the space of the columns, with its rows in order
-    along the path. Points of theirs are paired with points of our curve so that both arc lengths grow together and the sum of
-    squared distances is least: no column is taken for the independent one, so nothing depends on which of them turns
-    back. Points of theirs beyond our ends are left out, and counted.
+    along the path. Points of theirs are paired with points of our curve so that both arc lengths grow together and the
+    sum of squared distances is least: no column is taken for the independent one, so nothing depends on which of them
+    turns back. Points of theirs beyond our ends are left out, and counted.
 
     Args:
         ours: a `Path`, a CSV file (of `Path.to_csv`, for one), or {column: values}.
@@ -147,8 +148,7 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     line = smooth.line * scale
     matched, partners = _pair(b / scale, smooth)
     if not len(matched):
-        raise InputError("compare: no point of theirs lies along our curve: are columns, units and the order of the rows"
-                         " right?")
+        raise InputError("compare: no point of theirs lies along our curve: are columns, units, order of rows right?")
     partners = partners * scale
     control = next((n for n in names if n in ("pressure", "travel")), names[0])
     return Comparison(names, a, b, line, (matched, partners),
@@ -179,12 +179,12 @@ def _table(side: str, given: Any) -> tables.Table:
 def _columns(left: tables.Table, right: tables.Table, given: Any) -> dict[str, str]:
     """{our name: their name}, checked."""
     if given is None:
-        shared = [c for c in left.columns if c in right.columns and c not in ("iterations", "mass_error", "volume_error")]
+        shared = [c for c in left.columns if c in right.columns and c != "iterations"]
         pairs = {c: c for c in shared[:2]}
         if len(pairs) < 2:
             raise InputError(f"compare: columns: ours are {', '.join(left.columns)}; theirs are"
-                             f" {', '.join(right.columns)}: fewer than two have the same name; say which belong together,"
-                             f" as columns={{our name: their name}}")
+                             f" {', '.join(right.columns)}: fewer than two have the same name; say which belong"
+                             f" together, as columns={{our name: their name}}")
         return pairs
     pairs = dict(given) if isinstance(given, Mapping) else {c: c for c in given}
     if len(pairs) < 2:

@@ -111,7 +111,8 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
         return table.take(names.get(name, name), units.get(name))
     if mesh is None:
         points = np.column_stack([take("R"), take("Z")])
-        nodes = take("node").astype(int) if names.get("node", "node") in table.columns else np.arange(1, len(points) + 1)
+        numbered = names.get("node", "node") in table.columns
+        nodes = take("node").astype(int) if numbered else np.arange(1, len(points) + 1)
     else:
         plain = grid.read(mesh)
         nodes = take("node").astype(int)

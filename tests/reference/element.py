@@ -1,7 +1,7 @@
 """The six-node axisymmetric element of Song (1993): residual and stiffness by hand, section by section.
 
-Nodes: corners counter-clockwise, then the middles of edges 1-2, 2-3, 3-1. Strains and stresses are held as (11, 22, 12, 33),
-shape (4, m) for m elements at once; the components 12 and 21 are equal and vary together.
+Nodes: corners counter-clockwise, then the middles of edges 1-2, 2-3, 3-1. Strains and stresses are held as
+(11, 22, 12, 33), shape (4, m) for m elements at once; the components 12 and 21 are equal and vary together.
 """
 
 import numpy as np
@@ -13,9 +13,9 @@ RULES = {
     7: [(1 / 3, 1 / 3, 9 / 80), (_a, _a, _u), (1 - 2 * _a, _a, _u), (_a, 1 - 2 * _a, _u),
         (_b, _b, _v), (1 - 2 * _b, _b, _v), (_b, 1 - 2 * _b, _v)],
     4: [(1 / 3, 1 / 3, -27 / 96), (0.6, 0.2, 25 / 96), (0.2, 0.6, 25 / 96), (0.2, 0.2, 25 / 96)],
-    3: [(1 / 6, 1 / 6, 1 / 6), (2 / 3, 1 / 6, 1 / 6), (1 / 6, 2 / 3, 1 / 6)],       # the interior points of section 6.4
+    3: [(1 / 6, 1 / 6, 1 / 6), (2 / 3, 1 / 6, 1 / 6), (1 / 6, 2 / 3, 1 / 6)],    # the interior points of section 6.4
 }
-EDGE_RULE = [(0.5 - 0.15**0.5, 5 / 18), (0.5, 4 / 9), (0.5 + 0.15**0.5, 5 / 18)]     # three points, for (3.3.6), (3.3.7)
+EDGE_RULE = [(0.5 - 0.15**0.5, 5 / 18), (0.5, 4 / 9), (0.5 + 0.15**0.5, 5 / 18)]    # for (3.3.6), (3.3.7)
 
 
 class Mooney:
@@ -50,7 +50,8 @@ class Ogden:
         for mu, alpha in self.terms:
             a = (alpha - 2) / 2
             # mu lambda^(alpha - 2) and its slope, x = lambda^2
-            (f1, s1), (f2, s2), (f3, s3) = ((mu * x**a, mu * a * x ** (a - 1)) for x in (m + phi1, m - phi1, 1 + 2 * g33))
+            (f1, s1), (f2, s2), (f3, s3) = (
+                (mu * x**a, mu * a * x ** (a - 1)) for x in (m + phi1, m - phi1, 1 + 2 * g33))
             G = np.where(apart, (f1 - f2) / (2 * phi), s1)
             dG = np.where(apart, (s1 - s2) / (2 * phi), mu * a * (a - 1) * m ** (a - 2)) * dm
             dG = dG + ((s1 + s2) / 2 - G) / phi * dphi
