@@ -100,7 +100,8 @@ def measured(scene, way):
 
 
 def label(way):
-    changes = ", ".join(f"{k.replace('_', ' ')} {v:g}" for k, v in way.items() if k not in ("model", "along", "through"))
+    changes = ", ".join(f"{k.replace('_', ' ')} {v:g}" for k, v in way.items()
+                        if k not in ("model", "along", "through"))
     return f"{way['model']} {way['along']}x{way['through']}" + (f", {changes}" if changes else "")
 
 

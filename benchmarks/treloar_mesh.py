@@ -16,11 +16,11 @@ from formingx.results import files  # noqa: E402
 STRETCHES = (1.2, 1.5, 2.0, 3.0, 4.0, 6.0, 8.5)
 
 
-def pressures(elements, support, incompressibility=None, grading=1.0, until=8.5, max_steps=200):
+def pressures(elements, support, model=None, grading=1.0, until=8.5, max_steps=200):
     """Limit pressure and pressures at the stretches; None where the run stopped before."""
     mesh = fx.mesh.disc(radius=1.25, thickness=0.082, elements=elements, grading=grading)
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=2.0), supports=[fx.Symmetry("axis"), support],
-                     loads=[fx.Pressure("bottom")], incompressibility=incompressibility)
+                     loads=[fx.Pressure("bottom")], model=model)
     targets = [fx.pole_stretch(s) for s in STRETCHES if s <= until]
     try:
         path = fx.trace(scene, until=targets[-1], through=targets[:-1], max_steps=max_steps, progress=False)

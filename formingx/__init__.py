@@ -4,7 +4,7 @@ from . import mesh
 from .data import treloar1944
 from .errors import ConvergenceError, InputError
 from .fit import Fit, fit
-from .physics.incompressibility import DisplacementPenalty, MixedPressure
+from .physics.incompressibility import DisplacementPenalty, Membrane, MixedPressure
 from .physics.kinematics import Axisymmetric, PlaneStrain
 from .physics.loads import Pressure
 from .physics.materials import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh

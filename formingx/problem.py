@@ -16,9 +16,12 @@ from petsc4py import PETSc
 
 from .errors import InputError
 from .extended import ExtendedMatrix
+from .membrane import MidSurface
 from .physics.supports import Held
 from .scene import Scene
 from .solid import Solid
+
+_FORMULATIONS = {"solid": Solid, "membrane": MidSurface}
 
 
 class Problem:
@@ -26,7 +29,7 @@ class Problem:
 
     Attributes:
         scene: the scene.
-        forms: its fields, forms and scales (`Solid`).
+        forms: its fields, forms and scales (a `Formulation`).
         comm: communicator.
         x: a vector of unknowns to duplicate.
         matrix: the tangent, refilled by `tangent`.
@@ -34,7 +37,7 @@ class Problem:
     """
 
     def __init__(self, scene: Scene):
-        self.scene, self.forms = scene, Solid(scene)
+        self.scene, self.forms = scene, _FORMULATIONS[scene.model.body](scene)
         self.comm = self.forms.comm
         forms = self.forms
         index_map = forms.space.dofmap.index_map
@@ -116,6 +119,11 @@ class Problem:
         last = self.comm.size - 1
         return self.comm.bcast(x.array_r[self._n:].copy() if self.comm.rank == last else None, root=last)
 
+    def stiff_state(self, out: PETSc.Vec) -> None:
+        """out = a state near rest with a regular tangent, for the first direction of a path: for a solid, rest."""
+        self.forms.set_stiff()
+        self.fill(out, self.forms.w.x.array[: self._n])
+
     def assemble(self, form: Any) -> np.ndarray:
         """A compiled linear form at the state last set, owned part, shape (n,)."""
         array = self._buffer.array
@@ -144,7 +152,7 @@ class Problem:
         forms, zero = self.forms, PETSc.ScalarType(0)
         self._bcs, dofs, motion, means = [], [np.zeros(0, dtype=np.int32)], [np.zeros(0)], []
         for support in self.scene.supports:
-            for item in support.constraints():
+            for item in forms.constraints(support):
                 if not isinstance(item, Held):
                     means.append(forms.compile(forms.mean_row(item)))
                     continue
@@ -173,8 +181,9 @@ class Problem:
 
     def _dofs_of(self, support: Any, sub: Any, item: Held) -> np.ndarray:
         if item.on is not None:
-            return fem.locate_dofs_topological(sub, 1, self.scene.mesh.facets_of(item.on))
-        near, point = 1e-8 * self.forms.length, np.array(item.point)[:, None]
+            mesh = self.forms.mesh
+            return fem.locate_dofs_topological(sub, mesh.facets.dim, mesh.facets_of(item.on))
+        near, point = 1e-8 * self.forms.length, self.forms.nearest(np.array([item.point])).T
         found = fem.locate_dofs_geometrical((sub, sub.collapse()[0]),
                                             lambda X: np.hypot(*(X[:2] - point)) < near)[0]
         if self.comm.allreduce(len(found), MPI.MAX) == 0:

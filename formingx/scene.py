@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from .errors import InputError, count, known
 from .mesh import Mesh
-from .physics.incompressibility import MixedPressure
+from .physics.incompressibility import DisplacementPenalty, Membrane, MixedPressure
 from .physics.kinematics import Axisymmetric
 from .physics.materials import Material
 from .physics.supports import Held
@@ -24,7 +24,7 @@ class Scene:
         materials: {layer name: material}, or one material for all layers.
         supports: see `formingx.physics.supports`.
         loads: see `formingx.physics.loads`. At most one load or support is driven (controlled by the run).
-        incompressibility: how the volume is kept; default `MixedPressure()`.
+        model: how the scene is modelled: `MixedPressure()` (default) or `DisplacementPenalty()`, a solid; `Membrane()`.
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
         quadrature_degree: of the energy; 5 (seven points) is the thesis' rule.
 
@@ -34,7 +34,7 @@ class Scene:
     """
 
     def __init__(self, *, mesh: Mesh, materials: Material | Mapping[str, Material], supports: Sequence[Any],
-                 loads: Sequence[Any] = (), incompressibility: Any = None, kinematics: Any = None,
+                 loads: Sequence[Any] = (), model: Any = None, kinematics: Any = None,
                  quadrature_degree: int = 5):
         if not isinstance(mesh, Mesh):
             raise InputError(f"Scene: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")
@@ -44,14 +44,19 @@ class Scene:
         self.materials = dict(materials)
         self.supports = list(supports)
         self.loads = list(loads)
-        self.incompressibility = incompressibility if incompressibility is not None else MixedPressure()
+        self.model = model if model is not None else MixedPressure()
+        if not isinstance(self.model, MixedPressure | DisplacementPenalty | Membrane):
+            raise InputError(f"Scene: model = {model!r}: must be a MixedPressure, a DisplacementPenalty or a Membrane")
         self.kinematics = kinematics if kinematics is not None else Axisymmetric()
         self.quadrature_degree = count("Scene: quadrature_degree", quadrature_degree)
         self._check_materials()
         self._check_boundaries()
         self._check_axis()
         self._check_rigid_body()
-        self._check_hinges()
+        if isinstance(self.model, Membrane):
+            self.model.check(self)
+        else:
+            self._check_hinges()
         driven = [x for x in (*self.loads, *self.supports) if getattr(x, "driven", False)]
         if len(driven) > 1:
             raise InputError(f"Scene: {', '.join(map(repr, driven))} are all driven: one control drives a run;"
@@ -125,27 +130,37 @@ class Scene:
                              f" for one")
 
     def _check_hinges(self) -> None:
-        """A plain mean pulls all layers with one traction: too much for one that is a hundred times softer."""
-        for support in self.supports:
-            for held in support.constraints():
-                if isinstance(held, Held) or held.by_stiffness:
-                    continue
-                tags = self._layers_at(held.on)
-                moduli = {name: self.materials[name].shear_modulus for name in self.mesh.layers
-                          if self.mesh.layers[name] in tags}
-                soft, hard = min(moduli, key=moduli.__getitem__), max(moduli, key=moduli.__getitem__)
-                if moduli[hard] > 100 * moduli[soft]:
-                    raise InputError(f"Scene: {support!r} pulls all layers with the same traction, but layer {soft!r} is"
-                                     f" {moduli[hard] / moduli[soft]:.3g} times softer than {hard!r}: use"
-                                     f" SimplySupported({held.on!r}, weight='stiffness')")
+        """What a hinge asks of the soft one of two layers must not be a hundred times too much for it.
 
-    def _layers_at(self, boundary: str) -> set[int]:
-        """Tags of the layers whose cells have a facet on a boundary, all ranks."""
+        A plain mean pulls all layers with one traction; and a hinged rim face is free, so a pressure on a soft layer
+        squeezes it out there.
+        """
+        moduli = {name: material.shear_modulus for name, material in self.materials.items()}
+        for held in (held for support in self.supports for held in support.constraints()):
+            if isinstance(held, Held):
+                continue
+            at_rim = self._layers_at(held.on)
+            hard = max(at_rim, key=moduli.__getitem__)
+            soft = min(at_rim, key=moduli.__getitem__)
+            if not held.by_stiffness and moduli[hard] > 100 * moduli[soft]:
+                raise InputError(f"Scene: SimplySupported({held.on!r}) pulls all layers with the same traction, but"
+                                 f" layer {soft!r} is {moduli[hard] / moduli[soft]:.3g} times softer than {hard!r}: use"
+                                 f" SimplySupported({held.on!r}, weight='stiffness')")
+            pressed = {name for load in self.loads for name in self._layers_at(load.on)} & at_rim
+            for name in pressed:
+                if moduli[hard] > 50 * moduli[name]:
+                    raise InputError(f"Scene: the pressure that bends layer {hard!r} would squeeze layer {name!r},"
+                                     f" {moduli[hard] / moduli[name]:.3g} times softer, out of the free face of the"
+                                     f" hinge SimplySupported({held.on!r}): use Clamped({held.on!r})")
+
+    def _layers_at(self, boundary: str) -> set[str]:
+        """Names of the layers whose cells have a facet on a boundary, all ranks."""
         topology, cells = self.mesh.domain.topology, self.mesh.cells
         topology.create_connectivity(1, 2)
         touching = {topology.connectivity(1, 2).links(f)[0] for f in self.mesh.facets_of(boundary)}
         mine = set(cells.values[np.isin(cells.indices, sorted(touching))].tolist())
-        return set().union(*self.mesh.domain.comm.allgather(mine))
+        tags = set().union(*self.mesh.domain.comm.allgather(mine))
+        return {name for name, tag in self.mesh.layers.items() if tag in tags}
 
     @property
     def extent(self) -> np.ndarray:

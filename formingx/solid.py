@@ -8,12 +8,13 @@ user's units, and what `solve` sees are numbers of order one.
 from __future__ import annotations
 
 import itertools
+from abc import ABC, abstractmethod
 from typing import Any
 
 import basix.ufl
 import numpy as np
 import ufl
-from dolfinx import fem
+from dolfinx import fem, la
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -21,50 +22,99 @@ from . import _compat
 from .physics import kinematics as kin
 
 
-class Solid:
-    """The forms of a scene.
+class Formulation(ABC):
+    """The forms of a scene: what a solid and a membrane have in common.
 
     Attributes:
         scene: the scene.
-        domain, comm: its `dolfinx.mesh.Mesh` and communicator.
+        mesh: the `Mesh` that the fields live on; domain, comm: its `dolfinx.mesh.Mesh` and communicator.
         length, stress, volume: scales L and mu, and the reference volume, in the user's units.
         space, w: the mixed `FunctionSpace` and the `Function` of all fields (dimensionless), displacement first.
+        displacement_element: the scalar element of a displacement component.
         u, X: displacement and reference position (UFL, user's unit of length, shape (2,)).
+        F, J: deformation gradient (UFL, shape (3, 3)) and its determinant.
+        dx, weight: weight * dx is the element of reference volume.
         control: the `Constant` of the dimensionless control; control_scale times it is the user's.
         residual: dPi/dw - external virtual work (UFL, rank 1); control_derivative: its derivative by the control,
             or None.
         energy: strain energy over stress times volume (UFL, rank 0).
+        slack_at_rest: True if the body at rest has no stiffness in some direction.
     """
+
+    slack_at_rest = False
 
     def __init__(self, scene: Any):
         self.scene = scene
-        self.domain = scene.mesh.domain
-        self.comm = self.domain.comm
         self._moduli = {id(m): m.shear_modulus for m in scene.materials.values()}
         self.length, self.stress = float(max(scene.extent)), max(self._moduli.values())
-        self._colours = _colour(scene) if scene.incompressibility.pressure_degree is not None else {}
-        self.space = self._make_space()
+        self.mesh = self._make_mesh()
+        self.domain = self.mesh.domain
+        self.comm = self.domain.comm
+        self.displacement_element, elements = self._elements(self.domain.basix_cell())
+        self.space = fem.functionspace(self.domain, basix.ufl.mixed_element(elements))
         self.w = fem.Function(self.space, name="w")
         self.control = self.constant(0.0)
         self.u = self.constant(self.length) * ufl.split(self.w)[0]
         self.X = ufl.SpatialCoordinate(self.domain)
-        self.dx = ufl.Measure("dx", self.domain, subdomain_data=scene.mesh.cells,
+        self.dx = ufl.Measure("dx", self.domain, subdomain_data=self.mesh.cells,
                               metadata={"quadrature_degree": scene.quadrature_degree})
-        self.ds = ufl.Measure("ds", self.domain, subdomain_data=scene.mesh.facets)
-        self.weight = scene.kinematics.weight(self.X)
+        self.ds = ufl.Measure("ds", self.domain, subdomain_data=self.mesh.facets)
+        self.weight = self._weight()
         self.volume = self.integral(self.weight * self.dx)
+        self._scale = self.constant(1 / (self.stress * self.volume))
         self.control_scale = self._scale_of_control()
-        self.J = kin.volume_ratio(scene.kinematics.deformation_gradient(self.u, self.X))
+        self.F = self._deformation_gradient()
+        self.J = kin.volume_ratio(self.F)
         self.energy = self._energy()
         self.residual, self.control_derivative = self._residual()
+
+    @abstractmethod
+    def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
+        """(outward normal, measure) of a boundary that a load acts on."""
+
+    @abstractmethod
+    def constraints(self, support: Any) -> list[Any]:
+        """What a support holds: a list of Held or MeanHeld."""
+
+    @abstractmethod
+    def nearest(self, points: np.ndarray) -> np.ndarray:
+        """The points of `mesh` that stand for points of the body, shape (n, 2)."""
+
+    @abstractmethod
+    def _make_mesh(self) -> Any:
+        """The `Mesh` of the fields."""
+
+    @abstractmethod
+    def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
+        """The scalar element of the displacement, and those of all fields."""
+
+    @abstractmethod
+    def _weight(self) -> Any:
+        """See `weight`."""
+
+    @abstractmethod
+    def _deformation_gradient(self) -> Any:
+        """See `F`."""
+
+    @abstractmethod
+    def _energy(self) -> Any:
+        """See `energy`."""
+
+    def mean_row(self, held: Any) -> Any:
+        """Linear form: mean of a displacement component (dimensionless) over a boundary, as a `MeanHeld` asks."""
+        raise NotImplementedError
+
+    def idle_unknowns(self) -> list[tuple[Any, np.ndarray]]:
+        """[(sub space, local dofs)] of unknowns that no equation holds: they stay 0."""
+        return []
+
+    def set_stiff(self) -> None:
+        """Put `w` to a state near rest whose tangent is regular: its tangent gives a path its first direction."""
+        self.w.x.array[:] = 0
 
     def constant(self, value: float) -> fem.Constant:
         """A number in a form that can be changed without compiling it again."""
         return fem.Constant(self.domain, PETSc.ScalarType(value))
-
-    def boundary(self, name: str, quadrature_degree: int) -> ufl.Measure:
-        """The measure of a named boundary."""
-        return self.ds(self.scene.mesh.boundaries[name], metadata={"quadrature_degree": quadrature_degree})
 
     def compile(self, form: Any) -> Any:
         """A compiled form."""
@@ -78,8 +128,56 @@ class Solid:
         """The test function of all fields (dimensionless)."""
         return ufl.TestFunction(self.space)
 
-    def mean_row(self, held: Any) -> Any:
-        """Linear form: mean of a displacement component (dimensionless) over a boundary, as a `MeanHeld` asks."""
+    def metric_row(self) -> Any:
+        """Linear form whose vector is the lumped mass of the displacement, over the volume."""
+        v = ufl.split(self.test_function())[0]
+        dx = ufl.dx(self.domain, metadata={"quadrature_degree": 4})
+        return (v[0] + v[1]) * self.weight / self.constant(self.volume) * dx
+
+    def _scale_of_control(self) -> float:
+        """Pressure: stress times thickness over length, thickness being volume over loaded area. Motion: length."""
+        driven = self.scene.driven
+        if driven is None or not hasattr(driven, "virtual_work"):
+            return self.length
+        area = self.integral(self.scene.kinematics.weight(self.X) * self.face(driven.on, 2)[1])
+        return self.stress * self.volume / (area * self.length)
+
+    def _residual(self) -> tuple[Any, Any]:
+        v = self.test_function()
+        residual = ufl.derivative(self.energy, self.w, v)
+        du = self.constant(self.length) * ufl.split(v)[0]
+        control, driven = ufl.variable(self.control), None
+        for load in self.scene.loads:
+            value = self.constant(self.control_scale) * control if load.driven else self.constant(load.value)
+            N, ds = self.face(load.on, load.quadrature_degree)
+            work = load.virtual_work(self.scene.kinematics, self.u, du, self.X, N, value)
+            residual -= self._scale * work * ds
+            if load.driven:
+                driven = -self._scale * ufl.diff(work, control) * ds
+        return residual, driven
+
+
+class Solid(Formulation):
+    """A scene as an incompressible solid; the fields are displacement and, if the model has them, pressures.
+
+    Attributes:
+        bodies: [(material, its layers)]: layers of one material object are one body.
+    """
+
+    def boundary(self, name: str, quadrature_degree: int) -> ufl.Measure:
+        """The measure of a named boundary."""
+        return self.ds(self.scene.mesh.boundaries[name], metadata={"quadrature_degree": quadrature_degree})
+
+    def face(self, name, quadrature_degree):
+        return ufl.FacetNormal(self.domain), self.boundary(name, quadrature_degree)
+
+    def constraints(self, support):
+        return support.constraints()
+
+    def nearest(self, points):
+        return points
+
+    def mean_row(self, held):
         ds, weight = self.boundary(held.on, 3), self.weight
         if held.by_stiffness:
             stiffness = fem.Function(fem.functionspace(self.domain, ("DG", 0)))
@@ -90,72 +188,66 @@ class Solid:
         v = ufl.split(self.test_function())[0][held.component]
         return v * weight / self.constant(self.integral(weight * ds)) * ds
 
-    def metric_row(self) -> Any:
-        """Linear form whose vector is the lumped mass of the displacement, over the volume."""
-        v = ufl.split(self.test_function())[0]
-        dx = ufl.dx(self.domain, metadata={"quadrature_degree": 3})
-        return (v[0] + v[1]) * self.weight / self.constant(self.volume) * dx
-
     def idle_unknowns(self) -> list[tuple[Any, np.ndarray]]:
         """[(sub space, local dofs)] of pressures that belong to no cell of their layers."""
-        found = []
+        found, mesh, dofmap = [], self.mesh, self.space.dofmap
         for colour in sorted(set(self._colours.values())):
             sub = self.space.sub(1 + colour)
-            mesh = self.scene.mesh
             cells = np.concatenate([mesh.cells.find(mesh.layers[n]) for n, c in self._colours.items() if c == colour])
-            dofs = sub.dofmap.list
-            found.append((sub, np.setdiff1d(dofs, dofs[cells]).astype(np.int32)))
+            used = la.vector(dofmap.index_map, 1)              # the cells may all be on another rank
+            used.array[sub.dofmap.list[cells].ravel()] = 1
+            used.scatter_reverse(la.InsertMode.add)
+            used.scatter_forward()
+            dofs = np.unique(sub.dofmap.list)
+            found.append((sub, dofs[used.array[dofs] == 0].astype(np.int32)))
         return found
 
-    def _make_space(self) -> Any:
-        cell = self.domain.basix_cell()
-        elements = [basix.ufl.element("Lagrange", cell, 2, shape=(2,))]
-        if self._colours:
-            degree = self.scene.incompressibility.pressure_degree
-            elements += [basix.ufl.element("Lagrange", cell, degree)] * (max(self._colours.values()) + 1)
-        return fem.functionspace(self.domain, basix.ufl.mixed_element(elements))
+    def _make_mesh(self) -> Any:
+        scene = self.scene
+        self.bodies = _by_material(scene)
+        self._colours = _colour(scene) if scene.model.pressure else {}
+        return scene.mesh
 
-    def _scale_of_control(self) -> float:
-        """Pressure: stress times thickness over length, thickness being volume over loaded area. Motion: length."""
-        driven = self.scene.driven
-        if driven is None or not hasattr(driven, "virtual_work"):
-            return self.length
-        area = self.integral(self.weight * self.boundary(driven.on, 2))
-        return self.stress * self.volume / (area * self.length)
+    def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
+        pressure = self.scene.model.pressure
+        element = basix.ufl.element("Lagrange", cell, 2)
+        if pressure and pressure.bubble:
+            element = basix.ufl.enriched_element([element, basix.ufl.element("Bubble", cell, 3)])
+        fields = [basix.ufl.blocked_element(element, shape=(2,))]
+        if pressure:
+            field = basix.ufl.element(pressure.family, cell, pressure.degree)
+            fields += [field] * (max(self._colours.values()) + 1)
+        return element, fields
+
+    def _weight(self) -> Any:
+        return self.scene.kinematics.weight(self.X)
+
+    def _deformation_gradient(self) -> Any:
+        return self.scene.kinematics.deformation_gradient(self.u, self.X)
 
     def _energy(self) -> Any:
         scene = self.scene
-        fields = ufl.split(self.w)
-        self._scale = self.constant(1 / (self.stress * self.volume))
-        eps = self.constant(scene.incompressibility.eps)
-        F = scene.kinematics.deformation_gradient(self.u, self.X)
+        self._eps = self.constant(scene.model.eps)
         energy = 0
-        for material, names in _by_material(scene):
+        for material, names in self.bodies:
             tags = tuple(scene.mesh.layers[n] for n in names)
             dx = self.dx if len(tags) == len(scene.mesh.layers) else self.dx(tags)
-            W = material.strain_energy(F, **{k: self.constant(c) for k, c in material.parameters.items()})
-            if scene.incompressibility.stress_free:
-                W -= self.constant(material.rest_stress) * ufl.ln(self.J)
-            energy += self._scale * W * self.weight * dx
-            modulus = self.constant(self._moduli[id(material)])
-            p = self.constant(self.stress) * fields[1 + self._colours[names[0]]] if self._colours else None
-            for density, metadata in scene.incompressibility.terms(self.J, p, modulus, eps):
-                energy += self._scale * density * self.weight * dx(metadata={**dx.metadata(), **metadata})
+            for density, metadata in self.energy_densities(material, names, self.F):
+                energy += self._scale * density * self.weight * (dx(metadata=metadata) if metadata else dx)
         return energy
 
-    def _residual(self) -> tuple[Any, Any]:
-        v = self.test_function()
-        residual = ufl.derivative(self.energy, self.w, v)
-        du = self.constant(self.length) * ufl.split(v)[0]
-        control, driven = ufl.variable(self.control), None
-        for load in self.scene.loads:
-            value = self.constant(self.control_scale) * control if load.driven else self.constant(load.value)
-            work = load.virtual_work(self.scene.kinematics, self.u, du, self.X, ufl.FacetNormal(self.domain), value)
-            ds = self.boundary(load.on, load.quadrature_degree)
-            residual -= self._scale * work * ds
-            if load.driven:
-                driven = -self._scale * ufl.diff(work, control) * ds
-        return residual, driven
+    def energy_densities(self, material: Any, names: list[str], F: Any) -> list[tuple[Any, dict]]:
+        """[(energy per reference volume (UFL, stress), quadrature metadata)] of a body for F, shape (3, 3).
+
+        The energy of the material, then what keeps the volume: W(F) - rest_stress ln J, and p (J - 1) or a penalty.
+        """
+        model, J = self.scene.model, kin.volume_ratio(F)
+        W = material.strain_energy(F, **{k: self.constant(c) for k, c in material.parameters.items()})
+        if model.stress_free:
+            W -= self.constant(material.rest_stress) * ufl.ln(J)
+        modulus = self.constant(self._moduli[id(material)])
+        p = self.constant(self.stress) * ufl.split(self.w)[1 + self._colours[names[0]]] if self._colours else None
+        return [(W, {}), *model.terms(J, p, modulus, self._eps)]
 
 
 def _by_material(scene: Any) -> list[tuple[Any, list[str]]]:
@@ -170,6 +262,8 @@ def _by_material(scene: Any) -> list[tuple[Any, list[str]]]:
 def _colour(scene: Any) -> dict[str, int]:
     """{layer: number of its pressure field}: bodies of different materials that touch get different fields."""
     mesh = scene.mesh
+    if not scene.model.pressure.continuous:
+        return dict.fromkeys(mesh.layers, 0)
     topology = mesh.domain.topology
     topology.create_connectivity(2, 0)
     groups = [names for _, names in _by_material(scene)]

@@ -89,7 +89,7 @@ def test_units(tmp_path):
 def test_run_against_hand_coded_solver(tmp_path):
     """The other side as it comes: a coarse CSV of a hand-coded program, past the pressure maximum."""
     scene = treloar((10, 1), fx.PinnedNode(1.25, 0.041),
-                    incompressibility=fx.DisplacementPenalty(eps=0.1, stress_free=False))
+                    model=fx.DisplacementPenalty(eps=0.1, stress_free=False))
     path = fx.trace(scene, until=fx.pole_stretch(3.5), progress=False)
     _, body, _ = pair(scene, element.Mooney(2.0, 0.0), tmp_path)
     R, Z = body.nodes.T

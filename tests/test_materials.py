@@ -188,15 +188,18 @@ def test_limit(material):
 @pytest.mark.parametrize("material", [fx.Gent(mu=1.0, Jm=20.0), fx.ArrudaBoyce(mu=1.0, N=8.0)],
                          ids=lambda m: type(m).__name__)
 def test_inflation_to_the_limit(material, caplog):
-    """A step that is far too long leaves the domain, is halved, and the path goes on to 99.99 % of the limit."""
+    """A step that is far too long leaves the domain, is halved, and the path goes on to 99.8 % of the limit.
+
+    (On this mesh the quadrature points come to the limit when the pole itself is at 99.88 % of it.)
+    """
     mesh = fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1))
     scene = fx.Scene(mesh=mesh, materials=material, supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
                      loads=[fx.Pressure("bottom")])
     limit = material.largest_stretch("equibiaxial")
     caplog.set_level("INFO", "formingx")
-    path = fx.trace(scene, until=fx.pole_stretch(0.9999 * limit), step=fx.StepControl(length=2.0))
+    path = fx.trace(scene, until=fx.pole_stretch(0.998 * limit), step=fx.StepControl(length=2.0))
     assert path.counts.failures >= 1 and "came to its limit, I1 <" in caplog.text
-    assert path.counts.steps < 40 and path.last.measures["pole_stretch"] == pytest.approx(0.9999 * limit, rel=1e-8)
+    assert path.counts.steps < 40 and path.last.measures["pole_stretch"] == pytest.approx(0.998 * limit, rel=1e-8)
 
 
     with pytest.raises(fx.InputError, match=rf"pole_stretch = {limit:g}: must be less than {limit:.6g}, where I1 comes"

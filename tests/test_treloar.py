@@ -52,7 +52,7 @@ def test_mass_is_kept(path):
 @pytest.mark.parametrize("eps", [0.0, 1e-3, 1e-9])
 @pytest.mark.parametrize("support", [fx.SimplySupported("rim"), fx.Clamped("rim")], ids=lambda s: type(s).__name__)
 def test_cost_does_not_depend_on_the_penalty(eps, support):
-    path = fx.trace(treloar((40, 2), support, incompressibility=fx.MixedPressure(eps=eps)), until=fx.pole_stretch(8.5))
+    path = fx.trace(treloar((40, 2), support, model=fx.MixedPressure(eps=eps)), until=fx.pole_stretch(8.5))
     assert path.counts.steps <= 25 and path.counts.iterations <= 150, path.counts
 
 

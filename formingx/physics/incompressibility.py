@@ -1,34 +1,78 @@
-"""How the volume is kept: which unknowns, which energy, which quadrature.
+"""How a scene is modelled: as a solid, and how its volume is kept there, or as a membrane.
 
-Both ways are the penalty of Song (1993), eq. (3.4.1), W + (mu/eps) (I3 - 1)^2, with eps dimensionless (mu is the
-layer's shear modulus). Where it keeps the pressure as an unknown p (tension positive), the same penalty reads
+Both ways of the solid are the penalty of Song (1993), eq. (3.4.1), W + (mu/eps) (I3 - 1)^2, with eps dimensionless (mu
+is the layer's shear modulus). Where it keeps the pressure as an unknown p (tension positive), the same penalty reads
 W + p (J - 1) - p^2/(2 k), k = 8 mu/eps: equal for small J - 1, and a Newton method that is far better behaved, as
 the linearised constraint carries no wrong stress k (J - 1).
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ..errors import InputError, finite, non_negative, positive
+from ..errors import InputError, finite, known, non_negative, positive
+
+
+class Membrane:
+    """A membrane: the sheet's mid-surface, its thickness as data, for thin sheets (Adkins and Rivlin 1952).
+
+    The stretch through the thickness is 1/(l1 l2), so the volume is kept exactly; layers are bonded and their energies
+    add up. It has no bending, so a rim cannot be clamped, and knows no stress through the thickness.
+    """
+
+    body = "membrane"
+
+    def check(self, scene):
+        """Raise an InputError if the scene has what a membrane cannot have."""
+        for support in scene.supports:
+            if getattr(support, "holds_rotation", False):
+                raise InputError(f"Scene: {support!r} with model=Membrane(): a membrane has no bending stiffness, its"
+                                 f" rim cannot be clamped; use SimplySupported({support.on!r}), or a solid model")
+
+
+class PressureSpace(NamedTuple):
+    """A pair of elements on triangles: the pressure's, and whether a cubic bubble enriches the P2 displacement."""
+
+    family: str
+    degree: int
+    bubble: bool
+
+    @property
+    def continuous(self) -> bool:
+        """True if the pressure is continuous inside a layer: it then needs a field of its own in each."""
+        return self.family == "Lagrange"
+
+
+_SPACES = {
+    "P0": PressureSpace("DG", 0, bubble=False),
+    "P1": PressureSpace("Lagrange", 1, bubble=False),
+    "P1dg": PressureSpace("DG", 1, bubble=True),
+}
 
 
 class MixedPressure:
-    """The pressure is an unknown: P2 displacement, continuous P1 pressure in each layer (Taylor-Hood).
+    """A solid with the pressure as an unknown: P2 displacement and one of three pressure spaces.
 
-    The pressure jumps across the interface of two materials.
+    The pressure jumps across the interface of two materials, in each of them.
 
     Args:
-        eps: dimensionless penalty parameter; 0 keeps the volume exactly (weakly, in the P1 space).
+        eps: dimensionless penalty parameter; 0 keeps the volume exactly (weakly, in the pressure space).
+        space: "P1": continuous in each layer (Taylor-Hood); "P0": one value in each element, cheap, displacements
+            converge with order 2 instead of 3; "P1dg": linear in each element, the P2 displacement enriched by a cubic
+            bubble (Crouzeix and Raviart 1973). Both of these keep the volume of each element.
     """
 
-    pressure_degree = 1
+    body = "solid"
     stress_free = True
 
-    def __init__(self, *, eps: float = 0.0):
+    def __init__(self, *, eps: float = 0.0, space: str = "P1dg"):
         self.eps = non_negative("MixedPressure: eps", eps)
         if self.eps > 1:
             raise InputError(f"MixedPressure: eps = {eps!r}: must be at most 1 (thesis: 2e-2 to 1e-7)")
+        known("MixedPressure: space", space, _SPACES)
+        self.space, self.pressure = space, _SPACES[space]
 
     def terms(self, J, p, modulus, eps):
         """[(energy density, quadrature metadata)] for J = det F, pressure p and the layer's shear modulus."""
@@ -39,7 +83,7 @@ class MixedPressure:
 
 
 class DisplacementPenalty:
-    """The thesis' own way: displacements only, the penalty integrated by a reduced rule (section 3.4).
+    """A solid the thesis' own way: displacements only, the penalty integrated by a reduced rule (section 3.4).
 
     Args:
         eps: dimensionless penalty parameter, above 0 (thesis: 2e-2 to 1e-7).
@@ -49,7 +93,8 @@ class DisplacementPenalty:
             then swells or shrinks to I3 - 1 of the order of eps.
     """
 
-    pressure_degree = None
+    body = "solid"
+    pressure = None
 
     def __init__(self, *, eps: float = 1e-3, points: int = 3, stress_free: bool = True):
         self.stress_free = bool(stress_free)

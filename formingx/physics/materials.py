@@ -186,6 +186,10 @@ class ArrudaBoyce(Material):
 class Ogden(Material):
     """W = sum mu_k / alpha_k (l1^alpha_k + l2^alpha_k + l3^alpha_k - 3), eq. (4.3) of Song (1993).
 
+    Where alpha_k < 0, l1^alpha_k is written (l2 l3)^-alpha_k, and so on: the same at constant volume (alpha_k = -2 is
+    I2), but finite in an element that is squeezed flat on the way to a solution. Without it Newton's method fails at
+    the stretches of a blown sheet.
+
     Args:
         mu: the mu_k, stress; the shear modulus is half the sum of mu_k alpha_k.
         alpha: as many exponents alpha_k, none zero, each with mu_k alpha_k > 0.
@@ -206,7 +210,11 @@ class Ogden(Material):
         super().check()
 
     def strain_energy(self, F, **constants):
-        return sum(m / a * (kinematics.sum_of_powers(F, a) - 3) for m, a in self._pairs(constants))
+        energy, J = 0, kinematics.volume_ratio(F)
+        for (m, a), (_, exponent) in zip(self._pairs(constants), self._pairs(self.parameters), strict=True):
+            powers = kinematics.sum_of_powers(F, a)
+            energy += m / a * ((powers if exponent > 0 else J**-a * powers) - 3)
+        return energy
 
     @staticmethod
     def _pairs(constants):

@@ -58,6 +58,8 @@ class Clamped(_On):
     The corner of a clamped rim is singular: see the README for the band that this leaves in a limit pressure.
     """
 
+    holds_rotation = True
+
     def constraints(self):
         """What is held: a list of Held or MeanHeld."""
         return [Held(R, on=self.on), Held(Z, on=self.on)]

@@ -4,81 +4,11 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import basix.ufl
 import numpy as np
 import ufl
-from dolfinx import geometry
-from mpi4py import MPI
 
-from .. import _compat
 from ..errors import InputError, finite, positive
-
-
-class Probe:
-    """Displacement at fixed reference points: rows of weights on the unknowns.
-
-    Args:
-        problem: the `Problem`.
-        points: reference coordinates (R, Z), shape (n, 2), the same on all ranks.
-
-    Raises:
-        InputError: a point outside the mesh.
-    """
-
-    def __init__(self, problem: Any, points: np.ndarray):
-        points = np.atleast_2d(np.asarray(points, dtype=float))
-        mesh, comm = problem.forms.domain, problem.comm
-        padded = np.zeros((len(points), 3))
-        padded[:, :2] = points
-        tree = _compat.tree_of_cells(mesh, 1e-10 * problem.forms.length)
-        found = geometry.compute_colliding_cells(mesh, geometry.compute_collisions_points(tree, padded), padded)
-        owned = mesh.topology.index_map(2).size_local
-        cells = [next((c for c in found.links(i) if c < owned), -1) for i in range(len(points))]
-        ranks = np.where(np.array(cells) >= 0, comm.rank, comm.size)
-        owner = np.empty_like(ranks)
-        comm.Allreduce(ranks, owner, MPI.MIN)
-        if np.any(owner == comm.size):
-            r, z = points[np.argmax(owner == comm.size)]
-            raise InputError(f"point (R, Z) = ({r:.6g}, {z:.6g}) is not in the mesh")
-        element = basix.ufl.element("Lagrange", mesh.basix_cell(), 2)
-        cmap, X = _compat.coordinate_map(mesh), mesh.geometry.x
-        subs = [problem.forms.space.sub(0).sub(i).dofmap for i in (0, 1)]
-        self._problem, self.points = problem, points
-        self._mine = np.flatnonzero(owner == comm.rank)
-        self._dofs = np.empty((len(self._mine), 2, element.dim), dtype=np.int64)
-        self._weights = np.empty((len(self._mine), element.dim))
-        for k, i in enumerate(self._mine):
-            reference = cmap.pull_back(padded[i:i + 1], X[mesh.geometry.dofmap[cells[i]]])
-            self._weights[k] = element.tabulate(0, reference)[0, 0, :]
-            for component in (0, 1):
-                self._dofs[k, component] = subs[component].cell_dofs(cells[i])
-
-    def displacement(self, x: Any) -> np.ndarray:
-        """u at the points in the user's unit, shape (n, 2), all ranks."""
-        self._problem.set_state(x, float(self._problem.forms.control.value))
-        w = self._problem.forms.w.x.array
-        values = np.zeros((len(self.points), 2))
-        values[self._mine] = np.einsum("kj,kij->ki", self._weights, w[self._dofs])
-        return self._problem.forms.length * self._problem.comm.allreduce(values, MPI.SUM)
-
-    def row(self, factors: np.ndarray) -> np.ndarray:
-        """c with c . x = sum over points and components of factors (n, 2) times u over length; owned unknowns."""
-        problem = self._problem
-        index_map = problem.forms.space.dofmap.index_map
-        triples: list[list] = [[], []]
-        for k, i in enumerate(self._mine):
-            for component in (0, 1):
-                triples[0].append(index_map.local_to_global(self._dofs[k, component].astype(np.int32)))
-                triples[1].append(factors[i, component] * self._weights[k])
-        dofs = np.concatenate(triples[0]) if triples[0] else np.zeros(0, dtype=np.int64)
-        weights = np.concatenate(triples[1]) if triples[1] else np.zeros(0)
-        dofs = np.concatenate(problem.comm.allgather(dofs))
-        weights = np.concatenate(problem.comm.allgather(weights))
-        first, last = index_map.local_range
-        own = (dofs >= first) & (dofs < last)
-        row = np.zeros(last - first)
-        np.add.at(row, dofs[own] - first, weights[own])
-        return row
+from .probes import probe
 
 
 class Bound:
@@ -224,23 +154,23 @@ def bind_pole_height(problem: Any) -> Bound:
 def bind_pole_stretch(problem: Any) -> Bound:
     """See `pole_stretch`."""
     low, high = _pole(problem)
-    row = Probe(problem, [(0.0, low), (0.0, high)]).row(np.array([[0.0, -1.0], [0.0, 1.0]]))
-    return _Linear(problem, row * problem.forms.length / (high - low), 1.0, lambda t: max(t, 1e-300) ** -0.5,
-                   lambda s: s**-2)
+    row, power = probe(problem, [(0.0, low), (0.0, high)]).across()
+    return _Linear(problem, row, 1.0, lambda t: max(t, 1e-300) ** power, lambda s: s ** (1 / power))
 
 
 def bind_volume(problem: Any) -> Bound:
     """See `enclosed_volume`: minus the integral of (z - z_lowest) n_z da over the driven face."""
     driven, kinematics, forms = problem.scene.driven, problem.scene.kinematics, problem.forms
     z0 = forms.constant(problem.scene.mesh.nodes_of(driven.on)[:, 1].min())
-    area = kinematics.area_vector(forms.u, forms.X, ufl.FacetNormal(forms.domain))
+    N, face = forms.face(driven.on, 5)
+    area = kinematics.area_vector(forms.u, forms.X, N)
     scale = forms.length**kinematics.dimension_of_volume
     height = forms.X[1] + forms.u[1] - z0
-    return _Form(problem, -height * area[1] / forms.constant(scale) * forms.boundary(driven.on, 5), scale)
+    return _Form(problem, -height * area[1] / forms.constant(scale) * face, scale)
 
 
 def _displacement(problem, points, factors):
-    row = Probe(problem, points).row(np.asarray(factors))
+    row = probe(problem, points).row(np.asarray(factors))
     return _Linear(problem, row * problem.forms.length)
 
 

@@ -13,7 +13,7 @@ from .. import grid
 from .. import mesh as meshes
 from ..errors import InputError, known
 from . import files, plots, tables
-from .measures import Probe
+from .probes import probe
 
 _COMPONENTS = ("u_r", "u_z")
 
@@ -131,4 +131,4 @@ def _displacements(path: Any, state: Any, points: np.ndarray) -> np.ndarray:
     problem, state = path.problem, state or path.last
     problem.x.array_w[:] = state.x
     problem.forms.control.value = state.control
-    return Probe(problem, points).displacement(problem.x)
+    return probe(problem, points).displacement(problem.x)

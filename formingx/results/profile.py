@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .measures import Probe
+from .probes import Probe, probe
 
 
 @dataclass(frozen=True)
@@ -60,13 +60,13 @@ class Profiles:
 
     def of(self, state: Any) -> Profile:
         """The profile of a state (collective)."""
-        probe = self._probe = self._probe or self._make_probe()
+        self._probe = at = self._probe or self._make_probe()
         self._problem.x.array_w[:] = state.x
         self._problem.forms.control.value = state.control
-        deformed = probe.points + probe.displacement(self._problem.x)
-        n = len(probe.points) // 2
-        rest = np.hypot(*(probe.points[n:] - probe.points[:n]).T)
-        return Profile(probe.points[:n, 0].copy(), deformed[:n], deformed[n:], rest)
+        deformed = at.points + at.displacement(self._problem.x)
+        n = len(at.points) // 2
+        rest = np.hypot(*(at.points[n:] - at.points[:n]).T)
+        return Profile(at.points[:n, 0].copy(), deformed[:n], deformed[n:], rest)
 
     def _make_probe(self) -> Probe:
         mesh = self._problem.scene.mesh
@@ -75,4 +75,4 @@ class Profiles:
                 raise InputError(f"a profile needs boundaries 'bottom' and 'top'; the mesh has {list(mesh.boundaries)}")
         bottom, top = mesh.nodes_of("bottom"), mesh.nodes_of("top")
         above = np.column_stack([bottom[:, 0], np.interp(bottom[:, 0], top[:, 0], top[:, 1])])
-        return Probe(self._problem, np.vstack([bottom, above]))
+        return probe(self._problem, np.vstack([bottom, above]))

@@ -46,17 +46,21 @@ class Tolerances(NamedTuple):
     residual: float = 1e-8
     iterations: int = 12
 
-    def met(self, corrections: list[float], residual: float) -> bool:
-        """True if a state with these corrections behind it, and this residual, has converged.
+    def met(self, corrections: list[float], residuals: list[float]) -> bool:
+        """True if a state with these corrections behind it, and these residuals (its own last), has converged.
 
         Corrections that no longer shrink, below 1e-7, or that are below 1e-11, have met round-off (a flat thin sheet:
-        near 1e-8): then nothing better is to be had, and the residual may be what round-off leaves.
+        near 1e-8): then nothing better is to be had, and the residual may be what round-off leaves. A
+        residual that no longer shrinks with corrections below the tolerance is at round-off, however large: a stiff
+        penalty (8 mu/eps) times the round-off of the displacements can well exceed the support forces of a thin sheet.
         """
         if not corrections:
             return False
-        last, before = corrections[-1], corrections[-2] if len(corrections) > 1 else 1.0
+        residual, last, before = residuals[-1], corrections[-1], corrections[-2] if len(corrections) > 1 else 1.0
         ahead = last * min(1.0, last / before) ** 2
         if ahead < self.correction and residual < self.residual:
+            return True
+        if last < self.correction and residual > 0.3 * residuals[-2]:
             return True
         return (last < 1e-11 or 0.3 * before < last < 1e-7) and residual < 1e3 * self.residual
 
@@ -100,7 +104,7 @@ class BorderedNewton:
             residual = self.F.norm() / (problem.force_scale + UNLOADED)
             if not np.isfinite(residual):
                 raise Failure(f"the forces are not finite: {problem.why_not_finite}", history)
-            if self.tolerances.met([i.correction for i in history], residual):
+            if self.tolerances.met([i.correction for i in history], [*(i.residual for i in history), residual]):
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
             if len(history) >= 2 and history[-1].correction > (history[0].correction if len(history) > 2 else 0.5):

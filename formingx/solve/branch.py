@@ -34,10 +34,11 @@ class Branch:
 
     def start(self) -> State:
         """The unloaded body, with the tangent there."""
-        self._x.set(0)
+        self.problem.stiff_state(self._x)
         if not self.newton.tangent(self._x, 0.0):
             raise ConvergenceError("the unloaded body has a singular tangent: something in it is not held, or has no"
                                    " stiffness")
+        self._x.set(0)
         return self._state(0.0, [], "start", None)
 
     def solve(self, x: np.ndarray, control: float, constraint: Callable, kind: str, before: State) -> State:
@@ -56,6 +57,28 @@ class Branch:
         x.copy(self._x)
         self.newton.tangent(x, control)
         return self._state(control, history, "step", before)
+
+    def guess_from_rest(self, rest: State, control: float) -> np.ndarray:
+        """A guess of the state at a control, to correct at that control: rest, with what is held moved.
+
+        Where rest has no stiffness (a flat membrane) it is the state in the first direction on which F does no work.
+        """
+        if not self.problem.forms.slack_at_rest or control == 0:
+            return self.problem.motion(control)
+        sign, low, high = np.sign(control), 0.0, 1e-6
+
+        def work(length):
+            self._x.array_w[:] = sign * length * rest.direction
+            self.problem.residual(self._x, control, self.newton.F)
+            self._b.array_w[:] = rest.direction
+            return sign * self.newton.F.dot(self._b)
+
+        while work(high) < 0 and high < 1:
+            low, high = high, 2 * high
+        for _ in range(10):
+            middle = (low + high) / 2
+            low, high = (middle, high) if work(middle) < 0 else (low, middle)
+        return sign * high * rest.direction
 
     def step(self, old: State, length: float) -> State:
         """One step: predict along the tangent, correct in the plane normal to it at that distance (4.14 to 4.31)."""

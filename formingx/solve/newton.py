@@ -69,7 +69,7 @@ class FixedControl:
         self.history.append(Iteration(relative, correction, work / self._work if self._work else 1.0))
         if not np.isfinite(relative):
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
-        if self._tolerances.met([i.correction for i in self.history[1:]], relative):
+        if self._tolerances.met([i.correction for i in self.history[1:]], [i.residual for i in self.history]):
             return PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE
         return PETSc.SNES.ConvergedReason.ITERATING
 
@@ -104,8 +104,10 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
         if 1 - fraction < 1e-9:
             fraction = 1.0
         control = fraction * to / problem.forms.control_scale
-        lead = (control - old.control) / old.slope           # along the tangent, as far as the control asks
-        x.array_w[:] = old.x + (lead * old.direction if old.kind != "start" else problem.motion(control))
+        if old.kind == "start":
+            x.array_w[:] = branch.guess_from_rest(old, control)
+        else:                                                # along the tangent, as far as the control asks
+            x.array_w[:] = old.x + (control - old.control) / old.slope * old.direction
         converged = newton.solve(x, control)
         path.counts.iterations += len(newton.history) - 1
         if converged:

@@ -1,0 +1,191 @@
+"""Displacements at points of the body, read off the fields of a problem."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import basix.ufl
+import numpy as np
+from dolfinx import geometry
+from mpi4py import MPI
+
+from .. import _compat
+from ..errors import InputError
+from ..physics.kinematics import Axisymmetric
+
+
+class Probe:
+    """Displacement at fixed reference points: rows of weights on the unknowns.
+
+    Args:
+        problem: the `Problem`.
+        points: reference coordinates (R, Z), shape (n, 2), the same on all ranks.
+
+    Raises:
+        InputError: a point outside the mesh.
+    """
+
+    def __init__(self, problem: Any, points: Any):
+        points = np.atleast_2d(np.asarray(points, dtype=float))
+        forms, comm = problem.forms, problem.comm
+        cells, reference = self._locate(forms, forms.nearest(points))
+        ranks = np.where(cells >= 0, comm.rank, comm.size)
+        owner = np.empty_like(ranks)
+        comm.Allreduce(ranks, owner, MPI.MIN)
+        if np.any(owner == comm.size):
+            r, z = points[np.argmax(owner == comm.size)]
+            raise InputError(f"point (R, Z) = ({r:.6g}, {z:.6g}) is not in the mesh")
+        subs = [forms.space.sub(0).sub(i).dofmap for i in (0, 1)]
+        self._problem, self.points = problem, points
+        self._mine = mine = np.flatnonzero(owner == comm.rank)
+        self._cells, self._reference = cells[mine], reference[mine]
+        dim = forms.displacement_element.dim
+        self._dofs = np.array([[sub.cell_dofs(c) for sub in subs] for c in cells[mine]],
+                              dtype=np.int64).reshape(len(mine), 2, dim)
+        self._weights = _basis(forms.displacement_element, 0, self._reference)
+
+    def displacement(self, x: Any) -> np.ndarray:
+        """u at the points in the user's unit, shape (n, 2), all ranks."""
+        self._problem.set_state(x, float(self._problem.forms.control.value))
+        w = self._problem.forms.w.x.array
+        values = np.zeros((len(self.points), 2))
+        values[self._mine] = self._problem.forms.length * self._local(w[self._dofs])
+        return self._problem.comm.allreduce(values, MPI.SUM)
+
+    def across(self) -> tuple[np.ndarray, float]:
+        """(row, power) with in-plane stretch = (1 + row . x)^power for two points, one above the other on the axis."""
+        (_, low), (_, high) = self.points
+        return self.row(np.array([[0.0, -1.0], [0.0, 1.0]])) * self._problem.forms.length / (high - low), -0.5
+
+    def row(self, factors: np.ndarray) -> np.ndarray:
+        """c with c . x = sum over points and components of factors (n, 2) times u over length; owned unknowns."""
+        return self._row(factors, self._weights)
+
+    def _locate(self, forms: Any, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Owned cell of each point, or -1, shape (n,), and the coordinates in the reference cell, shape (n, tdim)."""
+        domain = forms.domain
+        padded = np.zeros((len(points), 3))
+        padded[:, :2] = points
+        tree = _compat.tree_of_cells(domain, 1e-10 * forms.length)
+        found = geometry.compute_colliding_cells(domain, geometry.compute_collisions_points(tree, padded), padded)
+        owned = domain.topology.index_map(2).size_local
+        cells = np.array([next((c for c in found.links(i) if c < owned), -1) for i in range(len(points))], dtype=int)
+        cmap, X, reference = _compat.coordinate_map(domain), domain.geometry.x, np.zeros((len(points), 2))
+        for i in np.flatnonzero(cells >= 0):
+            reference[i] = cmap.pull_back(padded[i:i + 1], X[domain.geometry.dofmap[cells[i]]])[0]
+        return cells, reference
+
+    def _local(self, values: np.ndarray) -> np.ndarray:
+        """u over length at this rank's points, shape (m, 2), from the unknowns of their cells, shape (m, 2, dim)."""
+        return np.einsum("kj,kij->ki", self._weights, values)
+
+    def _row(self, factors: np.ndarray, point_weights: np.ndarray) -> np.ndarray:
+        problem = self._problem
+        index_map = problem.forms.space.dofmap.index_map
+        triples: list[list] = [[], []]
+        for k, i in enumerate(self._mine):
+            for component in (0, 1):
+                triples[0].append(index_map.local_to_global(self._dofs[k, component].astype(np.int32)))
+                triples[1].append(factors[i, component] * point_weights[k])
+        dofs = np.concatenate(triples[0]) if triples[0] else np.zeros(0, dtype=np.int64)
+        weights = np.concatenate(triples[1]) if triples[1] else np.zeros(0)
+        dofs = np.concatenate(problem.comm.allgather(dofs))
+        weights = np.concatenate(problem.comm.allgather(weights))
+        first, last = index_map.local_range
+        own = (dofs >= first) & (dofs < last)
+        row = np.zeros(last - first)
+        np.add.at(row, dofs[own] - first, weights[own])
+        return row
+
+
+class MidSurfaceProbe(Probe):
+    """The same on a membrane: points off the mid-surface move with it, their distance changes as the thickness."""
+
+    def __init__(self, problem: Any, points: np.ndarray):
+        super().__init__(problem, points)
+        element, domain = problem.forms.displacement_element, problem.forms.domain
+        nodes = domain.geometry.x[domain.geometry.dofmap[self._cells].ravel(), :2]
+        nodes = nodes.reshape(len(self._cells), domain.geometry.dofmap.shape[1], 2)
+        geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(domain).degree, shape=())
+        self._middle = np.einsum("kj,kji->ki", _basis(geometry, 0, self._reference), nodes)
+        tangent = np.einsum("kj,kji->ki", _basis(geometry, 1, self._reference), nodes)       # dX/dxi
+        speed = np.hypot(*tangent.T)[:, None] * np.where(tangent[:, :1] > 0, 1.0, -1.0)
+        self._tangent = tangent / speed                                                     # towards growing R
+        slopes = (_basis(element, 1, self._reference) / speed)[:, None]                     # d/dS of the basis
+        self._slopes = np.repeat(slopes, 2, axis=1)
+        self._on_axis = (self._middle[:, 0] < 1e-12 * problem.forms.length) & ("axis" in problem.forms.mesh.boundaries)
+        for k in np.flatnonzero(self._on_axis):
+            self._slopes[k] = 0.0                      # u_z is even in R; u_r is odd: R and R^3 through the two nodes
+            far = int(np.argmax(nodes[k, :2, 0]))      # leave an error of the fourth order
+            h = nodes[k, far, 0]
+            self._slopes[k, 0, [far, 2]] = -1 / (3 * h), 8 / (3 * h)
+
+    def across(self):
+        """See `Probe.across`: at the pole the membrane stays normal to the axis, and both stretches are 1 + du_r/dR."""
+        axisymmetric = isinstance(self._problem.scene.kinematics, Axisymmetric)
+        row = self._row(np.array([[1.0, 0.0], [0.0, 0.0]]), self._slopes[:, 0] * self._problem.forms.length)
+        return row, 1.0 if axisymmetric else 0.5
+
+    def row(self, factors):
+        """See `Probe.row`; only points of the mid-surface."""
+        middle = self._problem.forms.nearest(self.points)
+        off = np.abs(self.points - middle).max(axis=1) > 1e-8 * self._problem.forms.length
+        if np.any(off):
+            r, z = self.points[np.argmax(off)]
+            raise InputError(f"point (R, Z) = ({r:.6g}, {z:.6g}) is not on the mid-surface, and a membrane knows no"
+                             f" other: there it is ({middle[np.argmax(off)][0]:.6g}, {middle[np.argmax(off)][1]:.6g})")
+        return super().row(factors)
+
+    def _locate(self, forms, points):
+        """By R alone, as the mid-surface is a graph over R."""
+        domain = forms.domain
+        nodes = domain.geometry.x[domain.geometry.dofmap, 0]                   # ends first, then the middle
+        owned = domain.topology.index_map(1).size_local
+        cells, reference = np.full(len(points), -1), np.zeros((len(points), 1))
+        near = 1e-10 * forms.length
+        for i, R in enumerate(points[:, 0]):
+            ends = nodes[:owned, :2]
+            hit = np.flatnonzero((ends.min(axis=1) - near <= R) & (ends.max(axis=1) + near >= R))
+            if len(hit):
+                a, b = ends[hit[0]]
+                bulge = 4 * nodes[hit[0], 2] - 2 * (a + b) if nodes.shape[1] > 2 else 0.0
+                xi = (R - a) / (b - a)
+                for _ in range(20):                                            # R = a + (b - a) xi + bulge xi (1 - xi)
+                    xi -= (a + (b - a) * xi + bulge * xi * (1 - xi) - R) / (b - a + bulge * (1 - 2 * xi))
+                cells[i], reference[i] = hit[0], xi
+        return cells, reference
+
+    def _local(self, values):
+        u, du = super()._local(values), np.einsum("kij,kij->ki", self._slopes, values)
+        forms = self._problem.forms
+        t = self._tangent + forms.length * du
+        l1 = np.hypot(*t.T)
+        l2 = np.ones_like(l1)
+        if isinstance(self._problem.scene.kinematics, Axisymmetric):
+            R, u_r = self._middle[:, 0], forms.length * u[:, 0]
+            l2 = np.where(self._on_axis, 1 + forms.length * du[:, 0], 1 + u_r / np.where(self._on_axis, 1.0, R))
+        offset = self.points[self._mine] - self._middle
+        along = np.sum(offset * self._tangent, axis=1)
+        above = np.sum(offset * _normal(self._tangent), axis=1)
+        carried = along[:, None] * t + (above / (l1**2 * l2))[:, None] * _normal(t)
+        return u + (carried - offset) / forms.length
+
+
+def _normal(tangents: np.ndarray) -> np.ndarray:
+    """Vectors turned by a right angle, upwards, shape (m, 2)."""
+    return np.column_stack([-tangents[:, 1], tangents[:, 0]])
+
+
+def _basis(element: Any, derivative: int, reference: np.ndarray) -> np.ndarray:
+    """The scalar basis of an element, or its derivative on an interval, at m points of its cell, shape (m, dim)."""
+    if not len(reference):                             # basix does not take an empty set
+        return np.zeros((0, element.dim))
+    return element.tabulate(derivative, reference)[derivative].reshape(len(reference), element.dim)
+
+
+_PROBES = {"solid": Probe, "membrane": MidSurfaceProbe}
+
+
+def probe(problem: Any, points: Any) -> Probe:
+    """Displacement at fixed reference points (see `Probe`), whatever the body is modelled as."""
+    return _PROBES[problem.scene.model.body](problem, points)
