@@ -12,8 +12,6 @@ from pathlib import Path
 from mpi4py import MPI
 
 from . import InputError, compare
-from .results import files
-
 
 _COMPARE = """Compare a run's CSV file with another program's curve: differences, limit points, a picture.
 The header of THEIRS names its columns and may state units: pressure [psi]."""

@@ -167,7 +167,7 @@ def to_grid(mesh: Mesh) -> grid.Grid:
     from dolfinx.mesh import entities_to_geometry
     domain = mesh.domain
     if domain.comm.size > 1:
-        raise InputError("mesh.write: works on one rank")
+        raise InputError("the nodes of a mesh are numbered and written on one rank only: run this on one")
     domain.topology.create_connectivity(1, 2)
     points = domain.geometry.x[:, :2].copy()
     triangles = np.asarray(domain.geometry.dofmap)

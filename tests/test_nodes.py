@@ -136,6 +136,7 @@ def test_bad_nodal_results(path, tmp_path):
     good = {"node": [1, 2], "R": [0.0, 1.0], "Z": [0.0, 0.0], "u_r": [0.0, 0.0], "u_z": [0.0, 0.0]}
     for change, arguments, message in (
             ({"node": [1, 99]}, {"mesh": tmp_path / "mesh.txt"}, "node 99 is not in the mesh file"),
+            ({"node": [1, 1.5]}, {}, "must be whole numbers"),
             ({"R": [0.0, 3.0]}, {}, r"point \(R, Z\) = \(3, 0\) is not in the mesh"),
             ({}, {"columns": {"u_r": "U1"}}, "column 'U1' is not known"),
             ({}, {"columns": {"x": "U1"}}, "column 'x' is not known; known: 'node', 'R'"),

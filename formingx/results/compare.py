@@ -8,11 +8,13 @@ from itertools import zip_longest
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from ..errors import InputError, known
 from . import files, plots, tables
 
 _SAMPLES, _FINE = 2000, 33         # of a curve; and of the two pieces that meet at a sample
+_MOST = 10_000                     # points of theirs: each is measured against every sample
 
 
 @dataclass(frozen=True)
@@ -100,12 +102,12 @@ class Comparison:
         right.legend(frameon=False)
         return figure
 
-    def to_csv(self, file: Any, comm: Any = None) -> None:
+    def to_csv(self, file: Any, comm: Any = MPI.COMM_WORLD) -> None:
         """One row per compared point: both values and the difference of every column (rank 0 of `comm` writes)."""
         header = [f"{c}_{side}" for c in self.columns for side in ("theirs", "ours", "difference")]
         theirs = self.theirs[self.pairs[0]]
         rows = np.stack([theirs, self.pairs[1], theirs - self.pairs[1]], 2).reshape(len(theirs), -1)
-        files.write_rows(file, header, rows.tolist(), comm or _Alone())
+        files.write_rows(file, header, rows.tolist(), comm)
 
 
 def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str] | None = None,
@@ -126,8 +128,8 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
             states theirs ("m", "cm", "mm", "in", "Pa", "MPa", "bar", "psi", "kg/cm2", "cm3", ...).
 
     Raises:
-        InputError: a file that cannot be read, an unknown column or unit, a column that does not vary, or no point in
-            common.
+        InputError: a file that cannot be read, an unknown column or unit, a column that does not vary, rows that run
+            backwards, or no point in common.
     """
     left, right = _table("ours", ours), _table("theirs", theirs)
     pairs = _columns(left, right, columns)
@@ -161,10 +163,6 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
 
 def _percent(share: float) -> str:
     return f"{f'{100 * share:.2g} %':>10}"
-
-
-class _Alone:
-    rank = 0
 
 
 def _table(side: str, given: Any) -> tables.Table:
@@ -236,12 +234,22 @@ class _Smooth:
         return feet[j], bool(past > max(across, 1e-9))
 
 
+def _costs(points: np.ndarray, line: np.ndarray) -> np.ndarray:
+    """Least sum of squared distances up to point i whose partner is sample j, shape (points, samples)."""
+    cost = np.stack([((line - p) ** 2).sum(1) for p in points])
+    for i in range(1, len(points)):
+        cost[i] += np.minimum.accumulate(cost[i - 1])
+    return cost
+
+
 def _pair(points: np.ndarray, curve: _Smooth) -> tuple[np.ndarray, np.ndarray]:
     """(indices of the points that have a partner, their partners on the curve); both run forward."""
     n, line = len(points), curve.line
-    cost = np.stack([((line - p) ** 2).sum(1) for p in points])
-    for i in range(1, n):                                           # least sum up to point i, its partner at j
-        cost[i] += np.minimum.accumulate(cost[i - 1])
+    if n > _MOST:
+        raise InputError(f"compare: theirs has {n} points; at most {_MOST} can be compared: thin it out")
+    cost = _costs(points, line)
+    if 100 * _costs(points[::-1], line)[-1].min() < cost[-1].min():
+        raise InputError("compare: theirs runs along our curve backwards: put its rows in order along the path")
     at, partners, kept = len(line) - 1, np.empty_like(points), []
     for i in range(n - 1, -1, -1):
         at = int(np.argmin(cost[i, :at + 1]))

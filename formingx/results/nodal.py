@@ -109,13 +109,18 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
 
     def take(name: str) -> np.ndarray:
         return table.take(names.get(name, name), units.get(name))
+    def take_nodes() -> np.ndarray:
+        numbers = take("node")
+        if np.any(numbers != np.round(numbers)):
+            raise InputError(f"{table.name}: column {names.get('node', 'node')!r}: node numbers must be whole numbers")
+        return numbers.astype(int)
     if mesh is None:
         points = np.column_stack([take("R"), take("Z")])
         numbered = names.get("node", "node") in table.columns
-        nodes = take("node").astype(int) if numbered else np.arange(1, len(points) + 1)
+        nodes = take_nodes() if numbered else np.arange(1, len(points) + 1)
     else:
         plain = grid.read(mesh)
-        nodes = take("node").astype(int)
+        nodes = take_nodes()
         at = {int(n): k for k, n in enumerate(plain.numbers)}
         for node in nodes.tolist():
             if node not in at:
