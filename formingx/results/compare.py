@@ -43,7 +43,8 @@ class Comparison:
         line: our curve as compared, shape (m, columns).
         pairs: the points of `theirs` that were compared (indices), and their partners on our curve, shape (k, columns).
         differences: {column: `Difference`}.
-        limit_points: ours and theirs, each a list of {column: value}.
+        limit_points: ours and theirs, each a list of {column: value}: those that a run located, else those of the
+            parabola through the three points where the control (pressure or travel; else the first column) turns.
         resolution: how much each side's curve changes, as a share of the ranges, if every other point is left out: a
             difference below a tenth of that may come from drawing curves through points (a `Path` knows its tangents
             too: its curve is better than this says).
@@ -156,8 +157,8 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     return Comparison(names, a, b, line, (matched, partners),
                       {n: _difference(b[matched, k] - partners[:, k], scale[k], partners / scale)
                        for k, n in enumerate(names)},
-                      (_limit_points(left, a, line, names, control),
-                       _limit_points(right, b, _Smooth(b / scale).line * scale, names, control)),
+                      (_limit_points(left, a, names, control),
+                       _limit_points(right, b, names, control)),
                       (_resolution(a / scale), _resolution(b / scale)))
 
 
@@ -270,21 +271,24 @@ def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Differ
                       float(np.sqrt(np.average(values**2, weights=weights))))
 
 
-def _limit_points(table: tables.Table, points: np.ndarray, line: np.ndarray, names: list[str],
-                  control: str) -> list[dict[str, float]]:
-    """Those that the table marks; else where the control turns on the line through the points."""
+def _limit_points(table: tables.Table, points: np.ndarray, names: list[str], control: str) -> list[dict[str, float]]:
+    """Those that the table marks; else where the control turns, on the parabola (by arc length) of three points."""
     if table.kinds is not None and "start" in table.kinds:
         return [dict(zip(names, p.tolist())) for p, kind in zip(points, table.kinds) if kind == "limit point"]
     from scipy.signal import find_peaks
-    y = line[:, names.index(control)]
+    column = names.index(control)
+    y, scaled = points[:, column], points / _ranges(points)
     found = []
-    for sign in (1, -1):                                            # noise below half a percent is no limit point
-        for k in find_peaks(sign * y, prominence=5e-3 * np.ptp(y))[0]:
-            below, above = y[k] - y[k - 1], y[k] - y[k + 1]         # the parabola through three samples
-            t = (below - above) / (2 * (below + above)) if below + above else 0.0
-            first, second = (line[k + 1] - line[k - 1]) / 2, line[k + 1] - 2 * line[k] + line[k - 1]
-            found.append((k, line[k] + t * first + t**2 / 2 * second))
-    return [dict(zip(names, point.tolist())) for _, point in sorted(found, key=lambda pair: pair[0])]
+    # noise below half a percent is no limit point
+    for k in np.sort(np.concatenate([find_peaks(sign * y, prominence=5e-3 * np.ptp(y))[0] for sign in (1, -1)])):
+        s = _arc_length(scaled[k - 1:k + 2]) if np.ptp(y[k - 1:k + 2]) > 0 else np.zeros(3)
+        if not (s[0] < s[1] < s[2]):
+            found.append(points[k])
+            continue
+        parabolas = np.polyfit(s - s[1], points[k - 1:k + 2], 2)
+        at = -parabolas[1, column] / (2 * parabolas[0, column])
+        found.append(parabolas[0] * at**2 + parabolas[1] * at + parabolas[2])
+    return [dict(zip(names, point.tolist())) for point in found]
 
 
 def _resolution(points: np.ndarray) -> float:
