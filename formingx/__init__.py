@@ -14,6 +14,7 @@ from .results.measures import displacement, enclosed_volume, pole_height, pole_s
 from .results.nodal import NodalComparison, compare_nodes, write_nodes
 from .results.path import Path, State
 from .results.profile import Profile
+from .results.stress import Stress, StressField
 from .scene import Scene
 from .solve.bordered import Tolerances
 from .solve.continuation import trace

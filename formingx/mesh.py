@@ -71,45 +71,78 @@ def disc(*, radius: float, thickness: float | Mapping[str, float], elements: tup
     grading = positive("disc: grading", grading)
     if not 0 <= inner_radius < radius:
         raise InputError(f"disc: inner_radius = {inner_radius!r}: must be at least 0 and below radius = {radius!r}")
-    layers = dict(thickness) if isinstance(thickness, Mapping) else {"sheet": thickness}
+    sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
+    return _layered("disc", (inner_radius, radius), 0.0, thickness, elements, grading, sides, comm)
+
+
+def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], elements: tuple = (16, 8),
+           grading: float = 1.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
+    """The upper half of a hollow sphere about the origin of the (R, Z) plane: a quarter of an annulus.
+
+    Boundaries: `axis` (R = 0), `equator` (Z = 0), `inner`, `outer`. All nodes, those on edges too, lie where polar
+    coordinates put them: second-order geometry.
+
+    Args:
+        inner_radius: length.
+        thickness: a length (one layer, called `wall`), or {layer name: its thickness} from the inside out.
+        elements: (from the axis to the equator, through each layer), as in `disc`.
+        grading: size of the last element at the equator over that of the first at the axis.
+
+    Raises:
+        InputError: as in `disc`.
+    """
+    inner_radius = positive("sphere: inner_radius", inner_radius)
+    mesh = _layered("sphere", (0.0, np.pi / 2), inner_radius, thickness, elements, positive("sphere: grading", grading),
+                    ("axis", "equator", "inner", "outer"), comm, layer="wall")
+    x = mesh.domain.geometry.x
+    angle, radius = x[:, 0].copy(), x[:, 1].copy()
+    x[:, 0], x[:, 1] = radius * np.sin(angle), radius * np.sin(np.pi / 2 - angle)
+    return mesh
+
+
+def _layered(kind: str, ends: tuple, bottom: float, thickness: float | Mapping[str, float], elements: tuple,
+             grading: float, sides: tuple, comm: MPI.Comm, layer: str = "sheet") -> Mesh:
+    """Layers of triangles over the interval `ends`, from `bottom` up; `sides` names left, right, bottom and top."""
+    layers = dict(thickness) if isinstance(thickness, Mapping) else {layer: thickness}
     if not layers:
-        raise InputError("disc: thickness = {}: must name at least one layer")
-    heights = [positive(f"disc: thickness of {name!r}", h) for name, h in layers.items()]
+        raise InputError(f"{kind}: thickness = {{}}: must name at least one layer")
+    heights = [positive(f"{kind}: thickness of {name!r}", h) for name, h in layers.items()]
     if not (hasattr(elements, "__len__") and len(elements) == 2):
-        raise InputError(f"disc: elements = {elements!r}: must be (along the radius, through each layer)")
-    along = count("disc: elements along the radius", elements[0])
+        raise InputError(f"{kind}: elements = {elements!r}: must be (along the {_ALONG[kind]}, through each layer)")
+    along = count(f"{kind}: elements along the {_ALONG[kind]}", elements[0])
     through = elements[1] if hasattr(elements[1], "__len__") else [elements[1]] * len(layers)
     if len(through) != len(layers):
-        raise InputError(f"disc: elements through the layers = {through!r}: {len(layers)} layers need as many counts")
-    through = [count("disc: elements through a layer", n) for n in through]
+        raise InputError(f"{kind}: elements through the layers = {through!r}: {len(layers)} layers need as many counts")
+    through = [count(f"{kind}: elements through a layer", n) for n in through]
     ratio = grading ** (1 / (along - 1)) if along > 1 else 1.0
 
     def build(model):
         geo = model.geo
-        levels = np.concatenate([[0.0], np.cumsum(heights)])
-        points = [[geo.addPoint(r, z, 0) for r in (inner_radius, radius)] for z in levels]
+        levels = np.concatenate([[bottom], bottom + np.cumsum(heights)])
+        points = [[geo.addPoint(r, z, 0) for r in ends] for z in levels]
         across = [geo.addLine(*p) for p in points]
-        inner = [geo.addLine(a[0], b[0]) for a, b in zip(points, points[1:])]
-        outer = [geo.addLine(a[1], b[1]) for a, b in zip(points, points[1:])]
+        left = [geo.addLine(a[0], b[0]) for a, b in zip(points, points[1:])]
+        right = [geo.addLine(a[1], b[1]) for a, b in zip(points, points[1:])]
         for line in across:
             geo.mesh.setTransfiniteCurve(line, along + 1, "Progression", ratio)
         faces = []
         for k, n in enumerate(through):
-            for line in (inner[k], outer[k]):
+            for line in (left[k], right[k]):
                 geo.mesh.setTransfiniteCurve(line, n + 1)
-            faces.append(geo.addPlaneSurface([geo.addCurveLoop([across[k], outer[k], -across[k + 1], -inner[k]])]))
+            faces.append(geo.addPlaneSurface([geo.addCurveLoop([across[k], right[k], -across[k + 1], -left[k]])]))
             geo.mesh.setTransfiniteSurface(faces[-1], "AlternateLeft")
         geo.synchronize()
         for name, face in zip(layers, faces):
             model.addPhysicalGroup(2, [face], name=name)
-        boundaries = {"axis" if inner_radius == 0 else "inner": inner, "rim": outer, "bottom": across[:1],
-                      "top": across[-1:]}
-        for name, lines in boundaries.items():
+        for name, lines in zip(sides, (left, right, across[:1], across[-1:])):
             model.addPhysicalGroup(1, lines, name=name)
         model.mesh.generate(2)
         model.mesh.setOrder(2)
 
     return _from_gmsh(build, comm)
+
+
+_ALONG = {"disc": "radius", "sphere": "meridian"}
 
 
 def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:

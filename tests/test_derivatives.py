@@ -32,7 +32,7 @@ def random_state(problem, seed=1, size=0.004):
     rng = np.random.default_rng(seed)
     x, d = problem.x.duplicate(), problem.x.duplicate()
     x.setArray(size * rng.standard_normal(x.getLocalSize()))
-    d.setArray(0.01 * rng.standard_normal(x.getLocalSize()))
+    d.setArray(0.03 * rng.standard_normal(x.getLocalSize()))
     for v in (x, d):
         v.array_w[problem._held] = 0
     return x, d

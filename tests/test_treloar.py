@@ -137,10 +137,11 @@ def test_layers_of_one_material_are_one_body():
 
 
 def test_pressure_jumps_between_layers():
-    """Layers of different material have pressure fields of their own; three layers need only two."""
+    """Continuous pressures: layers of different material have fields of their own; three layers need only two."""
     mesh = fx.mesh.disc(radius=1.0, thickness={"a": 0.1, "b": 0.1, "c": 0.1}, elements=(6, 1))
-    soft, hard = fx.NeoHookean(c10=1.0), fx.NeoHookean(c10=100.0)
+    soft, hard = fx.NeoHookean(c10=1.0), fx.NeoHookean(c10=20.0)
     scene = fx.Scene(mesh=mesh, materials={"a": soft, "b": hard, "c": soft}, loads=[fx.Pressure("bottom")],
+                     model=fx.MixedPressure(space="P1"),
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
     path = fx.trace(scene, until=fx.pole_height(0.5))
     assert path.problem.forms.space.num_sub_spaces == 3
