@@ -81,7 +81,7 @@ def follow(body, held, row, heights, tolerance=1e-11):
 def _newton(body, free, row, height, u, q, tolerance):
     u, n = u.copy(), len(free)
     for _ in range(12):
-        with np.errstate(invalid="ignore", over="ignore"):          # a wild guess: refused below
+        with np.errstate(all="ignore"):          # a wild guess: refused below
             F, K, p = body.residual(u, q)
         if not np.isfinite(K).all():
             return None
