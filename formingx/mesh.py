@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from . import _compat
+from . import _compat, grid
 from .errors import InputError, count, known, positive
 
 
@@ -154,7 +154,10 @@ _ALONG = {"disc": "radius", "sphere": "meridian"}
 
 
 def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """A mesh of triangles from a gmsh file whose physical groups name the layers (2-D) and the boundaries (1-D).
+    """A mesh of triangles from a file.
+
+    A gmsh file: physical groups name the layers (2-D) and the boundaries (1-D). A name that ends in .txt: the text
+    format of `formingx.grid`.
 
     Raises:
         InputError: the file is not there, cannot be read, or has no named 2-D group.
@@ -165,6 +168,9 @@ def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
         import gmsh
         if not os.path.isfile(file):
             raise InputError(f"mesh file {file!r} is not there")
+        if _is_text(file):
+            _fill(model, grid.read(file))
+            return
         try:
             gmsh.merge(file)
         except Exception as error:
@@ -175,38 +181,73 @@ def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     return _from_gmsh(build, comm)
 
 
-def write(mesh: Mesh, file: str | os.PathLike, shift: tuple[float, float] = (0.0, 0.0)) -> None:
-    """Write a mesh with its names as a gmsh file (MSH 2.2, text), for `read` and for other solvers.
+def write(mesh: Mesh, file: str | os.PathLike, shift: tuple[float, float] = (0.0, 0.0),
+          numbering: str = "corners") -> None:
+    """Write a mesh with its names as a file for `read` and for other solvers.
 
-    Serial only. Nodes are numbered as in the mesh; `shift` is added to their coordinates.
+    A name that ends in .txt: the text format of `formingx.grid`, with its `numbering` ("corners" or "around"). Else a
+    gmsh file (MSH 2.2, text). Serial only. Nodes are numbered as in the mesh; `shift` is added to their coordinates.
     """
+    plain = to_grid(mesh)
+    plain = plain._replace(points=plain.points + np.array(shift))
+    if _is_text(file):
+        grid.write(plain, file, numbering)
+        return
+    if numbering != "corners":
+        raise InputError(f"mesh.write: numbering = {numbering!r}: gmsh files have their own, 'corners'; the text format"
+                         f" (.txt) has a choice")
     import gmsh
+    with _gmsh_model(mesh.domain.comm) as model:
+        _fill(model, plain, mesh.layers | mesh.boundaries)
+        gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
+        gmsh.write(os.fspath(file))
+
+
+def to_grid(mesh: Mesh) -> grid.Grid:
+    """The mesh as plain arrays (serial only); node i of the mesh has the number i + 1."""
     from dolfinx.mesh import entities_to_geometry
     domain = mesh.domain
     if domain.comm.size > 1:
-        raise InputError("mesh.write: works on one rank")
+        raise InputError("the nodes of a mesh are numbered and written on one rank only: run this on one")
     domain.topology.create_connectivity(1, 2)
-    geometry = domain.geometry
-    triangles = np.asarray(geometry.dofmap)
-    order = 2 if triangles.shape[1] == 6 else 1
-    # gmsh's second-order triangle has its mid-edge nodes on edges 01, 12, 20; DOLFINx numbers the opposite corner
-    triangles = triangles[:, [0, 1, 2, 5, 3, 4]] if order == 2 else triangles
-    with _gmsh_model(domain.comm) as model:
-        nodes = geometry.x + np.array([*shift, 0.0])
-        model.addDiscreteEntity(2, 1)
-        model.mesh.addNodes(2, 1, np.arange(1, len(nodes) + 1), nodes.ravel())
-        kinds = ((2, mesh.layers, mesh.cells, 9 if order == 2 else 2, lambda e: triangles[e]),
-                 (1, mesh.boundaries, mesh.facets, 8 if order == 2 else 1,
-                  lambda e: entities_to_geometry(domain, 1, e)))
-        for dim, names, tags, kind, corners in kinds:
-            for name, tag in names.items():
-                entity = model.addDiscreteEntity(dim, tag + 100)
-                entities = tags.find(tag)
-                if len(entities):
-                    model.mesh.addElementsByType(entity, kind, [], (corners(entities) + 1).ravel())
-                model.addPhysicalGroup(dim, [entity], tag, name)
-        gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
-        gmsh.write(os.fspath(file))
+    points = domain.geometry.x[:, :2].copy()
+    triangles = np.asarray(domain.geometry.dofmap)
+    # DOLFINx numbers a mid-edge node like the opposite corner; here edges are 01, 12, 20
+    triangles = grid.counter_clockwise(points, triangles[:, [0, 1, 2, 5, 3, 4][: triangles.shape[1]]])
+    corners = ((0, 1, 3), (1, 2, 4), (2, 0, 5))
+    edges = {frozenset(row[[i, j]].tolist()): row[[n for n in (i, j, k) if n < len(row)]]
+             for row in triangles for i, j, k in corners}
+    layers = {name: triangles[mesh.cells.find(tag)] for name, tag in mesh.layers.items()}
+    boundaries = {}
+    for name in mesh.boundaries:
+        ends = entities_to_geometry(domain, 1, mesh.facets_of(name))[:, :2]
+        rows = [edges[frozenset(pair)] for pair in ends.tolist()]
+        boundaries[name] = np.array(rows, dtype=np.int64).reshape(len(rows), triangles.shape[1] // 2)
+    return grid.Grid(points, np.arange(1, len(points) + 1), layers, boundaries)
+
+
+def _is_text(file: str | os.PathLike) -> bool:
+    return os.fspath(file).lower().endswith(".txt")
+
+
+def _fill(model: Any, plain: grid.Grid, tags: Mapping[str, int] | None = None) -> None:
+    """Put a grid into an empty gmsh model; `tags` of the named parts (default: counted)."""
+    names = [(2, name, rows) for name, rows in plain.layers.items()]
+    names += [(1, name, rows) for name, rows in plain.boundaries.items()]
+    # gmsh's readers want 1, 2, 3, ... and no node that belongs to nothing
+    used = np.unique(np.concatenate([rows.ravel() for rows in plain.layers.values()]))
+    number = np.zeros(len(plain.points), dtype=np.int64)
+    number[used] = np.arange(1, len(used) + 1)
+    nodes = np.column_stack([plain.points[used], np.zeros(len(used))])
+    kinds = {(2, 6): 9, (2, 3): 2, (1, 3): 8, (1, 2): 1}
+    model.addDiscreteEntity(2, 1)
+    model.mesh.addNodes(2, 1, np.arange(1, len(used) + 1), nodes.ravel())
+    for k, (dim, name, rows) in enumerate(names, 1):
+        tag = tags[name] if tags else k
+        entity = model.addDiscreteEntity(dim, tag + 100)
+        if len(rows):
+            model.mesh.addElementsByType(entity, kinds[dim, rows.shape[1]], [], number[rows].ravel())
+        model.addPhysicalGroup(dim, [entity], tag, name)
 
 
 def _from_gmsh(build: Any, comm: MPI.Comm) -> Mesh:
