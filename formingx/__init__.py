@@ -12,9 +12,12 @@ from .physics.loads import Pressure
 from .physics.materials import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Symmetry
 from .physics.tools import Tool
+from .results.compare import Comparison, compare
 from .results.measures import displacement, enclosed_volume, pole_height, pole_stretch, pressure, travel
+from .results.nodal import NodalComparison, compare_nodes, write_nodes
 from .results.path import Path, State
 from .results.profile import Profile
+from .results.stress import Stress, StressField
 from .scene import Scene
 from .solve.bordered import Tolerances
 from .solve.continuation import trace

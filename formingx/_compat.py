@@ -31,7 +31,7 @@ def coordinate_map(mesh: Any) -> Any:
     return geometry.cmaps[0] if hasattr(geometry, "cmaps") else geometry.cmap
 
 
-def tree_of_cells(mesh: Any, padding: float) -> Any:
-    """Bounding boxes of the owned and ghost cells."""
+def tree_of_cells(mesh: Any, padding: float, cells: Any) -> Any:
+    """Bounding boxes of cells (local numbers)."""
     from dolfinx import geometry
-    return geometry.bb_tree(mesh, mesh.topology.dim, padding=padding)
+    return geometry.bb_tree(mesh, mesh.topology.dim, entities=cells, padding=padding)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from . import _compat
-from .errors import InputError, count, positive
+from . import _compat, grid
+from .errors import InputError, count, known, positive
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,13 @@ class Mesh:
         return points[np.lexsort((points[:, 1], points[:, 0]))]
 
 
-def disc(*, radius: float, thickness: float | Mapping[str, float], elements: tuple = (40, 2),
-         grading: float = 1.0, inner_radius: float = 0.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
+ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
+"""Elements (along the radius, through each layer) of a disc: see the README for the error that each promises."""
+
+
+def disc(*, radius: float, thickness: float | Mapping[str, float], accuracy: str = "standard",
+         elements: tuple | None = None, grading: float = 1.0, inner_radius: float = 0.0,
+         comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     """A flat disc (or ring) in the (R, Z) plane, bottom face on Z = 0.
 
     Boundaries: `axis` (R = inner_radius; called `inner` if that is above 0), `rim`, `bottom`, `top`.
@@ -60,8 +65,9 @@ def disc(*, radius: float, thickness: float | Mapping[str, float], elements: tup
     Args:
         radius, inner_radius: lengths.
         thickness: a length (one layer, called `sheet`), or {layer name: its thickness} from bottom to top.
-        elements: (along the radius, through each layer); the latter may be a tuple, one count per layer. Each
-            rectangle is two triangles.
+        accuracy: "draft", "standard" or "fine": how many elements.
+        elements: (along the radius, through each layer), in place of `accuracy`; the latter may be a tuple, one count
+            per layer. Each rectangle is two triangles.
         grading: size of the last element at the rim over that of the first at the axis.
 
     Raises:
@@ -71,40 +77,72 @@ def disc(*, radius: float, thickness: float | Mapping[str, float], elements: tup
     grading = positive("disc: grading", grading)
     if not 0 <= inner_radius < radius:
         raise InputError(f"disc: inner_radius = {inner_radius!r}: must be at least 0 and below radius = {radius!r}")
-    layers = dict(thickness) if isinstance(thickness, Mapping) else {"sheet": thickness}
+    sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
+    known("disc: accuracy", accuracy, ACCURACY)
+    elements = ACCURACY[accuracy] if elements is None else elements
+    return _layered("disc", (inner_radius, radius), 0.0, thickness, elements, grading, sides, comm)
+
+
+def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], elements: tuple = (16, 8),
+           grading: float = 1.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
+    """The upper half of a hollow sphere about the origin of the (R, Z) plane: a quarter of an annulus.
+
+    Boundaries: `axis` (R = 0), `equator` (Z = 0), `inner`, `outer`. All nodes, those on edges too, lie where polar
+    coordinates put them: second-order geometry.
+
+    Args:
+        inner_radius: length.
+        thickness: a length (one layer, called `wall`), or {layer name: its thickness} from the inside out.
+        elements: (from the axis to the equator, through each layer), as in `disc`.
+        grading: size of the last element at the equator over that of the first at the axis.
+
+    Raises:
+        InputError: as in `disc`.
+    """
+    inner_radius = positive("sphere: inner_radius", inner_radius)
+    mesh = _layered("sphere", (0.0, np.pi / 2), inner_radius, thickness, elements, positive("sphere: grading", grading),
+                    ("axis", "equator", "inner", "outer"), comm, layer="wall")
+    x = mesh.domain.geometry.x
+    angle, radius = x[:, 0].copy(), x[:, 1].copy()
+    x[:, 0], x[:, 1] = radius * np.sin(angle), radius * np.sin(np.pi / 2 - angle)
+    return mesh
+
+
+def _layered(kind: str, ends: tuple, bottom: float, thickness: float | Mapping[str, float], elements: tuple,
+             grading: float, sides: tuple, comm: MPI.Comm, layer: str = "sheet") -> Mesh:
+    """Layers of triangles over the interval `ends`, from `bottom` up; `sides` names left, right, bottom and top."""
+    layers = dict(thickness) if isinstance(thickness, Mapping) else {layer: thickness}
     if not layers:
-        raise InputError("disc: thickness = {}: must name at least one layer")
-    heights = [positive(f"disc: thickness of {name!r}", h) for name, h in layers.items()]
+        raise InputError(f"{kind}: thickness = {{}}: must name at least one layer")
+    heights = [positive(f"{kind}: thickness of {name!r}", h) for name, h in layers.items()]
     if not (hasattr(elements, "__len__") and len(elements) == 2):
-        raise InputError(f"disc: elements = {elements!r}: must be (along the radius, through each layer)")
-    along = count("disc: elements along the radius", elements[0])
+        raise InputError(f"{kind}: elements = {elements!r}: must be (along the {_ALONG[kind]}, through each layer)")
+    along = count(f"{kind}: elements along the {_ALONG[kind]}", elements[0])
     through = elements[1] if hasattr(elements[1], "__len__") else [elements[1]] * len(layers)
     if len(through) != len(layers):
-        raise InputError(f"disc: elements through the layers = {through!r}: {len(layers)} layers need as many counts")
-    through = [count("disc: elements through a layer", n) for n in through]
+        raise InputError(f"{kind}: elements through the layers = {through!r}: {len(layers)} layers need as many counts")
+    through = [count(f"{kind}: elements through a layer", n) for n in through]
     ratio = grading ** (1 / (along - 1)) if along > 1 else 1.0
 
     def build(model):
         geo = model.geo
-        levels = np.concatenate([[0.0], np.cumsum(heights)])
-        points = [[geo.addPoint(r, z, 0) for r in (inner_radius, radius)] for z in levels]
+        levels = np.concatenate([[bottom], bottom + np.cumsum(heights)])
+        points = [[geo.addPoint(r, z, 0) for r in ends] for z in levels]
         across = [geo.addLine(*p) for p in points]
-        inner = [geo.addLine(a[0], b[0]) for a, b in zip(points, points[1:])]
-        outer = [geo.addLine(a[1], b[1]) for a, b in zip(points, points[1:])]
+        left = [geo.addLine(a[0], b[0]) for a, b in zip(points, points[1:])]
+        right = [geo.addLine(a[1], b[1]) for a, b in zip(points, points[1:])]
         for line in across:
             geo.mesh.setTransfiniteCurve(line, along + 1, "Progression", ratio)
         faces = []
         for k, n in enumerate(through):
-            for line in (inner[k], outer[k]):
+            for line in (left[k], right[k]):
                 geo.mesh.setTransfiniteCurve(line, n + 1)
-            faces.append(geo.addPlaneSurface([geo.addCurveLoop([across[k], outer[k], -across[k + 1], -inner[k]])]))
+            faces.append(geo.addPlaneSurface([geo.addCurveLoop([across[k], right[k], -across[k + 1], -left[k]])]))
             geo.mesh.setTransfiniteSurface(faces[-1], "AlternateLeft")
         geo.synchronize()
         for name, face in zip(layers, faces):
             model.addPhysicalGroup(2, [face], name=name)
-        boundaries = {"axis" if inner_radius == 0 else "inner": inner, "rim": outer, "bottom": across[:1],
-                      "top": across[-1:]}
-        for name, lines in boundaries.items():
+        for name, lines in zip(sides, (left, right, across[:1], across[-1:])):
             model.addPhysicalGroup(1, lines, name=name)
         model.mesh.generate(2)
         model.mesh.setOrder(2)
@@ -112,8 +150,14 @@ def disc(*, radius: float, thickness: float | Mapping[str, float], elements: tup
     return _from_gmsh(build, comm)
 
 
+_ALONG = {"disc": "radius", "sphere": "meridian"}
+
+
 def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """A mesh of triangles from a gmsh file whose physical groups name the layers (2-D) and the boundaries (1-D).
+    """A mesh of triangles from a file.
+
+    A gmsh file: physical groups name the layers (2-D) and the boundaries (1-D). A name that ends in .txt: the text
+    format of `formingx.grid`.
 
     Raises:
         InputError: the file is not there, cannot be read, or has no named 2-D group.
@@ -124,6 +168,9 @@ def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
         import gmsh
         if not os.path.isfile(file):
             raise InputError(f"mesh file {file!r} is not there")
+        if _is_text(file):
+            _fill(model, grid.read(file))
+            return
         try:
             gmsh.merge(file)
         except Exception as error:
@@ -134,38 +181,73 @@ def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     return _from_gmsh(build, comm)
 
 
-def write(mesh: Mesh, file: str | os.PathLike, shift: tuple[float, float] = (0.0, 0.0)) -> None:
-    """Write a mesh with its names as a gmsh file (MSH 2.2, text), for `read` and for other solvers.
+def write(mesh: Mesh, file: str | os.PathLike, shift: tuple[float, float] = (0.0, 0.0),
+          numbering: str = "corners") -> None:
+    """Write a mesh with its names as a file for `read` and for other solvers.
 
-    Serial only. Nodes are numbered as in the mesh; `shift` is added to their coordinates.
+    A name that ends in .txt: the text format of `formingx.grid`, with its `numbering` ("corners" or "around"). Else a
+    gmsh file (MSH 2.2, text). Serial only. Nodes are numbered as in the mesh; `shift` is added to their coordinates.
     """
+    plain = to_grid(mesh)
+    plain = plain._replace(points=plain.points + np.array(shift))
+    if _is_text(file):
+        grid.write(plain, file, numbering)
+        return
+    if numbering != "corners":
+        raise InputError(f"mesh.write: numbering = {numbering!r}: gmsh files have their own, 'corners'; the text format"
+                         f" (.txt) has a choice")
     import gmsh
+    with _gmsh_model(mesh.domain.comm) as model:
+        _fill(model, plain, mesh.layers | mesh.boundaries)
+        gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
+        gmsh.write(os.fspath(file))
+
+
+def to_grid(mesh: Mesh) -> grid.Grid:
+    """The mesh as plain arrays (serial only); node i of the mesh has the number i + 1."""
     from dolfinx.mesh import entities_to_geometry
     domain = mesh.domain
     if domain.comm.size > 1:
-        raise InputError("mesh.write: works on one rank")
+        raise InputError("the nodes of a mesh are numbered and written on one rank only: run this on one")
     domain.topology.create_connectivity(1, 2)
-    geometry = domain.geometry
-    triangles = np.asarray(geometry.dofmap)
-    order = 2 if triangles.shape[1] == 6 else 1
-    # gmsh's second-order triangle has its mid-edge nodes on edges 01, 12, 20; DOLFINx numbers the opposite corner
-    triangles = triangles[:, [0, 1, 2, 5, 3, 4]] if order == 2 else triangles
-    with _gmsh_model(domain.comm) as model:
-        nodes = geometry.x + np.array([*shift, 0.0])
-        model.addDiscreteEntity(2, 1)
-        model.mesh.addNodes(2, 1, np.arange(1, len(nodes) + 1), nodes.ravel())
-        kinds = ((2, mesh.layers, mesh.cells, 9 if order == 2 else 2, lambda e: triangles[e]),
-                 (1, mesh.boundaries, mesh.facets, 8 if order == 2 else 1,
-                  lambda e: entities_to_geometry(domain, 1, e)))
-        for dim, names, tags, kind, corners in kinds:
-            for name, tag in names.items():
-                entity = model.addDiscreteEntity(dim, tag + 100)
-                entities = tags.find(tag)
-                if len(entities):
-                    model.mesh.addElementsByType(entity, kind, [], (corners(entities) + 1).ravel())
-                model.addPhysicalGroup(dim, [entity], tag, name)
-        gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
-        gmsh.write(os.fspath(file))
+    points = domain.geometry.x[:, :2].copy()
+    triangles = np.asarray(domain.geometry.dofmap)
+    # DOLFINx numbers a mid-edge node like the opposite corner; here edges are 01, 12, 20
+    triangles = grid.counter_clockwise(points, triangles[:, [0, 1, 2, 5, 3, 4][: triangles.shape[1]]])
+    corners = ((0, 1, 3), (1, 2, 4), (2, 0, 5))
+    edges = {frozenset(row[[i, j]].tolist()): row[[n for n in (i, j, k) if n < len(row)]]
+             for row in triangles for i, j, k in corners}
+    layers = {name: triangles[mesh.cells.find(tag)] for name, tag in mesh.layers.items()}
+    boundaries = {}
+    for name in mesh.boundaries:
+        ends = entities_to_geometry(domain, 1, mesh.facets_of(name))[:, :2]
+        rows = [edges[frozenset(pair)] for pair in ends.tolist()]
+        boundaries[name] = np.array(rows, dtype=np.int64).reshape(len(rows), triangles.shape[1] // 2)
+    return grid.Grid(points, np.arange(1, len(points) + 1), layers, boundaries)
+
+
+def _is_text(file: str | os.PathLike) -> bool:
+    return os.fspath(file).lower().endswith(".txt")
+
+
+def _fill(model: Any, plain: grid.Grid, tags: Mapping[str, int] | None = None) -> None:
+    """Put a grid into an empty gmsh model; `tags` of the named parts (default: counted)."""
+    names = [(2, name, rows) for name, rows in plain.layers.items()]
+    names += [(1, name, rows) for name, rows in plain.boundaries.items()]
+    # gmsh's readers want 1, 2, 3, ... and no node that belongs to nothing
+    used = np.unique(np.concatenate([rows.ravel() for rows in plain.layers.values()]))
+    number = np.zeros(len(plain.points), dtype=np.int64)
+    number[used] = np.arange(1, len(used) + 1)
+    nodes = np.column_stack([plain.points[used], np.zeros(len(used))])
+    kinds = {(2, 6): 9, (2, 3): 2, (1, 3): 8, (1, 2): 1}
+    model.addDiscreteEntity(2, 1)
+    model.mesh.addNodes(2, 1, np.arange(1, len(used) + 1), nodes.ravel())
+    for k, (dim, name, rows) in enumerate(names, 1):
+        tag = tags[name] if tags else k
+        entity = model.addDiscreteEntity(dim, tag + 100)
+        if len(rows):
+            model.mesh.addElementsByType(entity, kinds[dim, rows.shape[1]], [], number[rows].ravel())
+        model.addPhysicalGroup(dim, [entity], tag, name)
 
 
 def _from_gmsh(build: Any, comm: MPI.Comm) -> Mesh:

@@ -1,18 +1,24 @@
-"""Membrane theory of free inflation, to compare with: Adkins & Rivlin, Phil. Trans. R. Soc. A 244 (1952) 505-531.
+"""Exact solutions to compare with: membrane theory of free inflation; the thick tube and the thick sphere.
 
-A flat circular membrane, rim held, under a pressure. With stretches l1 (meridional), l2 = r/R, l3 = 1/(l1 l2) and the
-Mooney energy, tensions per deformed length are T1 = 2 h0 l3 (l1^2 - l3^2)(c10 + c01 l2^2), T2 likewise. Equilibrium:
-d(T1 r)/dr = T2 and T1 dtheta/ds + T2 sin(theta)/r = p, theta the slope of the meridian. Integrated from the pole until
-l2 = 1: only the product p R counts, so no shooting is needed.
+Membrane: Adkins & Rivlin, Phil. Trans. R. Soc. A 244 (1952) 505-531. A flat circular membrane, rim held, under a
+pressure. With stretches l1 (meridional), l2 = r/R, l3 = 1/(l1 l2) and the Mooney energy, tensions per deformed length
+are T1 = 2 h0 l3 (l1^2 - l3^2)(c10 + c01 l2^2), T2 likewise. Equilibrium: d(T1 r)/dr = T2 and
+T1 dtheta/ds + T2 sin(theta)/r = p, theta the slope of the meridian. Integrated from the pole until l2 = 1: only the
+product p R counts, so no shooting is needed.
+
+Thick wall (Green & Adkins, Large Elastic Deformations, 1970; Mooney energy): l = r/R, r^n = R^n + a^n - A^n with n = 2
+(tube in plane strain) or 3 (sphere). Equilibrium, integrated from the free outer face: s_rr = g(l_outer) - g(l), with
+tube: g = 2 (c10 + c01) (ln l - l^-2/2), sphere: g = -c10 (4/l + l^-4) + c01 (4 l - 2 l^-2).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from .errors import InputError, non_negative, positive
+from .errors import InputError, known, non_negative, positive
 
 
 @dataclass(frozen=True)
@@ -92,3 +98,84 @@ def membrane_limit_point(*, radius: float, thickness: float, c10: float,
     found = minimize_scalar(lambda s: -state(s).pressure, bounds=(stretches[i - 1], stretches[i + 1]),
                             method="bounded", options={"xatol": 1e-8})
     return float(found.x), state(found.x)
+
+
+@dataclass(frozen=True)
+class ThickWallState:
+    """A thick tube or sphere inflated to a stretch of its inner face.
+
+    Attributes:
+        pressure: inside, stress.
+        R, r: reference and deformed radii through the wall, shape (n,), length.
+        radial, hoop, third: Cauchy stresses there, shape (n,); third is along the tube, or the sphere's other hoop.
+    """
+
+    pressure: float
+    R: np.ndarray
+    r: np.ndarray
+    radial: np.ndarray
+    hoop: np.ndarray
+    third: np.ndarray
+
+    @property
+    def hydrostatic_pressure(self) -> np.ndarray:
+        """-(s_rr + s_hoop + s_third)/3, shape (n,), stress."""
+        return -(self.radial + self.hoop + self.third) / 3
+
+
+def thick_wall(kind: str, inner_stretch: float, *, inner_radius: float, outer_radius: float, c10: float,
+               c01: float = 0.0, R: Any = None) -> ThickWallState:
+    """The exact state of a thick "tube" (plane strain) or "sphere" whose inner face has the stretch `inner_stretch`.
+
+    Args:
+        inner_radius, outer_radius: A and B, of the unloaded wall, length.
+        c10, c01: Mooney constants, stress.
+        R: reference radii to evaluate at, shape (n,); default: both faces.
+
+    Raises:
+        InputError: a size or constant that is not allowed.
+    """
+    known("thick_wall: kind", kind, ("tube", "sphere"))
+    A, B = positive("inner_radius", inner_radius), positive("outer_radius", outer_radius)
+    if not A < B:
+        raise InputError(f"outer_radius = {outer_radius!r}: must be above inner_radius = {inner_radius!r}")
+    c10, c01 = non_negative("c10", c10), non_negative("c01", c01)
+    n = 2 if kind == "tube" else 3
+    grown = (positive("inner_stretch", inner_stretch) ** n - 1) * A**n
+    R = np.array([A, B]) if R is None else np.asarray(R, dtype=float)
+    r = (R**n + grown) ** (1 / n)
+
+    def g(l):
+        if kind == "tube":
+            return 2 * (c10 + c01) * (np.log(l) - l**-2 / 2)
+        return -c10 * (4 / l + l**-4) + c01 * (4 * l - 2 * l**-2)
+
+    l, outer = r / R, (1 + grown / B**n) ** (1 / n)
+    radial = g(outer) - g(l)
+    if kind == "tube":
+        hoop = radial + 2 * (c10 + c01) * (l**2 - l**-2)
+        third = radial + 2 * c10 * (1 - l**-2) + 2 * c01 * (l**2 - 1)
+    else:
+        hoop = third = radial + 2 * c10 * (l**2 - l**-4) + 2 * c01 * (l**4 - l**-2)
+    return ThickWallState(float(g(inner_stretch) - g(outer)), R, r, radial, hoop, third)
+
+
+def thick_sphere_limit_point(**wall: float) -> tuple[float, ThickWallState] | None:
+    """(inner stretch, state) of the first pressure maximum of a thick sphere below a stretch of 20, or None.
+
+    Args:
+        wall: the sizes and constants of `thick_wall`.
+    """
+    from scipy.optimize import minimize_scalar
+
+    def pressure(stretch):
+        return thick_wall("sphere", stretch, **wall).pressure
+
+    stretches = np.geomspace(1.01, 20, 200)
+    p = [pressure(s) for s in stretches]
+    i = next((i for i in range(1, 199) if p[i - 1] < p[i] > p[i + 1]), None)
+    if i is None:
+        return None
+    found = minimize_scalar(lambda s: -pressure(s), bounds=(stretches[i - 1], stretches[i + 1]), method="bounded",
+                            options={"xatol": 1e-10})
+    return float(found.x), thick_wall("sphere", found.x, **wall)

@@ -1,6 +1,7 @@
 """Writes the coarse grids of the thesis' examples (Song 1993), for comparison with other solvers.
 
-./fx python3 meshes/make.py    six-node triangles, MSH 2.2 text, coordinates (R, Z) in the thesis' units, groups named
+./fx python3 meshes/make.py    six-node triangles, coordinates (R, Z) in the thesis' units, parts named: as gmsh files
+(MSH 2.2, text) and in the text format of formingx.grid, corners first
 """
 
 from pathlib import Path
@@ -17,5 +18,6 @@ GRIDS = {
 
 if __name__ == "__main__":
     for name, size in GRIDS.items():
-        fx.mesh.write(fx.mesh.disc(**size), Path(__file__).parent / f"{name}.msh")
+        for suffix in ("msh", "txt"):
+            fx.mesh.write(fx.mesh.disc(**size), Path(__file__).parent / f"{name}.{suffix}")
         print(f"{name}.msh")

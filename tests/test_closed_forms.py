@@ -48,6 +48,21 @@ def test_unloaded_body_of_the_printed_penalty_is_not_free_of_stress():
     assert path.last.measures["mass_error"] == pytest.approx(-1e-2 * 2.0 / 4.0 / 4, rel=0.02)
 
 
+@pytest.mark.parametrize("space", ["P1dg", "P1"])
+def test_path_starts_in_equilibrium_with_fixed_loads(space):
+    """A fixed pressure on the rim of a disc squeezes it before anything is driven: sigma_r = -p, uniaxial along Z."""
+    mesh = fx.mesh.disc(radius=1.0, thickness=2.0, elements=(3, 3))
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=2.0), model=fx.MixedPressure(space=space),
+                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")],
+                     loads=[fx.Pressure("rim", 1.5), fx.Pressure("top")])
+    path = fx.trace(scene, until=fx.pressure(1.5))
+    start, end = path.states[0], path.last
+    # free along Z: 2 c10 (l^2 - 1/l) = p; then hydrostatic pressure all round: back to rest
+    stretch = 1 + start.measures["pole_height"] / 1.0
+    assert 4.0 * (stretch**2 - 1 / stretch) == pytest.approx(1.5, rel=1e-8) and len(start.history) > 1
+    assert end.measures["pole_height"] == pytest.approx(0.0, abs=1e-8)
+
+
 def tube(elements, material):
     mesh = fx.mesh.disc(radius=2.0, inner_radius=1.0, thickness=0.5, elements=elements)
     return fx.Scene(mesh=mesh, materials=material, loads=[fx.Pressure("inner")],

@@ -5,6 +5,7 @@ import pytest
 from conftest import ROOT, treloar
 
 import formingx as fx
+from formingx.solid import Solid
 
 
 def test_disc_is_named_and_whole():
@@ -19,6 +20,33 @@ def test_grading():
     R = fx.mesh.disc(radius=1.0, thickness=0.1, elements=(6, 1), grading=0.2).nodes_of("bottom")[::2, 0]
     sizes = np.diff(R)
     assert sizes[-1] / sizes[0] == pytest.approx(0.2) and np.all(np.diff(sizes) < 0)
+
+
+def test_sphere_is_curved_to_second_order():
+    """Every node, mid-edge nodes too, on its circle; the volume converges with the fourth power of the size."""
+    errors = []
+    for n in (4, 8):
+        mesh = fx.mesh.sphere(inner_radius=2.0, thickness={"x": 0.5, "y": 1.0}, elements=(n, (1, 2)))
+        assert mesh.domain.geometry.cmap.degree == 2
+        assert set(mesh.layers) == {"x", "y"} and set(mesh.boundaries) == {"axis", "equator", "inner", "outer"}
+        for name, radius in (("inner", 2.0), ("outer", 3.5)):
+            nodes = mesh.nodes_of(name)
+            assert len(nodes) == 2 * n + 1 and np.hypot(*nodes.T) == pytest.approx(radius, rel=1e-14)
+        assert np.allclose(mesh.nodes_of("axis")[:, 0], 0) and np.all(mesh.nodes_of("equator")[:, 1] == 0)
+        scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("inner")],
+                         supports=[fx.Symmetry("axis"), fx.Symmetry("equator", normal="z")])
+        errors.append(abs(Solid(scene).volume / (2 / 3 * np.pi * (3.5**3 - 2.0**3)) - 1))
+    assert errors[1] < 1e-5 and np.log2(errors[0] / errors[1]) > 3.8, errors
+
+
+@pytest.mark.parametrize("wrong, words", [
+    ({"inner_radius": 0.0}, "sphere: inner_radius = 0.0: must be greater than 0"),
+    ({"thickness": {"x": -1}}, "sphere: thickness of 'x' = -1"),
+    ({"elements": (4, (1, 2))}, "sphere: elements through the layers"),
+    ({"elements": 4}, "along the meridian")])
+def test_sphere_refuses(wrong, words):
+    with pytest.raises(fx.InputError, match=words):
+        fx.mesh.sphere(**{"inner_radius": 1.0, "thickness": 0.5, **wrong})
 
 
 def test_file_and_back(tmp_path):

@@ -11,6 +11,7 @@ from ..errors import InputError
 from . import measures
 from .measures import Target
 from .profile import Profile, Profiles
+from .stress import Stresses, StressField
 
 
 @dataclass
@@ -61,7 +62,7 @@ class Path:
     def __init__(self, problem: Any, branch: Any):
         self.problem, self._branch = problem, branch
         self._recorded = measures.standard(problem)
-        self._profiles = Profiles(problem)
+        self._profiles, self._stresses = Profiles(problem), Stresses(problem)
         self.states: list[State] = []
         self.counts = Counts()
 
@@ -146,6 +147,10 @@ class Path:
     def profile(self, state: State | None = None) -> Profile:
         """Deformed outline and thickness of a sheet at a state (default: the last)."""
         return self._profiles.of(state or self.last)
+
+    def stress(self, state: State | None = None) -> StressField:
+        """Stresses and stretches at a state (default: the last), layer by layer."""
+        return self._stresses.of(state or self.last)
 
     def describe(self, state: State) -> str:
         """A state's main numbers in one line."""

@@ -6,12 +6,12 @@ from typing import Any
 
 import basix.ufl
 import numpy as np
-from dolfinx import geometry
 from mpi4py import MPI
 
 from .. import _compat
 from ..errors import InputError
 from ..physics.kinematics import Axisymmetric
+from .locate import locate
 
 
 class Probe:
@@ -27,21 +27,14 @@ class Probe:
 
     def __init__(self, problem: Any, points: Any):
         points = np.atleast_2d(np.asarray(points, dtype=float))
-        forms, comm = problem.forms, problem.comm
-        cells, reference = self._locate(forms, forms.nearest(points))
-        ranks = np.where(cells >= 0, comm.rank, comm.size)
-        owner = np.empty_like(ranks)
-        comm.Allreduce(ranks, owner, MPI.MIN)
-        if np.any(owner == comm.size):
-            r, z = points[np.argmax(owner == comm.size)]
-            raise InputError(f"point (R, Z) = ({r:.6g}, {z:.6g}) is not in the mesh")
+        forms = problem.forms
+        place = locate(forms.domain, forms.nearest(points), forms.length)
         subs = [forms.space.sub(0).sub(i).dofmap for i in (0, 1)]
         self._problem, self.points = problem, points
-        self._mine = mine = np.flatnonzero(owner == comm.rank)
-        self._cells, self._reference = cells[mine], reference[mine]
+        self._mine, self._cells, self._reference = place
         dim = forms.displacement_element.dim
-        self._dofs = np.array([[sub.cell_dofs(c) for sub in subs] for c in cells[mine]],
-                              dtype=np.int64).reshape(len(mine), 2, dim)
+        self._dofs = np.array([[sub.cell_dofs(c) for sub in subs] for c in place.cells],
+                              dtype=np.int64).reshape(len(place.mine), 2, dim)
         self._weights = _basis(forms.displacement_element, 0, self._reference)
 
     def displacement(self, x: Any) -> np.ndarray:
@@ -60,20 +53,6 @@ class Probe:
     def row(self, factors: np.ndarray) -> np.ndarray:
         """c with c . x = sum over points and components of factors (n, 2) times u over length; owned unknowns."""
         return self._row(factors, self._weights)
-
-    def _locate(self, forms: Any, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Owned cell of each point, or -1, shape (n,), and the coordinates in the reference cell, shape (n, tdim)."""
-        domain = forms.domain
-        padded = np.zeros((len(points), 3))
-        padded[:, :2] = points
-        tree = _compat.tree_of_cells(domain, 1e-10 * forms.length)
-        found = geometry.compute_colliding_cells(domain, geometry.compute_collisions_points(tree, padded), padded)
-        owned = domain.topology.index_map(2).size_local
-        cells = np.array([next((c for c in found.links(i) if c < owned), -1) for i in range(len(points))], dtype=int)
-        cmap, X, reference = _compat.coordinate_map(domain), domain.geometry.x, np.zeros((len(points), 2))
-        for i in np.flatnonzero(cells >= 0):
-            reference[i] = cmap.pull_back(padded[i:i + 1], X[domain.geometry.dofmap[cells[i]]])[0]
-        return cells, reference
 
     def _local(self, values: np.ndarray) -> np.ndarray:
         """u over length at this rank's points, shape (m, 2), from the unknowns of their cells, shape (m, 2, dim)."""
@@ -135,25 +114,6 @@ class MidSurfaceProbe(Probe):
             raise InputError(f"point (R, Z) = ({r:.6g}, {z:.6g}) is not on the mid-surface, and a membrane knows no"
                              f" other: there it is ({middle[np.argmax(off)][0]:.6g}, {middle[np.argmax(off)][1]:.6g})")
         return super().row(factors)
-
-    def _locate(self, forms, points):
-        """By R alone, as the mid-surface is a graph over R."""
-        domain = forms.domain
-        nodes = domain.geometry.x[domain.geometry.dofmap, 0]                   # ends first, then the middle
-        owned = domain.topology.index_map(1).size_local
-        cells, reference = np.full(len(points), -1), np.zeros((len(points), 1))
-        near = 1e-10 * forms.length
-        for i, R in enumerate(points[:, 0]):
-            ends = nodes[:owned, :2]
-            hit = np.flatnonzero((ends.min(axis=1) - near <= R) & (ends.max(axis=1) + near >= R))
-            if len(hit):
-                a, b = ends[hit[0]]
-                bulge = 4 * nodes[hit[0], 2] - 2 * (a + b) if nodes.shape[1] > 2 else 0.0
-                xi = (R - a) / (b - a)
-                for _ in range(20):                                            # R = a + (b - a) xi + bulge xi (1 - xi)
-                    xi -= (a + (b - a) * xi + bulge * xi * (1 - xi) - R) / (b - a + bulge * (1 - 2 * xi))
-                cells[i], reference[i] = hit[0], xi
-        return cells, reference
 
     def _local(self, values):
         u, du = super()._local(values), np.einsum("kij,kij->ki", self._slopes, values)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import ConvergenceError
 from ..results.path import State
-from .bordered import BorderedNewton, Failure, Tolerances
+from .bordered import UNLOADED, BorderedNewton, Failure, Tolerances
 
 CONTROL_WEIGHT = 0.1
 """Weight of the squared control against the mean squared displacement in arc length (both dimensionless)."""
@@ -33,13 +33,24 @@ class Branch:
         return float(np.sqrt(self.problem.inner(x, x) + CONTROL_WEIGHT * control**2))
 
     def start(self) -> State:
-        """The unloaded body, with the tangent there."""
-        self.problem.stiff_state(self._x)
-        if not self.newton.tangent(self._x, 0.0):
-            raise ConvergenceError("the unloaded body has a singular tangent: something in it is not held, or has no"
-                                   " stiffness")
+        """The body at control 0, in equilibrium with whatever else acts on it, and the tangent there."""
+        history: list = []
         self._x.set(0)
-        return self._state(0.0, [], "start", None)
+        self.problem.residual(self._x, 0.0, self.newton.F)
+        if self.newton.F.norm() > self.newton.tolerances.residual * (self.problem.force_scale + UNLOADED):
+            try:
+                _, history = self.newton.correct(self._x, 0.0, _no_control)
+            except Failure as failure:
+                raise ConvergenceError(f"no equilibrium was found before anything is driven, under the loads that have a"
+                                       f" fixed value: {failure.reason}; drive the largest of them instead") from None
+            self.iterations += len(history) - 1
+        else:
+            self.problem.stiff_state(self._x)
+            if not self.newton.tangent(self._x, 0.0):
+                raise ConvergenceError("the unloaded body has a singular tangent: something in it is not held, or has no"
+                                       " stiffness")
+            self._x.set(0)
+        return self._state(0.0, history, "start", None)
 
     def solve(self, x: np.ndarray, control: float, constraint: Callable, kind: str, before: State) -> State:
         """The solution of F = 0 and of the constraint, from a guess; raises `Failure`."""
@@ -176,6 +187,12 @@ class Branch:
             weight = CONTROL_WEIGHT * old.slope
             return gradient.dot(self._b) + weight * (control - control0), weight
         return c
+
+
+def _no_control(x: Any, control: float, gradient: Any) -> tuple[float, float]:
+    """The constraint control = 0."""
+    gradient.set(0)
+    return control, 1.0
 
 
 def _stationary(a: State, b: State, chord: float) -> float:

@@ -1,0 +1,130 @@
+"""The command line: python -m formingx [demo NAME ... | compare OURS THEIRS ...]."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import os
+import runpy
+import sys
+from pathlib import Path
+
+from mpi4py import MPI
+
+from . import InputError, compare
+
+_COMPARE = """Compare a run's CSV file with another program's curve: differences, limit points, a picture.
+The header of THEIRS names its columns and may state units: pressure [psi]."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line; returns the exit status: 0, or 2 if something that was given is not allowed."""
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        if words[:1] == ["demo"]:
+            _demo(words[1:])
+        else:
+            options = _parser().parse_args(words)
+            _compare(options) if options.command else _say(_overview())
+    except InputError as error:
+        if MPI.COMM_WORLD.rank == 0:
+            print(f"formingx: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m formingx", description=_overview(),
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+    commands.add_parser("demo", help="run a demo: demo NAME [its options]")
+    two = commands.add_parser("compare", help="compare two curves",
+                              formatter_class=argparse.RawDescriptionHelpFormatter, description=_COMPARE)
+    two.add_argument("ours", metavar="OURS", help="CSV file of a run (Path.to_csv)")
+    two.add_argument("theirs", metavar="THEIRS", help="CSV file of the other program, rows in order along its path")
+    two.add_argument("--columns", nargs="+", metavar="OURS=THEIRS", default=[],
+                     help="columns that belong together, at least two (a bare NAME: the same on both sides)")
+    two.add_argument("--units", nargs="+", metavar="OURS=UNIT", default=[],
+                     help="for a column of ours: a factor for theirs, or our unit if their header states theirs")
+    two.add_argument("--out", type=Path, default=Path("results") / "compare",
+                     help="folder for curves.png and pairs.csv (default: %(default)s)")
+    return parser
+
+
+def _overview() -> str:
+    lines = ["formingx: how polymers are formed, simulated with finite elements.", "", "Commands:",
+             "  demo NAME [OPTIONS]        run a demo (demo NAME --help: its options)",
+             "  compare OURS THEIRS        compare two curves (compare --help)", ""]
+    demos = _demos()
+    if not demos:
+        return "\n".join([*lines, "No demos here: they are in the folder demos/ of the checkout."])
+    width = max(map(len, demos))
+    return "\n".join([*lines, "Demos:", *(f"  {name:{width}}  {line}" for name, line in demos.items())])
+
+
+def _folder() -> Path:
+    return Path(__file__).resolve().parents[1] / "demos"
+
+
+def _demos() -> dict[str, str]:
+    """{name: first line of its docstring} of the scripts that can be run."""
+    found = {}
+    for file in sorted(_folder().glob("*.py")):
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        if any(isinstance(node, ast.FunctionDef) and node.name == "main" for node in tree.body):
+            found[file.stem] = (ast.get_docstring(tree) or "").partition("\n")[0]
+    return found
+
+
+def _demo(words: list[str]) -> None:
+    """Run a demo in this process, as `python demos/NAME.py OPTIONS` would: also under mpirun."""
+    demos = _demos()
+    listed = ", ".join(demos) or f"none; {os.fspath(_folder())} holds no demo"
+    if not words:
+        raise InputError(f"demo: needs a NAME; known: {listed}")
+    name, *options = words
+    if name in ("-h", "--help"):
+        _say(_overview())
+        return
+    if name not in demos:
+        raise InputError(f"demo {name!r} is not known; known: {listed}")
+    script = os.fspath(_folder() / f"{name}.py")
+    before = sys.argv, sys.path[:]
+    sys.argv, sys.path[:0] = [script, *options], [os.fspath(_folder())]
+    try:
+        runpy.run_path(script, run_name="__main__")
+    finally:
+        sys.argv, sys.path[:] = before
+
+
+def _compare(options: argparse.Namespace) -> None:
+    comm = MPI.COMM_WORLD
+    columns = {our: their or our for our, their in (_pair("--columns", word, False) for word in options.columns)}
+    units: dict[str, float | str] = {}
+    for our, unit in (_pair("--units", word, True) for word in options.units):
+        try:
+            units[our] = float(unit)
+        except ValueError:
+            units[our] = unit
+    found = compare(options.ours, options.theirs, columns=columns or None, units=units)
+    _say(str(found))
+    found.to_csv(options.out / "pairs.csv", comm)
+    if comm.rank == 0:
+        found.plot().savefig(options.out / "curves.png", dpi=150)
+    _say(f"Results are in {options.out}/: curves.png, pairs.csv")
+
+
+def _pair(option: str, word: str, both: bool) -> tuple[str, str]:
+    left, equals, right = word.partition("=")
+    if not left or (equals or both) and not right:
+        raise InputError(f"{option} {word!r}: must be {'COLUMN=UNIT or COLUMN=FACTOR' if both else 'OURS=THEIRS'}")
+    return left, right
+
+
+def _say(text: str) -> None:
+    if MPI.COMM_WORLD.rank == 0:
+        print(text, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,182 @@
+"""Comparison of curves: closed forms, curves that turn back, units, limit points, bad input."""
+
+import numpy as np
+import pytest
+from conftest import run, treloar
+from reference import element
+from test_reference_element import follow, pair
+
+import formingx as fx
+from formingx.results import tables
+
+
+def spiral(t, shift=0.0):
+    """A curve on which both columns turn back: nothing is a function of anything."""
+    return {"pressure": 3.0 + t * np.cos(t) / 5 + shift, "pole_height": 100 * t * np.sin(t)}
+
+
+def write(file, header, columns):
+    file.write_text("\n".join([header, *(",".join(map(repr, map(float, row))) for row in zip(*columns))]) + "\n")
+    return file
+
+
+def test_same_curve_other_points():
+    """Two samplings of one curve: no difference but that of curves through points."""
+    t = np.linspace(0, 12, 700)
+    found = fx.compare(spiral(t), spiral(np.linspace(0.2, 11.8, 173)))
+    assert found.columns == ["pressure", "pole_height"] and found.beyond == 0
+    for d in found.differences.values():
+        assert d.rms <= d.maximum < 1e-5 * d.range
+        assert d.maximum < found.resolution[0] * d.range
+
+
+def test_error_falls_with_the_points():
+    """What is left falls fast with the number of points, and `resolution` is above it."""
+    errors = []
+    for n in (40, 80, 160):
+        found = fx.compare(spiral(np.linspace(0, 12, n)), spiral(np.linspace(0.2, 11.8, 173)))
+        errors.append(max(d.maximum / d.range for d in found.differences.values()))
+        assert errors[-1] < found.resolution[0]
+    assert errors[1] < errors[0] / 3 and errors[2] < errors[1] / 3
+
+
+def test_known_shift():
+    """A straight line moved along its normal: half of the distance on each scaled axis."""
+    t = np.linspace(0, 1, 21)
+    found = fx.compare({"a": 2 * t, "b": 10 * t}, {"a": 2 * t + 0.02, "b": 10 * t - 0.1})
+    for name, value in (("a", 0.02), ("b", -0.1)):
+        d = found.differences[name]
+        assert np.allclose(d.values, value) and d.rms == pytest.approx(abs(value)) == d.maximum
+    assert found.differences["a"].range == 2.0
+
+
+def test_a_longer_curve_is_cut():
+    t = np.linspace(0, 1, 41)
+    longer = np.linspace(-0.5, 2, 51)
+    found = fx.compare({"a": t, "b": t**2}, {"a": longer, "b": np.where(longer > 0, longer**2, 0)})
+    assert found.beyond == 30 and max(d.maximum for d in found.differences.values()) < 1e-4
+
+
+def test_limit_points_of_a_table():
+    """Maximum and minimum of a cubic, from 25 points; marked ones are taken as they are."""
+    t = np.linspace(-2, 2, 25)
+    cubic = {"pressure": t**3 - 3 * t, "travelled": t}
+    found = fx.compare(cubic, cubic).limit_points[1]
+    assert [p["pressure"] for p in found] == pytest.approx([2, -2], abs=0.01)
+    assert [p["travelled"] for p in found] == pytest.approx([-1, 1], abs=0.02)
+
+
+def test_units(tmp_path):
+    """psi and inches in the header against kg/cm2 and cm; factors; other names; semicolons; comments."""
+    t = np.linspace(0, 5, 30)
+    ours = {"pressure": np.sin(t), "pole_height": t}
+    text = ["# from elsewhere", "H (in);p [psi]"] + [f"{h / 2.54!r};{p / 0.070306957964!r}"
+                                                     for h, p in zip(t.tolist(), np.sin(t).tolist())]
+    (tmp_path / "theirs.csv").write_text("\n".join(text))
+    names = {"pressure": "p", "pole_height": "H"}
+    for units in ({"pressure": "kg/cm2", "pole_height": "cm"}, {"pressure": 0.070306957964, "pole_height": 2.54}):
+        found = fx.compare(ours, tmp_path / "theirs.csv", columns=names, units=units)
+        assert max(d.maximum for d in found.differences.values()) < 1e-6
+    with pytest.raises(fx.InputError, match=r"column 'p' is in 'psi': say what to make of it"):
+        fx.compare(ours, tmp_path / "theirs.csv", columns=names)
+    with pytest.raises(fx.InputError, match="'psi' cannot be turned into 'cm'"):
+        fx.compare(ours, tmp_path / "theirs.csv", columns=names, units={"pressure": "cm", "pole_height": "cm"})
+    with pytest.raises(fx.InputError, match="unit 'ksc' is not known; known: m, cm"):
+        fx.compare(ours, tmp_path / "theirs.csv", columns=names, units={"pressure": "ksc", "pole_height": "cm"})
+    assert tables.conversion("cm3", "m3") == pytest.approx(1e-6)
+
+
+def test_run_against_hand_coded_solver(tmp_path):
+    """The other side as it comes: a coarse CSV of a hand-coded program, past the pressure maximum."""
+    scene = treloar((10, 1), fx.PinnedNode(1.25, 0.041),
+                    model=fx.DisplacementPenalty(eps=0.1, stress_free=False))
+    path = fx.trace(scene, until=fx.pole_stretch(3.5), progress=False)
+    _, body, _ = pair(scene, element.Mooney(2.0, 0.0), tmp_path)
+    R, Z = body.nodes.T
+    pin, pole = (np.argmin(np.hypot(R - radius, Z - 0.041)) for radius in (1.25, 0.0))
+    row = np.zeros(2 * len(R))
+    row[2 * pole + 1] = 1.0
+    heights = np.linspace(0.1, 2.0, 15)
+    states = follow(body, np.concatenate([2 * np.flatnonzero(R == 0), [2 * pin, 2 * pin + 1]]), row, heights)
+    theirs = write(tmp_path / "theirs.csv", "H,p", [heights, [q for _, q in states]])
+    found = fx.compare(path, theirs, columns={"pressure": "p", "pole_height": "H"})
+    assert found.beyond == 0
+    for d in found.differences.values():
+        assert d.maximum < 1e-4 * d.range
+    (ours,), (other,) = found.limit_points
+    assert ours["pressure"] == path.limit_points[0].measures["pressure"]
+    assert other["pressure"] == pytest.approx(ours["pressure"], rel=2e-4)
+    assert other["pole_height"] == pytest.approx(ours["pole_height"], abs=(heights[1] - heights[0]) / 10)
+    assert "theirs minus ours" in str(found) and "1 theirs" in str(found)
+    found.plot().savefig(tmp_path / "both.png")
+    assert (tmp_path / "both.png").stat().st_size > 10_000
+    found.to_csv(tmp_path / "pairs.csv")
+    assert len((tmp_path / "pairs.csv").read_text().splitlines()) == 16
+    # its last displacements, node by node, in the numbering of the mesh file
+    u = states[-1][0]
+    nodes = write(tmp_path / "nodes.csv", "node,u_r,u_z", [range(1, len(u) + 1), *u.T])
+    nodal = fx.compare_nodes(path, nodes, mesh=tmp_path / "mesh.txt", state=path.at(fx.pole_height(heights[-1])))
+    assert nodal.maximum < 1e-8 * nodal.largest and nodal.largest > 1.9
+    # the run's own file: the same limit point, and curves that differ by their drawing only
+    path.to_csv(tmp_path / "ours.csv")
+    again = fx.compare(tmp_path / "ours.csv", path)
+    assert again.columns == ["pressure", "pole_height"] and again.limit_points[0] == again.limit_points[1]
+    assert max(d.maximum / d.range for d in again.differences.values()) < 1e-6
+
+
+GOOD = {"a": [0, 1, 2], "b": [0, 1, 4]}
+
+
+@pytest.mark.parametrize("text, message", [
+    (None, "cannot be read"), ("", "is empty"), ("1,2\n3,4\n5,6\n", "the first line must name the columns"),
+    ("a,b\n1,2\n", "1 rows of data"), ("a,b\n1,2\n3\n4,5\n", "line 3: 1 cells, but the header names 2"),
+    ("a,a\n1,2\n3,4\n", "stands twice"), ("a,b\n1,2\n3,x\n4,5\n", "column 'b': row 2 of the data is empty or not a"),
+    ("a,b\n1,2\n3,nan\n4,5\n", "row 2"), ("a,c\n1,2\n3,4\n", "fewer than two have the same name"),
+    ("a,b\n1,2\n1,3\n", "column 'a' does not vary on their side"),
+])
+def test_bad_tables(tmp_path, text, message):
+    file = tmp_path / "theirs.csv"
+    if text is not None:
+        file.write_text(text)
+    with pytest.raises(fx.InputError, match=message):
+        fx.compare(GOOD, file)
+
+
+@pytest.mark.parametrize("arguments, message", [
+    ({"columns": {"a": "a", "x": "b"}}, "column 'x' is not known; known: 'a', 'b'"),
+    ({"columns": {"a": "a", "b": "y"}}, "theirs: column 'y' is not known"),
+    ({"columns": ["a"]}, "at least two columns"),
+    ({"units": {"z": 1}}, "units: column 'z' is not known"),
+    ({"units": {"a": 0}}, "must be greater than 0"),
+    ({"units": {"a": "cm"}}, "does not state the unit of column 'a'"),
+])
+def test_bad_arguments(arguments, message):
+    with pytest.raises(fx.InputError, match=message):
+        fx.compare(GOOD, GOOD, **arguments)
+
+
+def test_backwards():
+    t = np.linspace(0, 2, 30)
+    with pytest.raises(fx.InputError, match="backwards"):
+        fx.compare({"a": t, "b": t**2}, {"a": t[::-1], "b": t[::-1] ** 2})
+
+
+def test_on_two_ranks(tmp_path):
+    """The same report, and one file, on any number of ranks."""
+    write(tmp_path / "theirs.csv", "pressure,pole_height", [[0.0, 0.3, 0.45, 0.49], [0.0, 0.5, 0.9, 1.3]])
+    script = f"""import sys; sys.path.insert(0, 'tests')
+import formingx as fx
+from conftest import run, treloar
+from mpi4py import MPI
+path = fx.trace(treloar((10, 1)), until=fx.pole_stretch(2.0), progress=False)
+found = fx.compare(path, {str(tmp_path / 'theirs.csv')!r})
+found.to_csv({str(tmp_path / 'pairs.csv')!r})
+print([round(d.maximum, 9) for d in found.differences.values()]) if MPI.COMM_WORLD.rank == 0 else None"""
+    assert run("-c", script, ranks=2) == run("-c", script)
+    assert len((tmp_path / "pairs.csv").read_text().splitlines()) == 5
+
+
+def test_bad_arrays():
+    for wrong, message in (({"a": [1, 2], "b": [1]}, "as long as each other"), ({"a": ["x"], "b": [1]}, "numbers")):
+        with pytest.raises(fx.InputError, match=message):
+            fx.compare(GOOD, wrong)
