@@ -134,13 +134,11 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     """
     left, right = _table("ours", ours), _table("theirs", theirs)
     pairs = _columns(left, right, columns)
-    units: dict[str, Any] = dict(units or {})
-    for name in units:
+    for name in units or {}:
         known("compare: units: column", name, pairs)
-    for name in pairs:
-        units.setdefault(name, left.units.get(name))
+    in_units: dict[str, Any] = {name: left.units.get(name) for name in pairs} | dict(units or {})
     a = np.column_stack([left.columns[c] if left.units[c] else left.take(c) for c in pairs])
-    b = np.column_stack([right.take(their, units[our]) for our, their in pairs.items()])
+    b = np.column_stack([right.take(their, in_units[our]) for our, their in pairs.items()])
     names = list(pairs)
     scale = _ranges(a)
     for name, size, other in zip(names, scale, _ranges(b)):

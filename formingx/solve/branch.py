@@ -41,14 +41,14 @@ class Branch:
             try:
                 _, history = self.newton.correct(self._x, 0.0, _no_control)
             except Failure as failure:
-                raise ConvergenceError(f"no equilibrium was found before anything is driven, under the loads that have a"
-                                       f" fixed value: {failure.reason}; drive the largest of them instead") from None
+                raise ConvergenceError(f"no equilibrium was found before anything is driven, under the loads that have"
+                                       f" a fixed value: {failure.reason}; drive the largest of them instead") from None
             self.iterations += len(history) - 1
         else:
             self.problem.stiff_state(self._x)
             if not self.newton.tangent(self._x, 0.0):
-                raise ConvergenceError("the unloaded body has a singular tangent: something in it is not held, or has no"
-                                       " stiffness")
+                raise ConvergenceError("the unloaded body has a singular tangent: something in it is not held, or has"
+                                       " no stiffness")
             self._x.set(0)
         return self._state(0.0, history, "start", None)
 
