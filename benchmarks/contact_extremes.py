@@ -1,4 +1,4 @@
-"""Contact far from its defaults: penalties, ramps, fillets, friction, depths and thicknesses; each ends right or says why.
+"""Contact far from its defaults: penalties, ramps, fillets, friction, depths and thicknesses.
 
 The cup of demos/cup.py on 30 x 2 x 2 triangles, to 60 psi times h0/0.3 cm.
 """
@@ -38,7 +38,7 @@ def main():
     args = options.parse_args()
     print(f"{'case':34}{'psi':>8}{'pole t/t0':>10}{'least':>8}{'depth/h0':>10}{'length':>8}{'states':>8}{'Newton':>8}"
           f"{'cuts':>6}{'s':>7}  end")
-    for group, cases in CASES.items():
+    for cases in CASES.values():
         for case in cases:
             began = time.perf_counter()
             path, end = run(args.elements, **case)

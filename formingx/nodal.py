@@ -39,6 +39,7 @@ class NodalContact:
                                self.points)
         self._scale = solid.length / (solid.stress * solid.volume) * self.area
         self._motion = solid.control_scale * np.array(contact.moves or (0.0, 0.0))
+        self._last: Any = None                              # positions and tractions last computed
         self.memory = None if contact.mu == 0 else self.law.start(self.points)
         self._arrived = np.zeros(len(self.points), dtype=bool)     # in the step before the last accepted state
         self._allowed = contact.nodes_per_step
@@ -59,7 +60,7 @@ class NodalContact:
         values[self.dofs] += self._scale[:, None] * self.tractions(fields, control).force
 
     def stiffness(self, fields: np.ndarray, control: float, ahead: bool = False) -> np.ndarray:
-        """Derivative of the nodal forces by the nodes' own unknowns, shape (n, 2, 2); `ahead`: see `Law.stiffness_ahead`."""
+        """Derivative of the nodal forces by the nodes' own unknowns, shape (n, 2, 2); `ahead`: see the law."""
         values = self.tractions(fields, control).stiffness
         if ahead and self._memory is not None:
             values = self.law.stiffness_ahead(self.positions(fields, control), self._memory, self._arrived)

@@ -61,8 +61,8 @@ class Scene:
         else:
             self._check_hinges()
         if self.contacts and isinstance(self.model, Membrane):
-            raise InputError(f"Scene: {self.contacts[0]!r}: a membrane has no contact yet: use a solid model, MixedPressure() for"
-                             f" one")
+            raise InputError(f"Scene: {self.contacts[0]!r}: a membrane has no contact yet: use a solid model,"
+                             f" MixedPressure() for one")
         for contact in self.contacts:
             self._check_contact(contact)
         driven = [x for x in (*self.loads, *self.supports, *self.contacts) if getattr(x, "driven", False)]

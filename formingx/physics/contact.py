@@ -5,9 +5,10 @@ Song (1993), eqs. (5.7) to (5.14), per unit reference area, at a point whose sig
     normal traction      N = k F(d),  F the ramp (5.13) of half-width theta: 0 below -theta, d above theta, C1 between;
     tangential traction  T = k F'(d) g, not more than mu N,
 
-g being the elastic slip: the tangential motion since the point touched (entered the ramp), less what has slid. Stick is mu = inf,
-frictionless mu = 0. A point that was out of touch at the last accepted state slips from where it arrives inside the
-step, which the tangent of the path foretells: taken from the end of the step, the slip would depend on its length.
+g being the elastic slip: the tangential motion since the point touched (entered the ramp), less what has slid. Stick
+is mu = inf, frictionless mu = 0. A point that was out of touch at the last accepted state slips from where it arrives
+inside the step, which the tangent of the path foretells: taken from the end of the step, the slip would depend on its
+length.
 
 Contact acts at the nodes of six-node triangles, which are the points of the Gauss-Lobatto rule on a facet (exact
 for the lumped area): there history is read where it lives.
@@ -69,7 +70,7 @@ class Contact:
         return self.mu == 0
 
     def law(self, k: float, theta: float, points: np.ndarray) -> Law:
-        """Tractions for a penalty k (stress/length) and a ramp theta (length), at points that start there, shape (n, 2)."""
+        """Tractions for a penalty k (stress/length) and a ramp theta (length), at points, shape (n, 2)."""
         return Law(self.tool, self.mu, k, theta, np.maximum(self.tool.signed_distance(points) + 0.999 * theta, 0.0))
 
     def __repr__(self) -> str:
@@ -79,8 +80,8 @@ class Contact:
 class Touch(NamedTuple):
     """What n points remember of the last accepted state, seen from the tool.
 
-    position: shape (n, 2), length; distance: signed, shape (n,), length; slip: elastic slip g, shape (n,), length; arrival:
-    where the point will be when it touches, if it does in the step ahead, shape (n, 2), length.
+    position: shape (n, 2), length; distance: signed, shape (n,), length; slip: elastic slip g, shape (n,), length;
+    arrival: where the point will be when it touches, if it does in the step ahead, shape (n, 2), length.
     """
 
     position: np.ndarray
@@ -93,7 +94,8 @@ class Tractions(NamedTuple):
     """Tractions at n points per unit reference area, as the residual wants them (what the body does to the tool).
 
     force: shape (n, 2), stress; stiffness: its derivative, shape (n, 2, 2), stress/length; touch: what to remember;
-    normal, tangential: N and T, shape (n,), stress; sense: of sliding, 1 or -1 along the tangent, 0 if stuck, shape (n,).
+    normal, tangential: N and T, shape (n,), stress; sense: of sliding, 1 or -1 along the tangent, 0 if stuck, shape
+    (n,).
     """
 
     force: np.ndarray
@@ -107,8 +109,8 @@ class Tractions(NamedTuple):
 class Law:
     """Tractions at points, a function of their positions and of what they remember.
 
-    Distances are less by `shift`, shape (n,), length: a point that touches from the start begins at the foot of the ramp, free
-    of stress.
+    Distances are less by `shift`, shape (n,), length: a point that touches from the start begins at the foot of the
+    ramp, free of stress.
     """
 
     def __init__(self, tool: Tool, mu: float, k: float, theta: float, shift: np.ndarray | float = 0.0):
@@ -140,8 +142,9 @@ class Law:
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None) -> Tractions:
         """At points x, shape (n, 2), which remember `old` (not used without friction).
 
-        `sense`: that of the iteration before. A point that would turn from sliding one way to sliding the other is taken as
-        stuck for this one iteration: Newton's method would send it to and fro across the narrow range of stick.
+        `sense`: that of the iteration before. A point that would turn from sliding one way to sliding the other is
+        taken as stuck for this one iteration: Newton's method would send it to and fro across the narrow range of
+        stick.
         """
         near, k = self._nearest(x), self.k
         d, n, t, bend = near.distance, near.normal, near.tangent, near.curvature
@@ -152,6 +155,7 @@ class Law:
         zero = np.zeros(len(x))
         if self.mu == 0:
             return Tractions(force, stiffness, _touch(x, d, zero), N, zero, zero)
+        assert old is not None
         g, dg = self._slip(x, near, old)
         T, dT = k * slope * g, (k * slope)[:, None] * dg
         rising = (np.abs(d) < self.theta) * k / (2 * self.theta)

@@ -1,7 +1,8 @@
 """Rigid tools: profiles of straight lines and circular arcs with a signed distance, and ready-made shapes.
 
-The solid of a tool lies to the left of its profile, seen along the order of the points. Curved edges stay curved: a fillet
-is an arc, a sharp corner an arc of radius 0, so a profile is smooth up to its corners and the distance to it is exact.
+The solid of a tool lies to the left of its profile, seen along the order of the points. Curved edges stay curved: a
+fillet is an arc, a sharp corner an arc of radius 0, so a profile is smooth up to its corners and the distance to it
+is exact.
 """
 
 from __future__ import annotations
@@ -82,7 +83,8 @@ class Tool:
 
     Args:
         points: corners (R, Z), shape (n, 2), in the mesh's unit of length, the solid to their left.
-        fillets: radius at every corner, or one for all; 0 leaves it sharp. Ends of an open profile have none, but an end
+        fillets: radius at every corner, or one for all; 0 leaves it sharp. Ends of an open profile have none, but an
+        end
             on R = 0 may (the tip of a cone).
         closed: the last point is joined to the first.
 
@@ -392,7 +394,7 @@ def _rounded(points: np.ndarray, radii: list[float], closed: bool) -> list[Line 
         if out is None or come is None:
             if abs(points[i][0]) > 1e-9 * size:
                 raise InputError(f"Tool: fillet at point {i} = {radius!r}: an open end has no corner to round")
-            out, come = (-come if out is None else out), (-out if come is None else come)
+            out, come = (-come if out is None else out), (-out if come is None else come)   # type: ignore[operator]
         turn = _turn(come, out)
         if abs(turn) < _FLAT:
             continue

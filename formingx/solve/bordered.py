@@ -47,7 +47,7 @@ class Tolerances(NamedTuple):
 
     correction: float = 1e-10
     residual: float = 1e-8
-    iterations: int = 20
+    iterations: int = 12
 
     def met(self, corrections: list[float], residuals: list[float]) -> bool:
         """True if a state with these corrections behind it, and these residuals (its own last), has converged.
@@ -106,6 +106,7 @@ class BorderedNewton:
         history: list[Iteration] = []
         problem.residual(x, control, self.F)
         work0 = moved = 0.0
+        limit = self.tolerances.iterations * (2 if problem.has_kinks else 1)      # points touch and let go on the way
         while True:
             residual = self.F.norm() / (problem.force_scale + UNLOADED)
             if not np.isfinite(residual):
@@ -113,11 +114,11 @@ class BorderedNewton:
             if self.tolerances.met([i.correction for i in history], [*(i.residual for i in history), residual]):
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
-            if len(history) >= 2 and moved > SMALL and history[-1].correction > (
-                    history[0].correction if len(history) > 2 else 0.5):
+            grown = len(history) >= 2 and history[-1].correction > (history[0].correction if len(history) > 2 else 0.5)
+            if grown and not (problem.has_kinks and moved < SMALL):
                 raise Failure("the iteration diverges", history)
-            if len(history) >= self.tolerances.iterations:
-                raise Failure(f"no convergence in {self.tolerances.iterations} iterations", history)
+            if len(history) >= limit:
+                raise Failure(f"no convergence in {limit} iterations", history)
             if not self.tangent(x, control):
                 raise Failure("the tangent matrix is singular", history)
             c, c_control = constraint(x, control, self.gradient)
@@ -136,7 +137,7 @@ class BorderedNewton:
             correction = moved / (self._norm(x, control) + 1e-8)
             if not np.isfinite(correction):
                 raise Failure("the tangent matrix is singular", history)
-            if len(history) > 2 and correction > 0.8 * max(history[-1].correction, history[-2].correction):
+            if problem.has_kinks and len(history) > 2 and correction > 0.8 * max(i.correction for i in history[-2:]):
                 x.axpy(-0.5, self.a)                # to and fro between two states: halfway ends it
                 control -= 0.5 * step
             history.append(Iteration(residual, correction, work / work0))

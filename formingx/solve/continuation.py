@@ -70,7 +70,7 @@ class _Run:
             while self._is_open(self.until):
                 if path.counts.steps >= max_steps:
                     self._give_up(f"{max_steps} states were accepted before it")
-                for state in self._sorted_into(path.last, self._next(path.last)):
+                for state in self._next(path.last):
                     self._record(state)
                     if path.problem.memory or not self._is_open(self.until) and state.met is self.until:
                         break                           # with a history, the rest of the step starts from here
@@ -91,8 +91,11 @@ class _Run:
                 start.direction, start.slope = -start.direction, -start.slope
         return start
 
-    def _next(self, old: State) -> State:
-        """The next state: at a target within reach, or one step ahead; failures halve the step."""
+    def _next(self, old: State) -> list[State]:
+        """The next states: one at a target within reach, or one step ahead, and what lies on the way to it.
+
+        Failures halve the step.
+        """
         problem = self.path.problem
         while True:
             length = problem.reach(old.x, old.control, old.direction, old.slope, self.step.length)
@@ -109,9 +112,10 @@ class _Run:
                     new.met = target
                 if problem.too_far(old.x, old.control, new.x, new.control):
                     raise Failure("too much came into contact in one step", [])
+                states = self._sorted_into(old, new)
                 if target is None and not limited:
                     self.step.accepted(len(new.history) - 1)
-                return new
+                return states
             except Failure as failure:
                 self.path.counts.failures += 1
                 self.step.length = length
@@ -148,13 +152,16 @@ class _Run:
         return best
 
     def _sorted_into(self, old: State, new: State) -> list[State]:
-        """The states from old to new in order: a limit point and targets inside the step, then new itself."""
+        """The states from old to new in order: a limit point and targets inside the step, then new itself.
+
+        Raises `Failure` if one of them cannot be solved for.
+        """
         found = []
         if old.slope * new.slope < 0 and old.kind != "limit point":
             try:
                 found.append(self.branch.limit_point(old, new))
             except Failure as failure:
-                raise self._error(f"a limit point lies ahead but could not be located: {failure.reason}") from None
+                raise Failure(f"a limit point lies ahead but could not be located: {failure.reason}", []) from None
         for target, bound in self.open:
             if target is new.met:
                 continue
@@ -163,7 +170,7 @@ class _Run:
                 try:
                     state = self.branch.between(old, new, bound, target.value)
                 except Failure as failure:
-                    raise self._error(f"{target} was passed but could not be solved for: {failure.reason}") from None
+                    raise Failure(f"{target} was passed but could not be solved for: {failure.reason}", []) from None
                 state.met = target
                 found.append(state)
         found.sort(key=lambda state: self.branch.progress(old, state))
