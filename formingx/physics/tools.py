@@ -84,8 +84,7 @@ class Tool:
     Args:
         points: corners (R, Z), shape (n, 2), in the mesh's unit of length, the solid to their left.
         fillets: radius at every corner, or one for all; 0 leaves it sharp. Ends of an open profile have none, but an
-        end
-            on R = 0 may (the tip of a cone).
+            end on R = 0 may (the tip of a cone).
         closed: the last point is joined to the first.
 
     Raises:

@@ -106,7 +106,7 @@ class BorderedNewton:
         history: list[Iteration] = []
         problem.residual(x, control, self.F)
         work0 = moved = 0.0
-        limit = self.tolerances.iterations * (2 if problem.has_kinks else 1)      # points touch and let go on the way
+        limit = self.tolerances.iterations + (8 if problem.has_kinks else 0)       # points touch and let go on the way
         while True:
             residual = self.F.norm() / (problem.force_scale + UNLOADED)
             if not np.isfinite(residual):
