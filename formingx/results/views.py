@@ -39,7 +39,7 @@ def _draw(profile: Any, file: str, title: str) -> None:
     surface["ratio"] = np.broadcast_to(values, x.shape).ravel(order="F")
     plotter = pyvista.Plotter(off_screen=True, window_size=(1000, 800))
     plotter.set_background("white")
-    bar = {"title": title, "color": "black", "vertical": True, "position_x": 0.88, "position_y": 0.2, "height": 0.6,
+    bar = {"title": title, "color": "black", "vertical": True, "position_x": 0.85, "position_y": 0.2, "height": 0.6,
            "width": 0.07, "title_font_size": 20, "label_font_size": 18, "fmt": "%.2f", "n_labels": 5}
     plotter.add_mesh(surface, scalars="ratio", cmap="viridis_r", smooth_shading=True, scalar_bar_args=bar,
                      ambient=0.45, diffuse=0.65, specular=0.25, specular_power=20, split_sharp_edges=True)
