@@ -60,6 +60,9 @@ def main():
         study(f"clamped {n[0]}x{n[1]}", n, clamp)
     for n, grading in [((40, 2), 0.3), ((40, 4), 0.3), ((60, 4), 0.2), ((80, 4), 1.0)][:2 if args.quick else None]:
         study(f"clamped {n[0]}x{n[1]}, rim {grading:g} of pole", n, clamp, grading=grading, until=3.0, max_steps=120)
+    for space in () if args.quick else ("P1dg", "P1"):
+        for n in ((60, 3), (80, 4)):
+            study(f"clamped {n[0]}x{n[1]}, {space}", n, clamp, fx.MixedPressure(space=space), max_steps=100)
     for n in ((10, 1), (20, 2), (40, 4))[:2 if args.quick else None]:
         study(f"pinned node {n[0]}x{n[1]}", n, pin, until=3.0, max_steps=120)
     for eps in (8e-2, 2e-2, 1e-3):

@@ -6,6 +6,7 @@ from conftest import treloar
 
 import formingx as fx
 from formingx.reference import membrane_limit_point
+from formingx.results.probes import Probe
 
 STRETCHES = (1.2, 1.5, 2.0, 3.0, 4.0, 6.0)
 
@@ -39,6 +40,16 @@ def test_targets_are_hit_exactly(path):
         assert path.met(fx.pole_stretch(stretch)).measures["pole_stretch"] == pytest.approx(stretch, rel=1e-9)
     assert path.last.measures["pole_stretch"] == pytest.approx(8.5, rel=1e-9)
     assert np.all(np.diff(path["pole_stretch"]) > 0)
+
+
+def test_pole_stretch_is_that_of_the_mid_fibre(path):
+    """(thickness/original)^(-1/2) and the in-plane stretch of the mid-thickness fibre differ by 6e-4 at most."""
+    near = 1e-3 * 1.25
+    probe = Probe(path.problem, [(near, 0.041)])
+    for state in path.states:
+        path.problem.x.array_w[:] = state.x
+        fibre = 1 + probe.displacement(path.problem.x)[0, 0] / near
+        assert fibre == pytest.approx(state.measures["pole_stretch"], rel=6e-4)
 
 
 def test_mass_is_kept(path):
