@@ -45,8 +45,8 @@ def main():
             ratio, m, c = path.profile().thickness_ratio, path.last.measures, path.counts
             label = ", ".join(f"{k} {v}" if isinstance(v, str) else f"{k} {v:g}" for k, v in case.items())
             print(f"{label:34}{m['pressure']:8.4g}{ratio[0]:10.5f}{ratio.min():8.4f}"
-                  f"{path['penetration'].max() / case.get('thickness', 0.3):10.1e}{m['contact_length']:8.2f}{c.steps:8d}"
-                  f"{c.iterations:8d}{c.failures:6d}{time.perf_counter() - began:7.1f}  {end}", flush=True)
+                  f"{path['penetration'].max() / case.get('thickness', 0.3):10.1e}{m['contact_length']:8.2f}"
+                  f"{c.steps:8d}{c.iterations:8d}{c.failures:6d}{time.perf_counter() - began:7.1f}  {end}", flush=True)
 
 
 if __name__ == "__main__":

@@ -65,7 +65,8 @@ def main():
             f"  {'psi':>6}{'pole t/t0':>12}{'least t/t0':>12}{'at R, cm':>10}")
         for p in (f"{p:g}" for p in PRESSURES):
             say(f"  {p:>6}" + "".join(f"{n[f'{key}_at_psi'][p]:{width}}" for key, width in (
-                ("pole_thickness_ratio", "12.5f"), ("min_thickness_ratio", "12.5f"), ("min_thickness_at_R_cm", "10.3f"))))
+                ("pole_thickness_ratio", "12.5f"), ("min_thickness_ratio", "12.5f"),
+                ("min_thickness_at_R_cm", "10.3f"))))
         path.to_csv(args.out / f"{name}.csv")
         files.write_profile(path.profile(), args.out / f"{name}_profile.csv", COMM)
         draw_forming(path, [path.met(fx.pressure(p)) for p in PRESSURES[:-1]] + [path.last], mould, args.out, name)

@@ -62,7 +62,8 @@ def main():
         summary[name] = n = key_numbers(path, mould)
         say(f"{name}: first contact {n['first_contact_pressure_psi']:.4g} psi at R = {n['first_contact_at_R_cm']} cm,"
             f" filled at {n['filled_pressure_psi']} psi, least thickness ratio"
-            f" {n['min_thickness_ratio_at_psi'][f'{PRESSURES[-1]:g}']:.4f}; {n['steps']} states, {n['newton_iterations']}"
+            f" {n['min_thickness_ratio_at_psi'][f'{PRESSURES[-1]:g}']:.4f};"
+            f" {n['steps']} states, {n['newton_iterations']}"
             f" Newton iterations, {n['cutbacks']} cut back, {n['solve_seconds']:.1f} s")
         path.to_csv(args.out / f"{name}.csv")
         files.write_profile(path.profile(), args.out / f"{name}_profile.csv", COMM)

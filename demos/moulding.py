@@ -41,7 +41,8 @@ def at_pressures(path, pressures, unit: str) -> dict:
     return {
         f"pole_thickness_ratio_at_{unit}": {p: profile.thickness_ratio[0] for p, profile in profiles.items()},
         f"min_thickness_ratio_at_{unit}": {p: profile.thickness_ratio[thinnest[p]] for p, profile in profiles.items()},
-        f"min_thickness_at_R_cm_at_{unit}": {p: profile.reference_radius[thinnest[p]] for p, profile in profiles.items()},
+        f"min_thickness_at_R_cm_at_{unit}": {
+            p: profile.reference_radius[thinnest[p]] for p, profile in profiles.items()},
     }
 
 
@@ -66,7 +67,8 @@ def draw_forming(path, states, tool, out, name: str, unit: str = "psi", side: st
         right.plot(points, pressure, color=color)
     span = np.vstack([getattr(path.profile(s), face) for s in states for face in ("bottom", "top")])
     left.set(xlabel="r, cm", ylabel="z, cm", title=name.replace("_", " "), xlim=(0, 1.15 * size),
-             ylim=(span[:, 1].min() - 0.05 * size, max(span[:, 1].max(), min(outline[:, 1].max(), 2 * size)) + 0.1 * size))
+             ylim=(span[:, 1].min() - 0.05 * size,
+                   max(span[:, 1].max(), min(outline[:, 1].max(), 2 * size)) + 0.1 * size))
     middle.set(xlabel="reference radius R, cm", ylabel="thickness / original", title="thickness", ylim=(0, 1.02))
     right.set(xlabel="reference radius R, cm", ylabel=f"contact pressure, {unit}", title="contact pressure",
               ylim=(0, 1.4 * states[-1].measures["pressure"]))

@@ -21,7 +21,8 @@ def points_near(tool, depths, seed=0):
     return np.vstack([middle + d * near.normal for d in depths]), np.vstack([near.tangent for _ in depths])
 
 
-SIDES = [side * THETA for kink in (-1, 1) for side in (kink * (1 - 1e-3), kink * (1 + 1e-3))] + [-0.5 * THETA, 3 * THETA]
+SIDES = [side * THETA for kink in (-1, 1) for side in (kink * (1 - 1e-3), kink * (1 + 1e-3))]
+SIDES += [-0.5 * THETA, 3 * THETA]
 
 
 def derivative(f, x, h):
@@ -78,7 +79,8 @@ def cup(friction, elements=(20, 2), depth=5.0, thickness=0.3, fillet=1.0, **opti
 
 def form(scene, *pressures, **step):
     targets = [fx.pressure(p) for p in pressures]
-    return fx.trace(scene, until=targets[-1], through=targets[:-1], step=fx.StepControl(target=8, **step), progress=False,
+    return fx.trace(scene, until=targets[-1], through=targets[:-1], progress=False,
+                    step=fx.StepControl(target=8, **step),
                     max_steps=600)
 
 
@@ -195,7 +197,8 @@ def test_coulomb_goes_over_into_free_and_stick():
 
 
 def test_a_scene_pays_for_what_is_in_it():
-    free = Problem(fx.Scene(mesh=fx.mesh.disc(radius=1, thickness=0.1, elements=(4, 1)), materials=fx.NeoHookean(c10=1.0),
+    mesh = fx.mesh.disc(radius=1, thickness=0.1, elements=(4, 1))
+    free = Problem(fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0),
                             supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")]))
     assert free.contacts == [] and free.memory == []
     assert Problem(cup("none", (4, 1))).memory == []

@@ -20,7 +20,8 @@ SHAPES = {
     "sharp cone": tools.cone(half_angle=50, z=0.1),
     "sphere": tools.sphere(radius=1.3, z=0.2),
     "mirrored": tools.male(radius=2, height=3, fillet=0.5).mirrored().moved(z=5),
-    "turned": tools.Tool([(1, 0), (3, 0.5), (2.5, 2), (1.2, 1.5)], fillets=[0.1, 0.2, 0.0, 0.3], closed=True).turned(20),
+    "turned": tools.Tool([(1, 0), (3, 0.5), (2.5, 2), (1.2, 1.5)], fillets=[0.1, 0.2, 0.0, 0.3],
+                         closed=True).turned(20),
     "long": tools.Tool([(0.5 * k, 0.3 * (k % 2)) for k in range(40)], fillets=0.05),
 }
 
@@ -117,7 +118,8 @@ def test_gmsh_curves(tmp_path):
     (lambda: tools.Tool([(0, 0), (0, 0), (1, 0)]), "are the same"),
     (lambda: tools.Tool([(0, 0), (1, 0), (1, 1)], fillets=[0, -1, 0]), "must not be negative"),
     (lambda: tools.Tool([(1, 0), (2, 0), (2, 1)], fillets=[0.1, 0, 0]), "no corner to round"),
-    (lambda: tools.Tool.of_pieces([Line(np.zeros(2), np.ones(2)), Line(np.zeros(2), np.ones(2))]), "follow one another"),
+    (lambda: tools.Tool.of_pieces([Line(np.zeros(2), np.ones(2)), Line(np.zeros(2), np.ones(2))]),
+     "follow one another"),
     (lambda: tools.cup(radius=1, depth=5, draft=20), "leaves no floor"),
     (lambda: tools.cone(half_angle=90), "below 90"),
     (lambda: tools.bottle(radius=1, height=1, neck=2, shoulder=1, neck_height=1), "below radius"),

@@ -43,7 +43,7 @@ def test_targets_are_hit_exactly(path):
 
 
 def test_pole_stretch_is_that_of_the_mid_fibre(path):
-    """(thickness/original)^(-1/2) and the in-plane stretch of the mid-thickness fibre differ by 1.4e-3 on this mesh (3e-4 on a fine one)."""
+    """It and the in-plane stretch of the mid-thickness fibre differ by 1.4e-3 on this mesh (3e-4 on a fine one)."""
     near = 1e-3 * 1.25
     probe = Probe(path.problem, [(near, 0.041)])
     for state in path.states:
