@@ -11,11 +11,16 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
+import numpy as np  # noqa: E402
 from common import COMM, say  # noqa: E402
+from scipy.sparse import csr_matrix  # noqa: E402
 
 import formingx as fx  # noqa: E402
+from formingx.problem import Problem  # noqa: E402
 from formingx.reference import membrane_inflation, membrane_limit_point  # noqa: E402
 from formingx.results import files  # noqa: E402
+from formingx.solve.bordered import Failure  # noqa: E402
+from formingx.solve.branch import Branch  # noqa: E402
 
 RATIO = 15.24
 
@@ -102,6 +107,38 @@ def rows(quick):
                lambda path, s=stress: limit(path) * s, ordinary, "cm and kg/cm2")
 
 
+def why():
+    """Why the displacement-only penalty breaks: condition of the tangent at rest, and Newton's radius there.
+
+    The radius is the longest first step, as deflection over the radius of the sheet, from which Newton converges.
+    """
+    say(f"{'10x1 elements, at rest':44}{'condition':>12}{'negative eigenvalues':>22}{'first step':>12}")
+    for name, make in (("displacement only, 3 points", lambda e: fx.DisplacementPenalty(eps=e, points=3)),
+                       ("displacement only, 4 points", lambda e: fx.DisplacementPenalty(eps=e, points=4)),
+                       ("pressure as an unknown", lambda e: fx.MixedPressure(eps=e))):
+        for eps in (2e-2, 1e-3, 1e-4, 1e-6):
+            mesh = fx.mesh.disc(radius=1.0, thickness=1 / RATIO, elements=(10, 1))
+            problem = Problem(fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), model=make(eps),
+                                       loads=[fx.Pressure("bottom")],
+                                       supports=[fx.Symmetry("axis"), fx.Clamped("rim")]))
+            x = problem.x.duplicate()
+            x.set(0)
+            indptr, columns, values = problem.tangent(x, 0.0).getValuesCSR()
+            dense = csr_matrix((values, columns, indptr)).toarray()
+            scale = 1 / np.sqrt(np.where(np.diag(dense) != 0, np.abs(np.diag(dense)), 1.0))
+            scaled = dense * scale[:, None] * scale
+            negative = int(np.sum(np.linalg.eigvalsh((scaled + scaled.T) / 2) < -1e-10))
+            branch = Branch(problem, fx.Tolerances())
+            start, step = branch.start(), 1.0
+            while step > 1e-9:
+                try:
+                    branch.step(start, step)
+                    break
+                except Failure:
+                    step /= 2
+            say(f"{name + f', eps {eps:g}':44}{np.linalg.cond(scaled):12.1e}{negative:22d}{step:12.1e}")
+
+
 def run(group, name, options, read, reference, what):
     """One row: outcome, deviation, cost."""
     began = time.perf_counter()
@@ -135,6 +172,8 @@ def main():
             f"{r['iterations']:6d}{r['mass_error']:9.0e}{r['seconds']:6.1f}  {r['outcome']}")
     right = sum(r["outcome"] == "right" for r in found)
     say(f"{right} of {len(found)} rows end right; the others end with the error shown")
+    if not args.quick:
+        why()
     files.write_summary(args.out / "summary.json", {"rows": found}, COMM)
 
 

@@ -97,7 +97,7 @@ class Tool:
             raise InputError(f"Tool: {len(points)} points: a{' closed' if closed else 'n open'} profile needs at least"
                              f" {3 if closed else 2}")
         n = len(points)
-        radii = list(np.asarray(fillets)) if np.ndim(fillets) else [
+        radii: list = list(np.asarray(fillets)) if np.ndim(fillets) else [
             fillets if closed or 0 < i < n - 1 else 0.0 for i in range(n)]
         if len(radii) != n:
             raise InputError(f"Tool: {len(radii)} fillets for {n} points: give one number, or one for each point")
