@@ -118,7 +118,12 @@ class Formulation(ABC):
 
     def compile(self, form: Any) -> Any:
         """A compiled form."""
-        return fem.form(form, jit_options=_compat.JIT_OPTIONS)
+        try:
+            return fem.form(form, jit_options=_compat.JIT_OPTIONS)
+        except TimeoutError as error:
+            raise TimeoutError(
+                f"a form is being compiled by another process for more than {_compat.JIT_OPTIONS['timeout']} s, or a"
+                f" compilation was killed: if no other run is going on, remove the folder .cache/fenics") from error
 
     def integral(self, form: Any) -> float:
         """The value of a UFL integral over all ranks, compiled for this one use."""
