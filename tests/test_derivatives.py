@@ -61,6 +61,22 @@ def assert_second_order(error, exact, steps=(1e-3, 1e-4)):
     assert errors[1] < 1e-6 and (errors[0] < 1e-9 or errors[1] < 0.05 * errors[0]), errors
 
 
+def assert_derivatives(problem, x, d):
+    """Along d at x: the tangent is the derivative of the residual, the residual that of the energy."""
+    exact = problem.x.duplicate()
+    problem.tangent(x, 0.7).mult(d, exact)
+    f = residual(problem, 0.7)
+    assert_second_order(lambda h: np.abs(difference(f, x, d, h) - exact.array_r).max(), exact.array_r)
+
+    energy = problem.forms.compile(problem.forms.energy)
+
+    def value(y):
+        problem.set_state(y, 0.0)
+        return problem.assemble_scalar(energy)
+    slope = residual(problem, 0.0)(x) @ d.array_r
+    assert_second_order(lambda h: abs(difference(value, x, d, h) - slope), slope, steps=(3e-4, 3e-5))
+
+
 @pytest.mark.parametrize("keeping", KEEPING, ids=lambda k: f"{type(k).__name__}-{k.eps}-{getattr(k, 'points', '')}")
 @pytest.mark.parametrize("kinematics", [fx.Axisymmetric(), fx.PlaneStrain()], ids=lambda k: type(k).__name__)
 def test_tangent_is_derivative_of_residual(keeping, kinematics):

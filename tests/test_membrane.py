@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from conftest import run_json, treloar
 from scipy.interpolate import CubicSpline
-from test_derivatives import assert_second_order, difference, random_state, residual
+from test_derivatives import assert_derivatives, difference, random_state
 
 import formingx as fx
 from formingx.problem import Problem
@@ -33,19 +33,7 @@ def trace(scene, until, **options):
 def test_residual_and_tangent_are_derivatives(material, kinematics):
     scene = sheet(4, material, kinematics=kinematics)
     problem = Problem(scene)
-    x, d = random_state(problem)
-    exact = problem.x.duplicate()
-    problem.tangent(x, 0.7).mult(d, exact)
-    f = residual(problem, 0.7)
-    assert_second_order(lambda h: np.abs(difference(f, x, d, h) - exact.array_r).max(), exact.array_r)
-
-    energy = problem.forms.compile(problem.forms.energy)
-
-    def value(y):
-        problem.set_state(y, 0.0)
-        return problem.assemble_scalar(energy)
-    slope = residual(problem, 0.0)(x) @ d.array_r
-    assert_second_order(lambda h: abs(difference(value, x, d, h) - slope), slope, steps=(3e-4, 3e-5))
+    assert_derivatives(problem, *random_state(problem))
 
 
 @pytest.mark.parametrize("on", ["bottom", "top"])

@@ -6,7 +6,7 @@ import pytest
 import ufl
 from conftest import run_json, treloar
 from dolfinx import fem
-from test_derivatives import assert_second_order, difference, random_state, residual, scene
+from test_derivatives import assert_derivatives, random_state, scene
 
 import formingx as fx
 from formingx.problem import Problem
@@ -29,18 +29,7 @@ def tube(elements, model):
 def test_residual_and_tangent_are_derivatives(space, eps, kinematics):
     problem = Problem(scene(keeping=fx.MixedPressure(eps=eps, space=space), kinematics=kinematics,
                             loads=[fx.Pressure("bottom")]))
-    x, d = random_state(problem, size=0.003)
-    exact = problem.x.duplicate()
-    problem.tangent(x, 0.7).mult(d, exact)
-    f = residual(problem, 0.7)
-    assert_second_order(lambda h: np.abs(difference(f, x, d, h) - exact.array_r).max(), exact.array_r)
-    energy = problem.forms.compile(problem.forms.energy)
-
-    def value(y):
-        problem.set_state(y, 0.0)
-        return problem.assemble_scalar(energy)
-    slope = residual(problem, 0.0)(x) @ d.array_r
-    assert_second_order(lambda h: abs(difference(value, x, d, h) - slope), slope, steps=(3e-4, 3e-5))
+    assert_derivatives(problem, *random_state(problem, size=0.003))
 
 
 @pytest.mark.parametrize("space, order, volume_order, last", [

@@ -59,6 +59,7 @@ class _Run:
                  step: StepControl, tolerances: Tolerances):
         self.until, self.step, self._best = until, step, 0.0
         self.open = [(target, target.bind(problem)) for target in (*through, until)]
+        self._aim = self.open[-1][1]                        # the measure of `until`
         self.branch = Branch(problem, tolerances)
         self.path = Path(problem, self.branch)
 
@@ -84,9 +85,8 @@ class _Run:
     def _facing_target(self, start: State) -> State:
         """The start, its tangent turned if a target that changes sign with the control lies the other way."""
         if self.until.signed:
-            bound = next(b for t, b in self.open if t is self.until)
-            now = self.branch.value(bound, start.x, start.control)
-            ahead = self.branch.value(bound, start.x + start.direction, start.control + start.slope)
+            now = self.branch.value(self._aim, start.x, start.control)
+            ahead = self.branch.value(self._aim, start.x + start.direction, start.control + start.slope)
             if (ahead - now) * (self.until.value - now) < 0:
                 start.direction, start.slope = -start.direction, -start.slope
         return start
@@ -130,9 +130,8 @@ class _Run:
         """
         if not self._is_open(self.until):
             return
-        bound = next(b for t, b in self.open if t is self.until)
-        start = self.path.value(bound, self.path.states[0])
-        gained = (self.path.value(bound, self.path.last) - start) / (self.until.value - start)
+        start = self.path.value(self._aim, self.path.states[0])
+        gained = (self.path.value(self._aim, self.path.last) - start) / (self.until.value - start)
         self._best = max(self._best, gained)
         kept = 0.0 if self.until.bind is measures.bind_control else 0.5
         if self._best > 0.05 and gained < kept * self._best:
@@ -195,8 +194,7 @@ class _Run:
     def _error(self, why: str) -> ConvergenceError:
         """What happened, what was met, what to try."""
         path = self.path
-        bound = next(b for t, b in self.open if t is self.until)
-        values = [self.branch.value(bound, s.x, s.control) for s in path.states]
+        values = [path.value(self._aim, s) for s in path.states]
         best = int(np.argmin([abs(v - self.until.value) for v in values]))
         limits = "".join(f" A limit point was passed at {path.describe(s)}." for s in path.limit_points)
         return ConvergenceError(
