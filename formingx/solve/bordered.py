@@ -96,7 +96,8 @@ class Tolerances(NamedTuple):
             return True
         if last < self.correction and residual > 0.3 * residuals[-2]:
             return True
-        return (last < 1e-11 or 0.3 * before < last < 1e-7) and residual < 1e3 * self.residual
+        stalled = 0.3 * before < last < 1e-7 and residual > 0.3 * residuals[-2]
+        return (last < 1e-11 or stalled) and residual < 1e3 * self.residual
 
 
 class BorderedNewton:
