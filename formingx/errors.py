@@ -15,11 +15,12 @@ class ConvergenceError(RuntimeError):
 
     Attributes:
         path: what was computed up to there (`formingx.Path`), its last state converged; or None.
+        diagnosis: why, in numbers and words, and as a picture (`formingx.results.diagnosis.Diagnosis`); or None.
     """
 
-    def __init__(self, message: str, path: Any = None):
-        super().__init__(message)
-        self.path = path
+    def __init__(self, message: str, path: Any = None, diagnosis: Any = None):
+        super().__init__(f"{message}\n{diagnosis}" if diagnosis is not None else message)
+        self.path, self.diagnosis = path, diagnosis
 
 
 def positive(name: str, value: Any) -> float:

@@ -35,6 +35,7 @@ class Failure(Exception):
     def __init__(self, reason: str, history: list[Iteration]):
         super().__init__(reason)
         self.reason, self.history = reason, history
+        self.attempt: Any = None                            # where it ended (`diagnosis.Attempt`), if that is known
 
 
 class Tolerances(NamedTuple):
@@ -80,6 +81,7 @@ class BorderedNewton:
         self.solver = DirectSolver(problem.matrix, problem.symmetric)
         new = problem.x.duplicate
         self.F, self.F_control, self.gradient, self.a, self.b = new(), new(), new(), new(), new()
+        self.reached = 0.0, 0.0                             # control and its last correction in `correct`
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> bool:
         """`self.b` = dx/dcontrol along the path at a solution; False if the tangent matrix is singular.
@@ -105,6 +107,8 @@ class BorderedNewton:
         problem = self.problem
         history: list[Iteration] = []
         problem.residual(x, control, self.F)
+        self.a.set(0)
+        self.reached = control, 0.0
         work0 = moved = 0.0
         limit = self.tolerances.iterations + (8 if problem.has_kinks else 0)       # points touch and let go on the way
         while True:
@@ -141,6 +145,7 @@ class BorderedNewton:
                 x.axpy(-0.5, self.a)                # to and fro between two states: halfway ends it
                 control -= 0.5 * step
             history.append(Iteration(residual, correction, work / work0))
+            self.reached = control, step
             problem.residual(x, control, self.F)
 
     def destroy(self) -> None:
