@@ -30,19 +30,22 @@ class Place(NamedTuple):
 
     def __str__(self) -> str:
         layer = f" in layer {self.layer!r}" if self.layer else ""
-        near = f", {self.distance:.3g} from boundary {self.boundary!r}" if self.boundary else ""
+        if not self.boundary:
+            return f"(R, Z) = ({self.R:.6g}, {self.Z:.6g}){layer}"
+        near = f", {self.distance:.3g} from boundary {self.boundary!r}" if self.distance else f", on {self.boundary!r}"
         return f"(R, Z) = ({self.R:.6g}, {self.Z:.6g}){layer}{near}"
 
 
 def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
     """A point, shape (2,), the same on all ranks, with the nearest boundary of the mesh; collective."""
-    best = ("", np.inf)
+    best, size = ("", np.inf), 0.0
     for name in mesh.boundaries:
         nodes = mesh.nodes_of(name)
         if len(nodes):
             away = float(np.hypot(*(nodes - point).T).min())
-            best = (name, away) if away < best[1] else best
-    return Place(float(point[0]), float(point[1]), layer, best[0], best[1] if best[0] else 0.0)
+            best, size = (name, away) if away < best[1] else best, max(size, float(np.abs(nodes).max()))
+    R, Z, distance = (0.0 if abs(v) < 1e-9 * size else float(v) for v in (*point, best[1]))
+    return Place(R, Z, layer, best[0], distance)
 
 
 def shape_quality(corners: np.ndarray) -> np.ndarray:
@@ -151,16 +154,17 @@ class Diagnosis:
     picture_data: Any = field(default=None, repr=False)
 
     def __str__(self) -> str:
-        lines = [f"Step {self.step} failed after {self.what} {self.control:.6g}"
-                 + (f", at {self.what} {self.aimed:.6g}" if self.aimed is not None else "") + f": {self.reason}."]
+        at = f", at {self.what} {self.aimed:.8g}" if self.aimed is not None else ""
+        lines = [f"Step {self.step} failed after {self.what} {self.control:.8g}{at}: {self.reason}." if self.step else
+                 f"There is no first state: {self.reason}."]
         lines += [f"Cause: {cause}." for cause in self.causes] or ["Cause: the numbers below single out none."]
         if self.residual:
             parts = ", ".join(f"{k} {v:.3g}" if np.isfinite(v) else f"{k} not finite" for k, v in self.residual.items())
             at = f"; the largest at {self.worst}" if self.worst else ""
             lines.append(f"Forces left over, over the support forces: {parts}{at}.")
         if self.smallest_J is not None:
-            failed = f"; in the failed attempt {self.failed_J:.4g} at {self.at_failed_J}" \
-                if self.failed_J is not None else ""
+            new = self.failed_J is not None and abs(self.failed_J - self.smallest_J) > 0.01 * abs(self.smallest_J)
+            failed = f"; in the failed attempt {self.failed_J:.4g} at {self.at_failed_J}" if new else ""
             lines.append(f"Smallest J: {self.smallest_J:.4g} at {self.at_J}{failed}.")
         if self.condition is not None:
             lines.append(f"Condition number of the tangent: {self.condition:.2g}.")
@@ -174,7 +178,7 @@ class Diagnosis:
         """Draw the last good state, deformed, its elements coloured by J, the worst places marked (rank 0 draws).
 
         Raises:
-            InputError: a membrane has no elements to draw.
+            InputError: a membrane has no elements to draw, nor has a run without a good state.
         """
         if self.picture_data is None:
             raise InputError("Diagnosis.picture: there are no elements to draw: a membrane has none across its"

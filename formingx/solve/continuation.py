@@ -26,6 +26,9 @@ from .stepping import StepControl
 
 log = logging.getLogger("formingx")
 
+_TRY = (" Try a target within what was met, a smaller first step (step=StepControl(length=...)), more elements where"
+        " the body deforms most, or more max_steps.")
+
 
 def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Target] = (),
           step: StepControl | None = None, tolerances: Tolerances | None = None, max_steps: int = 200,
@@ -202,7 +205,8 @@ class _Run:
                 f" {int(np.ceil((aim - now) / (now - before)))} steps more at that pace")
 
     def _give_up(self, why: str, attempt: Any = None, pace: str = "") -> None:
-        found = diagnose(self.branch, self.path.states, why, attempt, pace)
+        found = diagnose(self.branch, self.path.states, why, attempt, pace,
+                         self.until.value if self.until.bind is measures.bind_control else None)
         raise self._error(f"{why}.", found)
 
     def _error(self, why: str, diagnosis: Any) -> ConvergenceError:
@@ -214,8 +218,7 @@ class _Run:
         return ConvergenceError(
             f"{self.until} was not reached: {why} The nearest met was {values[best]:.6g}, at"
             f" {path.describe(path.states[best])}.{limits} The last good state is {path.describe(path.last)};"
-            f" it is kept in the error's `path`. Try a target within what was met, a smaller first step"
-            f" (step=StepControl(length=...)), more elements where the body deforms most, or more max_steps.", path, diagnosis)
+            f" it is kept in the error's `path`.{'' if diagnosis.advice else _TRY}", path, diagnosis)
 
 
 def _progress_bar(comm: Any, until: measures.Target, progress: bool) -> Any:

@@ -29,12 +29,13 @@ class Found(NamedTuple):
 
 
 def diagnose(branch: Any, states: list, reason: str, attempt: Attempt | None = None, pace: str = "",
-             fixed_control: bool = False) -> Diagnosis:
+             target: float | None = None, fixed_control: bool = False) -> Diagnosis:
     """Everything that the last good state and the failed attempt tell; collective.
 
     Args:
         branch: a `Branch`. states: the accepted ones, may be empty. attempt: None: no iteration failed.
-        pace: what more is known if the run was ended in good health. fixed_control: it could not pass a limit point.
+        pace: what more is known if the run was ended in good health. target: of the control (the user's units), if that
+            is what the run aims at. fixed_control: the run cannot pass a limit point.
     """
     problem, scale = branch.problem, branch.problem.forms.control_scale
     x, keep = problem.x.duplicate(), problem.memory
@@ -67,7 +68,7 @@ def diagnose(branch: Any, states: list, reason: str, attempt: Attempt | None = N
             sum(int(np.sum(touch)) for touch in _touching(problem, last.x, last.control)), MPI.SUM)
         facts |= _tangents(branch, states, x)
         problem.memory = keep
-    causes, advice = _verdict(facts, fixed_control, pace, problem)
+    causes, advice = _verdict(facts, fixed_control, pace, target)
     x.destroy()
     data = (problem.comm.rank, shape, marks) if shape else None
     return Diagnosis(**facts, causes=tuple(causes), advice=tuple(advice), picture_data=data)
@@ -216,14 +217,11 @@ def _changes(states: list, usable: list, sign: Any) -> list[tuple]:
     return found
 
 
-def _verdict(facts: dict, fixed_control: bool, pace: str, problem: Any) -> tuple[list[str], list[str]]:
+def _verdict(facts: dict, fixed_control: bool, pace: str, target: float | None) -> tuple[list[str], list[str]]:
     """What the numbers prove or make likely, and what to try."""
     causes, advice = [], []
     what, J, failed_J = facts["what"], facts.get("smallest_J"), facts.get("failed_J")
     infinite = any(np.isinf(v) for v in facts.get("residual", {}).values())
-    if pace:
-        causes.append(pace)
-        advice.append("more max_steps")
     if (facts.get("I1") or 0) > 0.8:
         causes.append(f"a material is near the end of its domain: I1 - 3 is {100 * facts['I1']:.3g} % of what its limit"
                       f" allows at {facts['limit']}")
@@ -236,6 +234,11 @@ def _verdict(facts: dict, fixed_control: bool, pace: str, problem: Any) -> tuple
                       + (f" (in the failed attempt J = {failed_J:.3g})" if inverted else ""))
         advice.append(f"smaller elements around (R, Z) = ({facts['at_J'].R:.4g}, {facts['at_J'].Z:.4g}), or elements that"
                       f" start long in the direction in which they are squeezed there")
+    limits = facts.get("limit_points", ())
+    if target is not None and limits and abs(target) > max(map(abs, limits)):
+        causes.append(f"the {what} has its maximum, {max(limits, key=abs):.6g}, at a limit point that was passed, and"
+                      f" {target:.6g} lies beyond it")
+        advice.append("a target that grows beyond a limit point (pole_height, pole_stretch, enclosed_volume)")
     ahead, aimed = facts.get("limit_ahead"), facts.get("aimed")
     if ahead is not None and fixed_control:
         causes.append(f"a limit point lies ahead: the {what} can rise no further than about {ahead:.6g}, as the slope of"
@@ -252,4 +255,7 @@ def _verdict(facts: dict, fixed_control: bool, pace: str, problem: Any) -> tuple
         causes.append(f"round-off: the condition number of the tangent is {facts['condition']:.1g}, next to nothing of"
                       f" 16 digits is left")
         advice.append("a larger eps, a lower contact penalty, or layers less different in stiffness")
+    if pace and not causes:
+        causes.append(pace)
+        advice.append("more max_steps")
     return causes, list(dict.fromkeys(advice))
