@@ -110,12 +110,15 @@ def test_no_first_state_and_a_membrane(tmp_path):
 
 def test_condition_number():
     """The estimate against NumPy's 1-norm condition number of the same matrix, and the sign of its determinant."""
+    from scipy.sparse import csr_matrix
+
     from formingx.problem import Problem
     from formingx.solve.direct import DirectSolver, condition
     problem = Problem(treloar(elements=(4, 1)))
     x = problem.x.duplicate()
     x.set(0)
-    dense = problem.tangent(x, 0.0).convert("dense").getDenseArray().copy()
+    rows, columns, values = problem.tangent(x, 0.0).getValuesCSR()
+    dense = csr_matrix((values, columns, rows)).toarray()
     solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
     assert solver.factorise() and solver.sign() == np.linalg.slogdet(dense)[0]
     exact = np.linalg.cond(dense, 1)
@@ -132,7 +135,7 @@ try:
 except fx.ConvergenceError as error:
     d = error.diagnosis
     if fx.mesh.MPI.COMM_WORLD.rank == 0:
-        print(json.dumps([d.limit_ahead, d.smallest_J, d.condition, d.at_J.R, d.residual["displacement"] > 0]))
+        print(json.dumps([d.limit_ahead, d.smallest_J, d.condition, d.at_J.R, len(d.causes)]))
 """
 
 

@@ -59,12 +59,13 @@ def shape_quality(corners: np.ndarray) -> np.ndarray:
 class Body(NamedTuple):
     """A solid in one state, all ranks: m elements with k quadrature points each.
 
-    points: reference, shape (m, k, 2), length; J, I1: det F and tr F^T F there, shape (m, k); layers: tag of each
+    points, moved: reference and deformed, shape (m, k, 2), length; J, I1: det F and tr F^T F there, shape (m, k); layers: tag of each
     element, shape (m,); outline: deformed nodes around each, shape (m, 6, 2), length; quality, at_rest: shape of its
     corner triangle deformed and at rest (`shape_quality`), shape (m,).
     """
 
     points: np.ndarray
+    moved: np.ndarray
     J: np.ndarray
     I1: np.ndarray
     layers: np.ndarray
@@ -91,14 +92,14 @@ def body(problem: Any, x: Any, control: float) -> Body | None:
             return np.zeros((0, len(points), n))
         return fem.Expression(expression, points).eval(domain, cells).reshape(len(cells), len(points), n)
     F, X = at(F, gauss, 5), at(where, gauss, 2)
-    rest, moved = at(where, nodes, 2), at(where + forms.u, nodes, 2)
+    rest, moved, points = at(where, nodes, 2), at(where + forms.u, nodes, 2), at(where + forms.u, gauss, 2)
     tags = np.zeros(len(cells), dtype=np.int64)
     for tag in problem.scene.mesh.layers.values():
         found = problem.scene.mesh.cells.find(tag)
         tags[found[found < len(cells)]] = tag
     J = (F[..., 0] * F[..., 3] - F[..., 1] * F[..., 2]) * F[..., 4]
     turned = np.sign(shape_quality(rest[:, :3]))                     # cells may be numbered clockwise
-    local = (X, J, (F**2).sum(-1), tags, moved[:, _OUTLINE], turned * shape_quality(moved[:, :3]),
+    local = (X, points, J, (F**2).sum(-1), tags, moved[:, _OUTLINE], turned * shape_quality(moved[:, :3]),
              turned * shape_quality(rest[:, :3]))
     return Body(*(np.concatenate(part) for part in zip(*problem.comm.allgather(local), strict=True)))
 
@@ -196,7 +197,7 @@ def _draw(shape: Body, marks: list, title: str, file: Any) -> None:
     height = float(np.clip(7.0 * size[1] / size[0], 2.0, 7.0)) + 1.2
     figure, axes = plots.figure(width=8.0, height=height)
     J = shape.J[np.arange(len(shape.J)), np.argmax(np.abs(shape.J - 1), axis=1)]
-    reach = max(float(np.abs(J - 1).max()), 1e-3)
+    reach = float(np.clip(np.abs(J - 1).max(), 1e-3, 1.0))
     drawn = PolyCollection(shape.outline, array=J, cmap="RdBu", edgecolors="0.35", linewidths=0.4,
                            clim=(1 - reach, 1 + reach))
     axes.add_collection(drawn)
@@ -208,7 +209,7 @@ def _draw(shape: Body, marks: list, title: str, file: Any) -> None:
     axes.set_xlabel("r")
     axes.set_ylabel("z")
     axes.set_title(title, fontsize=10)
-    figure.colorbar(drawn, ax=axes, label="J, farthest from 1 in the element", shrink=0.85)
+    figure.colorbar(drawn, ax=axes, label="J where it is farthest from 1 in the element", shrink=0.85, extend="both")
     if marks:
         figure.legend(loc="outside lower center", ncols=len(marks), frameon=False, fontsize=9)
     figure.savefig(file, dpi=150)

@@ -88,14 +88,14 @@ def _worst_of(problem: Any, shape: Body, marks: list) -> dict[str, Any]:
     J, where, at = _smallest_J(problem, shape)
     facts: dict[str, Any] = {"smallest_J": J, "at_J": where,
                              "shape": float((shape.quality / shape.at_rest).min())}
-    marks.append((f"smallest J {J:.3g}", shape.outline[at[0]].mean(0)))
+    marks.append((f"smallest J {J:.3g}", shape.moved[at]))
     limits = np.array([problem.scene.materials[_layer(problem, tag)].largest_I1 for tag in shape.layers])
     near = (shape.I1 - 3) / (limits[:, None] - 3)
     if np.isfinite(limits).any():
         at = np.unravel_index(int(np.argmax(near)), near.shape)
         facts["I1"] = float(near[at])
         facts["limit"] = place(problem.scene.mesh, shape.points[at], _layer(problem, shape.layers[at[0]]))
-        marks.append(("nearest to the material's limit", shape.outline[at[0]].mean(0)))
+        marks.append(("nearest to the material's limit", shape.moved[at]))
     return facts
 
 
