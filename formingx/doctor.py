@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from .errors import InputError
+from .errors import instance, several
 from .physics.incompressibility import DisplacementPenalty, Membrane
 from .physics.tools import Arc
 from .results.diagnosis import place, shape_quality
@@ -63,10 +63,9 @@ def doctor(scene: Scene, *, targets: Sequence[Target] = ()) -> Report:
     Raises:
         InputError: `scene` is not a Scene, or a target not a target.
     """
-    if not isinstance(scene, Scene):
-        raise InputError(f"doctor: scene = {scene!r}: must be a formingx.Scene")
-    if isinstance(targets, Target) or not all(isinstance(t, Target) for t in targets):
-        raise InputError(f"doctor: targets = {targets!r}: must be a list of targets, such as [pole_stretch(3)]")
+    instance("doctor: scene", scene, Scene, "a formingx.Scene")
+    for target in several("doctor: targets", targets, "targets, such as [pole_stretch(3)]"):
+        instance("doctor: targets: target", target, Target, "a target, such as pole_stretch(3)")
     sheet = _Sheet(scene)
     checks = (_driven, _elements, _layers, _fillets, _contact_penalties, _volume_penalty, _units)
     findings = [finding for check in checks for finding in check(scene, sheet, targets)]

@@ -67,5 +67,5 @@ def test_layers_and_nothing_driven():
 def test_bad_input():
     with pytest.raises(fx.InputError, match="scene = 'disc'"):
         fx.doctor("disc")
-    with pytest.raises(fx.InputError, match="targets = "):
+    with pytest.raises(fx.InputError, match="target = 3.0"):
         fx.doctor(treloar(), targets=[3.0])

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
 
+from ..errors import count, positive
 from .direct import DirectSolver
 
 UNLOADED = 1e-5
@@ -38,17 +40,26 @@ class Failure(Exception):
         self.attempt: Any = None                            # where it ended (`diagnosis.Attempt`), if that is known
 
 
-class Tolerances(NamedTuple):
+@dataclass(frozen=True)
+class Tolerances:
     """When a state counts as converged: all of these.
 
     correction: the next correction that quadratic convergence predicts, over |x|.
     residual: |F| over the norm of the support forces.
     iterations: at most so many.
+
+    Raises:
+        InputError: a value that is not greater than 0.
     """
 
     correction: float = 1e-10
     residual: float = 1e-8
     iterations: int = 12
+
+    def __post_init__(self) -> None:
+        positive("Tolerances: correction", self.correction)
+        positive("Tolerances: residual", self.residual)
+        count("Tolerances: iterations", self.iterations)
 
     def met(self, corrections: list[float], residuals: list[float]) -> bool:
         """True if a state with these corrections behind it, and these residuals (its own last), has converged.

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ConvergenceError, InputError, count
+from ..errors import ConvergenceError, InputError, count, instance, several
 from ..problem import Problem
 from ..results import measures
 from ..results.path import Path, State
@@ -48,12 +48,19 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
         InputError: nothing is driven, or a target needs something that the scene does not have.
         ConvergenceError: the target was not reached. It carries the path so far and says what to try.
     """
+    instance("trace: scene", scene, Scene, "a formingx.Scene")
+    through = several("trace: through", through, "targets, such as pole_stretch(3)")
+    for target in (until, *through):
+        instance("trace: target", target, measures.Target, "a target, such as pole_stretch(3)")
+    instance("trace: step", step, StepControl | None, "a StepControl or None")
+    instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
+    max_steps = count("trace: max_steps", max_steps)
     if scene.driven is None:
         raise InputError("trace: nothing is driven: give one load no value, as Pressure('bottom'), or"
                          " add a Displaced support")
     problem = Problem(scene)
     run = _Run(problem, until, through, replace(step or StepControl()), tolerances or Tolerances())
-    return run.trace(count("trace: max_steps", max_steps), progress)
+    return run.trace(max_steps, progress)
 
 
 class _Run:

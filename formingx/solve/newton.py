@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..errors import ConvergenceError, InputError, count, finite
+from ..errors import ConvergenceError, InputError, count, finite, instance
 from ..problem import Problem
 from ..results.path import Path
 from ..scene import Scene
@@ -93,6 +93,8 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
         InputError: nothing is driven, or an argument is not allowed.
         ConvergenceError: an increment did not converge; it carries the path so far.
     """
+    instance("solve: scene", scene, Scene, "a formingx.Scene")
+    instance("solve: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     if scene.driven is None:
         raise InputError("solve: nothing is driven: give one load no value, as Pressure('bottom'), or"
                          " add a Displaced support")
