@@ -74,8 +74,8 @@ def test_buckling():
     Ends clamped, one free to move sideways: strain pi^2 (h / L)^2 / 12.
     """
     thickness, length = 0.2, 2.0
-    scene = fx.Scene(mesh=fx.mesh.disc(radius=thickness, thickness=length, elements=(2, 16)), kinematics=fx.PlaneStrain(),
-                     materials=fx.NeoHookean(c10=1.0), supports=[fx.Clamped("bottom"), fx.Displaced("top")])
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=thickness, thickness=length, elements=(2, 16)),
+                     kinematics=fx.PlaneStrain(), materials=fx.NeoHookean(c10=1.0), supports=[fx.Clamped("bottom"), fx.Displaced("top")])
     step = fx.StepControl(length=0.001, growth=1.0)
     _, found = failure(lambda: fx.trace(scene, until=fx.travel(-0.3), max_steps=14, step=step, progress=False))
     euler = length * math.pi**2 * (thickness / length) ** 2 / 12
@@ -97,8 +97,8 @@ def test_contact_that_does_not_settle():
 
 def test_no_first_state_and_a_membrane(tmp_path):
     """Without a good state, or without elements across the thickness, what can be said is said."""
-    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1)), materials=fx.NeoHookean(c10=2.0),
-                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1)),
+                     materials=fx.NeoHookean(c10=2.0), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
                      loads=[fx.Pressure("bottom"), fx.Pressure("top", -5.0)])
     _, found = failure(lambda: fx.trace(scene, until=fx.pressure(0.6), progress=False))
     assert found.step == 0 and str(found).startswith("There is no first state")
