@@ -21,7 +21,7 @@ _PENETRATION = 0.01        # of the thickness
 
 
 class Finding(NamedTuple):
-    """One thing found: severity ("error": the run will fail; "warning": it may, or be wrong), what it is about, text."""
+    """One thing found: severity ("error": the run will fail; "warning": it may), what it is about, text."""
 
     severity: str
     about: str
@@ -205,7 +205,7 @@ def _contact_penalties(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Fi
 
 
 def _volume_penalty(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
-    """The volume changes by about eps stretch^2 / 8: pressure of the order of mu stretch^2 over a bulk modulus 8 mu/eps."""
+    """The volume changes by about eps stretch^2 / 8: pressure near mu stretch^2 over a bulk modulus 8 mu/eps."""
     model = scene.model
     if isinstance(model, Membrane):
         return
@@ -231,8 +231,8 @@ def _units(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
     aimed = [(str(t), t.value) for t in targets if t.name == "pressure"] if not scene.contacts else []
     for name, value in (*fixed, *aimed):
         if abs(value) > 1e3 * natural or 0 < abs(value) < 1e-6 * natural:
-            yield Finding("warning", name, f"it is {abs(value) / natural:.2g} times shear modulus x thickness / length ="
-                          f" {natural:.3g}, what such a sheet bears: are the units of stress the same (Pa, kPa, MPa)?")
+            yield Finding("warning", name, f"it is {abs(value) / natural:.2g} times shear modulus x thickness / length"
+                          f" = {natural:.3g}, what such a sheet bears: are the units of stress the same (Pa, kPa, MPa)?")
     for contact in scene.contacts:
         tool = contact.tool
         gap = float(-tool.signed_distance(scene.mesh.nodes_of(contact.on)).max())

@@ -75,7 +75,8 @@ def test_buckling():
     """
     thickness, length = 0.2, 2.0
     scene = fx.Scene(mesh=fx.mesh.disc(radius=thickness, thickness=length, elements=(2, 16)),
-                     kinematics=fx.PlaneStrain(), materials=fx.NeoHookean(c10=1.0), supports=[fx.Clamped("bottom"), fx.Displaced("top")])
+                     kinematics=fx.PlaneStrain(), materials=fx.NeoHookean(c10=1.0),
+                     supports=[fx.Clamped("bottom"), fx.Displaced("top")])
     step = fx.StepControl(length=0.001, growth=1.0)
     _, found = failure(lambda: fx.trace(scene, until=fx.travel(-0.3), max_steps=14, step=step, progress=False))
     euler = length * math.pi**2 * (thickness / length) ** 2 / 12

@@ -59,9 +59,9 @@ def shape_quality(corners: np.ndarray) -> np.ndarray:
 class Body(NamedTuple):
     """A solid in one state, all ranks: m elements with k quadrature points each.
 
-    points, moved: reference and deformed, shape (m, k, 2), length; J, I1: det F and tr F^T F there, shape (m, k); layers: tag of each
-    element, shape (m,); outline: deformed nodes around each, shape (m, 6, 2), length; quality, at_rest: shape of its
-    corner triangle deformed and at rest (`shape_quality`), shape (m,).
+    points, moved: reference and deformed, shape (m, k, 2), length; J, I1: det F and tr F^T F there, shape (m, k);
+    layers: tag of each element, shape (m,); outline: deformed nodes around each, shape (m, 6, 2), length; quality,
+    at_rest: shape of its corner triangle deformed and at rest (`shape_quality`), shape (m,).
     """
 
     points: np.ndarray

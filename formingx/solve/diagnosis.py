@@ -133,7 +133,9 @@ def _moved(problem: Any, state: Any, point: np.ndarray) -> np.ndarray:
     own = dofs[:, 0] < problem.forms.space.dofmap.index_map.size_local
     away = np.hypot(*(points[own] - point).T)
     at = int(np.argmin(away)) if len(away) else 0
-    mine = (float(away[at]), (problem.forms.length * state.x[dofs[own][at]]).tolist()) if len(away) else (np.inf, [0, 0])
+    mine = (np.inf, [0.0, 0.0])
+    if len(away):
+        mine = (float(away[at]), (problem.forms.length * state.x[dofs[own][at]]).tolist())
     return point + np.array(min(problem.comm.allgather(mine))[1])
 
 
@@ -232,8 +234,8 @@ def _verdict(facts: dict, fixed_control: bool, pace: str, target: float | None) 
         now = f"J = {J:.3g}" if J < 0.3 else f"its shape is {facts['shape']:.2g} of what it was at rest"
         causes.append(f"an element is about to turn inside out: {now} in the last good state, at {facts['at_J']}"
                       + (f" (in the failed attempt J = {failed_J:.3g})" if inverted else ""))
-        advice.append(f"smaller elements around (R, Z) = ({facts['at_J'].R:.4g}, {facts['at_J'].Z:.4g}), or elements that"
-                      f" start long in the direction in which they are squeezed there")
+        advice.append(f"smaller elements around (R, Z) = ({facts['at_J'].R:.4g}, {facts['at_J'].Z:.4g}), or elements"
+                      f" that start long in the direction in which they are squeezed there")
     limits = facts.get("limit_points", ())
     if target is not None and limits and abs(target) > max(map(abs, limits)):
         causes.append(f"the {what} has its maximum, {max(limits, key=abs):.6g}, at a limit point that was passed, and"
@@ -241,8 +243,8 @@ def _verdict(facts: dict, fixed_control: bool, pace: str, target: float | None) 
         advice.append("a target that grows beyond a limit point (pole_height, pole_stretch, enclosed_volume)")
     ahead, aimed = facts.get("limit_ahead"), facts.get("aimed")
     if ahead is not None and fixed_control:
-        causes.append(f"a limit point lies ahead: the {what} can rise no further than about {ahead:.6g}, as the slope of"
-                      f" the path tells" + (f"; {aimed:.6g} was asked for" if aimed is not None else ""))
+        causes.append(f"a limit point lies ahead: the {what} can rise no further than about {ahead:.6g}, as the slope"
+                      f" of the path tells" + (f"; {aimed:.6g} was asked for" if aimed is not None else ""))
         advice.append("`trace`, which passes limit points, or a lower target")
     for a, b in facts.get("turned", ()):
         causes.append(f"the tangent lost definiteness between {what} {a:.6g} and {b:.6g} without a limit point: another"
