@@ -231,8 +231,8 @@ def _units(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
     aimed = [(str(t), t.value) for t in targets if t.name == "pressure"] if not scene.contacts else []
     for name, value in (*fixed, *aimed):
         if abs(value) > 1e3 * natural or 0 < abs(value) < 1e-6 * natural:
-            yield Finding("warning", name, f"it is {abs(value) / natural:.2g} times shear modulus x thickness / length"
-                          f" = {natural:.3g}, what such a sheet bears: are the units of stress the same (Pa, kPa, MPa)?")
+            yield Finding("warning", name, f"it is {abs(value) / natural:.2g} times shear modulus x thickness"
+                          f" / length = {natural:.3g}: are the units of stress the same (Pa, kPa, MPa)?")
     for contact in scene.contacts:
         tool = contact.tool
         gap = float(-tool.signed_distance(scene.mesh.nodes_of(contact.on)).max())
