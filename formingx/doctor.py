@@ -196,7 +196,7 @@ def _contact_penalties(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Fi
                           f" the face {100 * depth:.2g} % of the thickness into the tool: use"
                           f" {traction / (0.001 * stress):.1g} or more")
         if contact.penalty > 1e9:
-            yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g}: next to it few of 16 digits are left"
+            yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g}: few of 16 digits are left"
                           f" for the body; 2e4 is the default")
         if contact.ramp > 0.05:
             yield Finding("warning", repr(contact), f"ramp = {contact.ramp:g}: the face feels the tool already"
