@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from . import _compat, grid
-from .errors import InputError, count, known, positive
+from .errors import InputError, count, known, non_negative, positive
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,8 @@ def disc(*, radius: float, thickness: float | Mapping[str, float], accuracy: str
     """
     radius = positive("disc: radius", radius)
     grading = positive("disc: grading", grading)
-    if not 0 <= inner_radius < radius:
+    inner_radius = non_negative("disc: inner_radius", inner_radius)
+    if inner_radius >= radius:
         raise InputError(f"disc: inner_radius = {inner_radius!r}: must be at least 0 and below radius = {radius!r}")
     sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
     known("disc: accuracy", accuracy, ACCURACY)
@@ -162,6 +163,8 @@ def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     Raises:
         InputError: the file is not there, cannot be read, or has no named 2-D group.
     """
+    if not isinstance(file, str | os.PathLike):
+        raise InputError(f"mesh.read: file = {file!r}: must be the name of a file")
     file = os.fspath(file)
 
     def build(model):

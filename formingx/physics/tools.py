@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, finite, non_negative, positive
+from ..errors import InputError, finite, non_negative, pair, positive, several
 
 _FLAT = 1e-9          # radians: a joint that turns less is smooth
 _TURN = 2 * math.pi
@@ -92,7 +92,7 @@ class Tool:
     """
 
     def __init__(self, points: Sequence[Sequence[float]], fillets: float | Sequence[float] = 0.0, closed: bool = False):
-        points = np.array([[finite("Tool: points: R", p[0]), finite("Tool: points: Z", p[1])] for p in points])
+        points = np.array([pair("Tool: points", p) for p in several("Tool: points", points, "points (R, Z)")])
         if len(points) < (3 if closed else 2):
             raise InputError(f"Tool: {len(points)} points: a{' closed' if closed else 'n open'} profile needs at least"
                              f" {3 if closed else 2}")
@@ -271,8 +271,9 @@ def male(*, radius: float, height: float, base: float = 0.0, draft: float = 0.0,
     """
     radius, height = positive("male: radius", radius), positive("male: height", height)
     base, wide = finite("male: base", base), radius + height * math.tan(_draft("male", draft))
+    foot = non_negative("male: foot", foot)
     return Tool([(2 * wide + foot, base), (wide, base), (radius, base + height), (0.0, base + height)],
-                [0.0, non_negative("male: foot", foot), non_negative("male: fillet", fillet), 0.0])
+                [0.0, foot, non_negative("male: fillet", fillet), 0.0])
 
 
 def bottle(*, radius: float, height: float, neck: float, shoulder: float, neck_height: float, base: float = 0.0,

@@ -62,6 +62,12 @@ def _replace(file: Any, write: Any) -> None:
     file = FilePath(file)
     file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_name(file.name + ".part")
-    with open(part, "w", newline="") as stream:
-        write(stream)
-    os.replace(part, file)
+    try:
+        with open(part, "w", newline="") as stream:
+            write(stream)
+        os.replace(part, file)
+    except BaseException as error:
+        part.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename is None:           # a full disk does not say which file
+            raise type(error)(error.errno, error.strerror, str(file)) from None
+        raise
