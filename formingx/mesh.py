@@ -178,7 +178,8 @@ def parison(*, inner_radius: float, thickness: float | Mapping[str, float], leng
     wall = thickness if not isinstance(thickness, Mapping) else sum(thickness.values())
     joint = length / (length + np.pi / 2 * (inner_radius + wall / 2))
     node = joints[1 + np.argmin(np.abs(joints[1:-1] - joint))]
-    from_neck[np.abs(from_neck - node) < 1e-6] = node      # gmsh grades to some ten digits
+    for place in (node, 1.0):                              # gmsh places nodes to some ten digits
+        from_neck[np.abs(from_neck - place) < 1e-6] = place
     z = length * np.maximum(1 - from_neck / node, 0.0)
     angle = np.pi / 2 * np.maximum((from_neck - node) / (1 - node), 0.0)
     x[:, 0], x[:, 1] = radius * np.sin(np.pi / 2 - angle), z - radius * np.sin(angle)

@@ -33,7 +33,7 @@ def revolved(profile: Any, file: Any, comm: Any, title: str = "thickness / origi
 def extruded(profile: Any, file: Any, comm: Any, title: str = "thickness / original") -> None:
     """A sheet in plane strain as a long part, coloured by thickness ratio, as a PNG (rank 0 draws).
 
-    A half sheet, which begins at R = 0, is drawn whole; it is as deep as it is wide.
+    A half sheet, which begins at R = 0, is drawn whole; it is half as long again as it is wide.
 
     Raises:
         InputError: there is neither a screen nor Xvfb to draw on.
