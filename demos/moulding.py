@@ -79,9 +79,11 @@ def draw_forming(path, states, tool, name: str, unit: str = "psi", side: str = "
                  along: str = "reference radius R", largest: float = 1.4, curve=None):
     """Profiles in the mould, thickness and contact pressure against reference arc length: the figure.
 
-    `side`: the face that looks at the tool; `along`: what arc length is called; `largest`: contact pressure that is
-    drawn, over the pressure; `curve`: (arc length, thickness ratio, label) of a law to compare with.
+    `unit`: of the pressure, or of the travel of a moving tool; `side`: the face that looks at the tool; `along`: what
+    arc length is called; `largest`: contact pressure that is drawn, over the pressure; `curve`: (arc length, thickness
+    ratio, label) of a law to compare with.
     """
+    control = "pressure" if "pressure" in path.columns else "travel"
     outline, profiles = tool.outline(), [path.profile(state) for state in states]
     span = np.vstack([points for profile in profiles for points in (profile.bottom, profile.top)])
     size = span[:, 0].max()
@@ -94,14 +96,14 @@ def draw_forming(path, states, tool, name: str, unit: str = "psi", side: str = "
         color = f"C{k}"
         plots.outline(profile, left, color=color)
         middle.plot(profile.reference_length, profile.thickness_ratio, color=color,
-                    label=f"{state.measures['pressure']:.3g} {unit}")
+                    label=f"{state.measures[control]:.3g} {unit}")
         right.plot(*contact_pressure(path, state, profile, side), color=color)
     if curve:
         middle.plot(*curve[:2], "k--", linewidth=1.2, label=curve[2])
     left.set(xlabel="r, cm", ylabel="z, cm", title=name.replace("_", " "), xlim=(0, 1.15 * size), ylim=(low, high))
     middle.set(xlabel=f"{along}, cm", ylabel="thickness / original", title="thickness", ylim=(0, 1.02))
-    right.set(xlabel=f"{along}, cm", ylabel=f"contact pressure, {unit}", title="contact pressure",
-              ylim=(0, largest * states[-1].measures["pressure"]))
+    right.set(xlabel=f"{along}, cm", ylabel="contact pressure, psi", title="contact pressure",
+              ylim=(0, largest * states[-1].measures["pressure"] if control == "pressure" else None))
     figure.legend(frameon=False, loc="outside right center")
     return figure
 

@@ -74,3 +74,16 @@ def test_parison_quick(tmp_path):
     assert body["6"] == pytest.approx(0.0922, rel=1e-2) and body["4"] == pytest.approx(body["8"], rel=1e-2)
     assert found["stick"]["least_thickness_cm"] == pytest.approx(0.0762, rel=2e-2)
     assert (tmp_path / "stick.png").stat().st_size > 10_000
+
+
+def test_male_mould_quick(tmp_path):
+    found = summary("male_mould", tmp_path, "--quick")
+    drape, stick = found["drape_frictionless"], found["vacuum_stick"]
+    assert drape["first_contact_at_cm"] == pytest.approx(0.05, rel=2e-2)
+    assert drape["pole_thickness_ratio_at_cm"]["3"] == pytest.approx(0.8918, rel=1e-2)
+    assert drape["tool_force_lb_at_cm"]["3"] == pytest.approx(23.1, rel=2e-2)
+    # the top sticks before it has stretched; where it slides it thins
+    assert stick["pole_thickness_ratio_at_psi"]["60"] == pytest.approx(0.978, rel=1e-2)
+    assert found["vacuum_coulomb_0.3"]["pole_thickness_ratio_at_psi"]["60"] == pytest.approx(0.793, rel=2e-2)
+    assert stick["min_thickness_ratio_at_psi"]["60"] == pytest.approx(0.480, rel=3e-2)
+    assert (tmp_path / "vacuum_stick.png").stat().st_size > 10_000
