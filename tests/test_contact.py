@@ -188,6 +188,15 @@ def test_thickness_does_not_depend_on_the_step(friction):
     assert np.abs(a / b - 1).max() < 2e-3
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", ["stick", 0.3])
+def test_thickness_does_not_depend_on_the_largest_step(friction):
+    thickness = [form(cup(friction, (40, 2)), 30.0, 60.0, largest=largest, length=0.05).profile().thickness
+                 for largest in (0.2, 0.1, 0.05)]
+    changes = [np.abs(a / b - 1).max() for a, b in zip(thickness, thickness[1:])]
+    assert max(changes) < 2e-3, changes
+
+
 def test_coulomb_goes_over_into_free_and_stick():
     pole = {f: form(cup(f), 15.0).profile().thickness_ratio[0] for f in ("none", 0, 1e-3, 0.05, 0.3, 10, "stick")}
     assert pole[0] == pole["none"]
