@@ -20,6 +20,7 @@ from .membrane import MidSurface
 from .nodal import NodalContact
 from .physics.supports import Held
 from .scene import Scene
+from .setting import Setting
 from .solid import Solid
 
 _FORMULATIONS = {"solid": Solid, "membrane": MidSurface}
@@ -34,7 +35,8 @@ class Problem:
         comm: communicator.
         x: a vector of unknowns to duplicate.
         matrix: the tangent, refilled by `tangent`.
-        contacts: the nodal forces of the scene's contacts (`NodalContact`).
+        contacts: the nodal forces of the scene's contacts (`NodalContact`); touching: of those that are there now.
+        setting: the `Setting` that x and control are seen under; see `enter`.
         force_scale: norm of all support forces at the state whose residual was last computed.
     """
 
@@ -47,13 +49,19 @@ class Problem:
         self._buffer = la.vector(index_map, 1)
         tangent = ufl.derivative(forms.residual, forms.w, ufl.TrialFunction(forms.space))
         self._residual = forms.compile(forms.residual)
-        self._by_control = [forms.compile(f) for f in (forms.control_derivative,) if f is not None]
+        self._by_control = forms.control_derivative and forms.compile(forms.control_derivative)
         self.contacts = [NodalContact(forms, contact, self.assemble) for contact in scene.contacts]
-        self._hold(tangent)
-        self._matrix = ExtendedMatrix(forms.compile(tangent), index_map, self._bcs, self._rows, self.comm,
-                                      self.symmetric)
+        self._collect()
+        self._by_motion = self._lift = None
+        if any(getattr(thing, "constraints", None) for thing in scene.drivable):
+            self._lift = fem.Function(forms.space)              # held unknowns move the others through the tangent
+            self._by_motion = forms.compile(ufl.action(tangent, self._lift))
+        self._matrix = ExtendedMatrix(forms.compile(tangent), index_map, [bc for _, bc, _, _ in self._holds],
+                                      [row for _, row in self._means], self.comm, self.symmetric)
         self.matrix = self._matrix.mat
         self.x = self.matrix.createVecRight()
+        self.setting: Any = None
+        self.enter(Setting.first(scene), np.zeros(self.x.getLocalSize()), 0.0)
         self._metric = np.maximum(self.assemble(forms.compile(forms.metric_row())), 0)
         self.force_scale = 0.0
 
@@ -70,12 +78,12 @@ class Problem:
     @property
     def has_kinks(self) -> bool:
         """True if F has kinks, where the tangent ahead of a state differs from that behind it (`tangent`)."""
-        return bool(self.contacts)
+        return bool(self.touching)
 
     @property
     def branch(self) -> Any:
         """On which side of its kinks F was when the residual was last computed, the same on all ranks; hashable."""
-        return tuple(self.comm.allgather(tuple(c.branch for c in self.contacts))) if self.contacts else None
+        return tuple(self.comm.allgather(tuple(c.branch for c in self.touching))) if self.touching else None
 
     @property
     def memory(self) -> list[Any]:
@@ -94,28 +102,39 @@ class Problem:
                   for m in self.scene.materials.values() if m.largest_I1 < np.inf}
         return ", or ".join(["an element turned inside out", *(limits or ["the material left its domain"])])
 
+    def shown(self, control: float) -> tuple[str, float]:
+        """What the control stands for, in words, and its value in the user's units."""
+        number, things = self.setting.leading, self.scene.things
+        if number is None:
+            return "control", control
+        name = "process time" if number == len(things) else self.scene.column(things[number]).replace("_", " ")
+        return name, self.forms.scales[number] * self.setting.amplitude(number, control)
+
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         """out = F(x, control); sets `force_scale`."""
         multipliers = self.set_state(x, control)
         values, fields = self.assemble(self._residual), x.array_r[: self._n]
-        for contact in self.contacts:
+        for contact in self.touching:
             contact.add_residual(values, fields, control)
         self.force_scale = np.sqrt(self._dot(values, values))
         for multiplier, row in zip(multipliers, self._rows, strict=True):
             values += multiplier * row
-        values[self._held] = fields[self._held] - self._motion * control
-        self.fill(out, values, [self._dot(row, fields) for row in self._rows])
+        values[self._held] = fields[self._held] - self._place - self._motion * control
+        self.fill(out, values, [self._dot(row, fields) - mean if there else multiplier for row, mean, there, multiplier
+                                in zip(self._rows, self._at, self._there, multipliers, strict=True)])
+        if self._left is not None:
+            out.axpy(control - 1, self._left)
 
     def begin(self) -> None:
         """Newton's method begins."""
-        for contact in self.contacts:
+        for contact in self.touching:
             contact.begin()
 
     def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
         """Ready the tangent at (x, control) for an iteration, and F, the residual there, for the solve with it."""
         if self.contacts:
             values = F.array_r[: self._n].copy()
-            for contact in self.contacts:
+            for contact in self.touching:
                 contact.linearise(values, x.array_r[: self._n], control)
             values[self._held] = F.array_r[: self._n][self._held]
             F.array_w[: self._n] = values
@@ -127,42 +146,46 @@ class Problem:
         """
         self.set_state(x, control)
         fields = x.array_r[: self._n]
-        return self._matrix.fill([(c.dofs, c.stiffness(fields, control, ahead)) for c in self.contacts])
+        return self._matrix.fill([(c.dofs, c.stiffness(fields, control, ahead)) for c in self.touching])
 
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         """out = dF/dcontrol at (x, control)."""
         self.set_state(x, control)
-        values = sum((self.assemble(form) for form in self._by_control), np.zeros(self._n))
-        for contact in self.contacts:
+        values = self.assemble(self._by_control) if self._by_control else np.zeros(self._n)
+        if self._moving:
+            values += self.assemble(self._by_motion)
+        for contact in self.touching:
             contact.add_control_derivative(values, x.array_r[: self._n], control)
         values[self._held] = -self._motion
         self.fill(out, values)
+        if self._left is not None:
+            out.axpy(1.0, self._left)
 
     def advance(self, x: np.ndarray, control: float) -> None:
         """A state is accepted: what has a history takes it up. x: own part, shape (n,)."""
-        for contact in self.contacts:
+        for contact in self.touching:
             contact.advance(x[: self._n], control)
 
     def reach(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step of at most `length` from x along (direction, slope) may be. Arrays: own part."""
         n = self._n
-        return min([c.reach(x[:n], control, direction[:n], slope, length) for c in self.contacts], default=length)
+        return min([c.reach(x[:n], control, direction[:n], slope, length) for c in self.touching], default=length)
 
     def prepare(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> None:
         """A step of this length from x along (direction, slope) is about to be taken. Arrays: own part."""
         n = self._n
-        for contact in self.contacts:
+        for contact in self.touching:
             contact.prepare(x[:n], control, direction[:n], slope, length)
 
     def too_far(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """True if more happened between two states than one step may bring. Arrays: own part."""
         n = self._n
-        return any([c.grew_too_much(old[:n], old_control, new[:n], control) for c in self.contacts])
+        return any([c.grew_too_much(old[:n], old_control, new[:n], control) for c in self.touching])
 
     def motion(self, control: float) -> np.ndarray:
         """The held unknowns at their values for a control, all else 0, shape (owned part of x,)."""
         values = np.zeros(self.x.getLocalSize())
-        values[self._held] = self._motion * control
+        values[self._held] = self._place + self._motion * control
         return values
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
@@ -211,38 +234,88 @@ class Problem:
         """Free the PETSc objects (collective)."""
         self._matrix.destroy()
         self.x.destroy()
+        if self._left is not None:
+            self._left.destroy()
 
-    def _hold(self, tangent: Any) -> None:
-        """Collect what is held: `_held` (owned dofs), `_motion` (their value per control), `_bcs`, `_rows`."""
+    def enter(self, setting: Setting, x: np.ndarray, control: float) -> None:
+        """Take a setting: from here on F is that of the setting, and (x, control) is a state on its path.
+
+        What is held is held where x has it, now or, if it is driven, at this control; if the setting fades what is left
+        without balance, that is what makes (x, control) a state. x: own part.
+        """
+        if setting == self.setting:
+            return
+        forms, before, off = self.forms, self.setting, set(setting.off)
+        self.setting, number = setting, {id(thing): i for i, thing in enumerate(self.scene.things)}
+        forms.set_loads(setting)
+        for contact in self.contacts:
+            i = number[id(contact.contact)]
+            contact.base, contact.rate = setting.base[i], setting.rate[i]
+        self.touching = [c for c in self.contacts if number[id(c.contact)] not in off]
+        if before is None or before.off != setting.off:
+            self._hold(off)
+        rate = np.append(setting.rate, 0.0)[self._movers]
+        self._motion = rate[self._own]
+        self._place = x[self._held] - self._motion * control
+        self._moving = bool(np.any(np.array(setting.rate)[self._motors])) if self._by_motion else False
+        if self._lift is not None:
+            self._lift.x.array[:] = 0
+            self._lift.x.array[self._holding] = rate
+        self._at = [self._dot(row, x[: self._n]) for row in self._rows]
+        self._leave(x, control)
+
+    def _leave(self, x: np.ndarray, control: float) -> None:
+        """`_left`: the forces without balance that a fading setting takes away, or None."""
+        if self._left is not None:
+            self._left.destroy()
+            self._left = None
+        if self.setting.fading and control < 1:
+            at, left = self.x.duplicate(), self.x.duplicate()
+            at.array_w[:] = x
+            self.residual(at, control, left)
+            left.scale(1 / (1 - control))
+            self._left = left
+            at.destroy()
+
+    def _collect(self) -> None:
+        """Everything that can be held: `_holds` [(thing's number, bc, local dofs, driven)], `_means` [(number, row)].
+
+        The number is -1 for unknowns that no equation holds.
+        """
         forms, zero = self.forms, PETSc.ScalarType(0)
-        self._bcs, dofs, motion, means = [], [np.zeros(0, dtype=np.int32)], [np.zeros(0)], []
-        for support in self.scene.supports:
+        self._holds: list[tuple[int, Any, np.ndarray, bool]] = []
+        self._means: list[tuple[int, np.ndarray]] = []
+        self._left: Any = None
+        for i, support in enumerate(self.scene.things):
+            if getattr(support, "constraints", None) is None:
+                continue
             for item in forms.constraints(support):
-                if not isinstance(item, Held):
-                    means.append(forms.compile(forms.mean_row(item)))
-                    continue
-                sub = forms.space.sub(0).sub(item.component)
-                found = self._dofs_of(support, sub, item)
-                self._bcs.append(fem.dirichletbc(zero, found, sub))
-                dofs.append(found)
-                motion.append(np.full(len(found), forms.control_scale / forms.length * item.driven))
+                if isinstance(item, Held):
+                    sub = forms.space.sub(0).sub(item.component)
+                    found = self._dofs_of(support, sub, item)
+                    self._holds.append((i, fem.dirichletbc(zero, found, sub), found, item.driven))
+                else:
+                    self._means.append((i, self.assemble(forms.compile(forms.mean_row(item)))))
         for sub, found in forms.idle_unknowns():
-            self._bcs.append(fem.dirichletbc(zero, found, sub))
-            dofs.append(found)
-            motion.append(np.zeros(len(found)))
-        numbers, motions = np.concatenate(dofs), np.concatenate(motion)
-        order = np.argsort(-np.abs(motions), kind="stable")     # where two supports meet, the driven one counts
-        held, first = np.unique(numbers[order], return_index=True)
-        moved = motions[order][first]
-        own = held < self._n
-        self._held, self._motion = held[own], moved[own]
-        self._rows = [self.assemble(form) for form in means]
+            self._holds.append((-1, fem.dirichletbc(zero, found, sub), found, False))
+        self._motors = sorted({i for i, _, _, driven in self._holds if driven})
+
+    def _hold(self, off: set[int]) -> None:
+        """Hold what is not off: `_held` (owned dofs), `_holding` (all), `_movers` (thing that moves each, or -1),
+        `_rows`, `_there` (which of them hold)."""
+        holds = [hold for hold in self._holds if hold[0] not in off]
+        numbers = np.concatenate([np.zeros(0, dtype=np.int32), *(dofs for _, _, dofs, _ in holds)])
+        movers = np.concatenate([np.zeros(0, dtype=int),
+                                 *(np.full(len(dofs), i if driven else -1) for i, _, dofs, driven in holds)])
+        order = np.argsort(movers < 0, kind="stable")           # where two supports meet, the driven one counts
+        self._holding, first = np.unique(numbers[order], return_index=True)
+        self._movers, self._own = movers[order][first], self._holding < self._n
+        self._held = self._holding[self._own]
+        self._there = [i not in off for i, _ in self._means]
+        self._rows = [there * row for (_, row), there in zip(self._means, self._there, strict=True)]
         for row in self._rows:
             row[self._held] = 0
-        if getattr(self.scene.driven, "constraints", None) is not None:
-            lift = fem.Function(forms.space)                     # held unknowns move the others through the tangent
-            lift.x.array[held] = moved
-            self._by_control.append(forms.compile(ufl.action(tangent, lift)))
+        self._matrix.hold([bc for _, bc, _, _ in holds], self._rows)
 
     def _dofs_of(self, support: Any, sub: Any, item: Held) -> np.ndarray:
         if item.on is not None:

@@ -16,12 +16,14 @@ class Pressure:
     Args:
         on: name of the boundary. A positive pressure pushes into the body.
         value: a fixed pressure (stress); None: the pressure is what the run controls.
+        name: what it is called in a process and in its columns.
     """
 
     quadrature_degree = 5
+    quantity = "pressure"
 
-    def __init__(self, on: str, value: float | None = None):
-        self.on = on
+    def __init__(self, on: str, value: float | None = None, name: str | None = None):
+        self.on, self.name = on, name
         self.value = None if value is None else finite(f"Pressure({on!r}): value", value)
 
     @property

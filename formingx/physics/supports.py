@@ -33,6 +33,8 @@ class MeanHeld(NamedTuple):
 
 
 class _On:
+    name: str | None = None
+
     def __init__(self, on: str):
         self.on = on
 
@@ -113,12 +115,15 @@ class Displaced(_On):
     Args:
         on: name of the boundary.
         component: "r" or "z".
+        name: what it is called in a process and in its columns.
     """
 
     driven = True
+    quantity = "travel"
 
-    def __init__(self, on: str, component: str = "z"):
+    def __init__(self, on: str, component: str = "z", name: str | None = None):
         super().__init__(on)
+        self.name = name
         self.component = _component(f"Displaced({on!r}): component", component)
 
     def constraints(self):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
+from ..setting import Setting
 from . import measures
 from .measures import Target
 from .profile import Profile, Profiles
@@ -27,6 +28,7 @@ class State:
         kind: "start", "step", "target" or "limit point".
         met: the target that it hits, or None.
         memory: what the problem remembers from here on (friction).
+        stage: name of the stage of a process; setting: what the stage had set, as plain data (`Setting`).
     """
 
     x: np.ndarray
@@ -38,6 +40,8 @@ class State:
     kind: str = "step"
     met: Target | None = None
     memory: list = field(default_factory=list)
+    stage: str = ""
+    setting: dict = field(default_factory=dict)
 
 
 @dataclass
@@ -57,11 +61,12 @@ class Path:
         states: all accepted states, in order along the path.
         counts: what the run cost (`Counts`).
         problem: the `Problem`, for further evaluation.
+        stage: name of the stage that is being recorded.
     """
 
-    def __init__(self, problem: Any, branch: Any):
-        self.problem, self._branch = problem, branch
-        self._recorded = measures.standard(problem)
+    def __init__(self, problem: Any, branch: Any, timed: bool = False):
+        self.problem, self._branch, self.stage = problem, branch, ""
+        self._recorded = measures.standard(problem, timed)
         self._profiles, self._stresses = Profiles(problem), Stresses(problem)
         self.states: list[State] = []
         self.counts = Counts()
@@ -97,14 +102,20 @@ class Path:
     def record(self, state: State) -> None:
         """Take up a state: what has a history goes on from it; evaluate the measures there."""
         self.problem.advance(state.x, state.control)
-        state.memory = self.problem.memory
+        state.memory, state.stage, state.setting = self.problem.memory, self.stage, asdict(self.problem.setting)
         state.measures = {name: self.value(bound, state) for name, bound in self._recorded.items()}
         self.states.append(state)
         self.counts.steps += state.kind != "start"
 
     def value(self, bound: Any, state: State) -> float:
         """A measure bound to this problem (`Target.bind`) at a state."""
+        self.go_to(state)
         return self._branch.value(bound, state.x, state.control)
+
+    def go_to(self, state: State) -> None:
+        """Make the problem that of the state's stage."""
+        if state.setting:
+            self.problem.enter(Setting(**state.setting), state.x, state.control)
 
     def at(self, target: Target, after: State | None = None) -> State:
         """The first state of the path that meets the target: solved for, not interpolated; the path stays as it is.
@@ -120,12 +131,14 @@ class Path:
         states = self.states[next((i for i, s in enumerate(self.states) if s is after), 0):]
         values = [self.value(bound, state) - target.value for state in states]
         for a, b, left, right in zip(values, values[1:], states, states[1:]):
-            if b == 0 or a * b < 0:
+            if left.setting == right.setting and (b == 0 or a * b < 0):
                 now, self.problem.memory = self.problem.memory, left.memory
                 try:
+                    self.go_to(left)
                     found = self._branch.between(left, right, bound, target.value)
                 finally:
                     self.problem.memory = now
+                found.stage, found.setting = left.stage, left.setting
                 found.measures = {name: self.value(m, found) for name, m in self._recorded.items()}
                 return found
         raise InputError(f"the path does not pass {target}: its values lie between"
@@ -138,7 +151,8 @@ class Path:
         """
         rows = [[self.states[0].measures[c] for c in columns]]
         for a, b in zip(self.states, self.states[1:]):
-            for k in range(1, points):
+            self.go_to(b)
+            for k in range(1, points if a.setting == b.setting else 0):
                 at = self._branch.interpolate(a, b, k / points)
                 rows.append([self._branch.value(self._recorded[c], *at) for c in columns])
             rows.append([b.measures[c] for c in columns])
@@ -154,11 +168,13 @@ class Path:
 
     def describe(self, state: State) -> str:
         """A state's main numbers in one line."""
-        return ", ".join(f"{k.replace('_', ' ')} {state.measures[k]:.6g}"
-                         for k in ("pressure", "travel", "pole_height", "pole_stretch") if k in state.measures)
+        scene = self.problem.scene
+        columns = ("process_time", *map(scene.column, scene.drivable), "pole_height", "pole_stretch")
+        return f"stage {state.stage!r}, " * bool(state.stage) + ", ".join(
+            f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in columns if k in state.measures)
 
     def to_csv(self, file: Any) -> None:
-        """Write one row per state: kind, iterations and every measure (rank 0 writes)."""
+        """Write one row per state: stage (of a process), kind, iterations and every measure (rank 0 writes)."""
         from . import files
         files.write_path(self, file)
 

@@ -55,6 +55,14 @@ class Branch:
             self._x.set(0)
         return self._state(0.0, history, "start", None)
 
+    def resume(self, x: np.ndarray, control: float) -> State:
+        """A state once more, under the setting that the problem has taken, and the tangent there."""
+        self._x.array_w[:] = x
+        self.problem.residual(self._x, control, self.newton.F)
+        if not self.newton.tangent(self._x, control):
+            raise Failure("the tangent is singular: something in the body is not held any more, or has no stiffness", [])
+        return self._state(control, [], "start", None)
+
     def solve(self, x: np.ndarray, control: float, constraint: Callable, kind: str, before: State) -> State:
         """The solution of F = 0 and of the constraint, from a guess; raises `Failure`."""
         self._x.array_w[:] = x
@@ -79,8 +87,16 @@ class Branch:
         if self.newton.tangent(self._x, state.control, ahead=True):
             size = self.norm(self.newton.b, 1.0)
             direction, slope = self.newton.b.array_r / size, 1 / size
-            sense = np.sign(self._inner(direction, slope, state.direction, state.slope)) or 1.0
-            state.direction, state.slope = sense * direction, sense * slope
+            state.direction, state.slope = self._like(state, direction, slope)
+
+    def turned(self, state: State, like: State) -> State:
+        """A state whose tangent points the way of another's."""
+        state.direction, state.slope = self._like(like, state.direction, state.slope)
+        return state
+
+    def _like(self, state: State, direction: np.ndarray, slope: float) -> tuple[np.ndarray, float]:
+        sense = np.sign(self._inner(direction, slope, state.direction, state.slope)) or 1.0
+        return sense * direction, sense * slope
 
     def guess_from_rest(self, rest: State, control: float) -> np.ndarray:
         """A guess of the state at a control, to correct at that control: rest, with what is held moved.

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ConvergenceError, InputError, count, instance, several
+from ..errors import ConvergenceError, count, instance, several
 from ..problem import Problem
 from ..results import measures
 from ..results.path import Path, State
@@ -55,52 +55,77 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
     instance("trace: step", step, StepControl | None, "a StepControl or None")
     instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     max_steps = count("trace: max_steps", max_steps)
-    if scene.driven is None:
-        raise InputError("trace: nothing is driven: give one load no value, as Pressure('bottom'), or"
-                         " add a Displaced support")
+    scene.only_driven("trace")
     problem = Problem(scene)
-    run = _Run(problem, until, through, replace(step or StepControl()), tolerances or Tolerances())
-    return run.trace(max_steps, progress)
+    branch = Branch(problem, tolerances or Tolerances())
+    path = Path(problem, branch)
+    run = Run(path, branch, [(target, target.bind(problem)) for target in (*through, until)], step)
+    run.trace(max_steps, progress, branch.start())
+    return path
 
 
-class _Run:
-    """One run: the path that grows, and the targets still open."""
+class Run:
+    """A path that grows with one control, and the targets still open.
 
-    def __init__(self, problem: Problem, until: measures.Target, through: Sequence[measures.Target],
-                 step: StepControl, tolerances: Tolerances):
-        self.until, self.step, self._best = until, step, 0.0
-        self.open = [(target, target.bind(problem)) for target in (*through, until)]
-        self._aim = self.open[-1][1]                        # the measure of `until`
-        self.branch = Branch(problem, tolerances)
-        self.path = Path(problem, self.branch)
+    Args:
+        path: where the states go; branch: solves for them.
+        targets: (target, its measure): the last one ends the run, the others are met on the way.
+        step: step control; default `StepControl()`.
+        turns: False: the control must not turn back (it is the time).
+    """
 
-    def trace(self, max_steps: int, progress: bool) -> Path:
+    def __init__(self, path: Path, branch: Branch, targets: Sequence[tuple[measures.Target, measures.Bound]],
+                 step: StepControl | None = None, turns: bool = True):
+        self.path, self.branch, self._turns = path, branch, turns
+        self.open = list(targets)
+        self.until, self._aim = self.open[-1]
+        self.step, self._best, self._first = replace(step or StepControl()), 0.0, len(path.states)
+
+    @property
+    def states(self) -> list[State]:
+        """Those of this run."""
+        return self.path.states[self._first:]
+
+    def trace(self, max_steps: int, progress: bool, start: State, sense: State | None = None) -> None:
+        """Follow the path from a state until the last target is met, which way is its own or that of `sense`."""
         path, began = self.path, time.perf_counter()
         bar = _progress_bar(path.problem.comm, self.until, progress)
         try:
-            self._record(self._facing_target(self.branch.start()))
+            self._record(self._facing_target(start) if sense is None else self.branch.turned(start, sense))
+            self._close_met(path.last)
+            before = path.counts.steps
             while self._is_open(self.until):
-                if path.counts.steps >= max_steps:
+                if path.counts.steps - before >= max_steps:
                     self._give_up(f"{max_steps} states were accepted before it", pace=self._pace(max_steps))
                 for state in self._next(path.last):
                     self._record(state)
                     if path.problem.memory or not self._is_open(self.until) and state.met is self.until:
                         break                           # with a history, the rest of the step starts from here
                 self._check_direction()
-                _show(bar, path, self.until)
+                _show(bar, self.states, self.until)
         finally:
             bar.close()
             path.counts.seconds += time.perf_counter() - began
-        return path
 
     def _facing_target(self, start: State) -> State:
-        """The start, its tangent turned if a target that changes sign with the control lies the other way."""
-        if self.until.signed:
+        """The start, its tangent turned if the target lies the other way.
+
+        (At rest a target that does not change sign with the control may be reached both ways.)
+        """
+        if self.until.signed or self.path.states:
+            size = 1.0 if self.until.signed else 1e-3
             now = self.branch.value(self._aim, start.x, start.control)
-            ahead = self.branch.value(self._aim, start.x + start.direction, start.control + start.slope)
+            ahead = self.branch.value(self._aim, start.x + size * start.direction, start.control + size * start.slope)
             if (ahead - now) * (self.until.value - now) < 0:
                 start.direction, start.slope = -start.direction, -start.slope
         return start
+
+    def _close_met(self, start: State) -> None:
+        """Close the targets that hold at the start already, to round-off."""
+        for target, bound in list(self.open):
+            if is_met(target, bound, self.branch.value(bound, start.x, start.control)):
+                start.met = start.met or target
+                self.open = [(t, b) for t, b in self.open if t is not target]
 
     def _next(self, old: State) -> list[State]:
         """The next states: one at a target within reach, or one step ahead, and what lies on the way to it.
@@ -142,10 +167,12 @@ class _Run:
         """
         if not self._is_open(self.until):
             return
-        start = self.path.value(self._aim, self.path.states[0])
+        start = self.path.value(self._aim, self.states[0])
         gained = (self.path.value(self._aim, self.path.last) - start) / (self.until.value - start)
         self._best = max(self._best, gained)
-        kept = 0.0 if self.until.bind is measures.bind_control else 0.5
+        if not self._turns and self.path.last.kind == "limit point":
+            self._give_up("the process cannot be followed in time: what its tables drive has a limit point here")
+        kept = 0.0 if isinstance(self._aim, measures.Amplitude) else 0.5
         if self._best > 0.05 and gained < kept * self._best or gained < -0.05:
             self._give_up("the path turned back, which a crease at a singular corner (a clamped rim on a fine mesh) can"
                           " cause")
@@ -203,7 +230,7 @@ class _Run:
     def _pace(self, max_steps: int) -> str:
         """How far a run had come when its steps ran out."""
         path, aim = self.path, self.until.value
-        start, before, now = (path.value(self._aim, s) for s in (path.states[0], path.states[-2], path.last))
+        start, before, now = (path.value(self._aim, s) for s in (self.states[0], path.states[-2], path.last))
         part = (now - start) / ((aim - start) or 1.0)
         if not (aim - now) * (now - before) > 0:
             return f"max_steps = {max_steps} ran out, and the last step led away from the target"
@@ -212,20 +239,26 @@ class _Run:
                 f" {int(np.ceil((aim - now) / (now - before)))} steps more at that pace")
 
     def _give_up(self, why: str, attempt: Any = None, pace: str = "") -> None:
-        found = diagnose(self.branch, self.path.states, why, attempt, pace,
-                         self.until.value if self.until.bind is measures.bind_control else None)
+        found = diagnose(self.branch, self.states, why, attempt, pace,
+                         self.until.value if isinstance(self._aim, measures.Amplitude) else None)
         raise self._error(f"{why}.", found)
 
     def _error(self, why: str, diagnosis: Any) -> ConvergenceError:
         """What happened, what was met, what to try."""
         path = self.path
-        values = [path.value(self._aim, s) for s in path.states]
+        states = self.states
+        values = [path.value(self._aim, s) for s in states]
         best = int(np.argmin([abs(v - self.until.value) for v in values]))
-        limits = "".join(f" A limit point was passed at {path.describe(s)}." for s in path.limit_points)
+        limits = "".join(f" A limit point was passed at {path.describe(s)}." for s in states if s.kind == "limit point")
         return ConvergenceError(
-            f"{self.until} was not reached: {why} The nearest met was {values[best]:.6g}, at"
-            f" {path.describe(path.states[best])}.{limits} The last good state is {path.describe(path.last)};"
+            f"{f'Stage {path.stage!r}: ' * bool(path.stage)}{self.until} was not reached: {why} The nearest met was {values[best]:.6g}, at"
+            f" {path.describe(states[best])}.{limits} The last good state is {path.describe(path.last)};"
             f" it is kept in the error's `path`.{'' if diagnosis.advice else _TRY}", path, diagnosis)
+
+
+def is_met(target: measures.Target, bound: measures.Bound, value: float) -> bool:
+    """True if a value of the target's measure is the target's, to round-off."""
+    return abs(value - target.value) <= 1e-12 * max(abs(value), abs(target.value), bound.size)
 
 
 def _progress_bar(comm: Any, until: measures.Target, progress: bool) -> Any:
@@ -234,10 +267,10 @@ def _progress_bar(comm: Any, until: measures.Target, progress: bool) -> Any:
                 bar_format="{desc}: {percentage:3.0f}% |{bar}| {elapsed}{postfix}")
 
 
-def _show(bar: Any, path: Path, until: measures.Target) -> None:
-    now = path.last.measures.get(until.name)
+def _show(bar: Any, states: list[State], until: measures.Target) -> None:
+    now = states[-1].measures.get(until.name)
     if not bar.disable and now is not None:
-        first = path.states[0].measures[until.name]
+        first = states[0].measures[until.name]
         bar.n = min(max((now - first) / ((until.value - first) or 1.0), 0.0), 1.0)
-        bar.set_postfix_str(f"state {path.counts.steps}", refresh=False)
+        bar.set_postfix_str(f"state {len(states)}", refresh=False)
         bar.update(0)
