@@ -128,7 +128,7 @@ class Process:
             if not any(scene.things[number] is thing for thing in scene.drivable):
                 raise InputError(f"{who}: {scene.things[number]!r} cannot be driven: a Pressure without value, a Displaced"
                                  f" support, or a Contact that moves can")
-            if number in off:
+            if number in off and not hasattr(scene.things[number], "moves"):    # a tool may go home while it is away
                 raise InputError(f"{who}: {scene.things[number]!r} is both driven and left out")
         if len(set(numbers)) < len(numbers):
             raise InputError(f"{who}: one thing has two tables")
