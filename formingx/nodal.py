@@ -11,6 +11,10 @@ from mpi4py import MPI
 from .physics.contact import Contact, Touch, Tractions
 
 
+HOVERING = 1e-3
+"""Distances (over thickness) at which a node is as good as in touch."""
+
+
 class NodalContact:
     """Residual, tangent and history of one contact, at the nodes of its face that this rank owns.
 
@@ -34,15 +38,21 @@ class NodalContact:
         self.lengths = assemble(solid.compile(solid.length_row(contact.on)))[self.dofs[:, 0]]
         self.area = self.lengths * solid.scene.kinematics.weight(self.points.T)
         self._comm, self._length = comm, solid.length
+        self._spread_to_axis(solid.scene.kinematics)
         self.thickness = solid.thickness(contact.on)
         self.law = contact.law(contact.penalty * solid.stress / self.thickness, contact.ramp * self.thickness,
                                self.points)
         self._scale = solid.length / (solid.stress * solid.volume) * self.area
         self._motion = solid.control_scale * np.array(contact.moves or (0.0, 0.0))
         self._last: Any = None                              # positions and tractions last computed
+        self._accepted: Any = None                          # positions at the last accepted state, nearest there
+        self._iterate: Any = None                           # the same of the iteration before
         self.memory = None if contact.mu == 0 else self.law.start(self.points)
+        self._sense: Any = None                             # of sliding, of the iteration before
         self._arrived = np.zeros(len(self.points), dtype=bool)     # in the step before the last accepted state
-        self._allowed = contact.nodes_per_step
+        # without history only the step's own convergence limits how much may touch in it
+        self._allowed = contact.nodes_per_step * (1 if contact.mu else 10)
+        self._foreseen = 0
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Nodes seen from the tool, shape (n, 2), length; `fields`: owned unknowns."""
@@ -52,8 +62,46 @@ class NodalContact:
         """What the law gives at a state, computed once for it."""
         x = self.positions(fields, control)
         if self._last is None or not np.array_equal(x, self._last[0]):
-            self._last = x, self.law.tractions(x, self.memory, self._last and self._last[1].sense)
+            self._last = x, self.law.tractions(x, self.memory)
         return self._last[1]
+
+    def _spread_to_axis(self, kinematics: Any) -> None:
+        """Give the node on the axis some area of its facet's, so that something holds it.
+
+        (1/24, -2/24, 1/24) of L times the weight at L: integrals of what is linear along the facet stay exact.
+        """
+        nodes = np.concatenate(self._comm.allgather(np.column_stack([self.points, self.lengths, self.area])))
+        for axis in nodes[(nodes[:, 3] == 0) & (nodes[:, 2] > 0)]:
+            length = 6 * axis[2]                                        # of its facet, on which Gauss-Lobatto gives 1/6
+            away = np.hypot(*(self.points - axis[:2]).T) / length
+            at = kinematics.weight(np.array([axis[0] + length, axis[1]])) * length / 24
+            for place, share in ((0.0, 1), (0.5, -2), (1.0, 1)):
+                self.area[np.abs(away - place) < 0.1] += share * at
+
+    @property
+    def branch(self) -> bytes:
+        """Which nodes touch and slide, of the tractions last computed."""
+        last = self._last[1]
+        return (last.sense + 4 * (last.normal != 0)).astype(np.int8).tobytes()
+
+    def begin(self) -> None:
+        """Newton's method begins at a guess ahead of the last accepted state."""
+        self._iterate = self._accepted
+
+    def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
+        """Make the tangent at a state the one that an iteration wants, and the residual (`values`) fit to it."""
+        x = self.positions(fields, control)
+        near = self.law.nearest(x)
+        plain = self.tractions(fields, control)
+        if self._iterate is not None:
+            before, there = self._iterate
+            expected = there.distance + np.einsum("ni,ni->n", there.normal, x - before)
+            sense = self._sense
+            found = self.law.tractions(x, self.memory, sense, expected)
+            values[self.dofs] += self._scale[:, None] * (found.force - plain.force)
+            self._last = x, found
+        self._sense = self._last[1].sense
+        self._iterate = x, near
 
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Add the nodal forces to the owned residual."""
@@ -62,7 +110,7 @@ class NodalContact:
     def stiffness(self, fields: np.ndarray, control: float, ahead: bool = False) -> np.ndarray:
         """Derivative of the nodal forces by the nodes' own unknowns, shape (n, 2, 2); `ahead`: see the law."""
         values = self.tractions(fields, control).stiffness
-        if ahead and self._memory is not None:
+        if ahead:
             values = self.law.stiffness_ahead(self.positions(fields, control), self._memory, self._arrived)
         return (self._scale * self._length)[:, None, None] * values
 
@@ -74,9 +122,11 @@ class NodalContact:
 
     def advance(self, fields: np.ndarray, control: float) -> None:
         """A state is accepted: remember it."""
+        x = self.positions(fields, control)
+        self._accepted, self._sense, self._last = (x, self.law.nearest(x)), None, None
         if self._memory is not None:
             before, theta = self._memory.distance, self.law.theta
-            self.memory = self.law.tractions(self.positions(fields, control), self._memory).touch
+            self.memory = self.law.tractions(x, self._memory).touch
             self._arrived = (before <= -theta) & (self._memory.distance > -theta)
 
     @property
@@ -105,10 +155,11 @@ class NodalContact:
 
     def prepare(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> None:
         """A step of this length along a tangent is about to be taken: foretell where nodes arrive."""
+        start = self.positions(fields, control)
+        velocity = self._length * direction[self.dofs] - slope * self._motion
+        times = self._arrivals(start, velocity, length)
+        self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         if self._memory is not None:
-            start = self.positions(fields, control)
-            velocity = self._length * direction[self.dofs] - slope * self._motion
-            times = self._arrivals(start, velocity, length)
             self.memory = self._memory._replace(arrival=start + times[:, None] * velocity)
 
     def _arrivals(self, start: np.ndarray, velocity: np.ndarray, length: float) -> np.ndarray:
@@ -123,10 +174,12 @@ class NodalContact:
         return times
 
     def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
-        """More than twice the new nodes that a step is meant to bring into contact."""
+        """More than twice the new nodes that a step is meant, or foreseen, to bring into contact."""
+        if self._memory is None:
+            return False
         a, b = (self.law.distance(self.positions(f, c)) for f, c in ((old, old_control), (new, control)))
-        found = int(np.sum((a <= -self.law.theta) & (b > -self.law.theta)))
-        return self._comm.allreduce(found, MPI.SUM) > 2 * self._allowed + 2
+        found = int(np.sum((a <= -self.law.theta - HOVERING * self.thickness) & (b > -self.law.theta)))
+        return self._comm.allreduce(found, MPI.SUM) > 2 * max(self._allowed, self._foreseen) + 2
 
     def largest_penetration(self, fields: np.ndarray, control: float) -> float:
         """Depth of the deepest node inside the tool, 0 if none is, length, all ranks."""

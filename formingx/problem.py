@@ -73,6 +73,11 @@ class Problem:
         return bool(self.contacts)
 
     @property
+    def branch(self) -> Any:
+        """On which side of its kinks F was when the residual was last computed, the same on all ranks; hashable."""
+        return tuple(self.comm.allgather(tuple(c.branch for c in self.contacts))) if self.contacts else None
+
+    @property
     def memory(self) -> list[Any]:
         """What F depends on besides x and control: of every contact with friction, its last accepted state."""
         return [contact.memory for contact in self.contacts if contact.memory is not None]
@@ -100,6 +105,20 @@ class Problem:
             values += multiplier * row
         values[self._held] = fields[self._held] - self._motion * control
         self.fill(out, values, [self._dot(row, fields) for row in self._rows])
+
+    def begin(self) -> None:
+        """Newton's method begins."""
+        for contact in self.contacts:
+            contact.begin()
+
+    def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
+        """Ready the tangent at (x, control) for an iteration, and F, the residual there, for the solve with it."""
+        if self.contacts:
+            values = F.array_r[: self._n].copy()
+            for contact in self.contacts:
+                contact.linearise(values, x.array_r[: self._n], control)
+            values[self._held] = F.array_r[: self._n][self._held]
+            F.array_w[: self._n] = values
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> PETSc.Mat:
         """dF/dx at (x, control): `matrix`, refilled.

@@ -3,7 +3,7 @@
 Song (1993), eqs. (5.7) to (5.14), per unit reference area, at a point whose signed distance to the tool is d:
 
     normal traction      N = k F(d),  F the ramp (5.13) of half-width theta: 0 below -theta, d above theta, C1 between;
-    tangential traction  T = k F'(d) g, not more than mu N,
+    tangential traction  T = k_t F'(d) g, not more than mu N; k_t = k for stick, k/100 for Coulomb's law,
 
 g being the elastic slip: the tangential motion since the point touched (entered the ramp), less what has slid. Stick
 is mu = inf, frictionless mu = 0. A point that was out of touch at the last accepted state slips from where it arrives
@@ -25,6 +25,13 @@ from ..errors import InputError, count, finite, non_negative, positive
 from .tools import Nearest, Tool
 
 
+SOFTER = 0.01
+"""Stiffness of elastic slip over that of the ramp, under Coulomb's law: a point slides after some mu 100 N/k of slip.
+
+Were it as stiff as the ramp, that range would be narrower than a step of Newton's method can aim at.
+"""
+
+
 class Contact:
     """A face of the body that a rigid tool stops.
 
@@ -44,7 +51,7 @@ class Contact:
     """
 
     def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float = 2e4,
-                 ramp: float = 1e-3, nodes_per_step: int = 1, moves: tuple[float, float] | None = None):
+                 ramp: float = 1e-5, nodes_per_step: int = 1, moves: tuple[float, float] | None = None):
         name = f"Contact({on!r})"
         if not isinstance(tool, Tool):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
@@ -71,7 +78,7 @@ class Contact:
 
     def law(self, k: float, theta: float, points: np.ndarray) -> Law:
         """Tractions for a penalty k (stress/length) and a ramp theta (length), at points, shape (n, 2)."""
-        return Law(self.tool, self.mu, k, theta, np.maximum(self.tool.signed_distance(points) + 0.999 * theta, 0.0))
+        return Law(self.tool, self.mu, k, theta, np.maximum(self.tool.signed_distance(points) + (1 - 1e-6) * theta, 0.0))
 
     def __repr__(self) -> str:
         return f"Contact({self.on!r}, {self.tool!r}, {self.friction!r})"
@@ -120,7 +127,8 @@ class Law:
         """Signed distance less the shift of points x, shape (n,), length."""
         return self.tool.signed_distance(x) - self.shift
 
-    def _nearest(self, x: np.ndarray) -> Nearest:
+    def nearest(self, x: np.ndarray) -> Nearest:
+        """`Tool.nearest`, the distances less the shift."""
         near = self.tool.nearest(x)
         return near._replace(distance=near.distance - self.shift)
 
@@ -139,49 +147,59 @@ class Law:
         """What points at x remember before anything has happened."""
         return _touch(x.copy(), self.distance(x), np.zeros(len(x)))
 
-    def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None) -> Tractions:
+    def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
+                  expected: np.ndarray | None = None) -> Tractions:
         """At points x, shape (n, 2), which remember `old` (not used without friction).
+
+        `expected`: distances, shape (n,), at which to linearise the ramp, those of the points if None. Newton's method
+        wants what the iteration before foretold: the normal traction as an unknown of its own would be that. Taken
+        from the points, the curvature of tool and motion, times a stiff penalty, would drown it.
 
         `sense`: that of the iteration before. A point that would turn from sliding one way to sliding the other is
         taken as stuck for this one iteration: Newton's method would send it to and fro across the narrow range of
         stick.
         """
-        near, k = self._nearest(x), self.k
+        near, k = self.nearest(x), self.k
         d, n, t, bend = near.distance, near.normal, near.tangent, near.curvature
-        F, slope = self.ramp(d)
-        N = k * F
+        F, slope = self.ramp(d if expected is None else expected)
+        pressed = k * F
+        ahead = 0.0 if expected is None else d - expected
+        N = pressed + k * slope * ahead
         force = N[:, None] * n
-        stiffness = _outer(k * slope, n, n) + _outer(N * bend, t, t)
+        stiffness = _outer(k * slope, n, n) + _outer(pressed * bend, t, t)
         zero = np.zeros(len(x))
         if self.mu == 0:
             return Tractions(force, stiffness, _touch(x, d, zero), N, zero, zero)
         assert old is not None
         g, dg = self._slip(x, near, old)
-        T, dT = k * slope * g, (k * slope)[:, None] * dg
-        rising = (np.abs(d) < self.theta) * k / (2 * self.theta)
+        rising = (np.abs(d if expected is None else expected) < self.theta) * k / (2 * self.theta)
+        kt = k if self.mu == math.inf else SOFTER * k
+        rising *= kt / k
+        T, dT = (kt * slope + rising * ahead) * g, (kt * slope)[:, None] * dg
         dT += (rising * g)[:, None] * n
         sense_now = zero
         if math.isfinite(self.mu):
             turned = False if sense is None else np.sign(T) * sense < 0
-            sliding, limit = (np.abs(T) > self.mu * N) & ~np.asarray(turned), np.sign(T) * self.mu
+            sliding, limit = (np.abs(T) > self.mu * pressed) & ~np.asarray(turned), np.sign(T) * self.mu
             sense_now = np.where(sliding, np.sign(T), 0.0)
             T = np.where(sliding, limit * N, T)
             dT = np.where(sliding[:, None], (limit * k * slope)[:, None] * n, dT)
         force = force + T[:, None] * t
         stiffness = stiffness + np.einsum("ni,nj->nij", t, dT) - _outer(T * bend, n, t)
-        kept = np.divide(T, k * slope, out=zero.copy(), where=slope > 0)
+        kept = np.divide(T, kt * slope, out=zero.copy(), where=slope > 0)
         kept *= 1 + 1e-9 * np.abs(sense_now)                 # what slides goes on sliding, whatever round-off says
         return Tractions(force, stiffness, _touch(x, d, kept), N, T, sense_now)
 
-    def stiffness_ahead(self, x: np.ndarray, old: Touch, arrived: np.ndarray) -> np.ndarray:
+    def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
         """The stiffness with points that have just touched (`arrived`), or are about to, pressed halfway into the ramp.
 
         At the foot of the ramp they have none, and the tangent of the path would let them slip where they will stick.
         """
-        near, now = self._nearest(x), self.tractions(x, old)
+        near, now = self.nearest(x), self.tractions(x, old)
         touching = (arrived | (np.abs(near.distance / self.theta + 1.025) < 0.025)) & (now.sense == 0)
         press = np.where(touching, np.maximum(-0.5 * self.theta - near.distance, 0.0), 0.0)
-        old = old._replace(distance=near.distance + press, position=x)
+        if old is not None:
+            old = old._replace(distance=near.distance + press, position=x)
         pressed = self.tractions(x + press[:, None] * near.normal, old)
         return np.where((press > 0)[:, None, None], pressed.stiffness, now.stiffness)
 

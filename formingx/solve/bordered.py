@@ -13,6 +13,9 @@ from .direct import DirectSolver
 UNLOADED = 1e-5
 """Support forces (over stress times volume over length) below which a body counts as unloaded."""
 
+SETTLING = 100
+"""At most so many iterations, points touching and letting go on the way."""
+
 SMALL = 1e-3
 """Corrections (dimensionless displacement) below which growth is no sign of divergence: points touch and let go."""
 
@@ -35,6 +38,31 @@ class Failure(Exception):
     def __init__(self, reason: str, history: list[Iteration]):
         super().__init__(reason)
         self.reason, self.history = reason, history
+
+
+class _Kinks:
+    """Which branch of its kinks a problem is on, iteration by iteration.
+
+    Attributes:
+        changed: the iteration that came to the branch it is on; share: of a correction to take: less when an iteration
+            comes back to a branch that it had left, for then it would go round for ever.
+    """
+
+    def __init__(self, problem: Any):
+        self._problem, self._iteration = problem, -1
+        self._seen: dict[Any, int] = {}
+        self._last: Any = None
+        self.changed, self.share = 0, 1.0
+
+    def look(self) -> None:
+        """To be called once an iteration, after the residual was computed."""
+        self._iteration += 1
+        now = self._problem.branch
+        if now != self._last and self._last is not None:
+            self.changed = self._iteration
+            self.share = 0.5 if now in self._seen else 1.0
+        self._seen[now] = self._iteration
+        self._last = now
 
 
 class Tolerances(NamedTuple):
@@ -104,9 +132,10 @@ class BorderedNewton:
         """
         problem = self.problem
         history: list[Iteration] = []
+        problem.begin()
         problem.residual(x, control, self.F)
         work0 = moved = 0.0
-        limit = self.tolerances.iterations + (8 if problem.has_kinks else 0)       # points touch and let go on the way
+        kinks = _Kinks(problem)
         while True:
             residual = self.F.norm() / (problem.force_scale + UNLOADED)
             if not np.isfinite(residual):
@@ -114,11 +143,14 @@ class BorderedNewton:
             if self.tolerances.met([i.correction for i in history], [*(i.residual for i in history), residual]):
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
-            grown = len(history) >= 2 and history[-1].correction > (history[0].correction if len(history) > 2 else 0.5)
+            problem.linearise(x, control, self.F)
+            kinks.look()
+            quiet = history[kinks.changed:]
+            grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
             if grown and not (problem.has_kinks and moved < SMALL):
                 raise Failure("the iteration diverges", history)
-            if len(history) >= limit:
-                raise Failure(f"no convergence in {limit} iterations", history)
+            if len(quiet) >= self.tolerances.iterations or len(history) >= SETTLING:
+                raise Failure(f"no convergence in {len(history)} iterations", history)
             if not self.tangent(x, control):
                 raise Failure("the tangent matrix is singular", history)
             c, c_control = constraint(x, control, self.gradient)
@@ -131,15 +163,12 @@ class BorderedNewton:
             self.a.axpy(step, self.b)
             work = abs(self.F.dot(self.a))
             work0 = work0 or work or 1.0
-            x.axpy(1.0, self.a)
-            control += step
+            x.axpy(kinks.share, self.a)
+            control += kinks.share * step
             moved = self._norm(self.a, step)
             correction = moved / (self._norm(x, control) + 1e-8)
             if not np.isfinite(correction):
                 raise Failure("the tangent matrix is singular", history)
-            if problem.has_kinks and len(history) > 2 and correction > 0.8 * max(i.correction for i in history[-2:]):
-                x.axpy(-0.5, self.a)                # to and fro between two states: halfway ends it
-                control -= 0.5 * step
             history.append(Iteration(residual, correction, work / work0))
             problem.residual(x, control, self.F)
 

@@ -134,7 +134,7 @@ class _Run:
         gained = (self.path.value(self._aim, self.path.last) - start) / (self.until.value - start)
         self._best = max(self._best, gained)
         kept = 0.0 if self.until.bind is measures.bind_control else 0.5
-        if self._best > 0.05 and gained < kept * self._best:
+        if self._best > 0.05 and gained < kept * self._best or gained < -0.05:
             self._give_up("the path turned back, which a crease at a singular corner (a clamped rim on a fine mesh) can"
                           " cause")
 

@@ -20,22 +20,29 @@ class DirectSolver:
     """Factorise, then solve as often as needed."""
 
     def __init__(self, matrix: PETSc.Mat, symmetric: bool):
-        self._matrix = matrix
-        self._ksp = PETSc.KSP().create(matrix.comm)
-        configure(self._ksp, matrix, symmetric)
+        self._matrix, self._symmetric = matrix, symmetric
+        self._create()
 
     def factorise(self) -> bool:
         """Factorise the matrix as it is now; False if it is singular to working precision."""
         self._ksp.setOperators(self._matrix)
         try:
             self._ksp.setUp()
+            good = self._ksp.getPC().getFailedReason() == 0
         except PETSc.Error:
-            return False
-        return self._ksp.getPC().getFailedReason() == 0
+            good = False
+        if not good:                     # PETSc refuses to factorise again with a MUMPS that has failed once
+            self.destroy()
+            self._create()
+        return good
 
     def solve(self, rhs: PETSc.Vec, out: PETSc.Vec) -> None:
         """out = matrix^-1 rhs."""
         self._ksp.solve(rhs, out)
+
+    def _create(self) -> None:
+        self._ksp = PETSc.KSP().create(self._matrix.comm)
+        configure(self._ksp, self._matrix, self._symmetric)
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
