@@ -45,8 +45,8 @@ class NodalContact:
         self._scale = solid.length / (solid.stress * solid.volume) * self.area
         self._motion = solid.control_scale * np.array(contact.moves or (0.0, 0.0))
         self._last: Any = None                              # positions and tractions last computed
-        self._accepted: Any = None                          # positions at the last accepted state, nearest there
-        self._iterate: Any = None                           # the same of the iteration before
+        self._accepted: Any = None                          # positions at the last accepted state
+        self._iterate: Any = None                           # `Motion` at the iteration before
         self.memory = None if contact.mu == 0 else self.law.start(self.points)
         self._sense: Any = None                             # of sliding, of the iteration before
         self._arrived = np.zeros(len(self.points), dtype=bool)     # in the step before the last accepted state
@@ -86,22 +86,18 @@ class NodalContact:
 
     def begin(self) -> None:
         """Newton's method begins at a guess ahead of the last accepted state."""
-        self._iterate = self._accepted
+        self._iterate = self._accepted if self._accepted is None else self.law.motion(self._accepted, self._memory)
 
     def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Make the tangent at a state the one that an iteration wants, and the residual (`values`) fit to it."""
         x = self.positions(fields, control)
-        near = self.law.nearest(x)
         plain = self.tractions(fields, control)
         if self._iterate is not None:
-            before, there = self._iterate
-            expected = there.distance + np.einsum("ni,ni->n", there.normal, x - before)
-            sense = self._sense
-            found = self.law.tractions(x, self.memory, sense, expected)
+            found = self.law.tractions(x, self._memory, self._sense, self._iterate.to(x))
             values[self.dofs] += self._scale[:, None] * (found.force - plain.force)
             self._last = x, found
         self._sense = self._last[1].sense
-        self._iterate = x, near
+        self._iterate = self.law.motion(x, self._memory)
 
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Add the nodal forces to the owned residual."""
@@ -123,7 +119,7 @@ class NodalContact:
     def advance(self, fields: np.ndarray, control: float) -> None:
         """A state is accepted: remember it."""
         x = self.positions(fields, control)
-        self._accepted, self._sense, self._last = (x, self.law.nearest(x)), None, None
+        self._accepted, self._sense, self._last = x, None, None
         if self._memory is not None:
             before, theta = self._memory.distance, self.law.theta
             self.memory = self.law.tractions(x, self._memory).touch

@@ -110,7 +110,7 @@ def test_forces_balance(friction):
 
 
 def test_work_of_the_pressure_is_stored():
-    errors = [work_error(largest) for largest in (0.04, 0.02, 0.01)]
+    errors = [work_error(largest) for largest in (0.02, 0.01, 0.005)]
     assert errors[2] < 1e-5, errors
 
 

@@ -22,13 +22,15 @@ def test_step_halves_down_to_its_floor_and_keeps_its_ceiling():
 
 
 def test_convergence_needs_residual_and_correction():
-    def met(corrections, residual):
-        return Tolerances(correction=1e-10, residual=1e-8).met(corrections, [*[1.0] * len(corrections), residual])
+    def met(corrections, residual, before=1.0):
+        residuals = [*[1.0] * (len(corrections) - 1), before, residual]
+        return Tolerances(correction=1e-10, residual=1e-8).met(corrections, residuals[-len(corrections) - 1:])
 
     assert met([1e-2, 1e-4, 1e-7], 1e-9)              # quadratic: the next would be 1e-13
     assert not met([1e-2, 1e-4, 1e-7], 1e-7)          # residual too large
     assert not met([1e-2, 1e-4], 1e-9)                # the next would be 1e-8
     assert not met([], 0.0)
-    assert met([1e-4, 3e-8, 2e-8], 1e-7)              # round-off: no longer shrinking
+    assert met([1e-4, 3e-8, 2e-8], 1e-7, before=2e-7)   # round-off: no longer shrinking
+    assert not met([1e-4, 3e-8, 2e-8], 1e-7, before=4e-7)      # the residual still does: a point lets go
     assert not met([1e-4, 3e-5, 2e-5], 1e-9)          # stalled far from it
     assert met([1e-2, 1e-6, 1e-12], 0.9)              # a residual at round-off, of a stiff penalty

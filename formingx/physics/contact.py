@@ -78,7 +78,7 @@ class Contact:
 
     def law(self, k: float, theta: float, points: np.ndarray) -> Law:
         """Tractions for a penalty k (stress/length) and a ramp theta (length), at points, shape (n, 2)."""
-        return Law(self.tool, self.mu, k, theta, np.maximum(self.tool.signed_distance(points) + (1 - 1e-6) * theta, 0.0))
+        return Law(self.tool, self.mu, k, theta, np.maximum(self.tool.signed_distance(points) + (1 - 1e-7) * theta, 0.0))
 
     def __repr__(self) -> str:
         return f"Contact({self.on!r}, {self.tool!r}, {self.friction!r})"
@@ -111,6 +111,25 @@ class Tractions(NamedTuple):
     normal: np.ndarray
     tangential: np.ndarray
     sense: np.ndarray
+
+
+class Motion(NamedTuple):
+    """Where n points are with respect to a tool, to first order.
+
+    position: shape (n, 2), length; distance, slip: shape (n,), length; normal, along: their gradients, shape (n, 2).
+    """
+
+    position: np.ndarray
+    distance: np.ndarray
+    normal: np.ndarray
+    slip: np.ndarray
+    along: np.ndarray
+
+    def to(self, x: np.ndarray) -> Motion:
+        """What it foretells for the points moved to x, shape (n, 2)."""
+        by = x - self.position
+        distance = self.distance + np.einsum("ni,ni->n", self.normal, by)
+        return self._replace(position=x, distance=distance, slip=self.slip + np.einsum("ni,ni->n", self.along, by))
 
 
 class Law:
@@ -148,12 +167,12 @@ class Law:
         return _touch(x.copy(), self.distance(x), np.zeros(len(x)))
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
-                  expected: np.ndarray | None = None) -> Tractions:
+                  expected: Motion | None = None) -> Tractions:
         """At points x, shape (n, 2), which remember `old` (not used without friction).
 
-        `expected`: distances, shape (n,), at which to linearise the ramp, those of the points if None. Newton's method
-        wants what the iteration before foretold: the normal traction as an unknown of its own would be that. Taken
-        from the points, the curvature of tool and motion, times a stiff penalty, would drown it.
+        `expected`: where to linearise the law, at the points if None. Newton's method wants what the iteration before
+        foretold: tractions as unknowns of their own would be those. Taken from the points, the curvature of tool and
+        motion, times a stiff penalty, would drown them.
 
         `sense`: that of the iteration before. A point that would turn from sliding one way to sliding the other is
         taken as stuck for this one iteration: Newton's method would send it to and fro across the narrow range of
@@ -161,9 +180,9 @@ class Law:
         """
         near, k = self.nearest(x), self.k
         d, n, t, bend = near.distance, near.normal, near.tangent, near.curvature
-        F, slope = self.ramp(d if expected is None else expected)
-        pressed = k * F
-        ahead = 0.0 if expected is None else d - expected
+        at = d if expected is None else expected.distance
+        F, slope = self.ramp(at)
+        pressed, ahead = k * F, d - at
         N = pressed + k * slope * ahead
         force = N[:, None] * n
         stiffness = _outer(k * slope, n, n) + _outer(pressed * bend, t, t)
@@ -172,23 +191,30 @@ class Law:
             return Tractions(force, stiffness, _touch(x, d, zero), N, zero, zero)
         assert old is not None
         g, dg = self._slip(x, near, old)
-        rising = (np.abs(d if expected is None else expected) < self.theta) * k / (2 * self.theta)
+        rising = (np.abs(at) < self.theta) * k / (2 * self.theta)
         kt = k if self.mu == math.inf else SOFTER * k
         rising *= kt / k
         T, dT = (kt * slope + rising * ahead) * g, (kt * slope)[:, None] * dg
         dT += (rising * g)[:, None] * n
-        sense_now = zero
+        sense_now, bent = zero, T
         if math.isfinite(self.mu):
-            turned = False if sense is None else np.sign(T) * sense < 0
-            sliding, limit = (np.abs(T) > self.mu * pressed) & ~np.asarray(turned), np.sign(T) * self.mu
-            sense_now = np.where(sliding, np.sign(T), 0.0)
-            T = np.where(sliding, limit * N, T)
+            trial = kt * slope * (g if expected is None else expected.slip)
+            turned = False if sense is None else np.sign(trial) * sense < 0
+            sliding, limit = (np.abs(trial) > self.mu * pressed) & ~np.asarray(turned), np.sign(trial) * self.mu
+            sense_now = np.where(sliding, np.sign(trial), 0.0)
+            T, bent = np.where(sliding, limit * N, T), np.clip(T, -self.mu * pressed, self.mu * pressed)
             dT = np.where(sliding[:, None], (limit * k * slope)[:, None] * n, dT)
         force = force + T[:, None] * t
-        stiffness = stiffness + np.einsum("ni,nj->nij", t, dT) - _outer(T * bend, n, t)
+        stiffness = stiffness + np.einsum("ni,nj->nij", t, dT) - _outer(bent * bend, n, t)
         kept = np.divide(T, kt * slope, out=zero.copy(), where=slope > 0)
         kept *= 1 + 1e-9 * np.abs(sense_now)                 # what slides goes on sliding, whatever round-off says
         return Tractions(force, stiffness, _touch(x, d, kept), N, T, sense_now)
+
+    def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
+        """Distance and slip of points x, shape (n, 2), and their gradients."""
+        near = self.nearest(x)
+        g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, old)
+        return Motion(x, near.distance, near.normal, g, dg)
 
     def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
         """The stiffness with points that have just touched (`arrived`), or are about to, pressed halfway into the ramp.

@@ -13,7 +13,7 @@ from .direct import DirectSolver
 UNLOADED = 1e-5
 """Support forces (over stress times volume over length) below which a body counts as unloaded."""
 
-SETTLING = 100
+SETTLING = 40
 """At most so many iterations, points touching and letting go on the way."""
 
 SMALL = 1e-3
@@ -60,7 +60,10 @@ class _Kinks:
         now = self._problem.branch
         if now != self._last and self._last is not None:
             self.changed = self._iteration
-            self.share = 0.5 if now in self._seen else 1.0
+            if now in self._seen:
+                self.share = max(self.share / 2, 0.25)
+        elif self._iteration > self.changed + 1:
+            self.share = 1.0
         self._seen[now] = self._iteration
         self._last = now
 
@@ -93,7 +96,8 @@ class Tolerances(NamedTuple):
             return True
         if last < self.correction and residual > 0.3 * residuals[-2]:
             return True
-        return (last < 1e-11 or 0.3 * before < last < 1e-7) and residual < 1e3 * self.residual
+        stalled = 0.3 * before < last < 1e-7 and residual > 0.3 * residuals[-2]
+        return (last < 1e-11 or stalled) and residual < 1e3 * self.residual
 
 
 class BorderedNewton:

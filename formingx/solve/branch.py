@@ -37,7 +37,7 @@ class Branch:
         history: list = []
         self._x.set(0)
         self.problem.residual(self._x, 0.0, self.newton.F)
-        if self.newton.F.norm() > self.newton.tolerances.residual * (self.problem.force_scale + UNLOADED):
+        if self.newton.F.norm() > Tolerances().residual * (self.problem.force_scale + UNLOADED):
             try:
                 _, history = self.newton.correct(self._x, 0.0, _no_control)
             except Failure as failure:
