@@ -143,6 +143,11 @@ class Problem:
         for contact in self.contacts:
             contact.advance(x[: self._n], control)
 
+    def remember(self, state: Any) -> None:
+        """Go on from a state that was accepted before: its history is what it was then."""
+        self.advance(state.x, state.control)
+        self.memory = state.memory
+
     def reach(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step of at most `length` from x along (direction, slope) may be. Arrays: own part."""
         n = self._n

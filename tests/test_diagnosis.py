@@ -1,5 +1,6 @@
 """A run made to fail for each reason gives the right words, numbers and place."""
 
+import importlib
 import math
 
 import numpy as np
@@ -85,12 +86,12 @@ def test_buckling():
     assert "possibly buckling" in found.causes[0] and found.limit_points == ()
 
 
-def test_contact_that_does_not_settle():
+def test_contact_that_does_not_settle(monkeypatch):
+    """Newton's method is given too few iterations for points that touch and let go."""
+    monkeypatch.setattr(importlib.import_module("formingx.solve.bordered"), "SETTLING", 3)
     tool = fx.tools.cylinder(radius=0.3, z=0.1)
-    scene = treloar(elements=(12, 1), support=fx.Clamped("rim"),
-                    contacts=[fx.Contact("top", tool, 3.0, penalty=1e7, ramp=1e-6)])
+    scene = treloar(elements=(12, 1), support=fx.Clamped("rim"), contacts=[fx.Contact("top", tool, 3.0)])
     _, found = failure(lambda: fx.trace(scene, until=fx.pole_height(0.9), max_steps=60, progress=False))
-    assert found.touching
     assert "contact does not settle" in str(found)
     assert found.worst.boundary == "top" and found.worst.distance == 0 and found.worst.R < 0.35
     assert found.residual["displacement"] > 1e-3 > found.residual["pressure"]

@@ -27,6 +27,7 @@ class State:
         kind: "start", "step", "target" or "limit point".
         met: the target that it hits, or None.
         memory: what the problem remembers from here on (friction).
+        stepping: what a run goes on with: its next step and its counts; empty inside a step.
     """
 
     x: np.ndarray
@@ -38,6 +39,7 @@ class State:
     kind: str = "step"
     met: Target | None = None
     memory: list = field(default_factory=list)
+    stepping: dict = field(default_factory=dict)
 
 
 @dataclass
@@ -161,6 +163,16 @@ class Path:
         """Write one row per state: kind, iterations and every measure (rank 0 writes)."""
         from . import files
         files.write_path(self, file)
+
+    def save(self, folder: Any) -> None:
+        """Write every state to a checkpoint folder, to look at later or to go on from (`formingx.load`).
+
+        Raises:
+            InputError: the folder holds another run.
+            OSError: it cannot be written.
+        """
+        from ..checkpoint import Checkpoint
+        Checkpoint(folder, self.problem).write(self)
 
     def plot(self, y: str, x: str, axes: Any = None, **style: Any) -> Any:
         """Draw column `y` over column `x`; returns the matplotlib axes."""

@@ -9,11 +9,12 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
+from ..checkpoint import Checkpoint
 from ..errors import ConvergenceError, InputError, count, instance, several
 from ..problem import Problem
 from ..results import measures
@@ -32,7 +33,7 @@ _TRY = (" Try a target within what was met, a smaller first step (step=StepContr
 
 def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Target] = (),
           step: StepControl | None = None, tolerances: Tolerances | None = None, max_steps: int = 200,
-          progress: bool = True) -> Path:
+          progress: bool = True, start: Path | None = None, checkpoint: Any = None) -> Path:
     """Follow the equilibrium path from the unloaded body until a target is reached, through limit points.
 
     Args:
@@ -43,10 +44,15 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
         tolerances: when a state counts as converged; default `Tolerances()`.
         max_steps: accepted states before the run gives up.
         progress: show a progress bar on runs of more than two seconds (rank 0).
+        start: a path of this scene to go on from, also one that `formingx.load` read; it stays as it is. Its steps go
+            on as they were, unless `step` is given; targets that it has met count as met.
+        checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
 
     Raises:
-        InputError: nothing is driven, or a target needs something that the scene does not have.
+        InputError: nothing is driven, a target needs something that the scene does not have, `start` is of another
+            scene, or the checkpoint holds another run.
         ConvergenceError: the target was not reached. It carries the path so far and says what to try.
+        OSError: the checkpoint cannot be written; the states in it are kept.
     """
     instance("trace: scene", scene, Scene, "a formingx.Scene")
     through = several("trace: through", through, "targets, such as pole_stretch(3)")
@@ -58,8 +64,11 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
     if scene.driven is None:
         raise InputError("trace: nothing is driven: give one load no value, as Pressure('bottom'), or"
                          " add a Displaced support")
-    problem = Problem(scene)
-    run = _Run(problem, until, through, replace(step or StepControl()), tolerances or Tolerances())
+    if start is not None and (not isinstance(start, Path) or start.problem.scene is not scene or not start.states):
+        raise InputError("trace: start: must be a path of this very scene: fx.load(folder, scene), or what trace gave"
+                         " back")
+    problem = Problem(scene) if start is None else start.problem
+    run = _Run(problem, until, through, step, tolerances or Tolerances(), start, checkpoint)
     return run.trace(max_steps, progress)
 
 
@@ -67,31 +76,57 @@ class _Run:
     """One run: the path that grows, and the targets still open."""
 
     def __init__(self, problem: Problem, until: measures.Target, through: Sequence[measures.Target],
-                 step: StepControl, tolerances: Tolerances):
-        self.until, self.step, self._best = until, step, 0.0
-        self.open = [(target, target.bind(problem)) for target in (*through, until)]
-        self._aim = self.open[-1][1]                        # the measure of `until`
+                 step: StepControl | None, tolerances: Tolerances, start: Path | None, checkpoint: Any):
+        self.until, self._best, self._began = until, 0.0, time.perf_counter()
+        targets = [(target, target.bind(problem)) for target in (*through, until)]
+        self._aim = targets[-1][1]                          # the measure of `until`
         self.branch = Branch(problem, tolerances)
-        self.path = Path(problem, self.branch)
+        path = self.path = Path(problem, self.branch)
+        if start is not None:
+            path.states, path.counts = list(start.states), replace(start.counts)
+            self.branch.iterations = path.counts.iterations
+        self.open = [(target, bound) for target, bound in targets if path.met(target) is None]
+        before: dict = next((s.stepping["step"] for s in reversed(path.states) if s.stepping), {})
+        self.step = replace(step or StepControl(**before))
+        self.checkpoint = Checkpoint(checkpoint, problem) if checkpoint is not None else None
 
     def trace(self, max_steps: int, progress: bool) -> Path:
-        path, began = self.path, time.perf_counter()
+        path, before = self.path, self.path.counts.steps
         bar = _progress_bar(path.problem.comm, self.until, progress)
         try:
-            self._record(self._facing_target(self.branch.start()))
+            if path.states:
+                path.problem.remember(path.last)
+                self._best = max(map(self._gained, path.states))
+            else:
+                self._record(self._facing_target(self.branch.start()))
+            self._settle()
             while self._is_open(self.until):
-                if path.counts.steps >= max_steps:
+                if path.counts.steps - before >= max_steps:
                     self._give_up(f"{max_steps} states were accepted before it", pace=self._pace(max_steps))
                 for state in self._next(path.last):
                     self._record(state)
                     if path.problem.memory or not self._is_open(self.until) and state.met is self.until:
                         break                           # with a history, the rest of the step starts from here
+                self._settle()
                 self._check_direction()
                 _show(bar, path, self.until)
         finally:
             bar.close()
-            path.counts.seconds += time.perf_counter() - began
+            path.counts.seconds += self._elapsed()
         return path
+
+    def _elapsed(self) -> float:
+        """Seconds since this was last asked."""
+        before, self._began = self._began, time.perf_counter()
+        return self._began - before
+
+    def _settle(self) -> None:
+        """A step is complete: note how the run goes on from here, on disk too."""
+        path = self.path
+        path.counts.seconds += self._elapsed()
+        path.last.stepping = {"step": asdict(self.step), "counts": asdict(path.counts)}
+        if self.checkpoint is not None:
+            self.checkpoint.write(path)
 
     def _facing_target(self, start: State) -> State:
         """The start, its tangent turned if a target that changes sign with the control lies the other way."""
@@ -142,13 +177,17 @@ class _Run:
         """
         if not self._is_open(self.until):
             return
-        start = self.path.value(self._aim, self.path.states[0])
-        gained = (self.path.value(self._aim, self.path.last) - start) / (self.until.value - start)
+        gained = self._gained(self.path.last)
         self._best = max(self._best, gained)
         kept = 0.0 if self.until.bind is measures.bind_control else 0.5
         if self._best > 0.05 and gained < kept * self._best or gained < -0.05:
             self._give_up("the path turned back, which a crease at a singular corner (a clamped rim on a fine mesh) can"
                           " cause")
+
+    def _gained(self, state: State) -> float:
+        """How far a state has come, from the first state (0) to the target (1)."""
+        start = self.path.value(self._aim, self.path.states[0])
+        return (self.path.value(self._aim, state) - start) / (self.until.value - start)
 
     def _within_reach(self, old: State, length: float) -> tuple:
         """(target, its measure, distance) of the first open target that the tangent meets within `length`."""
