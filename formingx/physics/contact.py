@@ -24,7 +24,6 @@ import numpy as np
 from ..errors import InputError, count, non_negative, pair, positive
 from .tools import Nearest, Tool
 
-
 SOFTER = 0.01
 """Stiffness of elastic slip over that of the ramp, under Coulomb's law: a point slides after some mu 100 N/k of slip.
 
