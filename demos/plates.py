@@ -67,9 +67,14 @@ def draw_lines(path, state, axes, elements, height=HALF_HEIGHT, radius=RADIUS, *
 
 
 def draw_grids(path, states, labels, elements, file, **size) -> None:
-    """Deformed grids side by side."""
-    figure, axes = plots.figure(len(states), width=3.2, height=3.0)
-    for a, state, label in zip(np.atleast_1d(axes), states, labels, strict=True):
+    """Deformed grids below one another, all on one scale."""
+    moved = [where(path, s, [(RADIUS, 0.0), (RADIUS, HALF_HEIGHT), (0.0, HALF_HEIGHT)]) for s in states]
+    wide, heights = max(m[:, 0].max() for m in moved) * 1.05, [m[:, 1].max() * 1.15 for m in moved]
+    figure, _ = plots.figure(1, width=5.2, height=5.2 / wide * sum(heights) + 0.45 * len(states))
+    figure.clear()
+    axes = figure.subplots(len(states), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+    for a, state, label, high in zip(axes, states, labels, heights, strict=True):
         draw_lines(path, state, a, elements, color="tab:blue", linewidth=0.7, **size)
-        a.set(title=label, xlabel="r, cm", ylabel="z, cm")
+        a.set(title=label, ylabel="z, cm", xlim=(0, wide), ylim=(0, high))
+    axes[-1].set_xlabel("r, cm")
     save(figure, file)
