@@ -61,8 +61,7 @@ class Checkpoint:
         if self._there is None:
             self._there = self._begin(path)
         for number in range(self._there, len(path)):
-            self._write_state(number, path.states[number], path.profile(path.states[number])
-                              if _has_profile(path) else None)
+            self._write_state(number, path.states[number], _profile(path, path.states[number]))
             self._there = number + 1
 
     def _begin(self, path: Path) -> int:
@@ -98,7 +97,7 @@ class Checkpoint:
         place = self.folder / _name(number)
         part = place.with_name(place.name + ".part")
         n = problem.forms.space.dofmap.index_map.size_local
-        data = _plain_state(state) | {"memory": _gather_memory(problem, state), "profile": profile and _lists(profile)}
+        data = _plain_state(state) | {"memory": _gather_memory(problem, state), "profile": profile}
         for name in _FIELDS:
             tails = comm.allgather(getattr(state, name)[n:].tolist())
             data[f"{name}_tail"] = tails[-1]
@@ -171,12 +170,15 @@ def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """(what scene.json says, what each state.json says) of a checkpoint; no scene is needed.
 
     Raises:
-        InputError: there is no checkpoint, or it is damaged.
+        InputError: there is no checkpoint, it holds no state, or it is damaged.
     """
     folder = FilePath(os.fspath(folder))
     about = _read_json(folder / "scene.json")
     _check_format(folder, about)
-    return about, [_read_json(place / "state.json") for place in _states(folder)]
+    states = [_read_json(place / "state.json") for place in _states(folder)]
+    if not states:
+        raise InputError(f"checkpoint {str(folder)!r} holds no state")
+    return about, states
 
 
 def _check_format(folder: FilePath, about: dict) -> None:
@@ -245,12 +247,13 @@ def _scatter_memory(problem: Any, memory: list[dict[str, Any]]) -> list[Any]:
     return found
 
 
-def _has_profile(path: Path) -> bool:
-    return {"bottom", "top"} <= set(path.problem.scene.mesh.boundaries)
-
-
-def _lists(profile: Any) -> dict[str, list]:
-    return {f.name: getattr(profile, f.name).tolist() for f in fields(profile)}
+def _profile(path: Path, state: State) -> dict[str, list] | None:
+    """The outline and the thickness of a sheet, so that a report needs no scene; None where there is no sheet."""
+    try:
+        profile = path.profile(state)
+    except InputError:
+        return None
+    return {name: getattr(profile, name).tolist() for name in ("bottom", "top", "thickness_ratio")}
 
 
 def _name(number: int) -> str:
