@@ -18,15 +18,16 @@ CASES = {
 }
 
 
-def run(elements, *, thickness=0.3, depth=5.0, fillet=1.0, friction="stick", **options):
-    """(path, or None; what happened)."""
-    mesh = fx.mesh.disc(radius=10.0, thickness=thickness, elements=(elements, 2))
+def run(elements, *, layers=2, pressures=None, thickness=0.3, depth=5.0, fillet=1.0, friction="stick", **options):
+    """(path, what happened)."""
+    mesh = fx.mesh.disc(radius=10.0, thickness=thickness, elements=(elements, layers))
+    targets = [fx.pressure(p) for p in pressures or (60.0 * thickness / 0.3,)]
     cup = fx.tools.cup(radius=10.0, depth=depth, mouth=thickness, fillet=fillet)
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0), loads=[fx.Pressure("bottom")],
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      contacts=[fx.Contact("top", cup, friction, **options)])
     try:
-        return fx.trace(scene, until=fx.pressure(60.0 * thickness / 0.3), step=fx.StepControl(target=8), max_steps=400,
+        return fx.trace(scene, until=targets[-1], through=targets[:-1], step=fx.StepControl(target=8), max_steps=400,
                         progress=False), "done"
     except fx.ConvergenceError as error:
         return error.path, str(error).split(" The nearest")[0]

@@ -5,8 +5,8 @@ r0 = 10 cm, h0 = 0.3 cm, clamped; cup radius 10 cm, depth 5 cm, bottom fillet 1 
 """
 
 import numpy as np
-from common import COMM, parser, say, summarise
-from moulding import at_pressures, cost, draw_forming, filled_at, name_of
+from common import parser, say, summarise
+from moulding import at_pressures, cost, filled_at, name_of, report
 
 import formingx as fx
 from formingx.results import files
@@ -17,15 +17,16 @@ PRESSURES = (2.0, 4.0, 8.0, 15.0, 30.0, 60.0, 160.0)
 LAWS = ("stick", "none", 0.3)
 
 
-def form(friction, elements, pressures=PRESSURES, **options):
-    """The path to the last pressure, and the mould."""
+def form(friction, elements, pressures=PRESSURES, kinematics=None, step=None, **options):
+    """The path to the last pressure, and the mould; in plane strain, the cup is a long trough."""
     mesh = fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=elements)
     mould = fx.tools.cup(radius=RADIUS, depth=DEPTH, mouth=THICKNESS, fillet=FILLET)
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=I1_CONSTANT, c01=I2_CONSTANT),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")],
-                     contacts=[fx.Contact("top", mould, friction, **options)])
+                     contacts=[fx.Contact("top", mould, friction, **options)], kinematics=kinematics)
     targets = [fx.pressure(p) for p in pressures]
-    path = fx.trace(scene, until=targets[-1], through=targets[:-1], step=fx.StepControl(target=8), max_steps=1000)
+    path = fx.trace(scene, until=targets[-1], through=targets[:-1], step=step or fx.StepControl(target=8),
+                    max_steps=1000)
     return path, mould
 
 
@@ -57,19 +58,8 @@ def main():
     for friction in LAWS:
         name = name_of(friction)
         path, mould = form(friction, elements)
-        summary[name] = n = key_numbers(path, mould)
-        filled = "not filled" if n["filled_pressure_psi"] is None else f"filled at {n['filled_pressure_psi']:.4g} psi"
-        say(f"{name}: first contact {n['first_contact_pressure_psi']:.5g} psi, {filled}, penetration"
-            f" {n['max_penetration_over_h0']:.1e} h0; {n['steps']} states, {n['newton_iterations']} Newton iterations,"
-            f" {n['cutbacks']} cut back, {n['solve_seconds']:.1f} s",
-            f"  {'psi':>6}{'pole t/t0':>12}{'least t/t0':>12}{'at R, cm':>10}")
-        for p in (f"{p:g}" for p in PRESSURES):
-            say(f"  {p:>6}" + "".join(f"{n[f'{key}_at_psi'][p]:{width}}" for key, width in (
-                ("pole_thickness_ratio", "12.5f"), ("min_thickness_ratio", "12.5f"),
-                ("min_thickness_at_R_cm", "10.3f"))))
-        path.to_csv(args.out / f"{name}.csv")
-        files.write_profile(path.profile(), args.out / f"{name}_profile.csv", COMM)
-        draw_forming(path, [path.met(fx.pressure(p)) for p in PRESSURES[:-1]] + [path.last], mould, args.out, name)
+        summary[name] = key_numbers(path, mould)
+        report(path, mould, summary[name], PRESSURES, args.out, name)
         if not args.quick and friction == LAWS[0]:
             path.view3d(args.out / "cup_3d.png")
     summarise(args.out, {**summary, "mesh": {"radius_elements": elements[0], "thickness_elements": elements[1]},

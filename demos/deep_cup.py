@@ -6,8 +6,8 @@ stresses in psi.
 """
 
 import numpy as np
-from common import COMM, parser, say, summarise
-from moulding import at_pressures, cost, draw_forming, filled_at, first_touch, name_of
+from common import parser, say, summarise
+from moulding import at_pressures, cost, filled_at, first_touch, name_of, write
 
 import formingx as fx
 from formingx.results import files
@@ -65,9 +65,7 @@ def main():
             f" {n['min_thickness_ratio_at_psi'][f'{PRESSURES[-1]:g}']:.4f};"
             f" {n['steps']} states, {n['newton_iterations']}"
             f" Newton iterations, {n['cutbacks']} cut back, {n['solve_seconds']:.1f} s")
-        path.to_csv(args.out / f"{name}.csv")
-        files.write_profile(path.profile(), args.out / f"{name}_profile.csv", COMM)
-        draw_forming(path, [path.met(fx.pressure(p)) for p in PRESSURES], mould, args.out, name)
+        write(path, mould, [path.met(fx.pressure(p)) for p in PRESSURES], args.out, name)
         if not args.quick and friction == "stick":
             path.view3d(args.out / "deep_cup_3d.png")
     summarise(args.out, {**summary, "mesh": {"radius_elements": elements[0], "thickness_elements": elements[1]},

@@ -1,10 +1,10 @@
 """What the demos of forming into and over moulds share: key numbers and pictures."""
 
 import numpy as np
-from common import save
+from common import COMM, save, say
 
 import formingx as fx
-from formingx.results import plots
+from formingx.results import files, plots
 
 
 def name_of(friction) -> str:
@@ -53,36 +53,70 @@ def cost(path) -> dict:
             "solve_seconds": counts.seconds}
 
 
-def draw_forming(path, states, tool, out, name: str, unit: str = "psi", side: str = "top") -> None:
-    """Profiles in the mould, thickness against reference radius, contact pressure: one picture."""
-    figure, (left, middle, right) = plots.figure(3, width=4.6)
-    outline = tool.outline()
+def report(path, mould, numbers: dict, pressures, out, name: str, **drawn) -> None:
+    """Say what came out under a friction law, and write its path, its last profile and its picture (`drawn`: its
+    options)."""
+    n = numbers
+    filled = "not filled" if n["filled_pressure_psi"] is None else f"filled at {n['filled_pressure_psi']:.4g} psi"
+    say(f"{name}: first contact {n['first_contact_pressure_psi']:.5g} psi, {filled}, penetration"
+        f" {n['max_penetration_over_h0']:.1e} h0; {n['steps']} states, {n['newton_iterations']} Newton iterations,"
+        f" {n['cutbacks']} cut back, {n['solve_seconds']:.1f} s",
+        f"  {'psi':>6}{'pole t/t0':>12}{'least t/t0':>12}{'at R, cm':>10}")
+    for p in (f"{p:g}" for p in pressures):
+        say(f"  {p:>6}" + "".join(f"{n[f'{key}_at_psi'][p]:{width}}" for key, width in (
+            ("pole_thickness_ratio", "12.5f"), ("min_thickness_ratio", "12.5f"), ("min_thickness_at_R_cm", "10.3f"))))
+    write(path, mould, [path.met(fx.pressure(p)) for p in pressures], out, name, **drawn)
+
+
+def write(path, tool, states, out, name: str, **drawn) -> None:
+    """A path, its last profile, and the picture of some of its states."""
+    path.to_csv(out / f"{name}.csv")
+    files.write_profile(path.profile(), out / f"{name}_profile.csv", COMM)
+    save(draw_forming(path, states, tool, name, **drawn), out / f"{name}.png")
+
+
+def draw_forming(path, states, tool, name: str, unit: str = "psi", side: str = "top",
+                 along: str = "reference radius R", largest: float = 1.4, curve=None):
+    """Profiles in the mould, thickness and contact pressure against reference arc length: the figure.
+
+    `unit`: of the pressure, or of the travel of a moving tool; `side`: the face that looks at the tool; `along`: what
+    arc length is called; `largest`: contact pressure that is drawn, over the pressure; `curve`: (arc length, thickness
+    ratio, label) of a law to compare with.
+    """
+    control = "pressure" if "pressure" in path.columns else "travel"
+    outline, profiles = tool.outline(), [path.profile(state) for state in states]
+    span = np.vstack([points for profile in profiles for points in (profile.bottom, profile.top)])
+    size = span[:, 0].max()
+    low = min(span[:, 1].min(), max(outline[:, 1].min(), -2 * size)) - 0.05 * size
+    high = max(span[:, 1].max(), min(outline[:, 1].max(), 2 * size)) + 0.1 * size
+    width = np.clip(4.2 * 1.15 * size / (high - low), 1.8, 4.6)
+    figure, (left, middle, right) = plots.figure(3, width=(width + 9.2) / 3, ratios=(width, 4.6, 4.6))
     left.plot(*outline.T, "k", linewidth=1.5)
-    size = path.profile(states[0]).reference_radius[-1]
-    for k, state in enumerate(states):
-        profile, p, color = path.profile(state), state.measures["pressure"], f"C{k}"
+    for k, (state, profile) in enumerate(zip(states, profiles)):
+        color = f"C{k}"
         plots.outline(profile, left, color=color)
-        middle.plot(profile.reference_radius, profile.thickness_ratio, color=color, label=f"{p:.3g} {unit}")
-        points, pressure = contact_pressure(path, state, profile, side)
-        right.plot(points, pressure, color=color)
-    span = np.vstack([getattr(path.profile(s), face) for s in states for face in ("bottom", "top")])
-    left.set(xlabel="r, cm", ylabel="z, cm", title=name.replace("_", " "), xlim=(0, 1.15 * size),
-             ylim=(span[:, 1].min() - 0.05 * size,
-                   max(span[:, 1].max(), min(outline[:, 1].max(), 2 * size)) + 0.1 * size))
-    middle.set(xlabel="reference radius R, cm", ylabel="thickness / original", title="thickness", ylim=(0, 1.02))
-    right.set(xlabel="reference radius R, cm", ylabel=f"contact pressure, {unit}", title="contact pressure",
-              ylim=(0, 1.4 * states[-1].measures["pressure"]))
-    middle.legend(frameon=False)
-    save(figure, out / f"{name}.png")
+        middle.plot(profile.reference_length, profile.thickness_ratio, color=color,
+                    label=f"{state.measures[control]:.3g} {unit}")
+        right.plot(*contact_pressure(path, state, profile, side), color=color)
+    if curve:
+        middle.plot(*curve[:2], "k--", linewidth=1.2, label=curve[2])
+    left.set(xlabel="r, cm", ylabel="z, cm", title=name.replace("_", " "), xlim=(0, 1.15 * size), ylim=(low, high))
+    middle.set(xlabel=f"{along}, cm", ylabel="thickness / original", title="thickness", ylim=(0, 1.02))
+    right.set(xlabel=f"{along}, cm", ylabel="contact pressure, psi", title="contact pressure",
+              ylim=(0, largest * states[-1].measures["pressure"] if control == "pressure" else None))
+    figure.legend(frameon=False, loc="outside right center")
+    return figure
 
 
 def contact_pressure(path, state, profile, side: str = "top") -> tuple[np.ndarray, np.ndarray]:
-    """(R, contact pressure per current area) on the facing side at a state."""
-    contact = path.problem.contacts[0]
-    points, traction = contact.traction(state.x, state.control)
-    facing = np.column_stack([np.interp(points[:, 0], profile.reference_radius, c) for c in getattr(profile, side).T])
-    along = np.hypot(*np.gradient(facing, points[:, 0], axis=0).T)
-    axisymmetric = path.problem.scene.kinematics.dimension_of_volume == 3
-    hoop = np.divide(facing[:, 0], points[:, 0], out=along.copy(), where=points[:, 0] > 0) if axisymmetric else 1.0
-    off_axis = slice(int(points[0, 0] < 1e-9 * points[-1, 0]), None)          # the node on the axis carries no area
-    return points[off_axis, 0], (traction[:, 0] / (along * hoop))[off_axis]
+    """(reference arc length, contact pressure per current area) at the nodes of the facing side at a state."""
+    points, traction = path.problem.contacts[0].traction(state.x, state.control)
+    rest, now = getattr(profile, f"rest_{side}"), getattr(profile, side)
+    nearest = np.hypot(*np.moveaxis(points[:, None] - rest, -1, 0)).argmin(1)
+    order = np.argsort(nearest)
+    at = nearest[order]
+    stretch = np.hypot(*np.gradient(now, axis=0).T) / np.hypot(*np.gradient(rest, axis=0).T)
+    if path.problem.scene.kinematics.dimension_of_volume == 3:
+        stretch *= np.divide(now[:, 0], rest[:, 0], out=stretch.copy(), where=rest[:, 0] > 1e-9 * rest[:, 0].max())
+    begin = int(rest[at[0], 0] < 1e-9 * rest[:, 0].max())           # the node on the axis carries no area
+    return profile.reference_length[at][begin:], (traction[order, 0] / stretch[at])[begin:]

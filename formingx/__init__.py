@@ -3,6 +3,7 @@
 from . import mesh
 from .checkpoint import load
 from .data import treloar1944
+from .doctor import doctor
 from .errors import ConvergenceError, InputError
 from .fit import Fit, fit
 from .physics import tools

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable, Iterable
 from typing import Any
 
 
@@ -15,11 +16,12 @@ class ConvergenceError(RuntimeError):
 
     Attributes:
         path: what was computed up to there (`formingx.Path`), its last state converged; or None.
+        diagnosis: why, in numbers and words, and as a picture (`formingx.results.diagnosis.Diagnosis`); or None.
     """
 
-    def __init__(self, message: str, path: Any = None):
-        super().__init__(message)
-        self.path = path
+    def __init__(self, message: str, path: Any = None, diagnosis: Any = None):
+        super().__init__(f"{message}\n{diagnosis}" if diagnosis is not None else message)
+        self.path, self.diagnosis = path, diagnosis
 
 
 def positive(name: str, value: Any) -> float:
@@ -44,6 +46,8 @@ def finite(name: str, value: Any) -> float:
         number = float(value)
     except (TypeError, ValueError):
         raise InputError(f"{name} = {value!r}: must be a number") from None
+    except OverflowError:
+        raise InputError(f"{name}: is too large a number") from None
     if not math.isfinite(number) or isinstance(value, bool):
         raise InputError(f"{name} = {value!r}: must be a finite number")
     return number
@@ -57,7 +61,29 @@ def count(name: str, value: Any) -> int:
     return int(number)
 
 
+def instance(name: str, value: Any, kind: Any, what: str) -> Any:
+    """`value`, or an InputError unless it is an instance of `kind`."""
+    if not isinstance(value, kind):
+        raise InputError(f"{name} = {value!r}: must be {what}")
+    return value
+
+
+def several(name: str, values: Any, what: str) -> list[Any]:
+    """`values` as a list, or an InputError unless it is a list, a tuple or the like."""
+    if not isinstance(values, Iterable) or isinstance(values, str | bytes | dict):
+        raise InputError(f"{name} = {values!r}: must be a list of {what}")
+    return list(values)
+
+
+def pair(name: str, values: Any) -> tuple[float, float]:
+    """`values` as two floats, or an InputError unless they are two finite numbers."""
+    found = several(name, values, "two numbers")
+    if len(found) != 2:
+        raise InputError(f"{name} = {values!r}: must be two numbers")
+    return finite(name, found[0]), finite(name, found[1])
+
+
 def known(kind: str, name: Any, names: Any) -> None:
     """An InputError that lists the known names unless `name` is one of them."""
-    if name not in names:
+    if not isinstance(name, Hashable) or name not in names:
         raise InputError(f"{kind} {name!r} is not known; known: {', '.join(map(repr, names)) or 'none'}")

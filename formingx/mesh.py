@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from . import _compat, grid
-from .errors import InputError, count, known, positive
+from .errors import InputError, count, known, non_negative, positive
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,44 @@ class Mesh:
         points = points[first]
         return points[np.lexsort((points[:, 1], points[:, 0]))]
 
+    def line_of(self, boundary: str) -> np.ndarray:
+        """Ends and middles of the edges of a boundary one after the other, from its end of smaller R (of smaller Z).
+
+        Shape (2 n + 1, 2) for n edges, the ends at even rows; same on all ranks.
+
+        Raises:
+            InputError: the boundary is not one line with two ends.
+        """
+        from dolfinx.mesh import entities_to_geometry
+        domain = self.domain
+        domain.topology.create_connectivity(1, 2)
+        domain.topology.create_connectivity(2, 1)
+        mid_edge = domain.geometry.dofmap.shape[1] == 6
+        # of an edge: its two ends and, on second-order geometry, its middle
+        nodes = entities_to_geometry(domain, 1, self.facets_of(boundary)).reshape(-1, 3 if mid_edge else 2)
+        edges = np.concatenate(domain.comm.allgather(domain.geometry.x[nodes][..., :2]))
+        corners, ends = np.unique(np.round(edges[:, :2].reshape(-1, 2) / max(np.ptp(edges, axis=(0, 1)).max(), 1e-300),
+                                           12), axis=0, return_inverse=True)
+        ends = ends.reshape(-1, 2)
+        _, first = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)       # a ghost is there twice
+        at: dict[int, list[int]] = {}
+        for edge in first.tolist():
+            for corner in ends[edge].tolist():
+                at.setdefault(corner, []).append(edge)
+        tips = sorted(corner for corner, there in at.items() if len(there) == 1)     # corners are sorted by R, then Z
+        if len(tips) != 2 or max(map(len, at.values())) > 2:
+            raise InputError(f"boundary {boundary!r} must be one line with two ends; {len(tips)} ends were found")
+        corner, line, here = tips[0], [], -1
+        for _ in first:
+            here = next(e for e in at[corner] if e != here)
+            forward = ends[here, 0] == corner
+            a, b = edges[here, [0, 1] if forward else [1, 0]]
+            line += [a, edges[here, 2] if mid_edge else (a + b) / 2]
+            corner = ends[here, 1 if forward else 0]
+        if len(line) != 2 * len(first) or corner != tips[1]:
+            raise InputError(f"boundary {boundary!r} must be one line with two ends, but is in several parts")
+        return np.array([*line, b])
+
 
 ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
 """Elements (along the radius, through each layer) of a disc: see the README for the error that each promises."""
@@ -75,7 +113,8 @@ def disc(*, radius: float, thickness: float | Mapping[str, float], accuracy: str
     """
     radius = positive("disc: radius", radius)
     grading = positive("disc: grading", grading)
-    if not 0 <= inner_radius < radius:
+    inner_radius = non_negative("disc: inner_radius", inner_radius)
+    if inner_radius >= radius:
         raise InputError(f"disc: inner_radius = {inner_radius!r}: must be at least 0 and below radius = {radius!r}")
     sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
     known("disc: accuracy", accuracy, ACCURACY)
@@ -105,6 +144,46 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
     x = mesh.domain.geometry.x
     angle, radius = x[:, 0].copy(), x[:, 1].copy()
     x[:, 0], x[:, 1] = radius * np.sin(angle), radius * np.sin(np.pi / 2 - angle)
+    return mesh
+
+
+def parison(*, inner_radius: float, thickness: float | Mapping[str, float], length: float, elements: tuple = (60, 2),
+            grading: float = 1.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
+    """A closed tube, open at the top: the lower half of a hollow sphere about the origin, and a tube from Z = 0 up.
+
+    Boundaries: `axis` (R = 0), `inner`, `outer`, `neck` (Z = length). All nodes of the bottom, those on edges too, lie
+    where polar coordinates put them: second-order geometry.
+
+    Args:
+        inner_radius, length: of the tube, lengths.
+        thickness: a length (one layer, called `wall`), or {layer name: its thickness} from the inside out.
+        elements: (from the axis to the neck, through each layer), as in `disc`.
+        grading: size of the last element at the neck over that of the first at the axis.
+
+    Raises:
+        InputError: as in `disc`; fewer than two elements along the meridian.
+    """
+    inner_radius, length = positive("parison: inner_radius", inner_radius), positive("parison: length", length)
+    grading = positive("parison: grading", grading)
+    mesh = _layered("parison", (0.0, 1.0), inner_radius, thickness, elements, 1 / grading,
+                    ("neck", "axis", "inner", "outer"), comm, layer="wall")
+    along = int(elements[0])
+    if along < 2:
+        raise InputError(f"parison: elements along the meridian = {along}: must be at least 2, one in the bottom and"
+                         f" one in the tube")
+    x = mesh.domain.geometry.x
+    from_neck, radius = x[:, 0].copy(), x[:, 1].copy()
+    # the mesh has its elements along [0, 1] from the neck; the joint of tube and bottom becomes a node
+    joints = np.concatenate([[0.0], np.cumsum(grading ** (-np.arange(along) / max(along - 1, 1)))])
+    joints /= joints[-1]
+    wall = thickness if not isinstance(thickness, Mapping) else sum(thickness.values())
+    joint = length / (length + np.pi / 2 * (inner_radius + wall / 2))
+    node = joints[1 + np.argmin(np.abs(joints[1:-1] - joint))]
+    for place in (node, 1.0):                              # gmsh places nodes to some ten digits
+        from_neck[np.abs(from_neck - place) < 1e-6] = place
+    z = length * np.maximum(1 - from_neck / node, 0.0)
+    angle = np.pi / 2 * np.maximum((from_neck - node) / (1 - node), 0.0)
+    x[:, 0], x[:, 1] = radius * np.sin(np.pi / 2 - angle), z - radius * np.sin(angle)
     return mesh
 
 
@@ -150,7 +229,7 @@ def _layered(kind: str, ends: tuple, bottom: float, thickness: float | Mapping[s
     return _from_gmsh(build, comm)
 
 
-_ALONG = {"disc": "radius", "sphere": "meridian"}
+_ALONG = {"disc": "radius", "sphere": "meridian", "parison": "meridian"}
 
 
 def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
@@ -162,6 +241,8 @@ def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     Raises:
         InputError: the file is not there, cannot be read, or has no named 2-D group.
     """
+    if not isinstance(file, str | os.PathLike):
+        raise InputError(f"mesh.read: file = {file!r}: must be the name of a file")
     file = os.fspath(file)
 
     def build(model):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from .errors import InputError, count, known
+from .errors import InputError, count, known, several
 from .mesh import Mesh
 from .physics.contact import Contact
 from .physics.incompressibility import DisplacementPenalty, Membrane, MixedPressure
@@ -42,15 +42,19 @@ class Scene:
             raise InputError(f"Scene: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")
         if isinstance(materials, Material):
             materials = dict.fromkeys(mesh.layers, materials)
+        if not isinstance(materials, Mapping):
+            raise InputError(f"Scene: materials = {materials!r}: must be a formingx material, or {{layer: material}}")
         self.mesh = mesh
         self.materials = dict(materials)
-        self.supports = list(supports)
-        self.loads = list(loads)
-        self.contacts = list(contacts)
+        self.supports = _all_with("constraints", "supports", supports, "supports, such as Clamped('rim')")
+        self.loads = _all_with("virtual_work", "loads", loads, "loads, such as Pressure('bottom')")
+        self.contacts = _all_with("law", "contacts", contacts, "Contact(...)")
         self.model = model if model is not None else MixedPressure()
         if not isinstance(self.model, MixedPressure | DisplacementPenalty | Membrane):
             raise InputError(f"Scene: model = {model!r}: must be a MixedPressure, a DisplacementPenalty or a Membrane")
         self.kinematics = kinematics if kinematics is not None else Axisymmetric()
+        if not hasattr(self.kinematics, "dimension_of_volume") or isinstance(self.kinematics, type):
+            raise InputError(f"Scene: kinematics = {kinematics!r}: must be Axisymmetric() or PlaneStrain()")
         self.quadrature_degree = count("Scene: quadrature_degree", quadrature_degree)
         self._check_materials()
         self._check_boundaries()
@@ -85,9 +89,9 @@ class Scene:
 
     def _check_boundaries(self) -> None:
         for thing in (*self.loads, *self.supports, *self.contacts):
-            on = getattr(thing, "on", None)
-            if on is None:
+            if not hasattr(thing, "on"):
                 continue
+            on = thing.on
             known(f"{thing!r}: boundary", on, self.mesh.boundaries)
             if self.mesh.domain.comm.allreduce(len(self.mesh.facets_of(on)), MPI.SUM) == 0:
                 raise InputError(f"{thing!r}: boundary {on!r} is empty: no facet of the mesh carries it")
@@ -195,3 +199,12 @@ class Scene:
         high = np.array([comm.allreduce(X[:, i].max(initial=-np.inf), MPI.MAX) for i in (0, 1)])
         low = np.array([comm.allreduce(X[:, i].min(initial=np.inf), MPI.MIN) for i in (0, 1)])
         return high - low
+
+
+def _all_with(method: str, name: str, things: Any, what: str) -> list[Any]:
+    """A list of things that all have a method, or an InputError."""
+    things = several(f"Scene: {name}", things, what)
+    for thing in things:
+        if not hasattr(thing, method) or isinstance(thing, type):
+            raise InputError(f"Scene: {name}: {thing!r} is not allowed here: must be a list of {what}")
+    return things

@@ -188,6 +188,15 @@ def test_thickness_does_not_depend_on_the_step(friction):
     assert np.abs(a / b - 1).max() < 2e-3
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", ["stick", 0.3])
+def test_thickness_does_not_depend_on_the_largest_step(friction):
+    thickness = [form(cup(friction, (40, 2)), 30.0, 60.0, largest=largest, length=0.05).profile().thickness
+                 for largest in (0.2, 0.1, 0.05)]
+    changes = [np.abs(a / b - 1).max() for a, b in zip(thickness, thickness[1:])]
+    assert max(changes) < 2e-3, changes
+
+
 def test_coulomb_goes_over_into_free_and_stick():
     pole = {f: form(cup(f), 15.0).profile().thickness_ratio[0] for f in ("none", 0, 1e-3, 0.05, 0.3, 10, "stick")}
     assert pole[0] == pole["none"]
@@ -212,8 +221,7 @@ def test_a_moving_tool():
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      contacts=[fx.Contact("top", plug, "stick", moves=(0, -1))])
     path = fx.trace(scene, until=fx.travel(3.0), step=fx.StepControl(target=8), progress=False)
-    # the node on the axis carries no area, so nothing holds it: it may dip in by the sagitta of half an element
-    assert path.last.measures["penetration"] < 0.25**2 / (2 * 3) and path.last.measures["contact_length"] > 0.2
+    assert path.last.measures["penetration"] < 1e-3 * 0.5 and path.last.measures["contact_length"] > 0.2
     assert path.last.measures["tool_force"] == pytest.approx(support_force(path.problem, path.last, 1), rel=1e-7)
     problem, state, h = path.problem, path.last, 1e-7
     x, plus, minus, exact = (problem.x.duplicate() for _ in range(4))

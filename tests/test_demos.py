@@ -47,3 +47,43 @@ def test_cup_quick(tmp_path):
         assert (tmp_path / f"{name}.png").stat().st_size > 10_000
     assert found["stick"]["pole_thickness_ratio_at_psi"]["160"] == pytest.approx(0.7240, rel=1e-2)
     assert found["frictionless"]["pole_thickness_ratio_at_psi"]["160"] == pytest.approx(0.4649, rel=2e-2)
+
+
+def test_rectangular_part_quick(tmp_path):
+    found = summary("rectangular_part", tmp_path, "--quick")
+    stick, free = found["stick"], found["frictionless"]
+    for numbers in (stick, free, found["coulomb_0.3"]):
+        assert numbers["max_penetration_over_h0"] < 5e-3
+        assert numbers["first_contact_pressure_psi"] == pytest.approx(1.645, rel=5e-3)
+    # the membrane law has 0.8627 and 0.4842: it bends round the fillet without thickness
+    floor = found["membrane"]["floor_thickness_ratio"]
+    assert stick["pole_thickness_ratio_at_psi"]["160"] == pytest.approx(floor, rel=2e-2)
+    assert stick["min_thickness_ratio_at_psi"]["160"] == pytest.approx(0.517, rel=3e-2)
+    assert stick["mean_deviation_from_membrane"] < 0.03
+    assert free["pole_thickness_ratio_at_psi"]["160"] == pytest.approx(0.6846, rel=2e-2)
+    assert (tmp_path / "stick.png").stat().st_size > 10_000
+
+
+def test_parison_quick(tmp_path):
+    found = summary("parison", tmp_path, "--quick")
+    for numbers in (found["stick"], found["frictionless"]):
+        assert numbers["first_contact_pressure_psi"] == pytest.approx(9.91, rel=5e-3)
+        assert numbers["mass_error"] < 1e-9
+        assert numbers["cavity_volume_cm3"] == pytest.approx(295.8, rel=5e-3)
+    body = found["frictionless"]["thickness_cm_at_height_cm"]
+    assert body["6"] == pytest.approx(0.0922, rel=1e-2) and body["4"] == pytest.approx(body["8"], rel=1e-2)
+    assert found["stick"]["least_thickness_cm"] == pytest.approx(0.0762, rel=2e-2)
+    assert (tmp_path / "stick.png").stat().st_size > 10_000
+
+
+def test_male_mould_quick(tmp_path):
+    found = summary("male_mould", tmp_path, "--quick")
+    drape, stick = found["drape_frictionless"], found["vacuum_stick"]
+    assert drape["first_contact_at_cm"] == pytest.approx(0.05, rel=2e-2)
+    assert drape["pole_thickness_ratio_at_cm"]["3"] == pytest.approx(0.8918, rel=1e-2)
+    assert drape["tool_force_lb_at_cm"]["3"] == pytest.approx(23.1, rel=2e-2)
+    # the top sticks before it has stretched; where it slides it thins
+    assert stick["pole_thickness_ratio_at_psi"]["60"] == pytest.approx(0.978, rel=1e-2)
+    assert found["vacuum_coulomb_0.3"]["pole_thickness_ratio_at_psi"]["60"] == pytest.approx(0.793, rel=2e-2)
+    assert stick["min_thickness_ratio_at_psi"]["60"] == pytest.approx(0.480, rel=3e-2)
+    assert (tmp_path / "vacuum_stick.png").stat().st_size > 10_000

@@ -92,3 +92,47 @@ def test_first_order_mesh_gives_the_same_numbers(tmp_path):
                          supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
         pressures.append(fx.trace(scene, until=fx.pole_stretch(1.5)).last.measures["pressure"])
     assert pressures[0] == pytest.approx(pressures[1], rel=1e-9)
+
+
+def test_parison_is_a_tube_with_a_round_bottom():
+    """Every node of the bottom on its circle, of the tube on its line; the volume converges with the fourth power."""
+    errors = []
+    for n in (8, 16):
+        mesh = fx.mesh.parison(inner_radius=1.0, thickness={"x": 0.2, "y": 0.3}, length=3.0, elements=(n, 1))
+        assert set(mesh.layers) == {"x", "y"} and set(mesh.boundaries) == {"axis", "neck", "inner", "outer"}
+        for name, radius in (("inner", 1.0), ("outer", 1.5)):
+            line = mesh.line_of(name)
+            assert line[0] == pytest.approx([0, -radius]) and line[-1] == pytest.approx([radius, 3.0])
+            assert np.hypot(line[:, 0], np.minimum(line[:, 1], 0)) == pytest.approx(radius, rel=1e-14)
+            assert np.any(line[::2, 1] == 0)                       # the joint is a corner of elements
+        assert np.all(mesh.nodes_of("axis")[:, 0] == 0) and np.all(mesh.nodes_of("neck")[:, 1] == 3.0)
+        scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("inner")],
+                         supports=[fx.Symmetry("axis"), fx.Clamped("neck")])
+        errors.append(abs(Solid(scene).volume / (np.pi * ((1.5**3 - 1) * 2 / 3 + (1.5**2 - 1) * 3)) - 1))
+    assert errors[1] < 1e-4 and np.log2(errors[0] / errors[1]) > 3.5, errors
+
+
+def test_line_of_a_boundary():
+    mesh = fx.mesh.disc(radius=2.0, thickness=0.1, elements=(5, 1))
+    np.testing.assert_allclose(mesh.line_of("top"), mesh.nodes_of("top"))
+    np.testing.assert_allclose(mesh.line_of("rim"), mesh.nodes_of("rim"))
+
+
+@pytest.mark.parametrize("wrong, words", [
+    ({"length": 0}, "parison: length = 0: must be greater than 0"),
+    ({"elements": (1, 1)}, "must be at least 2"),
+    ({"inner_radius": -1}, "parison: inner_radius = -1")])
+def test_parison_refuses(wrong, words):
+    with pytest.raises(fx.InputError, match=words):
+        fx.mesh.parison(**{"inner_radius": 1.0, "thickness": 0.5, "length": 2.0, **wrong})
+
+
+def test_opposite_points_of_a_wall():
+    """Of concentric circles the normals meet at the same angle; the thickness of a wall at rest is exact."""
+    mesh = fx.mesh.parison(inner_radius=1.0, thickness=0.3, length=4.0, elements=(30, 1), grading=2.0)
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("inner")],
+                     supports=[fx.Symmetry("axis"), fx.Clamped("neck")])
+    profile = fx.trace(scene, until=fx.pressure(1e-3), progress=False).profile()
+    assert profile.original_thickness == pytest.approx(0.3, rel=1e-6)
+    np.testing.assert_allclose(profile.rest_top, mesh.line_of("outer"), atol=2e-4)
+    assert profile.reference_length[-1] == pytest.approx(4.0 + np.pi / 2 * 1.15, rel=1e-3)

@@ -109,6 +109,38 @@ def test_gmsh_curves(tmp_path):
     np.testing.assert_allclose(tool.signed_distance(points), same.signed_distance(points), atol=1e-12)
     with pytest.raises(fx.InputError, match="no curve 7"):
         tools.read(file, [7])
+    (tmp_path / "bad.geo").write_text("Point(1) = {0,")
+    with pytest.raises(fx.InputError, match="cannot be read"):
+        tools.read(tmp_path / "bad.geo", [1])
+
+
+@pytest.mark.parametrize("kind", ["brep", "step", "msh"])
+def test_gmsh_models(tmp_path, kind):
+    """Arcs stay arcs in CAD files, and in a mesh, whose nodes lie on them."""
+    import gmsh
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        occ = gmsh.model.occ
+        points = [occ.addPoint(*x, 0) for x in ((0, 5), (9, 5), (9, 4), (10, 4), (10, 0))]
+        occ.addLine(*points[:2]), occ.addCircleArc(*points[1:4]), occ.addLine(*points[3:])
+        occ.addCircle(0, 3, 0, 1), occ.addEllipse(0, 0, 0, 2, 1)
+        occ.synchronize()
+        if kind == "msh":
+            gmsh.model.mesh.setSize(gmsh.model.getEntities(0), 0.4)
+            gmsh.model.mesh.generate(1)
+        gmsh.write(str(tmp_path / f"mould.{kind}"))
+    finally:
+        gmsh.finalize()
+    file = tmp_path / f"mould.{kind}"
+    points = np.random.default_rng(1).uniform([0, 1.5], [12, 7], (100, 2))
+    tool, same = tools.read(file, [1, 2, 3]), tools.cup(radius=10, depth=5, fillet=1)
+    np.testing.assert_allclose(tool.signed_distance(points), same.signed_distance(points), atol=1e-12)
+    ball = tools.read(file, [4], closed=True)
+    np.testing.assert_allclose(ball.signed_distance(points), tools.sphere(radius=1, z=2).signed_distance(points),
+                               atol=1e-12)
+    with pytest.raises(fx.InputError, match="curve 5 is neither a straight line nor a circular arc"):
+        tools.read(file, [5])
 
 
 @pytest.mark.parametrize("build, message", [

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, count, finite, non_negative, positive
+from ..errors import InputError, count, non_negative, pair, positive
 from .tools import Nearest, Tool
 
 
@@ -62,7 +62,7 @@ class Contact:
         self.mu = words[friction] if isinstance(friction, str) else non_negative(f"{name}: friction", friction)
         self.penalty, self.ramp = positive(f"{name}: penalty", penalty), positive(f"{name}: ramp", ramp)
         self.nodes_per_step = count(f"{name}: nodes_per_step", nodes_per_step)
-        self.moves = None if moves is None else tuple(finite(f"{name}: moves", m) for m in moves)
+        self.moves = None if moves is None else pair(f"{name}: moves", moves)
         if self.moves == (0.0, 0.0):
             raise InputError(f"{name}: moves = (0, 0): must name a direction, or be None")
 

@@ -99,9 +99,9 @@ class DisplacementPenalty:
     def __init__(self, *, eps: float = 1e-3, points: int = 3, stress_free: bool = True):
         self.stress_free = bool(stress_free)
         self.eps = positive("DisplacementPenalty: eps", eps)
+        finite("DisplacementPenalty: points", points)
         if points not in _RULES:
             raise InputError(f"DisplacementPenalty: points = {points!r}: must be one of {sorted(_RULES)}")
-        finite("DisplacementPenalty: points", points)
         self.points = points
 
     def terms(self, J, p, modulus, eps):

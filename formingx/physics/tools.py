@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, finite, non_negative, positive
+from ..errors import InputError, finite, non_negative, pair, positive, several
 
 _FLAT = 1e-9          # radians: a joint that turns less is smooth
 _TURN = 2 * math.pi
@@ -92,7 +92,7 @@ class Tool:
     """
 
     def __init__(self, points: Sequence[Sequence[float]], fillets: float | Sequence[float] = 0.0, closed: bool = False):
-        points = np.array([[finite("Tool: points: R", p[0]), finite("Tool: points: Z", p[1])] for p in points])
+        points = np.array([pair("Tool: points", p) for p in several("Tool: points", points, "points (R, Z)")])
         if len(points) < (3 if closed else 2):
             raise InputError(f"Tool: {len(points)} points: a{' closed' if closed else 'n open'} profile needs at least"
                              f" {3 if closed else 2}")
@@ -271,8 +271,9 @@ def male(*, radius: float, height: float, base: float = 0.0, draft: float = 0.0,
     """
     radius, height = positive("male: radius", radius), positive("male: height", height)
     base, wide = finite("male: base", base), radius + height * math.tan(_draft("male", draft))
+    foot = non_negative("male: foot", foot)
     return Tool([(2 * wide + foot, base), (wide, base), (radius, base + height), (0.0, base + height)],
-                [0.0, non_negative("male: foot", foot), non_negative("male: fillet", fillet), 0.0])
+                [0.0, foot, non_negative("male: fillet", fillet), 0.0])
 
 
 def bottle(*, radius: float, height: float, neck: float, shoulder: float, neck_height: float, base: float = 0.0,
@@ -328,7 +329,9 @@ def sphere(*, radius: float, z: float = 0.0, r: float = 0.0) -> Tool:
 
 
 def read(file: str | os.PathLike, curves: Sequence[int], closed: bool = False) -> Tool:
-    """A tool from curves of a gmsh file (.geo, .brep, ...), in order; a negative number runs a curve backwards.
+    """A tool from curves of a gmsh file (.geo, .brep, .step, .msh), in order; a negative number runs a curve backwards.
+
+    A curve is taken for the line or the arc that it is, exactly; the curves of a mesh (.msh) by their nodes.
 
     Raises:
         InputError: the file cannot be read, or a curve is neither a line nor a circular arc.
@@ -342,35 +345,53 @@ def read(file: str | os.PathLike, curves: Sequence[int], closed: bool = False) -
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.model.add("formingx tool")
-        gmsh.merge(file)
+        try:
+            gmsh.merge(file)
+        except Exception as error:
+            raise InputError(f"tool file {file!r} cannot be read: {error}") from None
         known = {tag for _, tag in gmsh.model.getEntities(1)}
         for tag in curves:
             if abs(tag) not in known:
                 raise InputError(f"tool file {file!r} has no curve {abs(tag)}; it has {sorted(known)}")
-        return Tool.of_pieces([_gmsh_piece(gmsh.model, file, tag) for tag in curves], closed)
+        return Tool.of_pieces([_piece_through(_gmsh_points(gmsh.model, tag), f"tool file {file!r}: curve {abs(tag)}")
+                               for tag in curves], closed)
     finally:
         gmsh.model.remove()
         if ours:
             gmsh.finalize()
 
 
-def _gmsh_piece(model: Any, file: str, tag: int) -> Line | Arc:
-    kind = model.getType(1, abs(tag))
-    (low,), (high,) = model.getParametrizationBounds(1, abs(tag))
-    a, m, b = np.array(model.getValue(1, abs(tag), [low, (low + high) / 2, high])).reshape(3, 3)[:, :2]
-    if tag < 0:
-        a, b = b, a
-    if kind == "Line":
+def _gmsh_points(model: Any, tag: int) -> np.ndarray:
+    """Points along a curve, backwards if its number is negative, shape (n, 2)."""
+    if model.getType(1, abs(tag)) == "Discrete curve":
+        ends = [numbers.reshape(-1, {1: 2, 8: 3}.get(kind, 2))[:, :2]
+                for kind, _, numbers in zip(*model.mesh.getElements(1, abs(tag)))]
+        nodes = [ends[0][0, 0], *(end for pair in ends for end in pair[:, 1])] if ends else []
+        points = np.array([model.mesh.getNode(node)[0][:2] for node in nodes]).reshape(-1, 2)
+    else:
+        (low,), (high,) = model.getParametrizationBounds(1, abs(tag))
+        points = np.array(model.getValue(1, abs(tag), np.linspace(low, high, 9))).reshape(-1, 3)[:, :2]
+    return points if tag > 0 else points[::-1]
+
+
+def _piece_through(points: np.ndarray, name: str) -> Line | Arc:
+    """The line or the arc on which all points lie, in their order, shape (n, 2)."""
+    n, near = len(points), 1e-7 * max(np.ptp(points, axis=0).max(initial=0.0), 1e-300)
+    a, b = points[[0, -1]] if n > 1 else (np.zeros(2), np.zeros(2))
+    chord = b - a
+    off = (points - a) @ (-chord[1], chord[0]) / max(math.hypot(*chord), near)
+    if n > 1 and math.hypot(*chord) > near and np.abs(off).max() <= near:
         return Line(a, b)
-    if kind not in ("Circle", "TrimmedCurve"):
-        raise InputError(f"tool file {file!r}: curve {abs(tag)} is a {kind}: must be a line or a circular arc")
-    u, v = m - a, b - a
-    det = 2 * (u[0] * v[1] - u[1] * v[0])
-    centre = a + np.array([v[1] * (u @ u) - u[1] * (v @ v), u[0] * (v @ v) - v[0] * (u @ u)]) / det
-    start, end = (math.atan2(*(p - centre)[::-1]) for p in (a, b))
-    left = det > 0
-    sweep = (end - start) % _TURN if left else -((start - end) % _TURN)
-    return Arc(centre, math.dist(a, centre), start, sweep)
+    if n > 3:                                              # three points always lie on a circle
+        p, q, r = points[[0, n // 3, 2 * n // 3]]
+        centre = p + np.linalg.lstsq(2 * np.array([q - p, r - p]), [(q - p) @ (q - p), (r - p) @ (r - p)])[0]
+        radius = math.dist(p, centre)
+        if np.abs(np.hypot(*(points - centre).T) - radius).max() <= near:
+            angles = np.unwrap([math.atan2(*(x - centre)[::-1]) for x in points])
+            if np.all(np.diff(angles) * (angles[-1] - angles[0]) > 0):
+                return Arc(centre, radius, float(angles[0]), float(angles[-1] - angles[0]))
+    raise InputError(f"{name} is neither a straight line nor a circular arc"
+                     + (f" (of a mesh, {n} nodes; four are needed to know an arc)" if n < 4 else ""))
 
 
 def _rounded(points: np.ndarray, radii: list[float], closed: bool) -> list[Line | Arc]:

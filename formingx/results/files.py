@@ -21,11 +21,11 @@ def write_path(path: Any, file: Any) -> None:
 
 
 def write_profile(profile: Any, file: Any, comm: Any) -> None:
-    """One row per node of the bottom face: reference radius, arc length, both deformed faces, thickness, its ratio."""
-    columns = ["reference_radius", "arc_length", "r_bottom", "z_bottom", "r_top", "z_top", "thickness",
-               "thickness_ratio"]
-    table = np.column_stack([profile.reference_radius, profile.arc_length, profile.bottom, profile.top,
-                             profile.thickness, profile.thickness_ratio])
+    """One row per node of the bottom face: where it was, arc length, both deformed faces, thickness, its ratio."""
+    columns = ["reference_radius", "reference_length", "arc_length", "r_bottom", "z_bottom", "r_top", "z_top",
+               "thickness", "thickness_ratio"]
+    table = np.column_stack([profile.reference_radius, profile.reference_length, profile.arc_length, profile.bottom,
+                             profile.top, profile.thickness, profile.thickness_ratio])
     write_rows(file, columns, table.tolist(), comm)
 
 

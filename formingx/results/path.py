@@ -236,6 +236,10 @@ class Path:
         return plots.convergence(self, axes)
 
     def view3d(self, file: Any, state: State | None = None) -> None:
-        """Draw the sheet of a state (default: the last) revolved about the axis, coloured by thickness, as PNG."""
+        """Draw the sheet of a state (default: the last), coloured by thickness, as PNG.
+
+        It is revolved about the axis, or, in plane strain, extruded.
+        """
         from . import views
-        views.revolved(self.profile(state), file, self.problem.comm)
+        axisymmetric = self.problem.scene.kinematics.dimension_of_volume == 3
+        (views.revolved if axisymmetric else views.extruded)(self.profile(state), file, self.problem.comm)

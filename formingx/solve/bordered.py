@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
 
+from ..errors import count, positive
 from .direct import DirectSolver
 
 UNLOADED = 1e-5
@@ -38,6 +40,7 @@ class Failure(Exception):
     def __init__(self, reason: str, history: list[Iteration]):
         super().__init__(reason)
         self.reason, self.history = reason, history
+        self.attempt: Any = None                            # where it ended (`diagnosis.Attempt`), if that is known
 
 
 class _Kinks:
@@ -68,17 +71,26 @@ class _Kinks:
         self._last = now
 
 
-class Tolerances(NamedTuple):
+@dataclass(frozen=True)
+class Tolerances:
     """When a state counts as converged: all of these.
 
     correction: the next correction that quadratic convergence predicts, over |x|.
     residual: |F| over the norm of the support forces.
     iterations: at most so many.
+
+    Raises:
+        InputError: a value that is not greater than 0.
     """
 
     correction: float = 1e-10
     residual: float = 1e-8
     iterations: int = 12
+
+    def __post_init__(self) -> None:
+        positive("Tolerances: correction", self.correction)
+        positive("Tolerances: residual", self.residual)
+        count("Tolerances: iterations", self.iterations)
 
     def met(self, corrections: list[float], residuals: list[float]) -> bool:
         """True if a state with these corrections behind it, and these residuals (its own last), has converged.
@@ -112,6 +124,7 @@ class BorderedNewton:
         self.solver = DirectSolver(problem.matrix, problem.symmetric)
         new = problem.x.duplicate
         self.F, self.F_control, self.gradient, self.a, self.b = new(), new(), new(), new(), new()
+        self.reached = 0.0, 0.0                             # control and its last correction in `correct`
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> bool:
         """`self.b` = dx/dcontrol along the path at a solution; False if the tangent matrix is singular.
@@ -138,6 +151,8 @@ class BorderedNewton:
         history: list[Iteration] = []
         problem.begin()
         problem.residual(x, control, self.F)
+        self.a.set(0)
+        self.reached = control, 0.0
         work0 = moved = 0.0
         kinks = _Kinks(problem)
         while True:
@@ -154,7 +169,9 @@ class BorderedNewton:
             if grown and not (problem.has_kinks and moved < SMALL):
                 raise Failure("the iteration diverges", history)
             if len(quiet) >= self.tolerances.iterations or len(history) >= SETTLING:
-                raise Failure(f"no convergence in {len(history)} iterations", history)
+                unsettled = len(history) >= SETTLING and len(history) - kinks.changed < 3
+                raise Failure("contact does not settle: " * unsettled + f"no convergence in {len(history)} iterations",
+                              history)
             if not self.tangent(x, control):
                 raise Failure("the tangent matrix is singular", history)
             c, c_control = constraint(x, control, self.gradient)
@@ -174,6 +191,7 @@ class BorderedNewton:
             if not np.isfinite(correction):
                 raise Failure("the tangent matrix is singular", history)
             history.append(Iteration(residual, correction, work / work0))
+            self.reached = control, step
             problem.residual(x, control, self.F)
 
     def destroy(self) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import ConvergenceError
 from ..results.path import State
 from .bordered import UNLOADED, BorderedNewton, Failure, Tolerances
+from .diagnosis import Attempt, diagnose
 
 CONTROL_WEIGHT = 0.1
 """Weight of the squared control against the mean squared displacement in arc length (both dimensionless)."""
@@ -41,8 +42,10 @@ class Branch:
             try:
                 _, history = self.newton.correct(self._x, 0.0, _no_control)
             except Failure as failure:
-                raise ConvergenceError(f"no equilibrium was found before anything is driven, under the loads that have"
-                                       f" a fixed value: {failure.reason}; drive the largest of them instead") from None
+                found = diagnose(self, [], failure.reason, self._attempt())
+                raise ConvergenceError("no equilibrium was found before anything is driven, under the loads that have"
+                                       f" a fixed value: {failure.reason}; drive the largest of them instead",
+                                       diagnosis=found) from None
             self.iterations += len(history) - 1
         else:
             self.problem.stiff_state(self._x)
@@ -59,6 +62,7 @@ class Branch:
             control, history = self.newton.correct(self._x, control, constraint)
         except Failure as failure:
             self.iterations += len(failure.history)
+            failure.attempt = self._attempt()
             raise
         self.iterations += len(history) - 1
         return self._state(control, history, kind, before)
@@ -159,6 +163,10 @@ class Branch:
         self.newton.destroy()
         for vector in (self._x, self._a, self._b):
             vector.destroy()
+
+    def _attempt(self) -> Attempt:
+        control, step = self.newton.reached
+        return Attempt(self._x.array_r.copy(), control, self.newton.a.array_r.copy(), step)
 
     def _state(self, control: float, history: list, kind: str, before: State | None) -> State:
         """The state at (self._x, control); its tangent, from the last factorisation, points away from `before`."""

@@ -15,16 +15,20 @@ from typing import Any
 import numpy as np
 
 from ..checkpoint import Checkpoint
-from ..errors import ConvergenceError, InputError, count
+from ..errors import ConvergenceError, InputError, count, instance, several
 from ..problem import Problem
 from ..results import measures
 from ..results.path import Path, State
 from ..scene import Scene
 from .bordered import Failure, Tolerances
 from .branch import Branch
+from .diagnosis import diagnose
 from .stepping import StepControl
 
 log = logging.getLogger("formingx")
+
+_TRY = (" Try a target within what was met, a smaller first step (step=StepControl(length=...)), more elements where"
+        " the body deforms most, or more max_steps.")
 
 
 def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Target] = (),
@@ -50,6 +54,13 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
         ConvergenceError: the target was not reached. It carries the path so far and says what to try.
         OSError: the checkpoint cannot be written; the states in it are kept.
     """
+    instance("trace: scene", scene, Scene, "a formingx.Scene")
+    through = several("trace: through", through, "targets, such as pole_stretch(3)")
+    for target in (until, *through):
+        instance("trace: target", target, measures.Target, "a target, such as pole_stretch(3)")
+    instance("trace: step", step, StepControl | None, "a StepControl or None")
+    instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
+    max_steps = count("trace: max_steps", max_steps)
     if scene.driven is None:
         raise InputError("trace: nothing is driven: give one load no value, as Pressure('bottom'), or"
                          " add a Displaced support")
@@ -58,7 +69,7 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
                          " back")
     problem = Problem(scene) if start is None else start.problem
     run = _Run(problem, until, through, step, tolerances or Tolerances(), start, checkpoint)
-    return run.trace(count("trace: max_steps", max_steps), progress)
+    return run.trace(max_steps, progress)
 
 
 class _Run:
@@ -91,7 +102,7 @@ class _Run:
             self._settle()
             while self._is_open(self.until):
                 if path.counts.steps - before >= max_steps:
-                    self._give_up(f"{max_steps} states were accepted before it")
+                    self._give_up(f"{max_steps} states were accepted before it", pace=self._pace(max_steps))
                 for state in self._next(path.last):
                     self._record(state)
                     if path.problem.memory or not self._is_open(self.until) and state.met is self.until:
@@ -157,7 +168,8 @@ class _Run:
                 self.step.length = length
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 if not self.step.failed():
-                    self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}")
+                    self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
+                                  failure.attempt)
 
     def _check_direction(self) -> None:
         """Stop if the path has turned back: its target further away than half of what had been gained.
@@ -228,10 +240,23 @@ class _Run:
     def _is_open(self, target: measures.Target) -> bool:
         return any(t is target for t, _ in self.open)
 
-    def _give_up(self, why: str) -> None:
-        raise self._error(f"{why}.")
+    def _pace(self, max_steps: int) -> str:
+        """How far a run had come when its steps ran out."""
+        path, aim = self.path, self.until.value
+        start, before, now = (path.value(self._aim, s) for s in (path.states[0], path.states[-2], path.last))
+        part = (now - start) / ((aim - start) or 1.0)
+        if not (aim - now) * (now - before) > 0:
+            return f"max_steps = {max_steps} ran out, and the last step led away from the target"
+        return (f"max_steps = {max_steps} ran out in good health at {100 * part:.3g} % of the target: the last step"
+                f" gained {now - before:.4g} of the {aim - now:.4g} that are left, which makes about"
+                f" {int(np.ceil((aim - now) / (now - before)))} steps more at that pace")
 
-    def _error(self, why: str) -> ConvergenceError:
+    def _give_up(self, why: str, attempt: Any = None, pace: str = "") -> None:
+        found = diagnose(self.branch, self.path.states, why, attempt, pace,
+                         self.until.value if self.until.bind is measures.bind_control else None)
+        raise self._error(f"{why}.", found)
+
+    def _error(self, why: str, diagnosis: Any) -> ConvergenceError:
         """What happened, what was met, what to try."""
         path = self.path
         values = [path.value(self._aim, s) for s in path.states]
@@ -240,8 +265,7 @@ class _Run:
         return ConvergenceError(
             f"{self.until} was not reached: {why} The nearest met was {values[best]:.6g}, at"
             f" {path.describe(path.states[best])}.{limits} The last good state is {path.describe(path.last)};"
-            f" it is kept in the error's `path`. Try a target within what was met, a smaller first step"
-            f" (step=StepControl(length=...)), more elements where the body deforms most, or more max_steps.", path)
+            f" it is kept in the error's `path`.{'' if diagnosis.advice else _TRY}", path, diagnosis)
 
 
 def _progress_bar(comm: Any, until: measures.Target, progress: bool) -> Any:

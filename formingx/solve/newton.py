@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..errors import ConvergenceError, InputError, count, finite
+from ..errors import ConvergenceError, InputError, count, finite, instance
 from ..problem import Problem
 from ..results.path import Path
 from ..scene import Scene
 from .bordered import UNLOADED, Iteration, Tolerances
 from .branch import Branch
+from .diagnosis import Attempt, diagnose
 from .direct import configure
 from .stepping import StepControl
 
@@ -49,6 +50,10 @@ class FixedControl:
         self._control, self._work, self.history = control, 0.0, []
         self._snes.solve(None, x)
         return self._snes.getConvergedReason() > 0
+
+    def correction(self) -> np.ndarray:
+        """The last correction of x, own part, shape (n,)."""
+        return -self._snes.getSolutionUpdate().array_r
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
@@ -88,6 +93,8 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
         InputError: nothing is driven, or an argument is not allowed.
         ConvergenceError: an increment did not converge; it carries the path so far.
     """
+    instance("solve: scene", scene, Scene, "a formingx.Scene")
+    instance("solve: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     if scene.driven is None:
         raise InputError("solve: nothing is driven: give one load no value, as Pressure('bottom'), or"
                          " add a Displaced support")
@@ -116,10 +123,13 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
             continue
         path.counts.failures += 1
         if not step.failed():
+            attempt = Attempt(x.array_r.copy(), control, newton.correction(), 0.0)
+            found = diagnose(branch, path.states, "Newton's method at fixed control did not converge", attempt,
+                             fixed_control=True)
             raise ConvergenceError(
                 f"no equilibrium was found beyond {path.describe(old)} by Newton's method at fixed control, however"
                 f" small the increment: the path may turn back there. That state is the last good one; it is kept in"
-                f" the error's `path`. Try `trace`, which passes limit points.", path)
+                f" the error's `path`. Try `trace`, which passes limit points.", path, found)
     path.counts.seconds = time.perf_counter() - began
     newton.destroy()
     return path

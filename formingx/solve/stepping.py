@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..errors import InputError, count, finite, positive
+
 
 @dataclass
 class StepControl:
@@ -14,6 +16,9 @@ class StepControl:
         target: iterations that a step should take.
         growth: at most this factor from one step to the next; failures halve.
         smallest, largest: bounds of the length.
+
+    Raises:
+        InputError: a value that is not greater than 0.
     """
 
     length: float = 0.1
@@ -21,6 +26,13 @@ class StepControl:
     growth: float = 2.0
     smallest: float = 1e-6
     largest: float = float("inf")
+
+    def __post_init__(self) -> None:
+        for name in ("length", "growth", "smallest"):
+            positive(f"StepControl: {name}", getattr(self, name))
+        count("StepControl: target", self.target)
+        if self.largest != float("inf") and finite("StepControl: largest", self.largest) <= 0:
+            raise InputError(f"StepControl: largest = {self.largest!r}: must be greater than 0")
 
     def accepted(self, iterations: int) -> None:
         """A full step converged in so many iterations."""

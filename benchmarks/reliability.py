@@ -1,0 +1,334 @@
+"""How reliable the package is, in figures: bad input, ranks, and files that cannot be written.
+
+    python3 benchmarks/reliability.py [bad] [ranks] [files]
+
+Not counted yet: runs that are killed and restarted.
+
+bad: every public argument wrong in turn; counts how many gave an InputError (or a TypeError, for an unknown or a
+missing argument) before any solve. ranks: a free and a formed sheet on 1, 2, 3, 4 ranks; the largest relative
+difference of any measure of any state. files: a full disk, a folder that cannot be written: a clear error, and the
+earlier file is still there.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path as FilePath
+from typing import Any, NamedTuple
+
+import formingx as fx
+from formingx.solve import branch
+
+_NUMBER = {"a word": "x", "nan": math.nan, "inf": math.inf, "a bool": True, "a list": [], "an array": [1.0, 2.0],
+           "huge": 10**400, "a dict": {}}
+_NONE = {"None": None}
+_WORD = {"a number": 3, "nan": math.nan, "empty": "", "unknown": "nowhere", "a list": [], "a bool": True}
+BAD: dict[str, dict[str, Any]] = {
+    "number": _NUMBER | _NONE,
+    "optional number": _NUMBER,
+    "positive": _NUMBER | _NONE | {"0": 0, "negative": -1.0},
+    "not negative": _NUMBER | _NONE | {"negative": -1.0},
+    "count": _NUMBER | _NONE | {"0": 0, "negative": -1, "a fraction": 1.5},
+    "word": _WORD | _NONE,
+    "thing": {"a number": 3, "a word": "x", "nan": math.nan, "a list": [], "a bool": True} | _NONE,
+    "optional thing": {"a number": 3, "a word": "x", "nan": math.nan, "a list": [[]], "a bool": True},
+    "several": {"a number": 3, "nan": math.nan, "a wrong entry": [3], "a list of None": [None]} | _NONE,
+    "pair": {"a number": 3, "a word": "x", "one number": (1.0,), "three": (1.0, 2.0, 3.0), "nan": (math.nan, 0.0),
+             "words": ("a", "b"), "inf": (math.inf, 0.0)} | _NONE,
+    "flag": {},
+}
+"""{kind of argument: {what is wrong: a value that is not allowed}}."""
+
+
+class Call(NamedTuple):
+    """A public callable, its arguments as {name: (kind, a good value)}, and what uses the result up to the solve."""
+
+    name: str
+    make: Callable
+    arguments: dict[str, tuple[str, Any]]
+    use: Callable | None = None
+
+
+class Outcome(NamedTuple):
+    """What a wrong argument led to: "right", "accepted" or "wrong error"."""
+
+    call: str
+    argument: str
+    bad: str
+    outcome: str
+    error: str
+
+
+class _ReachedTheSolve(Exception):
+    pass
+
+
+def _stop(*_: Any) -> None:
+    raise _ReachedTheSolve
+
+
+def _mesh() -> fx.mesh.Mesh:
+    return fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1))
+
+
+def _scene(**change: Any) -> fx.Scene:
+    good = {"mesh": _mesh(), "materials": fx.NeoHookean(c10=1.0), "loads": [fx.Pressure("bottom")],
+            "supports": [fx.Symmetry("axis"), fx.Clamped("rim")]}
+    return fx.Scene(**{**good, **change})
+
+
+def _run(scene: Any, until: Any = None) -> None:
+    fx.trace(scene, until=until or fx.pole_height(0.1), progress=False)
+
+
+def calls() -> list[Call]:
+    """Every public callable that takes what a user types."""
+    positive, number, word = ("positive", 1.0), ("number", 0.1), ("word", "bottom")
+    materials = [Call(m.__name__, m, {k: (kind, v) for k, (kind, v) in args.items()}, lambda m: _scene(materials=m))
+                 for m, args in ((fx.NeoHookean, {"c10": positive}), (fx.MooneyRivlin,
+                                  {"c10": ("not negative", 1.0), "c01": ("not negative", 0.1)}),
+                                 (fx.Yeoh, {"c10": positive, "c20": number, "c30": number}),
+                                 (fx.Gent, {"mu": positive, "Jm": positive}),
+                                 (fx.ArrudaBoyce, {"mu": positive, "N": ("positive", 10.0)}))]
+    boundary = [Call(s.__name__, s, {"on": ("word", "rim"), **more},
+                     lambda s: _run(_scene(supports=[fx.Symmetry("axis"), s]))) for s, more in (
+        (fx.Clamped, {}), (fx.SimplySupported, {"weight": ("word", "area")}))]
+    targets = [Call(t.__name__, t, {"value": (kind, 0.1)}, lambda t: _run(_scene(), t)) for t, kind in (
+        (fx.pressure, "number"), (fx.pole_height, "number"), (fx.pole_stretch, "positive"),
+        (fx.enclosed_volume, "number"))]
+    size = {"radius": positive}
+    tools = [Call(f"tools.{t.__name__}", t, args) for t, args in (
+        (fx.tools.plane, {"z": number}),
+        (fx.tools.cup, size | {"depth": positive, "mouth": number, "draft": ("not negative", 0.0),
+                               "fillet": ("not negative", 0.1), "lip": ("not negative", 0.1)}),
+        (fx.tools.male, size | {"height": positive, "base": number, "draft": ("not negative", 0.0),
+                                "fillet": ("not negative", 0.1), "foot": ("not negative", 0.1)}),
+        (fx.tools.bottle, size | {"height": positive, "neck": ("positive", 0.5), "shoulder": positive,
+                                  "neck_height": positive, "base": number, "fillet": ("not negative", 0.1),
+                                  "shoulder_fillet": ("not negative", 0.1)}),
+        (fx.tools.cylinder, size | {"z": number, "fillet": ("not negative", 0.1)}),
+        (fx.tools.cone, {"half_angle": ("positive", 30.0), "z": number, "tip": ("not negative", 0.0),
+                         "size": positive}),
+        (fx.tools.sphere, size | {"z": number, "r": number}))]
+    disc = {"radius": positive, "thickness": ("positive", 0.1), "accuracy": ("word", "draft"),
+            "elements": ("pair or None", (4, 1)), "grading": positive, "inner_radius": ("not negative", 0.0)}
+    sphere = {"inner_radius": positive, "thickness": positive, "elements": ("pair", (4, 2)), "grading": positive}
+    contact = {"on": ("word", "top"), "tool": ("thing", fx.tools.plane(0.3)), "friction": ("friction", "stick"),
+               "penalty": positive, "ramp": positive, "nodes_per_step": ("count", 1), "moves": ("pair or None", None)}
+    return [
+        *materials, *boundary, *targets, *tools,
+        Call("Ogden", fx.Ogden, {"mu": ("terms", (1.0,)), "alpha": ("terms", (2.0,))},
+             lambda m: _scene(materials=m)),
+        Call("Symmetry", fx.Symmetry, {"on": ("word", "axis"), "normal": ("word", "r")},
+             lambda s: _run(_scene(supports=[s, fx.Clamped("rim")]))),
+        Call("Displaced", fx.Displaced, {"on": word, "component": ("word", "z")},
+             lambda s: _run(_scene(loads=[], supports=[fx.Symmetry("axis"), fx.Clamped("rim"), s]))),
+        Call("PinnedNode", fx.PinnedNode, {"r": ("number", 1.0), "z": ("number", 0.0)}),
+        Call("Pressure", fx.Pressure, {"on": word, "value": ("optional number", None)},
+             lambda p: _run(_scene(loads=[p]))),
+        Call("displacement", fx.displacement, {"value": number, "at": ("pair", (0.0, 0.0)),
+                                               "component": ("word", "z")}, lambda t: _run(_scene(), t)),
+        Call("travel", fx.travel, {"value": number}),
+        Call("mesh.disc", fx.mesh.disc, disc), Call("mesh.sphere", fx.mesh.sphere, sphere),
+        Call("mesh.read", fx.mesh.read, {"file": ("file", None)}),
+        Call("Contact", fx.Contact, contact, lambda c: _run(_scene(contacts=[c]))),
+        Call("Tool", fx.Tool, {"points": ("several", [(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)]),
+                               "fillets": ("not negative", 0.0),
+                               "closed": ("flag", False)}),
+        Call("MixedPressure", fx.MixedPressure, {"eps": ("not negative", 0.0), "space": ("word", "P1dg")}),
+        Call("DisplacementPenalty", fx.DisplacementPenalty, {"eps": positive, "points": ("count", 3),
+                                                             "stress_free": ("flag", True)}),
+        Call("Scene", fx.Scene, {
+            "mesh": ("thing", _mesh()), "materials": ("thing", fx.NeoHookean(c10=1.0)),
+            "supports": ("several", [fx.Symmetry("axis"), fx.Clamped("rim")]),
+            "loads": ("several", [fx.Pressure("bottom")]), "contacts": ("several", []),
+            "model": ("optional thing", None), "kinematics": ("optional thing", None),
+            "quadrature_degree": ("count", 5)}, _run),
+        Call("StepControl", fx.StepControl, {
+            "length": positive, "target": ("count", 4), "growth": positive, "smallest": positive,
+            "largest": ("step", 1.0)}, lambda s: fx.trace(_scene(), until=fx.pole_height(0.1), step=s, progress=False)),
+        Call("Tolerances", fx.Tolerances, {"correction": positive, "residual": positive, "iterations": ("count", 12)},
+             lambda t: fx.trace(_scene(), until=fx.pole_height(0.1), tolerances=t, progress=False)),
+        Call("trace", fx.trace, {
+            "scene": ("thing", _scene()), "until": ("thing", fx.pole_height(0.1)), "through": ("several", ()),
+            "step": ("optional thing", None), "tolerances": ("optional thing", None), "max_steps": ("count", 200),
+            "progress": ("flag", False)}),
+        Call("solve", fx.solve, {"scene": ("thing", _scene()), "to": number, "increments": ("count", 1),
+                                 "tolerances": ("optional thing", None)}),
+        Call("doctor", fx.doctor, {"scene": ("thing", _scene()), "targets": ("several", ())}),
+    ]
+
+
+BAD["pair or None"] = {k: v for k, v in BAD["pair"].items() if k != "None"}
+BAD["friction"] = {"unknown": "slippery", "nan": math.nan, "negative": -0.1, "a bool": True, "a list": [], "None": None}
+BAD["file"] = {"None": None, "a number": 3.5, "not there": "/nowhere/at all.msh", "a folder": "/", "empty": ""}
+BAD["terms"] = {k: v for k, v in BAD["several"].items() if k not in ("a number", "a wrong entry")}
+BAD["step"] = {k: v for k, v in BAD["positive"].items() if k != "inf"}
+_LEFT_OUT = {"comm"}
+
+
+def bad_input() -> list[Outcome]:
+    """Every argument of every call wrong in turn, one left out, one unknown."""
+    start = branch.Branch.start
+    branch.Branch.start = _stop                              # whatever gets that far was taken for good input
+    found = []
+    try:
+        for call in calls():
+            parameters = inspect.signature(call.make).parameters
+            left = set(parameters) - set(call.arguments) - _LEFT_OUT
+            assert not left, f"{call.name}: no bad values are known for {left}"
+            good = {k: v for k, (_, v) in call.arguments.items()}
+            if call.name != "mesh.read" and _try(call, good)[0] != "accepted":
+                raise AssertionError(f"{call.name}: the good values are refused: {_try(call, good)}")
+            for name, (kind, _) in call.arguments.items():
+                for what, value in BAD[kind].items():
+                    found.append(Outcome(call.name, name, what, *_try(call, good | {name: value})))
+                if parameters[name].default is inspect.Parameter.empty:
+                    rest = {k: v for k, v in good.items() if k != name}
+                    found.append(Outcome(call.name, name, "missing", *_try(call, rest, TypeError)))
+            found.append(Outcome(call.name, "no_such_argument", "unknown", *_try(call, good | {"no_such_argument": 1},
+                                                                                 TypeError)))
+    finally:
+        branch.Branch.start = start
+    return found
+
+
+def _try(call: Call, arguments: dict, also: type = fx.InputError) -> tuple[str, str]:
+    try:
+        made = call.make(**arguments)
+        if call.use:
+            call.use(made)
+    except (fx.InputError, also) as error:
+        return "right", str(error)
+    except _ReachedTheSolve:
+        return "accepted", ""
+    except Exception as error:  # noqa: BLE001  whatever else comes is what is counted
+        return "wrong error", f"{type(error).__name__}: {error}"
+    return "accepted", ""
+
+
+_RANKS = """
+import json, sys
+sys.path.insert(0, "tests")
+from conftest import treloar
+import formingx as fx
+free = fx.trace(treloar(elements=(12, 2)), until=fx.pole_stretch(3.0), progress=False)
+tool = fx.tools.cup(radius=1.25, depth=0.4, mouth=0.082, fillet=0.15)
+made = treloar(elements=(16, 1), support=fx.Clamped("rim"), contacts=[fx.Contact("top", tool, 0.3)])
+formed = fx.trace(made, until=fx.pressure(2.0), progress=False)
+if fx.mesh.MPI.COMM_WORLD.rank == 0:
+    print(json.dumps([{c: list(map(float, p[c])) for c in p.columns} for p in (free, formed)]))
+"""
+
+
+def ranks(counts: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, float]:
+    """{sheet: largest difference of a measure from that on 1 rank, over its largest value (mass_error: as it is)}."""
+    root = FilePath(__file__).parents[1]
+    results = []
+    for n in counts:
+        done = subprocess.run(["mpirun", "-n", str(n), sys.executable, "-c", _RANKS], cwd=root, capture_output=True,
+                              text=True, check=True)
+        results.append(json.loads(done.stdout.strip().splitlines()[-1]))
+    worst = {}
+    for k, name in enumerate(("free", "formed")):
+        worst[name] = 0.0
+        for other in results[1:]:
+            for column, a in results[0][k].items():
+                b = other[k][column]
+                if len(a) != len(b):
+                    worst[name] = math.inf                   # another number of states: not the same path
+                    continue
+                size = 1.0 if column == "mass_error" else max(map(abs, a)) or 1.0    # that is round-off already
+                worst[name] = max(worst[name], max(abs(x - y) for x, y in zip(a, b, strict=True)) / size)
+    return worst
+
+
+def files() -> dict[str, str]:
+    """{what was tried: "right" or what went wrong}: an error that names the file, and the earlier file stays."""
+    path = fx.trace(_scene(), until=fx.pole_height(0.05), progress=False)
+    writers: dict[str, Callable] = {
+        "path.to_csv": path.to_csv,
+        "write_summary": lambda file: fx.results.files.write_summary(file, {"a": "x" * 200_000}, path.problem.comm)}
+    found = {}
+    for name, write in writers.items():
+        with tempfile.TemporaryDirectory() as folder:
+            for what, place in (("full disk", _full_disk(folder)), ("a file for a folder", _file_as_folder(folder))):
+                if place is None:
+                    found[f"{name}, {what}"] = "not tried: no right to mount"
+                    continue
+                found[f"{name}, {what}"] = _write(write, place, FilePath(folder) / what)
+            _unmount(folder)
+    return found
+
+
+def _write(write: Callable, place: FilePath, _: Any) -> str:
+    file = place / "old.csv"
+    before = file.read_bytes() if file.exists() else None
+    try:
+        for _k in range(3):
+            write(file)
+    except (OSError, fx.InputError) as error:
+        after = file.read_bytes() if before is not None else None
+        left = [p.name for p in place.glob("*.part")] if place.is_dir() else []
+        if after != before:
+            return "the earlier file was lost"
+        if left:
+            return f"{left[0]} was left behind"
+        return "right" if "old.csv" in str(error) or str(place) in str(error) else f"the file is not named: {error}"
+    except Exception as error:  # noqa: BLE001
+        return f"{type(error).__name__}: {error}"
+    return "no error"
+
+
+def _full_disk(folder: str) -> FilePath | None:
+    place = FilePath(folder) / "full"
+    place.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", place], capture_output=True).returncode:
+        return None
+    (place / "old.csv").write_text("an earlier file\n")
+    with open(place / "filler", "wb") as stream:
+        try:
+            while True:
+                stream.write(b"x" * 4096)
+                stream.flush()
+        except OSError:
+            pass
+    return place
+
+
+def _unmount(folder: str) -> None:
+    subprocess.run(["umount", os.path.join(folder, "full")], capture_output=True)
+
+
+def _file_as_folder(folder: str) -> FilePath:
+    place = FilePath(folder) / "plain"
+    place.write_text("not a folder")
+    return place
+
+
+def main(what: list[str]) -> None:
+    """Print the figures."""
+    if not what or "bad" in what:
+        found = bad_input()
+        right = sum(o.outcome == "right" for o in found)
+        print(f"bad input: {len(found)} tried, {right} gave the right kind of error before any solve")
+        for o in found:
+            if o.outcome != "right":
+                print(f"  {o.call}({o.argument} = {o.bad}): {o.outcome} {o.error[:90]}")
+    if not what or "ranks" in what:
+        for name, worst in ranks().items():
+            print(f"ranks 1, 2, 3, 4: {name} sheet: largest difference of a measure {worst:.1e}")
+    if not what or "files" in what:
+        for name, outcome in files().items():
+            print(f"{name}: {outcome}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,276 @@
+"""Looks a scene over before it is run: what it finds is measured on the scene, and a good scene gives nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+
+from .errors import instance, several
+from .physics.incompressibility import DisplacementPenalty, Membrane
+from .physics.tools import Arc
+from .results.diagnosis import place, shape_quality
+from .results.measures import Target
+from .scene import Scene
+
+_FLATTEST = 110.0          # longest edge over height: discs of aspect 100 end right in benchmarks/extremes.py
+_PER_FILLET = 2.0          # elements along a fillet
+_PENETRATION = 0.01        # of the thickness
+
+
+class Finding(NamedTuple):
+    """One thing found: severity ("error": the run will fail; "warning": it may), what it is about, text."""
+
+    severity: str
+    about: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.severity}: {self.about}: {self.text}"
+
+
+class Report:
+    """What `doctor` found, worst first; prints in plain words.
+
+    Attributes:
+        findings: list of `Finding`; empty for a good scene.
+    """
+
+    def __init__(self, findings: Sequence[Finding]):
+        self.findings = sorted(findings, key=lambda f: f.severity)
+
+    @property
+    def healthy(self) -> bool:
+        """True if nothing was found."""
+        return not self.findings
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.findings)) or "nothing was found that stands against this scene"
+
+
+def doctor(scene: Scene, *, targets: Sequence[Target] = ()) -> Report:
+    """Look a scene over before the run; collective, no form is compiled and nothing is solved.
+
+    Elements (shape, number through a thick layer), the mesh against the fillets of the tools, penalties against the
+    precision that they leave, and sizes that look like mixed units. (What makes a run impossible, such as a body that
+    is free to move, is an `InputError` of `Scene` already.)
+
+    Args:
+        targets: what the run will aim at, to be looked over too.
+
+    Raises:
+        InputError: `scene` is not a Scene, or a target not a target.
+    """
+    instance("doctor: scene", scene, Scene, "a formingx.Scene")
+    for target in several("doctor: targets", targets, "targets, such as [pole_stretch(3)]"):
+        instance("doctor: targets: target", target, Target, "a target, such as pole_stretch(3)")
+    sheet = _Sheet(scene)
+    checks = (_driven, _elements, _layers, _fillets, _contact_penalties, _volume_penalty, _units)
+    findings = [finding for check in checks for finding in check(scene, sheet, targets)]
+    return Report([*findings, *_targets(scene, sheet, targets)])
+
+
+class _Sheet:
+    """Sizes of the body, all ranks.
+
+    corners: of all elements, shape (m, 3, 2); layer: their names; thickness: area of the section over its length;
+    length: largest extent; moduli: {layer: shear modulus}.
+    """
+
+    def __init__(self, scene: Scene):
+        mesh, comm = scene.mesh, scene.mesh.domain.comm
+        geometry = mesh.domain.geometry
+        n = mesh.domain.topology.index_map(2).size_local
+        names = np.full(n, "", dtype=object)
+        for name, tag in mesh.layers.items():
+            found = mesh.cells.find(tag)
+            names[found[found < n]] = name
+        corners = geometry.x[geometry.dofmap[:n, :3].ravel(), :2].reshape(n, 3, 2)
+        nodes = geometry.x[geometry.dofmap[:n].ravel(), :2].reshape(n, -1, 2)
+        parts = comm.allgather((corners, names.tolist(), _folded(nodes)))
+        self.corners = np.concatenate([c for c, _, _ in parts])
+        self.layer = np.array([name for _, part, _ in parts for name in part])
+        self.folded = np.concatenate([f for _, _, f in parts])
+        self.edges = np.stack([np.hypot(*(self.corners[:, i] - self.corners[:, j]).T)
+                               for i, j in ((0, 1), (1, 2), (2, 0))], 1)
+        self.quality = np.abs(shape_quality(self.corners))
+        self.area = self.quality * (self.edges**2).sum(1) / (4 * np.sqrt(3))
+        self.length = float(max(scene.extent))
+        self.thickness = float(self.area.sum()) / self.length
+        self.moduli = {name: material.shear_modulus for name, material in scene.materials.items()}
+
+
+def _folded(nodes: np.ndarray) -> np.ndarray:
+    """True for six-node triangles, shape (m, 6, 2), whose curved map turns inside out at a node, shape (m,)."""
+    if nodes.shape[1] != 6:
+        return np.zeros(len(nodes), dtype=bool)
+    a, b, c, bc, ac, ab = (nodes[:, i] for i in range(6))
+    found = []
+    for x, y in ((0, 0), (1, 0), (0, 1), (0.5, 0.5), (0, 0.5), (0.5, 0)):
+        z = 1 - x - y
+        by_x = (1 - 4 * z) * a + (4 * x - 1) * b + 4 * y * (bc - ac) + 4 * (z - x) * ab
+        by_y = (1 - 4 * z) * a + (4 * y - 1) * c + 4 * x * (bc - ab) + 4 * (z - y) * ac
+        found.append(by_x[:, 0] * by_y[:, 1] - by_x[:, 1] * by_y[:, 0])
+    turns = np.array(found)
+    return (turns.max(0) > 0) & (turns.min(0) <= 0) | (turns == 0).all(0)
+
+
+def _driven(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+    if scene.driven is None:
+        yield Finding("error", "loads", "nothing is driven, so there is no run: give one load no value, as"
+                                        " Pressure('bottom'), or add a Displaced support")
+
+
+def _elements(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+    if np.any(sheet.folded):
+        at = place(scene.mesh, sheet.corners[np.argmax(sheet.folded)].mean(0))
+        yield Finding("error", "mesh", f"{int(sheet.folded.sum())} elements are turned inside out at rest, one of them"
+                                       f" at {at}: a curved edge is bent too much for them; use smaller elements there")
+    if isinstance(scene.model, Membrane):
+        return
+    slender = sheet.edges.max(1) ** 2 / (2 * np.maximum(sheet.area, 1e-300))
+    worst = int(np.argmax(slender))
+    if slender[worst] > _FLATTEST:
+        at = place(scene.mesh, sheet.corners[worst].mean(0), sheet.layer[worst])
+        yield Finding("warning", "mesh", f"an element at {at} is {slender[worst]:.3g} times longer than high (up to"
+                                         f" 100 was tried): use more elements along the sheet, or Membrane()"
+                                         f" for one so thin")
+
+
+def _layers(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+    """A thick layer that one element spans cannot show how strain varies through it."""
+    if isinstance(scene.model, Membrane):
+        return
+    for name in scene.mesh.layers:
+        mine = sheet.layer == name
+        depth = sheet.area[mine].sum() / sheet.length
+        span = np.ptp(sheet.corners[mine][:, :, 1], axis=1).max(initial=0.0)
+        if depth > 0.2 * sheet.length and span > 0.99 * np.ptp(sheet.corners[mine][:, :, 1]):
+            yield Finding("warning", f"layer {name!r}", f"it is {depth / sheet.length:.3g} of the body's length thick,"
+                                                        f" and one element spans it: use two or more through it")
+    hard, soft = (pick(sheet.moduli, key=sheet.moduli.__getitem__) for pick in (max, min))
+    ratio = sheet.moduli[hard] / sheet.moduli[soft]
+    if ratio > 1e5:
+        yield Finding("warning", "materials", f"layer {hard!r} (shear modulus {sheet.moduli[hard]:.4g}) is {ratio:.2g}"
+                                              f" times stiffer than {soft!r} ({sheet.moduli[soft]:.4g}): are the units"
+                                              f" of stress the same (Pa and MPa)?")
+
+
+def _fillets(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+    """Rounded edges of a tool that the face cannot follow: fewer than two of its elements along one."""
+    for contact in scene.contacts:
+        nodes = scene.mesh.nodes_of(contact.on)
+        facets = scene.mesh.facets_of(contact.on)
+        total = scene.mesh.domain.comm.allreduce(_own(scene, facets), MPI.SUM)
+        edge = np.hypot(*np.ptp(nodes, axis=0)) / max(total, 1)
+        arcs = [p for p in contact.tool.pieces if isinstance(p, Arc) and p.radius > 0]
+        if not arcs:
+            continue
+        least = min(arcs, key=lambda p: p.radius * abs(p.sweep))
+        along = least.radius * abs(least.sweep)
+        if along < _PER_FILLET * edge:
+            need = int(np.ceil(total * _PER_FILLET * edge / along))
+            middle = least.centre + least.radius * np.array([np.cos(least.start + least.sweep / 2),
+                                                             np.sin(least.start + least.sweep / 2)])
+            yield Finding("warning", repr(contact), f"its fillet of radius {least.radius:.4g} at (R, Z) ="
+                          f" ({middle[0]:.4g}, {middle[1]:.4g}) is {along:.3g} long, {along / edge:.2g} elements of the"
+                          f" face ({edge:.3g} each): use {need} or more elements along it, or a larger fillet")
+
+
+def _own(scene: Scene, facets: np.ndarray) -> int:
+    return int(np.sum(facets < scene.mesh.domain.topology.index_map(1).size_local))
+
+
+def _contact_penalties(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+    """Penetration over thickness is traction / (penalty mu); the tangent's condition grows with the penalty."""
+    stress = max(sheet.moduli.values())
+    presses = [abs(t.value) for t in targets if t.name == "pressure"] if hasattr(scene.driven, "virtual_work") else []
+    for contact in scene.contacts:
+        traction = max([stress * sheet.thickness / sheet.length, *presses])
+        depth = traction / (contact.penalty * stress)
+        if depth > _PENETRATION:
+            why = "the target pressure" if presses else "a pressure of shear modulus times thickness over length"
+            yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g} lets {why}, {traction:.3g}, press"
+                          f" the face {100 * depth:.2g} % of the thickness into the tool: use"
+                          f" {traction / (0.001 * stress):.1g} or more")
+        if contact.penalty > 1e9:
+            yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g}: few of 16 digits are left"
+                          f" for the body; 2e4 is the default")
+        if contact.ramp > 0.05:
+            yield Finding("warning", repr(contact), f"ramp = {contact.ramp:g}: the face feels the tool already"
+                          f" {100 * contact.ramp:.3g} % of the thickness before it; 1e-3 is the default")
+
+
+def _volume_penalty(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+    """The volume changes by about eps stretch^2 / 8: pressure near mu stretch^2 over a bulk modulus 8 mu/eps."""
+    model = scene.model
+    if isinstance(model, Membrane):
+        return
+    stretch = max([t.value for t in targets if t.name == "pole_stretch"], default=1.0)
+    change = model.eps * stretch**2 / 8
+    if change > 0.01:
+        yield Finding("warning", repr(type(model).__name__), f"eps = {model.eps:g} lets the volume change by about"
+                      f" {100 * change:.2g} % at a stretch of {stretch:g}: use {0.008 / stretch**2:.1g} or less")
+    if isinstance(model, DisplacementPenalty):
+        if model.points == 4 and model.eps <= 1e-3:
+            yield Finding("warning", "DisplacementPenalty", f"points = 4 with eps = {model.eps:g}: the tangent becomes"
+                          f" indefinite in bending at eps <= 1e-3: use points=3, or MixedPressure()")
+        elif model.eps < 1e-4 or model.points == 7 and model.eps < 1e-3:
+            yield Finding("warning", "DisplacementPenalty", f"eps = {model.eps:g} with {model.points} points: the steps"
+                          f" become so short that runs do not end (1285 iterations at 1e-4 with three points): use"
+                          f" MixedPressure(), whose cost does not depend on eps")
+
+
+def _units(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+    """Sizes that belong together and differ by orders of magnitude."""
+    natural = max(sheet.moduli.values()) * sheet.thickness / sheet.length
+    fixed = [(repr(load), load.value) for load in scene.loads if not load.driven]
+    aimed = [(str(t), t.value) for t in targets if t.name == "pressure"] if not scene.contacts else []
+    for name, value in (*fixed, *aimed):
+        if abs(value) > 1e3 * natural or 0 < abs(value) < 1e-6 * natural:
+            yield Finding("warning", name, f"it is {abs(value) / natural:.2g} times shear modulus x thickness"
+                          f" / length = {natural:.3g}: are the units of stress the same (Pa, kPa, MPa)?")
+    for contact in scene.contacts:
+        tool = contact.tool
+        gap = float(-tool.signed_distance(scene.mesh.nodes_of(contact.on)).max())
+        if gap > 20 * sheet.length:
+            yield Finding("warning", repr(contact), f"the tool is {gap:.3g} away from a body of length"
+                          f" {sheet.length:.3g}: are the units of length the same (mm and m)?")
+            continue
+        arcs = [p.radius for p in tool.pieces if isinstance(p, Arc) and p.radius > 0]
+        shaped = len(tool.pieces) > 2 or tool.closed
+        if shaped and not 0.01 < tool.size / sheet.length < 100 or arcs and min(arcs) > 1e3 * sheet.length:
+            yield Finding("warning", repr(contact), f"the tool is {tool.size:.3g} large, the body {sheet.length:.3g}:"
+                          f" are the units of length the same (mm and m)?")
+
+
+def _targets(scene: Scene, sheet: _Sheet, targets: Sequence[Target]) -> Iterator[Finding]:
+    for target in targets:
+        if target.name == "pole_stretch" and scene.kinematics.dimension_of_volume == 3:
+            largest = max(m.largest_stretch("equibiaxial") for m in scene.materials.values())
+            if target.value >= largest:
+                yield Finding("error", str(target), f"no material of the scene can be stretched that far: the limit is"
+                                                    f" {largest:.6g}")
+        is_length = target.name in ("pole_height", "travel") or target.name.startswith("u_")
+        if is_length and abs(target.value) > 20 * sheet.length:
+            yield Finding("warning", str(target), f"that is {abs(target.value) / sheet.length:.3g} times the length of"
+                                                  f" the body, {sheet.length:.4g}: are the units of length the same?")
+        moved = not hasattr(scene.driven, "virtual_work")
+        if scene.driven is not None and target.name == ("pressure" if moved else "travel"):
+            yield Finding("error", str(target), f"the run drives {scene.driven!r}, which has no {target.name}")
+        inside = [c for c in scene.contacts if target.name == "pole_height" and _beyond(c, sheet, target.value, scene)]
+        for contact in inside:
+            yield Finding("error", str(target), f"it lies inside the tool of {contact!r}")
+
+
+def _beyond(contact: Any, sheet: _Sheet, height: float, scene: Scene) -> bool:
+    """True if the contact's face, moved to a pole height, has its pole deeper in a tool at rest than its thickness."""
+    if contact.driven:
+        return False
+    nodes = scene.mesh.nodes_of(contact.on)
+    pole = nodes[np.argmin(nodes[:, 0])]
+    if pole[0] > 1e-9 * sheet.length:
+        return False
+    return float(contact.tool.signed_distance((pole + [0.0, height])[None])[0]) > sheet.thickness

@@ -1,0 +1,215 @@
+"""Why a run could not go on, in numbers, words and a picture; and where in a body the worst places are."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import basix
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from ..errors import InputError
+from ..mesh import Mesh
+from . import plots
+
+_OUTLINE = [0, 5, 1, 3, 2, 4]          # nodes of a P2 triangle around its edge, DOLFINx order
+
+
+class Place(NamedTuple):
+    """A point of the body: reference (R, Z), length; the layer it is in ("" if that is not known); the nearest named
+    boundary and its distance, length."""
+
+    R: float
+    Z: float
+    layer: str
+    boundary: str
+    distance: float
+
+    def __str__(self) -> str:
+        layer = f" in layer {self.layer!r}" if self.layer else ""
+        if not self.boundary:
+            return f"(R, Z) = ({self.R:.6g}, {self.Z:.6g}){layer}"
+        near = f", {self.distance:.3g} from boundary {self.boundary!r}" if self.distance else f", on {self.boundary!r}"
+        return f"(R, Z) = ({self.R:.6g}, {self.Z:.6g}){layer}{near}"
+
+
+def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
+    """A point, shape (2,), the same on all ranks, with the nearest boundary of the mesh; collective."""
+    best, size = ("", np.inf), 0.0
+    for name in mesh.boundaries:
+        nodes = mesh.nodes_of(name)
+        if len(nodes):
+            away = float(np.hypot(*(nodes - point).T).min())
+            best, size = (name, away) if away < best[1] else best, max(size, float(np.abs(nodes).max()))
+    R, Z, distance = (0.0 if abs(v) < 1e-9 * size else float(v) for v in (*point, best[1]))
+    return Place(R, Z, layer, best[0], distance)
+
+
+def shape_quality(corners: np.ndarray) -> np.ndarray:
+    """4 sqrt(3) area / (sum of squared edges) of triangles, corners (n, 3, 2): 1 equilateral, 0 flat, < 0 inverted."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
+    squares = sum(((p - q) ** 2).sum(1) for p, q in ((a, b), (b, c), (c, a)))
+    return 4 * np.sqrt(3) * area / squares
+
+
+class Body(NamedTuple):
+    """A solid in one state, all ranks: m elements with k quadrature points each.
+
+    points, moved: reference and deformed, shape (m, k, 2), length; J, I1: det F and tr F^T F there, shape (m, k);
+    layers: tag of each element, shape (m,); outline: deformed nodes around each, shape (m, 6, 2), length; quality,
+    at_rest: shape of its corner triangle deformed and at rest (`shape_quality`), shape (m,).
+    """
+
+    points: np.ndarray
+    moved: np.ndarray
+    J: np.ndarray
+    I1: np.ndarray
+    layers: np.ndarray
+    outline: np.ndarray
+    quality: np.ndarray
+    at_rest: np.ndarray
+
+
+def body(problem: Any, x: Any, control: float) -> Body | None:
+    """The elements of a solid at a state (None: a membrane has no elements across its thickness); collective."""
+    forms = problem.forms
+    domain = forms.domain
+    if domain.topology.dim != 2:
+        return None
+    problem.set_state(x, control)
+    gauss = basix.make_quadrature(basix.CellType.triangle, problem.scene.quadrature_degree)[0]
+    nodes = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
+    where = ufl.as_vector([forms.X[0], forms.X[1]])
+    F = ufl.as_vector([forms.F[i] for i in ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))])
+    cells = np.arange(domain.topology.index_map(2).size_local, dtype=np.int32)
+
+    def at(expression, points, n):
+        if not len(cells):
+            return np.zeros((0, len(points), n))
+        return fem.Expression(expression, points).eval(domain, cells).reshape(len(cells), len(points), n)
+    F, X = at(F, gauss, 5), at(where, gauss, 2)
+    rest, moved, points = at(where, nodes, 2), at(where + forms.u, nodes, 2), at(where + forms.u, gauss, 2)
+    tags = np.zeros(len(cells), dtype=np.int64)
+    for tag in problem.scene.mesh.layers.values():
+        found = problem.scene.mesh.cells.find(tag)
+        tags[found[found < len(cells)]] = tag
+    J = (F[..., 0] * F[..., 3] - F[..., 1] * F[..., 2]) * F[..., 4]
+    turned = np.sign(shape_quality(rest[:, :3]))                     # cells may be numbered clockwise
+    local = (X, points, J, (F**2).sum(-1), tags, moved[:, _OUTLINE], turned * shape_quality(moved[:, :3]),
+             turned * shape_quality(rest[:, :3]))
+    return Body(*(np.concatenate(part) for part in zip(*problem.comm.allgather(local), strict=True)))
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What was found when a run could not go on. Numbers are None where they could not be had; a membrane has no J.
+
+    Attributes:
+        reason: how the last attempt ended.
+        step: number of the state that could not be reached (1: the first after the start).
+        control, aimed: the driven pressure (stress) or travel (length) of the last good state, and where the failed
+            attempt had got to.
+        residual: {"displacement", "pressure", "multipliers": norm of the forces left over, over that of the support
+            forces} in the failed attempt; inf where they were not finite.
+        worst: where the largest force was left over.
+        smallest_J, at_J: det F at the quadrature points of the last good state, its smallest, and where.
+        failed_J, at_failed_J: the same in the failed attempt.
+        shape: the worst shape of a deformed element of the last good state, over its shape at rest.
+        I1, limit: (I1 - 3) / (limit - 3) of the point nearest to its material's limit, and where; None: no limit.
+        turned: [(control before, after)] between which the determinant of the tangent changed its sign.
+        limit_points: controls of the limit points on the path.
+        limit_ahead: the control at which a limit point lies ahead, as the last slopes tell; or None.
+        flipped: nodes that came into contact, left it or changed between stick and slip in the last iteration.
+        touching: nodes in contact in the last good state.
+        condition: 1-norm condition number (estimate) of the tangent of the last good state.
+        causes: what the numbers prove or make likely, in plain words, the strongest first.
+        advice: what to try.
+    """
+
+    reason: str
+    step: int
+    control: float
+    aimed: float | None = None
+    residual: dict[str, float] = field(default_factory=dict)
+    worst: Place | None = None
+    smallest_J: float | None = None
+    at_J: Place | None = None
+    failed_J: float | None = None
+    at_failed_J: Place | None = None
+    shape: float | None = None
+    I1: float | None = None
+    limit: Place | None = None
+    turned: tuple = ()
+    limit_points: tuple = ()
+    limit_ahead: float | None = None
+    flipped: int | None = None
+    touching: int = 0
+    condition: float | None = None
+    causes: tuple = ()
+    advice: tuple = ()
+    what: str = "control"
+    picture_data: Any = field(default=None, repr=False)
+
+    def __str__(self) -> str:
+        at = f", at {self.what} {self.aimed:.8g}" if self.aimed is not None else ""
+        lines = [f"Step {self.step} failed after {self.what} {self.control:.8g}{at}: {self.reason}." if self.step else
+                 f"There is no first state: {self.reason}."]
+        lines += [f"Cause: {cause}." for cause in self.causes] or ["Cause: the numbers below single out none."]
+        if self.residual:
+            parts = ", ".join(f"{k} {v:.3g}" if np.isfinite(v) else f"{k} not finite" for k, v in self.residual.items())
+            at = f"; the largest at {self.worst}" if self.worst else ""
+            lines.append(f"Forces left over, over the support forces: {parts}{at}.")
+        if self.smallest_J is not None:
+            new = self.failed_J is not None and abs(self.failed_J - self.smallest_J) > 0.01 * abs(self.smallest_J)
+            failed = f"; in the failed attempt {self.failed_J:.4g} at {self.at_failed_J}" if new else ""
+            lines.append(f"Smallest J: {self.smallest_J:.4g} at {self.at_J}{failed}.")
+        if self.condition is not None:
+            lines.append(f"Condition number of the tangent: {self.condition:.2g}.")
+        if self.touching or self.flipped:
+            flips = f"; {self.flipped} changed state in the last iteration" if self.flipped is not None else ""
+            lines.append(f"Nodes in contact: {self.touching}{flips}.")
+        lines += [f"Try {'; '.join(self.advice)}."] if self.advice else []
+        return "\n".join(lines)
+
+    def picture(self, file: Any) -> None:
+        """Draw the last good state, deformed, its elements coloured by J, the worst places marked (rank 0 draws).
+
+        Raises:
+            InputError: a membrane has no elements to draw, nor has a run without a good state.
+        """
+        if self.picture_data is None:
+            raise InputError("Diagnosis.picture: there are no elements to draw: a membrane has none across its"
+                             " thickness, and without a good state there is no shape")
+        rank, shape, marks = self.picture_data
+        if rank == 0:
+            os.makedirs(os.path.dirname(os.path.abspath(file)), exist_ok=True)
+            _draw(shape, marks, f"last good state: {self.what} {self.control:.5g}", file)
+
+
+def _draw(shape: Body, marks: list, title: str, file: Any) -> None:
+    from matplotlib.collections import PolyCollection
+    size = np.ptp(shape.outline.reshape(-1, 2), axis=0)
+    wide = size[0] > 4 * size[1]
+    height = float(np.clip(7.0 * size[1] / size[0], 2.0, 7.0)) + 1.2
+    figure, axes = plots.figure(width=8.0, height=height)
+    J = shape.J[np.arange(len(shape.J)), np.argmax(np.abs(shape.J - 1), axis=1)]
+    reach = float(np.clip(np.abs(J - 1).max(), 1e-3, 1.0))
+    drawn = PolyCollection(shape.outline, array=J, cmap="RdBu", edgecolors="0.35", linewidths=0.4,
+                           clim=(1 - reach, 1 + reach))
+    axes.add_collection(drawn)
+    for (label, point), mark, colour in zip(marks, "osD^", ("tab:red", "black", "tab:purple", "tab:green")):
+        axes.plot(*point, mark, label=label, markersize=11, fillstyle="none", markeredgewidth=1.8, color=colour,
+                  zorder=3, clip_on=False)
+    axes.autoscale_view()
+    axes.set_aspect("equal", adjustable="datalim" if wide else "box")
+    axes.set_xlabel("r")
+    axes.set_ylabel("z")
+    axes.set_title(title, fontsize=10)
+    figure.colorbar(drawn, ax=axes, label="J where it is farthest from 1 in the element", shrink=0.85, extend="both")
+    if marks:
+        figure.legend(loc="outside lower center", ncols=len(marks), frameon=False, fontsize=9)
+    figure.savefig(file, dpi=150)

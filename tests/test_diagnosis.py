@@ -1,0 +1,146 @@
+"""A run made to fail for each reason gives the right words, numbers and place."""
+
+import importlib
+import math
+
+import numpy as np
+import pytest
+from conftest import run_json, treloar
+
+import formingx as fx
+
+
+def failure(attempt):
+    with pytest.raises(fx.ConvergenceError) as caught:
+        attempt()
+    error = caught.value
+    assert str(error.diagnosis) in str(error)
+    return error, error.diagnosis
+
+
+def test_limit_point_under_fixed_control():
+    """The limit pressure is told from the slopes of the path: that of `trace`, without having passed it."""
+    error, found = failure(lambda: fx.solve(treloar(), to=1.0, increments=5))
+    limit = fx.trace(treloar(), until=fx.pole_stretch(3.0), progress=False).limit_points[0].measures["pressure"]
+    assert found.limit_ahead == pytest.approx(limit, rel=1e-6)
+    assert found.control < found.limit_ahead < found.aimed
+    assert "a limit point lies ahead" in str(error) and "trace" in found.advice[0]
+    assert found.step == len(error.path) and found.turned == () and found.smallest_J > 0.99
+
+
+def test_target_beyond_a_limit_point():
+    error, found = failure(lambda: fx.trace(treloar(), until=fx.pressure(0.6), max_steps=30, progress=False))
+    assert found.limit_points == (error.path.limit_points[0].measures["pressure"],)
+    assert "the pressure has its maximum, 0.493279, at a limit point that was passed, and 0.6" in str(error)
+
+
+def test_too_few_steps():
+    """The number of steps that it foretells is enough, and nothing is blamed."""
+    error, found = failure(lambda: fx.trace(treloar(), until=fx.pole_stretch(3.0), max_steps=5, progress=False))
+    assert len(found.causes) == 1 and "max_steps = 5 ran out in good health" in found.causes[0]
+    more = int(found.causes[0].split("about ")[1].split()[0])
+    fx.trace(treloar(), until=fx.pole_stretch(3.0), max_steps=5 + more, progress=False)
+
+
+def test_limit_of_a_material():
+    """A volume that would need more than Gent's limit allows: the largest I1 of the sheet is at the pole."""
+    scene = fx.Scene(
+        mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1)), materials=fx.Gent(mu=4.0, Jm=10.0),
+        supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")])
+    _, found = failure(lambda: fx.trace(scene, until=fx.enclosed_volume(1e4), max_steps=60, progress=False))
+    assert 0.9 < found.I1 < 1
+    assert "a material is near the end of its domain" in found.causes[0]
+    assert "good health" not in str(found)
+
+
+def pressed(**change):
+    """A block glued to its base, pressed flat from above: its foot flows out and folds."""
+    return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(6, 6)), materials=fx.NeoHookean(c10=1.0),
+                    supports=[fx.Symmetry("axis"), fx.Clamped("bottom"), fx.Displaced("top")], **change)
+
+
+def test_element_about_to_turn_inside_out(tmp_path):
+    _, found = failure(lambda: fx.trace(pressed(), until=fx.travel(-0.95), max_steps=100, progress=False))
+    assert "an element is about to turn inside out" in found.causes[0]
+    assert found.smallest_J < 0.1 and found.what == "travel"
+    assert found.at_J.R > 0.6 and found.at_J.Z < 0.4 and found.at_J.layer == "sheet"      # the outer foot
+    assert "smaller elements around (R, Z) = (0.8" in found.advice[0]
+    found.picture(tmp_path / "a" / "last.png")
+    assert (tmp_path / "a" / "last.png").stat().st_size > 10_000
+
+
+def test_buckling():
+    """The tangent of a column in plane strain loses definiteness at Euler's load, where the run goes straight on.
+
+    Ends clamped, one free to move sideways: strain pi^2 (h / L)^2 / 12.
+    """
+    thickness, length = 0.2, 2.0
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=thickness, thickness=length, elements=(2, 16)),
+                     kinematics=fx.PlaneStrain(), materials=fx.NeoHookean(c10=1.0),
+                     supports=[fx.Clamped("bottom"), fx.Displaced("top")])
+    step = fx.StepControl(length=0.001, growth=1.0)
+    _, found = failure(lambda: fx.trace(scene, until=fx.travel(-0.3), max_steps=14, step=step, progress=False))
+    euler = length * math.pi**2 * (thickness / length) ** 2 / 12
+    before, after = found.turned[0]
+    assert len(found.turned) == 1 and 0.9 * euler < -before < -after < 1.25 * euler
+    assert "possibly buckling" in found.causes[0] and found.limit_points == ()
+
+
+def test_contact_that_does_not_settle(monkeypatch):
+    """Newton's method is given too few iterations for points that touch and let go."""
+    monkeypatch.setattr(importlib.import_module("formingx.solve.bordered"), "SETTLING", 3)
+    tool = fx.tools.cylinder(radius=0.3, z=0.1)
+    scene = treloar(elements=(12, 1), support=fx.Clamped("rim"), contacts=[fx.Contact("top", tool, 3.0)])
+    _, found = failure(lambda: fx.trace(scene, until=fx.pole_height(0.9), max_steps=60, progress=False))
+    assert "contact does not settle" in str(found)
+    assert found.worst.boundary == "top" and found.worst.distance == 0 and found.worst.R < 0.35
+    assert found.residual["displacement"] > 1e-3 > found.residual["pressure"]
+
+
+def test_no_first_state_and_a_membrane(tmp_path):
+    """Without a good state, or without elements across the thickness, what can be said is said."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1)),
+                     materials=fx.NeoHookean(c10=2.0), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
+                     loads=[fx.Pressure("bottom"), fx.Pressure("top", -5.0)])
+    _, found = failure(lambda: fx.trace(scene, until=fx.pressure(0.6), progress=False))
+    assert found.step == 0 and str(found).startswith("There is no first state")
+    _, found = failure(lambda: fx.solve(treloar(model=fx.Membrane()), to=1.0, increments=5))
+    assert found.smallest_J is None and "a limit point lies ahead" in str(found)
+    with pytest.raises(fx.InputError, match="no elements to draw"):
+        found.picture(tmp_path / "x.png")
+
+
+def test_condition_number():
+    """The estimate against NumPy's 1-norm condition number of the same matrix, and the sign of its determinant."""
+    from scipy.sparse import csr_matrix
+
+    from formingx.problem import Problem
+    from formingx.solve.direct import DirectSolver, condition
+    problem = Problem(treloar(elements=(4, 1)))
+    x = problem.x.duplicate()
+    x.set(0)
+    rows, columns, values = problem.tangent(x, 0.0).getValuesCSR()
+    dense = csr_matrix((values, columns, rows)).toarray()
+    solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
+    assert solver.factorise() and solver.sign() == np.linalg.slogdet(dense)[0]
+    exact = np.linalg.cond(dense, 1)
+    assert exact / 3 <= condition(problem.matrix, solver) <= exact * (1 + 1e-6)
+
+
+SCRIPT = """
+import json, sys
+sys.path.insert(0, "tests")
+from conftest import treloar
+import formingx as fx
+try:
+    fx.solve(treloar(), to=1.0, increments=5)
+except fx.ConvergenceError as error:
+    d = error.diagnosis
+    if fx.mesh.MPI.COMM_WORLD.rank == 0:
+        print(json.dumps([d.limit_ahead, d.smallest_J, d.condition, d.at_J.R, len(d.causes)]))
+"""
+
+
+def test_ranks_tell_the_same():
+    one, two = run_json(SCRIPT, 1), run_json(SCRIPT, 2)
+    assert two == pytest.approx(one, rel=1e-4)

@@ -1,0 +1,72 @@
+"""`doctor` finds what is wrong with a scene, and nothing in a good one."""
+
+import re
+
+import pytest
+from conftest import treloar
+
+import formingx as fx
+
+CUP = {"radius": 1.25, "depth": 0.4, "mouth": 0.082}
+
+
+def formed(elements=(40, 1), tool=None, **contact):
+    return treloar(elements=elements, support=fx.Clamped("rim"),
+                   contacts=[fx.Contact("top", tool or fx.tools.cup(fillet=0.1, **CUP), **contact)])
+
+
+@pytest.mark.parametrize("scene", [
+    lambda: treloar(),
+    lambda: treloar(elements=(60, 3), support=fx.Clamped("rim"), model=fx.DisplacementPenalty(eps=1e-2)),
+    lambda: treloar(model=fx.Membrane()),
+    lambda: treloar(length=1e-3, stress=1e-6),
+    lambda: formed(),
+])
+def test_good_scenes(scene):
+    report = fx.doctor(scene(), targets=[fx.pole_height(0.3)] if scene().contacts else [fx.pole_stretch(2.0)])
+    assert report.healthy and report.findings == []
+    assert "nothing was found" in str(report)
+
+
+@pytest.mark.parametrize("make, targets, severity, words", [
+    (lambda: formed((20, 1), fx.tools.cup(fillet=0.02, **CUP)), [], "warning",
+     "fillet of radius 0.02 .* is 0.0314 long, 0.5 elements .* use 80 or more"),
+    (lambda: formed(penalty=1.0), [], "warning", "6.6 % of the thickness into the tool"),
+    (lambda: formed(penalty=1e12), [], "warning", "of 16 digits"),
+    (lambda: formed(ramp=0.2), [], "warning", "20 % of the thickness before it"),
+    (lambda: formed(), [fx.pressure(1e4)], "warning", "the target pressure"),
+    (lambda: formed(), [fx.pole_height(0.6)], "error", "inside the tool"),
+    (lambda: formed(tool=fx.tools.cup(radius=1250.0, depth=400.0, mouth=82.0, fillet=100.0)), [], "warning",
+     "units of length"),
+    (lambda: treloar(elements=(1, 40)), [], "warning", "times longer than high"),
+    (lambda: treloar(model=fx.MixedPressure(eps=0.02)), [fx.pole_stretch(8.0)], "warning",
+     "volume change by about 16 %"),
+    (lambda: treloar(model=fx.DisplacementPenalty(eps=1e-6)), [], "warning", "steps become so short"),
+    (lambda: treloar(model=fx.DisplacementPenalty(eps=1e-3, points=4)), [], "warning", "indefinite"),
+    (lambda: treloar(), [fx.pressure(4e5)], "warning", "units of stress"),
+    (lambda: treloar(), [fx.pole_height(1000.0)], "warning", "units of length"),
+    (lambda: treloar(), [fx.travel(1.0)], "error", "has no travel"),
+])
+def test_findings(make, targets, severity, words):
+    report = fx.doctor(make(), targets=targets)
+    assert len(report.findings) == 1, str(report)
+    assert report.findings[0].severity == severity
+    assert re.search(words, str(report)), str(report)
+
+
+def test_layers_and_nothing_driven():
+    mesh = fx.mesh.disc(radius=1.0, thickness={"a": 0.5, "b": 0.5}, elements=(8, (1, 2)))
+    scene = fx.Scene(mesh=mesh, materials={"a": fx.NeoHookean(c10=1e6), "b": fx.NeoHookean(c10=1.0)},
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", 1e12)])
+    report = fx.doctor(scene)
+    assert [f.severity for f in report.findings] == ["error", "warning", "warning", "warning"]
+    for words in ("nothing is driven", "layer 'a': it is 0.5 of the body's length thick", "1e+06 times stiffer",
+                  "units of stress"):
+        assert words in str(report)
+
+
+def test_bad_input():
+    with pytest.raises(fx.InputError, match="scene = 'disc'"):
+        fx.doctor("disc")
+    with pytest.raises(fx.InputError, match="target = 3.0"):
+        fx.doctor(treloar(), targets=[3.0])
