@@ -52,8 +52,8 @@ def _parser() -> argparse.ArgumentParser:
                      help="folder for curves.png and pairs.csv (default: %(default)s)")
     look = commands.add_parser("open", help="say what is in a checkpoint",
                                description="Say what is in a checkpoint: the scene, the states, how the run ended.")
-    show = commands.add_parser("report", help="make a report of a checkpoint",
-                               description="Make one HTML file of a checkpoint: inputs, curves, thickness, convergence.")
+    show = commands.add_parser("report", help="make a report of a checkpoint", description="Make one HTML file of a"
+                               " checkpoint: inputs, curves, thickness, convergence.")
     for one in (look, show):
         one.add_argument("folder", metavar="FOLDER", help="a checkpoint (trace(..., checkpoint=FOLDER), Path.save)")
     show.add_argument("--out", type=Path, help="the HTML file (default: report.html in the checkpoint)")
@@ -131,7 +131,8 @@ def _open(options: argparse.Namespace) -> None:
     record = report.of_checkpoint(about, states)
     width = max(map(len, record.summary))
     lines = [f"{part:{width}}  {line}" for part, line in record.summary.items()]
-    columns = [c for c in ("pressure", "travel", "pole_height", "pole_stretch", "contact_length") if c in record.measures]
+    columns = [c for c in ("pressure", "travel", "pole_height", "pole_stretch", "contact_length")
+               if c in record.measures]
     extra = [key for key in ("setting", "stage") if any(state.get(key) for state in states)]
     lines += ["", f"{'state':>5}  {'kind':12}" + "".join(f"{c.replace('_', ' '):>16}" for c in columns)
               + "".join(f"  {key}" for key in extra)]

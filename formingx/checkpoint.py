@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 
+from . import _compat
 from .errors import InputError
 from .problem import Problem
 from .results import files
@@ -92,7 +93,6 @@ class Checkpoint:
         return files.on_root(problem.comm, lambda: _plainly(begin, folder, "cannot be begun"))
 
     def _write_state(self, number: int, state: State, profile: Any) -> None:
-        from adios4dolfinx import write_function_on_input_mesh
         problem, comm = self._problem, self._problem.comm
         place = self.folder / _name(number)
         part = place.with_name(place.name + ".part")
@@ -101,7 +101,7 @@ class Checkpoint:
         for name in _FIELDS:
             tails = comm.allgather(getattr(state, name)[n:].tolist())
             data[f"{name}_tail"] = tails[-1]
-        what = f"state {number} could not be written; the states before it are kept"
+        library, what = _compat.adios4dolfinx(), f"state {number} could not be written; the states before it are kept"
 
         def prepare():
             shutil.rmtree(part, ignore_errors=True)
@@ -110,7 +110,7 @@ class Checkpoint:
         files.on_root(comm, lambda: _plainly(prepare, self.folder, what))
         for name in _FIELDS:
             self._w.x.array[:n] = getattr(state, name)[:n]
-            write_function_on_input_mesh(part / f"{name}.bp", self._w, name=name)
+            library.write_function_on_input_mesh(part / f"{name}.bp", self._w, name=name)
 
         def finish():
             data["checksums"] = _checksums(part, data)
@@ -197,13 +197,12 @@ def _check_scene(folder: FilePath, about: dict, scene: dict) -> None:
 
 
 def _read_state(place: FilePath, data: dict, problem: Any) -> State:
-    from adios4dolfinx import read_function
     data = dict(data)
     n, last = problem.forms.space.dofmap.index_map.size_local, problem.comm.rank == problem.comm.size - 1
     w = fem.Function(problem.forms.space)
     arrays = {}
     for name in _FIELDS:
-        read_function(place / f"{name}.bp", w, name=name)
+        _compat.adios4dolfinx().read_function(place / f"{name}.bp", w, name=name)
         arrays[name] = np.concatenate([w.x.array[:n], data.pop(f"{name}_tail") if last else []])
     met = data.pop("met")
     return State(**arrays, met=Target(met[0], met[1], None, met[2]) if met else None,
@@ -253,7 +252,7 @@ def _profile(path: Path, state: State) -> dict[str, list] | None:
         profile = path.profile(state)
     except InputError:
         return None
-    return {name: getattr(profile, name).tolist() for name in ("bottom", "top", "thickness_ratio")}
+    return {f.name: getattr(profile, f.name).tolist() for f in fields(profile)}
 
 
 def _name(number: int) -> str:

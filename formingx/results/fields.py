@@ -6,7 +6,8 @@ Every triangle gets six nodes of its own, so that nothing is smeared over an int
     stretches               the larger and the smaller in the plane, and the hoop stretch (`Stress.principal_stretches`)
     principal_stresses      of the Cauchy stress, from the largest to the smallest, stress
     cauchy_rr, _zz, _rz, _hoop  its components; hydrostatic_pressure: minus a third of its trace, stress
-    contact_pressure        normal traction per deformed area, stress; one field for all tools, where there are any
+    contact_pressure        normal traction per deformed area at the face, stress, of all tools; where there are any
+                            (the first two nodes from the axis share their areas: there it is less accurate)
     thickness, thickness_ratio  of the sheet there, where the mesh has two faces that face each other
 
 A membrane is a line and has displacement and thickness only. Rank 0 writes.
@@ -85,22 +86,28 @@ class Fields:
         """Normal traction over the change of area along the face, zero elsewhere, shape (cells, nodes)."""
         from scipy.spatial import cKDTree
         problem, pressure = self._problem, np.zeros(self.points.shape[:2])
-        fields = state.x[: problem.forms.space.dofmap.index_map.size_local]
+        forms = problem.forms
+        fields, near = state.x[: forms.space.dofmap.index_map.size_local], 1e-9 * forms.length
         now, problem.memory = problem.memory, state.memory
         try:
             tractions = [contact.traction(fields, state.control) for contact in problem.contacts]
         finally:
             problem.memory = now
-        hoop = problem.scene.kinematics.dimension_of_volume == 3
         for contact, (points, values) in zip(problem.contacts, tractions):
+            tree = cKDTree(points)
+            total = np.zeros((len(points), 2))               # sum of area ratios, and of how many facets
             for cell, facet in self._facets(contact.contact.on):
                 nodes = [*(k for k in range(3) if k != facet), 3 + facet]
                 X, x = self.points[cell, nodes], moved[cell, nodes]
                 ratio = np.hypot(*_tangents(x).T) / np.hypot(*_tangents(X).T)
-                on_axis = X[:, 0] < 1e-9 * problem.forms.length
-                if hoop:
-                    ratio = ratio * np.where(on_axis, ratio, x[:, 0] / np.where(on_axis, 1.0, X[:, 0]))
-                pressure[cell, nodes] += values[cKDTree(points).query(X)[1], 0] / ratio
+                if problem.scene.kinematics.dimension_of_volume == 3:
+                    axis = X[:, 0] < near
+                    ratio = ratio * np.where(axis, ratio, x[:, 0] / np.where(axis, 1.0, X[:, 0]))
+                np.add.at(total, tree.query(X)[1], np.column_stack([ratio, np.ones(3)]))
+            total = problem.comm.allreduce(total)
+            away, at = tree.query(self.points.reshape(-1, 2))
+            found = (values[:, 0] * total[:, 1] / total[:, 0])[at]
+            pressure += np.where(away < near, found, 0.0).reshape(pressure.shape)
         return pressure
 
     def _facets(self, boundary: str) -> list[tuple[int, int]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import io
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from tempfile import TemporaryDirectory
@@ -16,6 +17,7 @@ import numpy as np
 from ..errors import InputError
 from . import files, plots
 from .compare import Smooth
+from .profile import Profile
 
 PENETRATION = 0.05
 """Penetration over the smallest thickness above which a report warns."""
@@ -32,7 +34,7 @@ class Record:
         summary: {part of the scene: one line}; versions: {program: version}; axisymmetric: else plane strain.
         kinds: of the states; measures: {column: shape (n,)}.
         histories: of the n states, rows (residual, correction, work) of Newton's iterations.
-        profiles: of the n states, with `bottom`, `top`, `thickness_ratio` and more (`Profile`), or None.
+        profiles: of the n states, each a `Profile`, or None.
         counts: what the run cost; until: (measure, value) that it aimed at, or None.
     """
 
@@ -73,7 +75,7 @@ class Record:
 
     def _smallest_thickness(self) -> float | None:
         last = self.profiles[-1]
-        return float(np.min(np.hypot(*(last.top - last.bottom).T))) if last is not None else None
+        return float(last.thickness.min()) if last is not None else None
 
 
 def of_path(path: Any) -> Record:
@@ -93,7 +95,7 @@ def of_path(path: Any) -> Record:
 def of_checkpoint(about: dict, states: list[dict]) -> Record:
     """The record of what `formingx.checkpoint.contents` gives."""
     stepping: dict = next((s["stepping"] for s in reversed(states) if s["stepping"]), {})
-    profiles = [s["profile"] and SimpleNamespace(**{k: np.array(v) for k, v in s["profile"].items()}) for s in states]
+    profiles = [s["profile"] and Profile(**{k: np.array(v) for k, v in s["profile"].items()}) for s in states]
     return Record(about["summary"], about["versions"], about["scene"]["kinematics"]["kind"] == "Axisymmetric",
                   [s["kind"] for s in states], {c: np.array([s["measures"][c] for s in states])
                                                 for c in states[0]["measures"]},
@@ -113,6 +115,9 @@ def _page(record: Record, title: str, failure: Any) -> str:
     parts = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{_lead(record)}</p>"]
     if failure is not None:
         parts.append(f"<div class='note bad'><h2>The run could not go on</h2><p>{_lines(str(failure))}</p></div>")
+        shape = _drawn(lambda file: failure.diagnosis.picture(file)) if getattr(failure, "diagnosis", None) else None
+        if shape:
+            parts.append(_picture(shape, "The last good state, its elements coloured by J.", "small"))
     if warnings:
         parts.append("<div class=note><h2>Warnings</h2><ul>"
                      + "".join(f"<li>{html.escape(w)}</li>" for w in warnings) + "</ul></div>")
@@ -183,7 +188,8 @@ def _key_numbers(record: Record) -> str:
 
 def _curves(record: Record) -> Any:
     pairs = [plots.main_columns(list(record.measures))]
-    others = [c for c in ("pole_stretch", "pole_height", "enclosed_volume") if c in record.measures and c != pairs[0][0]]
+    others = [c for c in ("pole_stretch", "pole_height", "enclosed_volume")
+              if c in record.measures and c != pairs[0][0]]
     pairs += [(c, pairs[0][1]) for c in others[:1]]
     figure, axes = plots.figure(len(pairs))
     for ax, (x, y) in zip(np.atleast_1d(axes), pairs):
@@ -208,9 +214,7 @@ def _shapes(record: Record) -> Any:
         colour = colormaps["viridis"](0.9 * i / max(len(chosen) - 1, 1))
         label = f"{_words(record.control)} {record.measures[record.control][k]:.4g}"
         plots.outline(profile, left, color=colour, label=label)
-        middle = (profile.bottom + profile.top) / 2
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(middle, axis=0).T))])
-        right.plot(along, profile.thickness_ratio, color=colour, label=label)
+        right.plot(profile.arc_length, profile.thickness_ratio, color=colour, label=label)
     left.set(xlabel="r", ylabel="z")
     right.set(xlabel="arc length", ylabel="thickness / original", ylim=(0, None))
     right.legend(frameon=False, fontsize=8, loc="best")
@@ -218,16 +222,19 @@ def _shapes(record: Record) -> Any:
 
 
 def _view(record: Record) -> bytes | None:
-    """The picture in three dimensions, where it can be drawn."""
     from mpi4py import MPI
 
     from . import views
-    if not record.axisymmetric:
-        return None
+    draw = views.revolved if record.axisymmetric else views.extruded
+    return _drawn(lambda file: draw(record.profiles[-1], file, MPI.COMM_SELF))
+
+
+def _drawn(draw: Callable[[Any], Any]) -> bytes | None:
+    """The picture that `draw` makes as a file, or None where there is nothing to draw, or nothing to draw it with."""
     with TemporaryDirectory() as folder:
-        file = FilePath(folder) / "view.png"
+        file = FilePath(folder) / "picture.png"
         try:
-            views.revolved(record.profiles[-1], file, MPI.COMM_SELF)
+            draw(file)
         except (InputError, ImportError):
             return None
         return file.read_bytes()
