@@ -10,7 +10,6 @@ from mpi4py import MPI
 
 from .physics.contact import Contact, Touch, Tractions
 
-
 HOVERING = 1e-3
 """Distances (over thickness) at which a node is as good as in touch."""
 

@@ -25,6 +25,7 @@ class Scene:
         materials: {layer name: material}, or one material for all layers.
         supports: see `formingx.physics.supports`.
         loads: see `formingx.physics.loads`. At most one load, support or tool is driven (controlled by the run).
+            (Contacts of one tool with several faces, of the same `moves`, count as one.)
         contacts: faces of the body that rigid tools stop, see `formingx.Contact`.
         model: how the scene is modelled: `MixedPressure()` (default) or `DisplacementPenalty()`, a solid; `Membrane()`.
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
@@ -70,7 +71,8 @@ class Scene:
         for contact in self.contacts:
             self._check_contact(contact)
         driven = [x for x in (*self.loads, *self.supports, *self.contacts) if getattr(x, "driven", False)]
-        if len(driven) > 1:
+        together = len({getattr(x, "moves", None) for x in driven}) == 1 and getattr(driven[0], "moves", None)
+        if len(driven) > 1 and not together:                     # one tool that meets several faces moves as one
             raise InputError(f"Scene: {', '.join(map(repr, driven))} are all driven: one control drives a run;"
                              f" give the others a value")
         self.driven = driven[0] if driven else None
