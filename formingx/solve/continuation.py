@@ -124,7 +124,8 @@ class _Run:
         """A step is complete: note how the run goes on from here, on disk too."""
         path = self.path
         path.counts.seconds += self._elapsed()
-        path.last.stepping = {"step": asdict(self.step), "counts": asdict(path.counts)}
+        path.last.stepping = {"step": asdict(self.step), "counts": asdict(path.counts),
+                               "until": [self.until.name, self.until.value]}
         if self.checkpoint is not None:
             self.checkpoint.write(path)
 
