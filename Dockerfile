@@ -2,12 +2,15 @@
 ARG SUITE=trixie
 FROM debian:${SUITE}-slim
 ARG PACKAGES="\
+    python3-adios4dolfinx \
     python3-dolfinx \
     python3-gmsh \
     python3-matplotlib \
+    python3-myst-parser \
     python3-pytest \
     python3-pyvista \
     python3-scipy \
+    python3-sphinx \
     python3-tqdm \
     libopenblas0-pthread \
     xauth \

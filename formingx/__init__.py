@@ -1,6 +1,7 @@
 """formingx: how polymers are formed, simulated with finite elements on FEniCSx."""
 
 from . import mesh
+from .checkpoint import load
 from .data import treloar1944
 from .doctor import doctor
 from .errors import ConvergenceError, InputError

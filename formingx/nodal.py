@@ -10,7 +10,6 @@ from mpi4py import MPI
 
 from .physics.contact import Contact, Touch, Tractions
 
-
 HOVERING = 1e-3
 """Distances (over thickness) at which a node is as good as in touch."""
 
@@ -72,7 +71,7 @@ class NodalContact:
         (1/24, -2/24, 1/24) of L times the weight at L: integrals of what is linear along the facet stay exact.
         """
         nodes = np.concatenate(self._comm.allgather(np.column_stack([self.points, self.lengths, self.area])))
-        for axis in nodes[(nodes[:, 3] == 0) & (nodes[:, 2] > 0)]:
+        for axis in nodes[(nodes[:, 3] < 1e-9 * nodes[:, 3].max()) & (nodes[:, 2] > 0)]:
             length = 6 * axis[2]                                        # of its facet, on which Gauss-Lobatto gives 1/6
             away = np.hypot(*(self.points - axis[:2]).T) / length
             at = kinematics.weight(np.array([axis[0] + length, axis[1]])) * length / 24

@@ -166,6 +166,13 @@ class Problem:
         for contact in self.touching:
             contact.advance(x[: self._n], control)
 
+    def remember(self, state: Any) -> None:
+        """Go on from a state that was accepted before: its history is what it was then."""
+        if state.setting:
+            self.enter(Setting(**state.setting), state.x, state.control)
+        self.advance(state.x, state.control)
+        self.memory = state.memory
+
     def reach(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step of at most `length` from x along (direction, slope) may be. Arrays: own part."""
         n = self._n

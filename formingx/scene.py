@@ -26,6 +26,7 @@ class Scene:
         supports: see `formingx.physics.supports`.
         loads: see `formingx.physics.loads`. One load, support or tool may be driven (controlled by the run), several by
             a `formingx.Process`.
+            (Contacts of one tool with several faces, of the same `moves` and name, count as one.)
         contacts: faces of the body that rigid tools stop, see `formingx.Contact`.
         model: how the scene is modelled: `MixedPressure()` (default) or `DisplacementPenalty()`, a solid; `Membrane()`.
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
@@ -57,8 +58,6 @@ class Scene:
         if not hasattr(self.kinematics, "dimension_of_volume") or isinstance(self.kinematics, type):
             raise InputError(f"Scene: kinematics = {kinematics!r}: must be Axisymmetric() or PlaneStrain()")
         self.quadrature_degree = count("Scene: quadrature_degree", quadrature_degree)
-        self.things = [*self.loads, *self.supports, *self.contacts]
-        self.drivable = [thing for thing in self.things if getattr(thing, "driven", False)]
         self._check_names()
         self._check_materials()
         self._check_boundaries()
@@ -74,9 +73,28 @@ class Scene:
             self._check_contact(contact)
 
     @property
+    def things(self) -> list[Any]:
+        """Loads, supports and contacts, in order."""
+        return [*self.loads, *self.supports, *self.contacts]
+
+    @property
+    def drivable(self) -> list[Any]:
+        """What can be driven; of a tool that meets several faces its first contact."""
+        return [thing for i, thing in enumerate(self.things) if getattr(thing, "driven", False) and self.together(i)[0] == i]
+
+    def together(self, number: int) -> list[int]:
+        """Numbers of the things that move as this one does: contacts with the same `moves` and name are of one tool."""
+        thing = self.things[number]
+        if getattr(thing, "moves", None) is None:
+            return [number]
+        return [i for i, other in enumerate(self.things)
+                if (getattr(other, "moves", None), getattr(other, "name", None)) == (thing.moves, thing.name)]
+
+    @property
     def driven(self) -> Any:
         """What a run with one control drives: the only thing that can be driven, or None."""
-        return self.drivable[0] if len(self.drivable) == 1 else None
+        drivable = self.drivable
+        return drivable[0] if len(drivable) == 1 else None
 
     def only_driven(self, who: str) -> Any:
         """`driven`, or an InputError unless one thing can be driven."""
@@ -113,7 +131,8 @@ class Scene:
         for name in names:
             if not isinstance(name, str) or not name:
                 raise InputError(f"Scene: name = {name!r}: must be a word")
-            if names.count(name) > 1:
+            same = [i for i, thing in enumerate(self.things) if getattr(thing, "name", None) == name]
+            if same != self.together(same[0]) and len(same) > 1:
                 raise InputError(f"Scene: two things are called {name!r}: names must differ")
         columns = [self.column(thing) for thing in self.drivable]
         for column in columns:

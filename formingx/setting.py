@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,26 +27,25 @@ class Setting:
     @classmethod
     def first(cls, scene: Any) -> Setting:
         """Everything at 0 and there; what is driven, if it is one thing, is the control."""
-        n = len(scene.things)
-        return cls([0.0] * (n + 1), [float(thing is scene.driven) for thing in scene.things] + [0.0], [])
+        rate = [float(scene.driven is not None and getattr(t, "driven", False)) for t in scene.things] + [0.0]
+        return cls([0.0] * len(rate), rate, [])
 
     @property
     def leading(self) -> int | None:
         """Number of what the control stands for: the time if it runs, else the one thing that is driven, or None."""
-        return max((i for i, rate in enumerate(self.rate) if rate), default=None)
+        if self.rate[-1]:
+            return len(self.rate) - 1
+        return next((i for i, rate in enumerate(self.rate) if rate), None)
+
+    @property
+    def rests(self) -> bool:
+        """True if only the time changes, or nothing."""
+        return not any(self.rate[:-1])
 
     def amplitude(self, number: int, control: float) -> float:
         """Of a thing, or with -1 the process time."""
         return self.base[number] + self.rate[number] * control
 
-    def driving(self, number: int, stage: int, piece: int, off: Iterable[int], control: float) -> tuple:
-        """(setting, control) with one thing driven from where it stands at a control; the others stay."""
-        base = [self.amplitude(i, control) for i in range(len(self.base))]
-        now, base[number] = base[number], 0.0
-        rate = [float(i == number) for i in range(len(base))]
-        return Setting(base, rate, sorted(off), False, stage, piece), now
-
-    def standing(self, stage: int, piece: int, off: Iterable[int], control: float, fading: bool = False) -> Setting:
-        """Everything stays where it stands at a control."""
-        base = [self.amplitude(i, control) for i in range(len(self.base))]
-        return Setting(base, [0.0] * len(base), sorted(off), fading, stage, piece)
+    def standing(self, control: float) -> list[float]:
+        """Amplitudes at a control, of the things and the time."""
+        return [self.amplitude(i, control) for i in range(len(self.base))]

@@ -221,8 +221,7 @@ def test_a_moving_tool():
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      contacts=[fx.Contact("top", plug, "stick", moves=(0, -1))])
     path = fx.trace(scene, until=fx.travel(3.0), step=fx.StepControl(target=8), progress=False)
-    # the node on the axis carries no area, so nothing holds it: it may dip in by the sagitta of half an element
-    assert path.last.measures["penetration"] < 0.25**2 / (2 * 3) and path.last.measures["contact_length"] > 0.2
+    assert path.last.measures["penetration"] < 1e-3 * 0.5 and path.last.measures["contact_length"] > 0.2
     assert path.last.measures["tool_force"] == pytest.approx(support_force(path.problem, path.last, 1), rel=1e-7)
     problem, state, h = path.problem, path.last, 1e-7
     x, plus, minus, exact = (problem.x.duplicate() for _ in range(4))

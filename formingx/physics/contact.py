@@ -24,7 +24,6 @@ import numpy as np
 from ..errors import InputError, count, non_negative, pair, positive
 from .tools import Nearest, Tool
 
-
 SOFTER = 0.01
 """Stiffness of elastic slip over that of the ramp, under Coulomb's law: a point slides after some mu 100 N/k of slip.
 
@@ -82,7 +81,8 @@ class Contact:
 
     def law(self, k: float, theta: float, points: np.ndarray) -> Law:
         """Tractions for a penalty k (stress/length) and a ramp theta (length), at points, shape (n, 2)."""
-        return Law(self.tool, self.mu, k, theta, np.maximum(self.tool.signed_distance(points) + (1 - 1e-7) * theta, 0.0))
+        depth = self.tool.signed_distance(points)
+        return Law(self.tool, self.mu, k, theta, np.maximum(depth + (1 - 1e-7) * theta, 0.0))
 
     def __repr__(self) -> str:
         return f"Contact({self.on!r}, {self.tool!r}, {self.friction!r})"

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import os
 import platform
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -32,22 +33,18 @@ def write_profile(profile: Any, file: Any, comm: Any) -> None:
 
 def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], comm: Any) -> None:
     """A CSV file with a header; numbers with all their digits."""
-    if comm.rank != 0:
-        return
-
     def write(stream):
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(header)
         for row in rows:
             writer.writerow([repr(float(v)) if isinstance(v, (float, np.floating)) else v for v in row])
-    _replace(file, write)
+    on_root(comm, lambda: replace(file, write))
 
 
 def write_summary(file: Any, summary: dict[str, Any], comm: Any) -> None:
     """A JSON file of key numbers; NaN is refused."""
-    if comm.rank == 0:
-        text = json.dumps(summary, indent=2, allow_nan=False, default=float) + "\n"
-        _replace(file, lambda stream: stream.write(text))
+    text = json.dumps(summary, indent=2, allow_nan=False, default=float) + "\n"
+    on_root(comm, lambda: replace(file, lambda stream: stream.write(text)))
 
 
 def versions() -> dict[str, str]:
@@ -59,17 +56,34 @@ def versions() -> dict[str, str]:
             "petsc4py": petsc4py.__version__, "numpy": np.__version__, "python": platform.python_version()}
 
 
-def _replace(file: Any, write: Any) -> None:
-    """Write beside the file, then rename: an earlier file survives a failure."""
+def on_root(comm: Any, action: Callable[[], Any]) -> Any:
+    """The result of an action that rank 0 alone takes, on all ranks; so is what it raises. Collective."""
+    result, error = None, None
+    if comm.rank == 0:
+        try:
+            result = action()
+        except (OSError, ValueError) as found:
+            error = found
+    result, error = comm.bcast((result, error), root=0)
+    if error is not None:
+        raise error
+    return result
+
+
+def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:
+    """Write beside the file, then rename: an earlier file survives a failure.
+
+    Raises:
+        OSError: the file cannot be written; it names the file, and no part is left behind.
+    """
     file = FilePath(file)
-    file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_name(file.name + ".part")
     try:
-        with open(part, "w", newline="") as stream:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with open(part, mode, newline=None if "b" in mode else "", encoding=None if "b" in mode else "utf-8") as stream:
             write(stream)
         os.replace(part, file)
-    except BaseException as error:
-        part.unlink(missing_ok=True)
-        if isinstance(error, OSError) and error.filename is None:           # a full disk does not say which file
-            raise type(error)(error.errno, error.strerror, str(file)) from None
-        raise
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            part.unlink()
+        raise OSError(error.errno, f"{os.fspath(file)!r} could not be written: {error.strerror}") from None

@@ -136,7 +136,7 @@ def changed() -> Target:
 def _driven(quantity: str, value: float, of: str | None) -> Target:
     def bind(problem):
         scene, rate = problem.scene, problem.setting.rate
-        found = [i for i, t in enumerate(scene.things) if t in scene.drivable and t.quantity == quantity]
+        found = [i for i, t in enumerate(scene.things) if any(t is d for d in scene.drivable) and t.quantity == quantity]
         if of is not None:
             known(f"{quantity}: of =", of, [n for n in (scene.things[i].name for i in found) if n])
             return Amplitude(problem, next(i for i in found if scene.things[i].name == of))
@@ -278,7 +278,8 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
         found["contact_length"] = _Nodal(problem, lambda c, *at: c.contact_length(*at), sum)
         found["penetration"] = _Nodal(problem, lambda c, *at: c.largest_penetration(*at), max)
         found["tool_force"] = _Nodal(problem, lambda c, *at: c.force(*at)[1], sum)
-        for contact in problem.contacts if len(problem.contacts) > 1 else []:
-            if contact.contact.name:
-                found[f"{contact.contact.name}_force"] = _Nodal(problem, lambda c, *at: c.force(*at)[1], sum, [contact])
+        names = [c.contact.name for c in problem.contacts]
+        for name in dict.fromkeys(filter(None, names)) if len(set(names)) > 1 else ():
+            of_tool = [c for c in problem.contacts if c.contact.name == name]
+            found[f"{name}_force"] = _Nodal(problem, lambda c, *at: c.force(*at)[1], sum, of_tool)
     return found

@@ -87,16 +87,8 @@ class Branch:
         if self.newton.tangent(self._x, state.control, ahead=True):
             size = self.norm(self.newton.b, 1.0)
             direction, slope = self.newton.b.array_r / size, 1 / size
-            state.direction, state.slope = self._like(state, direction, slope)
-
-    def turned(self, state: State, like: State) -> State:
-        """A state whose tangent points the way of another's."""
-        state.direction, state.slope = self._like(like, state.direction, state.slope)
-        return state
-
-    def _like(self, state: State, direction: np.ndarray, slope: float) -> tuple[np.ndarray, float]:
-        sense = np.sign(self._inner(direction, slope, state.direction, state.slope)) or 1.0
-        return sense * direction, sense * slope
+            sense = np.sign(self._inner(direction, slope, state.direction, state.slope)) or 1.0
+            state.direction, state.slope = sense * direction, sense * slope
 
     def guess_from_rest(self, rest: State, control: float) -> np.ndarray:
         """A guess of the state at a control, to correct at that control: rest, with what is held moved.

@@ -6,15 +6,17 @@ mesh nor the units. Targets are hit exactly: within reach, the equation "measure
 
 from __future__ import annotations
 
+import itertools
 import logging
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
-from ..errors import ConvergenceError, count, instance, several
+from ..checkpoint import Checkpoint
+from ..errors import ConvergenceError, InputError, count, instance, several
 from ..problem import Problem
 from ..results import measures
 from ..results.path import Path, State
@@ -32,7 +34,7 @@ _TRY = (" Try a target within what was met, a smaller first step (step=StepContr
 
 def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Target] = (),
           step: StepControl | None = None, tolerances: Tolerances | None = None, max_steps: int = 200,
-          progress: bool = True) -> Path:
+          progress: bool = True, start: Path | None = None, checkpoint: Any = None) -> Path:
     """Follow the equilibrium path from the unloaded body until a target is reached, through limit points.
 
     Args:
@@ -43,10 +45,15 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
         tolerances: when a state counts as converged; default `Tolerances()`.
         max_steps: accepted states before the run gives up.
         progress: show a progress bar on runs of more than two seconds (rank 0).
+        start: a path of this scene to go on from, also one that `formingx.load` read; it stays as it is. Its steps go
+            on as they were, unless `step` is given; targets that it has met count as met.
+        checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
 
     Raises:
-        InputError: nothing is driven, or a target needs something that the scene does not have.
+        InputError: nothing is driven, a target needs something that the scene does not have, `start` is of another
+            scene, or the checkpoint holds another run.
         ConvergenceError: the target was not reached. It carries the path so far and says what to try.
+        OSError: the checkpoint cannot be written; the states in it are kept.
     """
     instance("trace: scene", scene, Scene, "a formingx.Scene")
     through = several("trace: through", through, "targets, such as pole_stretch(3)")
@@ -56,11 +63,15 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
     instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     max_steps = count("trace: max_steps", max_steps)
     scene.only_driven("trace")
-    problem = Problem(scene)
+    if start is not None and (not isinstance(start, Path) or start.problem.scene is not scene or not start.states):
+        raise InputError("trace: start: must be a path of this very scene: fx.load(folder, scene), or what trace gave"
+                         " back")
+    problem = Problem(scene) if start is None else start.problem
     branch = Branch(problem, tolerances or Tolerances())
-    path = Path(problem, branch)
-    run = Run(path, branch, [(target, target.bind(problem)) for target in (*through, until)], step)
-    run.trace(max_steps, progress, branch.start())
+    path = Path(problem, branch, start)
+    targets = [(target, target.bind(problem)) for target in (*through, until)]
+    run = Run(path, branch, targets, step, checkpoint and Checkpoint(checkpoint, problem))
+    run.trace(max_steps, progress, None if path.states else branch.start())
     return path
 
 
@@ -70,30 +81,37 @@ class Run:
     Args:
         path: where the states go; branch: solves for them.
         targets: (target, its measure): the last one ends the run, the others are met on the way.
-        step: step control; default `StepControl()`.
+        step: step control; default that of the path's last states, or `StepControl()`.
+        checkpoint: where states are written after each step, or None.
         turns: False: the control must not turn back (it is the time).
     """
 
     def __init__(self, path: Path, branch: Branch, targets: Sequence[tuple[measures.Target, measures.Bound]],
-                 step: StepControl | None = None, turns: bool = True):
-        self.path, self.branch, self._turns = path, branch, turns
+                 step: StepControl | None, checkpoint: Checkpoint | None, turns: bool = True):
+        self.path, self.branch, self.checkpoint, self._turns = path, branch, checkpoint, turns
         self.open = list(targets)
         self.until, self._aim = self.open[-1]
-        self.step, self._best, self._first = replace(step or StepControl()), 0.0, len(path.states)
+        self._step, self._best, self._began = step, 0.0, time.perf_counter()
 
-    @property
-    def states(self) -> list[State]:
-        """Those of this run."""
-        return self.path.states[self._first:]
-
-    def trace(self, max_steps: int, progress: bool, start: State, sense: State | None = None) -> None:
-        """Follow the path from a state until the last target is met, which way is its own or that of `sense`."""
-        path, began = self.path, time.perf_counter()
+    def trace(self, max_steps: int, progress: bool, start: State | None) -> None:
+        """Follow the path from a state, or on from the last one, until the last target is met."""
+        path, before = self.path, self.path.counts.steps
+        self._first, kept = len(path.states), {}
         bar = _progress_bar(path.problem.comm, self.until, progress)
         try:
-            self._record(self._facing_target(start) if sense is None else self.branch.turned(start, sense))
+            if start is None:
+                self._first -= sum(1 for _ in itertools.takewhile(lambda s: s.setting == path.last.setting,
+                                                                  reversed(path.states)))
+                kept = next((s.stepping["step"] for s in reversed(self.states) if s.stepping), {})
+                path.problem.remember(path.last)
+                self._best = max(map(self._gained, self.states))
+                met = [s.met[:2] for s in self.states if s.met]
+                self.open = [(target, bound) for target, bound in self.open if target[:2] not in met]
+            else:
+                self._record(self._facing_target(start))
+            self.step = replace(self._step or StepControl(**kept))
             self._close_met(path.last)
-            before = path.counts.steps
+            self._settle()
             while self._is_open(self.until):
                 if path.counts.steps - before >= max_steps:
                     self._give_up(f"{max_steps} states were accepted before it", pace=self._pace(max_steps))
@@ -101,11 +119,27 @@ class Run:
                     self._record(state)
                     if path.problem.memory or not self._is_open(self.until) and state.met is self.until:
                         break                           # with a history, the rest of the step starts from here
+                self._settle()
                 self._check_direction()
                 _show(bar, self.states, self.until)
         finally:
             bar.close()
-            path.counts.seconds += time.perf_counter() - began
+            path.counts.seconds += self._elapsed()
+
+    @property
+    def states(self) -> list[State]:
+        """Those of this run."""
+        return self.path.states[self._first:]
+
+    def _elapsed(self) -> float:
+        """Seconds since this was last asked."""
+        before, self._began = self._began, time.perf_counter()
+        return self._began - before
+
+    def _settle(self) -> None:
+        """A step is complete: note how the run goes on from here, on disk too."""
+        self.path.counts.seconds += self._elapsed()
+        settle(self.path, self.step, self.until, self.checkpoint)
 
     def _facing_target(self, start: State) -> State:
         """The start, its tangent turned if the target lies the other way.
@@ -167,8 +201,7 @@ class Run:
         """
         if not self._is_open(self.until):
             return
-        start = self.path.value(self._aim, self.states[0])
-        gained = (self.path.value(self._aim, self.path.last) - start) / (self.until.value - start)
+        gained = self._gained(self.path.last)
         self._best = max(self._best, gained)
         if not self._turns and self.path.last.kind == "limit point":
             self._give_up("the process cannot be followed in time: what its tables drive has a limit point here")
@@ -176,6 +209,11 @@ class Run:
         if self._best > 0.05 and gained < kept * self._best or gained < -0.05:
             self._give_up("the path turned back, which a crease at a singular corner (a clamped rim on a fine mesh) can"
                           " cause")
+
+    def _gained(self, state: State) -> float:
+        """How far a state has come, from the first state (0) to the target (1)."""
+        start = self.path.value(self._aim, self.states[0])
+        return (self.path.value(self._aim, state) - start) / (self.until.value - start)
 
     def _within_reach(self, old: State, length: float) -> tuple:
         """(target, its measure, distance) of the first open target that the tangent meets within `length`."""
@@ -254,6 +292,13 @@ class Run:
             f"{f'Stage {path.stage!r}: ' * bool(path.stage)}{self.until} was not reached: {why} The nearest met was {values[best]:.6g}, at"
             f" {path.describe(states[best])}.{limits} The last good state is {path.describe(path.last)};"
             f" it is kept in the error's `path`.{'' if diagnosis.advice else _TRY}", path, diagnosis)
+
+
+def settle(path: Path, step: StepControl, until: measures.Target, checkpoint: Checkpoint | None) -> None:
+    """Note in the last state of a path how the run goes on from it, on disk too."""
+    path.last.stepping = {"step": asdict(step), "counts": asdict(path.counts), "until": [until.name, until.value]}
+    if checkpoint is not None:
+        checkpoint.write(path)
 
 
 def is_met(target: measures.Target, bound: measures.Bound, value: float) -> bool:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import clearance
+from ..checkpoint import Checkpoint
 from ..errors import ConvergenceError, InputError, count, finite, instance, several
 from ..problem import Problem
 from ..results import measures
@@ -23,10 +24,10 @@ from ..scene import Scene
 from ..setting import Setting
 from .bordered import UNLOADED, Failure, Tolerances
 from .branch import Branch
-from .continuation import Run, is_met
+from .continuation import Run, settle
 from .stepping import StepControl
 
-_SOON = 1e-12          # relative: times that are the same
+_SAME = 1e-12          # relative: times that are the same
 
 
 class Stage:
@@ -125,7 +126,7 @@ class Process:
         driven = [stage.drive] if stage.drive is not None else [thing for thing, _ in stage.tables]
         numbers = [scene.number(who, thing) for thing in driven]
         for number in numbers:
-            if not any(scene.things[number] is thing for thing in scene.drivable):
+            if not getattr(scene.things[number], "driven", False):
                 raise InputError(f"{who}: {scene.things[number]!r} cannot be driven: a Pressure without value, a Displaced"
                                  f" support, or a Contact that moves can")
             if number in off and not hasattr(scene.things[number], "moves"):    # a tool may go home while it is away
@@ -137,90 +138,90 @@ class Process:
             scene.check_held([t for t in there if hasattr(t, "constraints")], any(t in there for t in scene.contacts))
         except InputError as error:
             raise InputError(f"{who}: {error}") from None
-        tables = [(number, table) for number, (_, table) in zip(numbers, stage.tables)]
-        return _Plan(stage, None if stage.drive is None else numbers[0], tables, off)
+        tables = [(i, table) for number, (_, table) in zip(numbers, stage.tables) for i in scene.together(number)]
+        return _Plan(stage, scene.together(numbers[0]) if stage.drive is not None else [], tables, off)
 
     def run(self, *, tolerances: Tolerances | None = None, progress: bool = True,
-            start: Path | State | None = None) -> Path:
+            start: Path | State | None = None, checkpoint: Any = None) -> Path:
         """Run the stages; one path holds the states of all of them, every stage from a state of kind "start" on.
 
         Args:
             tolerances: when a state counts as converged; default `Tolerances()`.
             progress: show a progress bar on what takes more than two seconds (rank 0).
-            start: a path of this process to go on from, or a state of one; what it has done is not done again.
+            start: a path of this process to go on from, also one that `formingx.load` read, or a state of one.
+            checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
 
         Raises:
             InputError: a target does not fit its stage, a table does not begin where its thing stands, a tool comes in
                 where the body is.
             ConvergenceError: a target was not reached. It carries the path so far and says what to try.
+            OSError: the checkpoint cannot be written; the states in it are kept.
         """
         instance("Process: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
         instance("Process: start", start, Path | State | None, "a path, a state or None")
-        execution = _Execution(self, Problem(self.scene), tolerances or Tolerances(), progress)
-        if isinstance(start, State):
-            state, start = start, Path(execution.problem, execution.branch)
-            start.states = [state]
-        if start is not None:
-            execution.go_on_from(start)
-        return execution.run()
+        if isinstance(start, Path) and start.problem.scene is not self.scene:
+            raise InputError("Process: start: must be a path of this very scene: fx.load(folder, scene), or what run gave"
+                             " back")
+        problem = start.problem if isinstance(start, Path) else Problem(self.scene)
+        for state in [start] if isinstance(start, State) else start.states[-1:] if start else []:
+            if len(state.x) != problem.x.getLocalSize() or not 0 <= state.setting.get("stage", -1) < len(self.stages):
+                raise InputError("Process: start: must be of this process: its last state is of another scene or stage")
+        return _Execution(self, problem, tolerances or Tolerances(), progress, checkpoint, start).run()
 
 
 class _Plan(NamedTuple):
     """A stage with the things of the scene by their numbers: what it drives, [(number, its table)], what is left out."""
 
     stage: Stage
-    number: int | None
+    numbers: list[int]
     tables: list[tuple[int, np.ndarray]]
     off: list[int]
 
 
 class _Execution:
-    """One run of a process: from where it stands, stage by stage."""
+    """One run of a process: from where it stands, stage by stage.
 
-    def __init__(self, process: Process, problem: Problem, tolerances: Tolerances, progress: bool):
+    Piece 0 of a stage changes what takes part, pieces from 1 on drive; each has one `Setting`.
+    """
+
+    def __init__(self, process: Process, problem: Problem, tolerances: Tolerances, progress: bool, checkpoint: Any,
+                 start: Path | State | None):
         self.scene, self.plans, self.problem, self.progress = process.scene, process.plans, problem, progress
         self.branch, self._balanced = Branch(problem, tolerances), tolerances.residual
-        self.path = Path(problem, self.branch, timed=any(plan.tables for plan in self.plans))
+        timed = any(plan.tables for plan in self.plans)
+        self.path = Path(problem, self.branch, start if isinstance(start, Path) else None, timed)
+        self.path.states += [start] if isinstance(start, State) else []
+        self.checkpoint = None if checkpoint is None else Checkpoint(checkpoint, problem)
         self._rest = np.zeros(problem.x.getLocalSize())
         self._targets = [self._bind(plan) for plan in self.plans]   # so that nothing is compiled between stages
         problem.enter(Setting.first(process.scene), self._rest, 0.0)
 
-    def go_on_from(self, start: Path) -> None:
-        """Take up the states of a path."""
-        last, problem, path = start.last, self.problem, self.path
-        if len(last.x) != len(self._rest) or not last.setting or last.setting["stage"] >= len(self.plans):
-            raise InputError("Process: start: must be a path of this process")
-        path.states, path.counts = list(start.states), replace(start.counts)
-        path.go_to(last)
-        problem.advance(last.x, last.control)
-        problem.memory = last.memory
-
     def run(self) -> Path:
         """All stages that are left."""
-        states, first = self.path.states, self.path.states[-1].setting["stage"] if self.path.states else 0
-        for k, plan in enumerate(self.plans[first:], first):
-            begun = bool(states) and states[-1].setting["stage"] == k and states[-1].setting["piece"] > 0
+        last = self.path.last.setting if self.path.states else {"stage": 0, "piece": -1}
+        if self.path.states:
+            self.problem.remember(self.path.last)
+        for k, plan in enumerate(self.plans[last["stage"]:], last["stage"]):
             self.path.stage, self._stage, self._off, self._k = plan.stage.name, plan.stage, plan.off, k
-            if not begun:
-                self._change()
+            piece = last["piece"] if k == last["stage"] else -1     # of this stage, that has begun already
+            if piece < 1:
+                self._change(piece == 0)
             if plan.tables:
-                self._follow(plan.tables, begun)
-            elif plan.number is not None:
-                self._drive(plan.number, begun)
-            elif not begun:
-                before, _, control = self._standing()
-                self._enter(before.standing(k, 1, self._off, control), 0.0)
-                self.path.record(self._resumed(0.0))
+                self._follow(plan.tables, max(piece, 0))
+            elif plan.numbers:
+                self._drive(plan.numbers, piece > 0)
+            elif not self.path.states or self.path.last.setting["stage"] < k:
+                self._record(self._resumed(self._standing()[2]))
         return self.path
 
     def _bind(self, plan: _Plan) -> list[tuple[measures.Target, measures.Bound]]:
         """The targets of a stage and their measures; where it drives one thing the last is `until`."""
         stage, n = plan.stage, len(self.scene.things)
-        moving = {plan.number, *(i for i, _ in plan.tables)}
+        moving = {*plan.numbers, *(i for i, _ in plan.tables)}
         rate = [float(i in moving) for i in range(n)] + [float(bool(plan.tables))]
         self.problem.enter(Setting([0.0] * (n + 1), rate, plan.off), self._rest, 0.0)
         found = []
-        for target in (*stage.through, *([stage.until] if plan.number is not None else [])):
+        for target in (*stage.through, *([stage.until] if plan.numbers else [])):
             try:
                 bound = target.bind(self.problem)
             except InputError as error:
@@ -230,12 +231,14 @@ class _Execution:
             found.append((target, bound))
         return found
 
+
     def _standing(self) -> tuple[Setting, np.ndarray, float]:
         """The setting, the unknowns and the control where the process stands now."""
-        last = self.path.states[-1] if self.path.states else None
+        last = self.path.last if self.path.states else None
         return self.problem.setting, last.x if last else self._rest, last.control if last else 0.0
 
-    def _enter(self, setting: Setting, control: float) -> None:
+    def _enter(self, base: list[float], rate: list[float], piece: int, control: float, fading: bool = False) -> None:
+        setting = Setting(base, rate, self._off, fading, self._k, piece)
         self.problem.enter(setting, self._standing()[1], control)
 
     def _resumed(self, control: float) -> State:
@@ -247,29 +250,30 @@ class _Execution:
         except Failure as failure:
             raise ConvergenceError(f"{self._stage.who} cannot begin: {failure.reason}", self.path) from None
 
-    def _trace(self, targets: list, control: float, turns: bool = True, sense: State | None = None) -> list:
-        """Follow the path under the setting of now to the last target; returns the targets that are still open.
+    def _record(self, state: State) -> None:
+        """Take up a state that needs no solving."""
+        self.path.record(state)
+        settle(self.path, StepControl(), measures.changed(), self.checkpoint)
 
-        `sense`: a state whose tangent says which way to go; None: the way of the target.
-        """
-        run = Run(self.path, self.branch, targets, self._stage.step, turns)
-        run.trace(self._stage.max_steps, self.progress, self._resumed(control), sense)
+    def _trace(self, targets: list, control: float | None, turns: bool = True) -> list:
+        """Follow the path from a control (None: on from the last state); returns the targets that are still open."""
+        run = Run(self.path, self.branch, targets, self._stage.step, self.checkpoint, turns)
+        run.trace(self._stage.max_steps, self.progress, None if control is None else self._resumed(control))
         return run.open
 
-    def _change(self) -> None:
+    def _change(self, begun: bool) -> None:
         """Piece 0: what takes part changes. What that leaves without balance is taken away gradually."""
         before, x, control = self._standing()
-        if not self.path.states:
-            self._enter(before.standing(self._k, 0, self._off, control), control)
-            return
-        for i in set(before.off) - set(self._off):
-            self._bring_in(self.scene.things[i], x, control)
-        if before.off == self._off:
-            return
-        self._enter(before.standing(self._k, 0, self._off, control, fading=True), 0.0)
-        if self._out_of_balance(x):
+        start: float | None = None
+        if not begun:
+            for i in set(before.off) - set(self._off):
+                self._bring_in(self.scene.things[i], x, control)
+            still, fading = [0.0] * len(before.base), bool(self.path.states) and before.off != self._off
+            start = 0.0 if fading else control
+            self._enter(before.standing(control), still, 0, start, fading)
+        if self.problem.setting.fading and (begun or self._out_of_balance(x)):
             target = measures.changed()
-            self._trace([(target, target.bind(self.problem))], 0.0)
+            self._trace([(target, target.bind(self.problem))], start)
 
     def _bring_in(self, thing: Any, x: np.ndarray, control: float) -> None:
         """A tool that was away remembers nothing, and must not stand in the body."""
@@ -286,52 +290,59 @@ class _Execution:
         self.problem.residual(self.problem.x, 1.0, self.branch.newton.F)
         return self.branch.newton.F.norm() > self._balanced * (self.problem.force_scale + UNLOADED)
 
-    def _drive(self, number: int, begun: bool) -> None:
+    def _drive(self, numbers: list[int], begun: bool) -> None:
         """Piece 1: one thing is the control."""
-        targets = self._targets[self._k]
         before, _, control = self._standing()
-        last = self.path.last if begun else None
-        if last and is_met(*targets[-1], self.path.value(targets[-1][1], last)):
-            return
-        setting, control = before.driving(number, self._k, 1, self._off, control)
-        self._enter(setting, control)
-        self._trace(targets, control, sense=last)
+        if not begun:
+            base, rate = before.standing(control), [0.0] * len(before.base)
+            control = base[numbers[0]]
+            for number in numbers:
+                base[number], rate[number] = 0.0, 1.0
+            self._enter(base, rate, 1, control)
+        self._trace(self._targets[self._k], None if begun else control)
 
-    def _follow(self, tables: list[tuple[int, np.ndarray]], begun: bool) -> None:
+    def _follow(self, tables: list[tuple[int, np.ndarray]], piece: int) -> None:
         """Pieces 1, 2, ...: from knot to knot of the tables, the time being the control."""
         before, _, control = self._standing()
-        now, stage, through = before.amplitude(-1, control), self._stage, self._targets[self._k]
+        stage, through = self._stage, self._targets[self._k]
         end = stage.until.value if stage.until else max(table[-1, 0] for _, table in tables)
-        if not begun:
+        now = before.base[-1] if piece else before.amplitude(-1, control)
+        if not piece:
             self._check_beginning(tables, now, end)
-        piece = before.piece if begun else 0
-        while now < end - _SOON * abs(end):
-            knots = [t for _, table in tables for t in table[:, 0] if now + _SOON * abs(t) < t < end]
-            then, piece = min([*knots, end]), piece + 1
-            through = self._line(tables, now, then, piece, through)
-            now = then
+        begun = piece > 0
+        while begun or now < end - _SAME * abs(end):
+            then = min([t for _, table in tables for t in table[:, 0] if now + _SAME * abs(t) < t < end] + [end])
+            if not begun:
+                piece += 1
+                self._enter_line(tables, now, then, piece)
+            through = self._line(then, through, begun)
+            now, begun = then, False
 
-    def _line(self, tables: list, now: float, then: float, piece: int, through: list) -> list:
-        """One piece of all tables; returns the targets that are still open."""
+    def _enter_line(self, tables: list, now: float, then: float, piece: int) -> None:
+        """All tables are straight between these times; the control is the time, scaled so that no amplitude is faster."""
         before, _, control = self._standing()
-        base = [before.amplitude(i, control) for i in range(len(before.base))]
-        rate, scales = [0.0] * len(base), self.problem.forms.scales
+        base, scales = before.standing(control), self.problem.forms.scales
+        change = [0.0] * len(base)
         for i, table in tables:
             first, value = table[0]
-            ahead = np.interp(then, *table.T) / scales[i]
+            ahead = float(np.interp(then, *table.T)) / scales[i]
             if first > then:                                # still on the way from where it stands to its first knot
                 ahead = base[i] + (value / scales[i] - base[i]) * (then - now) / (first - now)
-            rate[i] = float(ahead - base[i])
-        most = max(map(abs, rate)) or 1.0
-        moves = any(abs(r) > 1e-14 for r in rate)
-        base[-1], rate[-1] = now, then - now
-        self._enter(Setting(base, [r / most for r in rate], self._off, False, self._k, piece), 0.0)
-        if moves:
-            target = measures.process_time(then)
-            return self._trace([*through, (target, target.bind(self.problem))], 0.0, turns=False)
-        self.path.record(self._resumed(0.0))
-        self.path.record(replace(self.path.last, control=most, kind="target", measures={}, history=[]))
-        return through
+            change[i] = ahead - base[i]
+        most = max(map(abs, change))
+        base[-1], change[-1] = now, then - now
+        self._enter(base, [c / (most or 1.0) for c in change], piece, 0.0)
+
+    def _line(self, then: float, through: list, begun: bool) -> list:
+        """Go to the end of a piece of the tables; returns the targets that are still open."""
+        if self.problem.setting.rests:                      # only time goes by
+            if not begun:
+                self._record(self._resumed(0.0))
+            if self.path.last.control < 1.0:
+                self._record(replace(self.path.last, control=1.0, kind="target", measures={}, history=[]))
+            return through
+        target = measures.process_time(then)
+        return self._trace([*through, (target, target.bind(self.problem))], None if begun else 0.0, turns=False)
 
     def _check_beginning(self, tables: list[tuple[int, np.ndarray]], now: float, end: float) -> None:
         who, (before, _, control) = self._stage.who, self._standing()
@@ -339,10 +350,10 @@ class _Execution:
             raise InputError(f"{who}: ends at time {end:g}, but the process time is {now:g} already: time cannot go back")
         for i, table in tables:
             name, first = repr(self.scene.things[i]), table[0]
-            if first[0] < now - _SOON * abs(now):
+            if first[0] < now - _SAME * abs(now):
                 raise InputError(f"{who}: the table of {name} begins at time {first[0]:g}, but the process time is {now:g}"
                                  f" already: it goes back in time")
             stands = before.amplitude(i, control) * self.problem.forms.scales[i]
-            if first[0] <= now + _SOON * abs(now) and abs(stands - first[1]) > 1e-9 * max(abs(stands), abs(first[1])):
+            if first[0] <= now + _SAME * abs(now) and abs(stands - first[1]) > 1e-9 * max(abs(stands), abs(first[1])):
                 raise InputError(f"{who}: the table of {name} begins with {first[1]:g} at time {first[0]:g}, but it stands"
                                  f" at {stands:g} then")

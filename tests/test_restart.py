@@ -1,0 +1,328 @@
+"""Checkpoints: a run goes on as if it had never stopped; a damaged or foreign checkpoint says so."""
+
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from conftest import ROOT, run, treloar
+from test_contact import cup
+
+import formingx as fx
+from formingx import checkpoint
+
+SCENES = {"hinged": (treloar, fx.pole_stretch(3.0)), "stick": (lambda: cup("stick"), fx.pressure(8.0)),
+          "coulomb": (lambda: cup(0.3), fx.pressure(8.0)),
+          "membrane": (lambda: treloar(model=fx.Membrane()), fx.pole_stretch(3.0))}
+OTHER_RANKS = """
+import sys
+sys.path.insert(0, "tests")
+import formingx as fx
+from test_restart import SCENES
+make, until = SCENES[{name!r}]
+scene = make()
+start = fx.load({folder!r}, scene, state={state}) if {state} is not None else None
+fx.trace(scene, until=until, start=start, progress=False).save({out!r})
+"""
+
+
+def numbers(path):
+    """All measures of all states, those that are round-off only (mass error) left out."""
+    return np.array([[s.measures[c] for c in path.columns if c != "mass_error"] for s in path.states])
+
+
+def same(path, other, rel=1e-9):
+    assert [s.kind for s in path.states] == [s.kind for s in other.states]
+    np.testing.assert_allclose(numbers(path), numbers(other), rtol=rel, atol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """{scene: (its folder, the scene, the path of an uninterrupted run)}."""
+    found = {}
+    for name, (make, until) in SCENES.items():
+        folder, scene = tmp_path_factory.mktemp("runs") / name, make()
+        found[name] = folder, scene, fx.trace(scene, until=until, progress=False, checkpoint=folder)
+    return found
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_any_state_goes_on_to_the_same_path(name, whole):
+    folder, scene, path = whole[name]
+    same(fx.load(folder, scene), path, rel=0)
+    for state in (0, len(path) // 2, len(path) - 2):
+        again = fx.trace(scene, until=SCENES[name][1], start=fx.load(folder, scene, state), progress=False)
+        same(again, path)
+        if path.states[state].stepping:
+            assert (again.counts.steps, again.counts.iterations) == (path.counts.steps, path.counts.iterations)
+
+
+@pytest.mark.parametrize("name, ranks", [("hinged", (1, 2)), ("hinged", (2, 1)), ("stick", (1, 2)), ("stick", (2, 1)),
+                                         ("membrane", (1, 2))])
+def test_on_another_number_of_ranks(name, ranks, whole, tmp_path):
+    folder, scene, path = whole[name]
+    made = folder
+    if ranks[0] > 1:
+        made = tmp_path / "made"
+        run("-c", OTHER_RANKS.format(name=name, folder="", state=None, out=str(made)), ranks=ranks[0])
+    if ranks[1] > 1:
+        out = tmp_path / "out"
+        run("-c", OTHER_RANKS.format(name=name, folder=str(made), state=len(path) // 2, out=str(out)), ranks=ranks[1])
+        same(fx.load(out, scene), path)
+    else:
+        start = fx.load(made, scene, state=len(path) // 2)
+        same(fx.trace(scene, until=SCENES[name][1], start=start, progress=False), path)
+
+
+def test_goes_on_to_another_target_and_from_memory(whole, tmp_path):
+    folder, scene, path = whole["hinged"]
+    further = fx.trace(scene, until=fx.pole_stretch(4.0), start=path, progress=False)
+    assert len(further) > len(path) == len(fx.load(folder, scene))
+    assert further.last.measures["pressure"] == pytest.approx(0.4390, rel=5e-3)
+    assert fx.trace(scene, until=SCENES["hinged"][1], start=path, progress=False).last is path.last
+    copy = tmp_path / "copy"
+    path.save(copy)
+    path.save(copy)                                       # there is nothing more to write
+    assert len(fx.load(copy, scene)) == len(path)
+    fx.trace(scene, until=fx.pole_stretch(4.0), start=fx.load(copy, scene), progress=False, checkpoint=copy)
+    same(fx.load(copy, scene), further)
+
+
+def test_a_run_that_fails_leaves_its_states(tmp_path):
+    scene = treloar()
+    with pytest.raises(fx.ConvergenceError) as caught:
+        fx.trace(scene, until=fx.pole_stretch(8.0), max_steps=3, progress=False, checkpoint=tmp_path / "run")
+    path = fx.load(tmp_path / "run", scene)
+    same(path, caught.value.path)
+    assert fx.trace(scene, until=fx.pole_stretch(2.0), start=path, progress=False).last.measures["pole_stretch"] \
+        == pytest.approx(2.0)
+
+
+def test_solve_is_saved_too(tmp_path):
+    scene = treloar()
+    path = fx.solve(scene, to=0.3, increments=3)
+    path.save(tmp_path / "run")
+    found = fx.trace(scene, until=fx.pressure(0.45), start=fx.load(tmp_path / "run", scene), progress=False)
+    assert found["pressure"][-1] == pytest.approx(0.45) and len(found) > len(path)
+
+
+KILLED = """
+import sys
+sys.path.insert(0, "tests")
+import formingx as fx
+from test_restart import SCENES
+make, until = SCENES["stick"]
+print("begins", flush=True)
+fx.trace(make(), until=until, progress=False, checkpoint=sys.argv[1])
+"""
+
+
+def killed_after(seconds, folder):
+    """Kill -9 a run so long after its first state; True if it was still running."""
+    child = subprocess.Popen([sys.executable, "-c", KILLED, str(folder)], cwd=ROOT, stdout=subprocess.DEVNULL)
+    while not (folder / "0000").exists() and child.poll() is None:
+        time.sleep(0.001)
+    time.sleep(seconds)
+    running = child.poll() is None
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    return running
+
+
+def test_killed_at_any_moment(whole, tmp_path):
+    _, scene, path = whole["stick"]
+    rng = np.random.default_rng(int.from_bytes(os.urandom(4), "little"))
+    for k in range(2):
+        folder = tmp_path / f"run{k}"
+        seconds = rng.uniform(0, 0.6)
+        running = killed_after(seconds, folder)
+        left = fx.load(folder, scene)
+        assert 1 <= len(left) <= len(path), seconds
+        again = fx.trace(scene, until=SCENES["stick"][1], start=left, progress=False, checkpoint=folder)
+        same(again, path)
+        same(fx.load(folder, scene), path)
+        assert running or len(left) == len(path)
+
+
+@pytest.mark.slow
+def test_killed_at_fifty_moments(whole, tmp_path):
+    _, scene, path = whole["stick"]
+    for k, seconds in enumerate(np.random.default_rng(1).uniform(0, 0.8, 50)):
+        killed_after(seconds, tmp_path / f"run{k}")
+        left = fx.load(tmp_path / f"run{k}", scene)
+        same(fx.trace(scene, until=SCENES["stick"][1], start=left, progress=False), path)
+
+
+@pytest.fixture
+def copied(whole, tmp_path):
+    shutil.copytree(whole["hinged"][0], tmp_path / "run")
+    return tmp_path / "run", whole["hinged"][1]
+
+
+@pytest.mark.parametrize("file", ["0003/x.bp/data.0", "0003/direction.bp/md.0", "0003/state.json", "scene.json"])
+@pytest.mark.parametrize("how", ["cut", "changed", "gone", "empty"])
+def test_damaged(file, how, copied):
+    folder, scene = copied
+    victim = folder / file
+    content = victim.read_bytes()
+    if how == "gone":
+        victim.unlink()
+    else:
+        changed = bytearray(content)
+        changed[len(content) // 2] ^= 0xFF
+        victim.write_bytes({"cut": content[:-7], "empty": b"", "changed": bytes(changed)}[how])
+    with pytest.raises(fx.InputError, match="damaged|not there"):
+        fx.load(folder, scene)
+
+
+def test_a_digit_that_changed(copied):
+    folder, scene = copied
+    file = folder / "0003" / "state.json"
+    text = file.read_text()
+    k = text.index('"control": ') + 16
+    file.write_text(text[:k] + str((int(text[k]) + 1) % 10) + text[k + 1:])
+    with pytest.raises(fx.InputError, match="0003' is damaged"):
+        fx.load(folder, scene)
+    assert len(fx.load(folder, scene, state=2)) == 3
+
+
+def test_a_state_that_is_missing(copied):
+    folder, scene = copied
+    shutil.rmtree(folder / "0002")
+    with pytest.raises(fx.InputError, match="state 2 is missing"):
+        fx.load(folder, scene)
+
+
+def test_unfinished_states_count_for_nothing(whole, copied):
+    folder, scene = copied
+    shutil.copytree(folder / "0003", folder / "0099.part")                         # killed while writing
+    path = whole["hinged"][2]
+    assert len(fx.load(folder, scene)) == len(path)
+    k = next(k for k, state in enumerate(path.states) if state.kind == "limit point")
+    assert len(fx.load(folder, scene, state=k)) == k + 1
+    for later in range(k + 1, len(path)):                                          # killed inside a step
+        shutil.rmtree(folder / f"{later:04d}")
+    left = fx.load(folder, scene)
+    assert len(left) == k
+    same(fx.trace(scene, until=SCENES["hinged"][1], start=left, progress=False, checkpoint=folder), path)
+    same(fx.load(folder, scene), path)
+
+
+OTHERS = {
+    "mesh.cells: 20 there, 24 here": lambda: treloar((12, 1)),
+    r"materials.sheet.kind: 'NeoHookean\(c10=2.0": lambda: treloar(stress=2.0),
+    r"supports\[1\].kind: 'SimplySupported' there": lambda: treloar(support=fx.Clamped("rim")),
+    "model.eps": lambda: treloar(model=fx.MixedPressure(eps=1e-3)),
+    r"mesh.extent\[0\]: 1.25 there, 0.625 here": lambda: treloar(length=2.0),
+}
+
+
+@pytest.mark.parametrize("message", OTHERS)
+def test_of_another_scene(message, whole):
+    folder, _, path = whole["hinged"]
+    with pytest.raises(fx.InputError, match=f"of another scene: .*{message}"):
+        fx.load(folder, OTHERS[message]())
+
+
+def test_contacts_are_compared_to_the_last_number(whole):
+    folder, *_ = whole["stick"]
+    with pytest.raises(fx.InputError, match=r"contacts\[0\].penalty: 20000.0 there, 10000.0 here"):
+        fx.load(folder, cup("stick", penalty=1e4))
+    with pytest.raises(fx.InputError, match=r"contacts\[0\].tool.pieces"):
+        fx.load(folder, cup("stick", fillet=1.1))
+
+
+def test_the_folder_of_another_run_is_left_alone(copied):
+    folder, scene = copied
+    before = sorted(map(str, folder.rglob("*")))
+    with pytest.raises(fx.InputError, match="holds 9 states of another run: go on"):
+        fx.trace(scene, until=fx.pole_stretch(1.2), progress=False, checkpoint=folder,
+                 step=fx.StepControl(length=0.03))
+    with pytest.raises(fx.InputError, match="is of another scene"):
+        fx.trace(treloar((8, 1)), until=fx.pole_stretch(1.2), progress=False, checkpoint=folder)
+    assert sorted(map(str, folder.rglob("*"))) == before
+
+
+@pytest.mark.parametrize("given, message", [
+    ({"state": 99}, "state = 99: the checkpoint holds states 0 to"),
+    ({"state": "last"}, "state = 'last'"),
+])
+def test_bad_state(given, message, copied):
+    with pytest.raises(fx.InputError, match=message):
+        fx.load(*copied, **given)
+
+
+def test_nothing_there(tmp_path):
+    with pytest.raises(fx.InputError, match="is not there"):
+        fx.load(tmp_path / "nothing", treloar())
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(fx.InputError, match="is not a folder"):
+        fx.load(tmp_path / "file", treloar())
+    with pytest.raises(fx.InputError, match="is there already and is no checkpoint"):
+        treloar_path(tmp_path / "file")
+    with pytest.raises(fx.InputError, match="start: must be a path of this very scene"):
+        fx.trace(treloar(), until=fx.pole_stretch(2.0), start="run")
+
+
+def treloar_path(folder):
+    return fx.trace(treloar(), until=fx.pole_stretch(1.5), progress=False, checkpoint=folder)
+
+
+def test_a_later_format_is_refused(copied):
+    folder, scene = copied
+    about = json.loads((folder / "scene.json").read_text()) | {"formingx": 99}
+    (folder / "scene.json").write_text(json.dumps(about))
+    with pytest.raises(fx.InputError, match="has the format 99"):
+        fx.load(folder, scene)
+
+
+def test_unwritable_folder():
+    with pytest.raises(OSError, match="checkpoint '/proc/run': cannot be begun"):
+        treloar_path("/proc/run")
+
+
+def test_full_disk(copied):
+    """A limit on the size of files stands for a disk that is full: the states that are there are kept."""
+    folder, scene = copied
+    path, limit = fx.load(folder, scene), resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = sorted(map(str, folder.rglob("*")))
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limit[1]))
+    try:
+        with pytest.raises(OSError, match=r"state \d+ could not be written; the states before it are kept"):
+            fx.trace(scene, until=fx.pole_stretch(3.5), start=path, progress=False, checkpoint=folder)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
+    kept = sorted(map(str, folder.rglob("*")))
+    assert [f for f in kept if ".part" not in f] == before
+    assert len(fx.load(folder, scene)) == len(path)
+
+
+UNWRITABLE = """
+import sys
+sys.path.insert(0, "tests")
+from mpi4py import MPI
+from test_restart import treloar_path
+try:
+    treloar_path("/proc/run")
+except OSError as error:
+    print(MPI.COMM_WORLD.rank, error, flush=True)
+"""
+
+
+def test_errors_come_on_all_ranks():
+    assert run("-c", UNWRITABLE, ranks=2).count("cannot be begun") == 2
+
+
+def test_contents_need_no_scene(whole):
+    folder, _, path = whole["hinged"]
+    about, states = checkpoint.contents(folder)
+    assert about["summary"]["material of sheet"] == "NeoHookean(c10=2.0)" and len(states) == len(path)
+    assert states[-1]["measures"] == path.last.measures
+    np.testing.assert_allclose(states[-1]["profile"]["top"], path.profile().top, atol=1e-12)
