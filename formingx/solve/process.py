@@ -115,6 +115,7 @@ class Process:
             raise InputError("Process: it has no stage")
         for stage in self.stages:
             instance("Process: stage", stage, Stage, "a formingx.Stage")
+        for stage in self.stages:
             if sum(other.name == stage.name for other in self.stages) > 1:
                 raise InputError(f"Process: two stages are called {stage.name!r}: names must differ")
         self.plans = [self._plan(stage) for stage in self.stages]
@@ -328,7 +329,7 @@ class _Execution:
             ahead = float(np.interp(then, *table.T)) / scales[i]
             if first > then:                                # still on the way from where it stands to its first knot
                 ahead = base[i] + (value / scales[i] - base[i]) * (then - now) / (first - now)
-            change[i] = ahead - base[i]
+            change[i] = ahead - base[i] if abs(ahead - base[i]) > _SAME * abs(ahead) else 0.0
         most = max(map(abs, change))
         base[-1], change[-1] = now, then - now
         self._enter(base, [c / (most or 1.0) for c in change], piece, 0.0)
