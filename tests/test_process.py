@@ -41,8 +41,8 @@ def air(name, pressure, **options):
     return Stage(name, drive="air", until=fx.pressure(pressure), step=STEP, **options)
 
 
-def same(a, b, size=1e-8):
-    return np.abs(a.x - b.x).max() < size * np.abs(b.x).max()
+def same(a, b, size=1e-8, n=None):
+    return np.abs(a.x - b.x)[:n].max() < size * np.abs(b.x).max()
 
 
 def end(path, stage):
@@ -144,7 +144,7 @@ def test_derivative_by_control_after_a_change_of_stage(number):
     """dF/dcontrol, and with it everything driven at once by a table, is the derivative of F."""
     path = run(kinds(), Stage("bar", drive="bar", until=fx.travel(0.5), step=STEP),
                Stage("pin", drive="pin", until=fx.travel(-0.3), step=STEP), Stage("air", drive="air", until=fx.pressure(0.01)))
-    problem, state, h = path.problem, path.last, 1e-6
+    problem, state, h = path.problem, path.last, 1e-8 if number in (1, 4) else 1e-6      # a ramp is narrow
     rate = [0.0] * 6
     rate[number] = 1.0
     if number == 1:                                                         # all together
@@ -204,9 +204,9 @@ def test_a_tool_that_leaves():
                air("blow", 0.02, without=["plug"]), plug("home", -4.0, without=["plug"]), plug("again", -1.0))
     alone = run(plugged(), air("blow", 0.02, without=["plug"]))
     assert np.abs(end(path, "gone").x).max() < 1e-8
-    assert same(end(path, "blow"), alone.last) and np.array_equal(end(path, "home").x, end(path, "blow").x)
+    assert same(end(path, "blow"), alone.last) and same(end(path, "home"), end(path, "blow"), 1e-12)
     assert end(path, "gone").measures["tool_force"] == 0 < path.last.measures["tool_force"]
-    with pytest.raises(fx.InputError, match="Stage 'again'.*comes in where the body is: 1.* inside the tool"):
+    with pytest.raises(fx.InputError, match="Stage 'again'.*comes in where the body is, which reaches 2.51"):
         run(plugged("stick"), air("blow", 0.02, without=["plug"]), plug("again", 1.0))
 
 
@@ -222,8 +222,8 @@ def test_supports_that_open_and_close():
     path = run(hinged, air("up", 0.05, without=[hinge]), Stage("open", without=[grip]), Stage("close", without=[hinge]),
                air("down", 0.0, without=[hinge]), Stage("loose", without=[grip]))
     plain = run(hinged, air("up", 0.05, without=[grip]))
-    assert same(end(path, "open"), plain.last) and same(end(path, "close"), plain.last)
     held, opened = path.problem, end(path, "open")
+    assert same(opened, plain.last) and same(end(path, "close"), plain.last, n=held._n)     # n: without the hinge's force
     held.enter(Setting(**end(path, "down").setting), end(path, "down").x, 0.0)
     assert np.abs(end(path, "down").x - opened.x)[held._held].max() < 1e-14
     assert end(path, "down").measures["pole_height"] > 0.1                  # the turned rim keeps it bent

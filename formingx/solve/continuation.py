@@ -117,6 +117,8 @@ class Run:
                     self._give_up(f"{max_steps} states were accepted before it", pace=self._pace(max_steps))
                 for state in self._next(path.last):
                     self._record(state)
+                    if state.kind == "limit point" and not self._turns:
+                        self._give_up("no state follows in time: what the tables drive has a limit point here")
                     if path.problem.memory or not self._is_open(self.until) and state.met is self.until:
                         break                           # with a history, the rest of the step starts from here
                 self._settle()
@@ -203,8 +205,6 @@ class Run:
             return
         gained = self._gained(self.path.last)
         self._best = max(self._best, gained)
-        if not self._turns and self.path.last.kind == "limit point":
-            self._give_up("the process cannot be followed in time: what its tables drive has a limit point here")
         kept = 0.0 if isinstance(self._aim, measures.Amplitude) else 0.5
         if self._best > 0.05 and gained < kept * self._best or gained < -0.05:
             self._give_up("the path turned back, which a crease at a singular corner (a clamped rim on a fine mesh) can"
@@ -213,7 +213,7 @@ class Run:
     def _gained(self, state: State) -> float:
         """How far a state has come, from the first state (0) to the target (1)."""
         start = self.path.value(self._aim, self.states[0])
-        return (self.path.value(self._aim, state) - start) / (self.until.value - start)
+        return (self.path.value(self._aim, state) - start) / ((self.until.value - start) or 1.0)
 
     def _within_reach(self, old: State, length: float) -> tuple:
         """(target, its measure, distance) of the first open target that the tangent meets within `length`."""

@@ -283,8 +283,8 @@ class _Execution:
                 contact.forget(x, control)
                 depth = contact.largest_penetration(x, control)
                 if depth > 1e-6 * self.problem.forms.length:
-                    raise InputError(f"{self._stage.who}: {thing!r} comes in where the body is: {depth:.6g} of the body is"
-                                     f" inside the tool")
+                    raise InputError(f"{self._stage.who}: {thing!r} comes in where the body is, which reaches {depth:.6g}"
+                                     f" into the tool")
 
     def _out_of_balance(self, x: np.ndarray) -> bool:
         self.problem.x.array_w[:] = x
