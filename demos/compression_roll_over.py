@@ -1,10 +1,10 @@
 """A stuck block whose side rolls onto the plates (Song 1993, section 7.3.3, figs. 7.4 to 7.10).
 
-I1 constant 1.0 MPa, I2 constant 0.1 MPa; compression ratios H/h to 5.23, on the thesis' 64 triangles and on finer grids.
+I1 constant 1.0 MPa, I2 constant 0.1 MPa; compression ratios H/h to 5.23, on the thesis' 64 triangles and finer grids.
 """
 
 import numpy as np
-from common import parser, say, save, summarise
+from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, block, draw_grids, force, press, where
 
 import formingx as fx
@@ -63,7 +63,8 @@ def main():
             pictures = path, met, elements
     path, met, elements = pictures
     states = list(met.values())
-    draw_grids(path, [path.states[0], *states], ["H/h = 1", *(f"H/h = {r}" for r in met)], elements, args.out / "grids.png")
+    labels = ["H/h = 1", *(f"H/h = {r}" for r in met)]
+    draw_grids(path, [path.states[0], *states], labels, elements, args.out / "grids.png")
     figure, (left, middle, right) = plots.figure(3, width=4.4)
     left.plot(HALF_HEIGHT / (HALF_HEIGHT - path["travel"][1:]), NEWTON * path["tool_force"][1:], ".-")
     left.set(xlabel="H / h", ylabel="force, N", title="force on one plate", yscale="log")
