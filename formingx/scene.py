@@ -118,7 +118,7 @@ class Scene:
 
     def check_travel(self, travel: float) -> None:
         """An InputError if the driven tool's travel (length) would put a held boundary as a whole inside the tool."""
-        if getattr(self.driven, "moves", None) is None:
+        if not isinstance(self.driven, Contact) or self.driven.moves is None:
             return
         moves = np.array(self.driven.moves)
         for support in self.supports:
