@@ -105,8 +105,9 @@ def test_compression_stick_quick(tmp_path):
 
 
 def test_compression_roll_over_quick(tmp_path):
-    found = summary("compression_roll_over", tmp_path, "--quick")["8x4"]
-    assert found["ended"] == "done" and set(found["force_N_at_ratio"]) == {"1.19", "1.47", "1.87", "2.5", "3.4", "5.23"}
+    found = summary("compression_roll_over", tmp_path, "--quick")
+    assert set(found["grids"]) == {"8x4"} and found["ended"] == "done"
+    assert set(found["force_N_at_ratio"]) == {"1.19", "1.47", "1.87", "2.5", "3.4", "5.23"}
     assert found["mid_radius_cm_at_ratio"]["1.87"] == pytest.approx(1.871, rel=5e-3)
 
 
