@@ -4,7 +4,7 @@ Neo-Hookean, I1 constant 0.10 MPa; R0 = 1.32 cm, H = 1.25 cm, pressed to h = 0.3
 """
 
 import numpy as np
-from common import parser, say, save, summarise
+from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, RADIUS, block, force, press
 
 import formingx as fx

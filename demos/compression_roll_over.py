@@ -1,10 +1,10 @@
 """A stuck block whose side rolls onto the plates (Song 1993, section 7.3.3, figs. 7.4 to 7.10).
 
-I1 constant 1.0 MPa, I2 constant 0.1 MPa; compression ratios H/h to 5.23, on the thesis' 64 triangles and on finer grids.
+I1 constant 1.0 MPa, I2 constant 0.1 MPa; compression ratios H/h to 5.23, on the thesis' 64 triangles and finer grids.
 """
 
 import numpy as np
-from common import parser, say, save, summarise
+from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, block, draw_grids, force, press, where
 
 import formingx as fx
@@ -39,14 +39,14 @@ def main():
     options.add_argument("--friction", type=str, default="stick", help="stick, none, or a coefficient of friction")
     args = options.parse_args()
     friction = args.friction if args.friction in ("stick", "none") else float(args.friction)
-    summary, pictures = {}, None
+    grids, pictures = {}, None
     for elements in GRIDS[:1] if args.quick else GRIDS:
         scene = block(fx.MooneyRivlin(c10=1.0, c01=0.1), friction, elements, roll_over=True)
         path, end = press(scene, [travel(r) for r in RATIOS], max_steps=400)
         met = {f"{r:g}": path.met(fx.travel(travel(r))) for r in RATIOS}
         met = {r: state for r, state in met.items() if state is not None}
         reached = HALF_HEIGHT / (HALF_HEIGHT - path.last.measures["travel"])
-        summary[f"{elements[0]}x{elements[1]}"] = {
+        found = grids[f"{elements[0]}x{elements[1]}"] = {
             "force_N_at_ratio": {r: force(s) for r, s in met.items()},
             "mid_radius_cm_at_ratio": {r: float(where(path, s, [(1.32, 0.0)])[0, 0]) for r, s in met.items()},
             "reached_ratio": reached, "ended": end, "steps": path.counts.steps,
@@ -58,12 +58,13 @@ def main():
             + ("" if end == "done" else f"; {end[:400]}"))
         for r, state in met.items():
             say(f"  ratio {r}: {force(state):9.2f} N, radius at the middle"
-                f" {summary[f'{elements[0]}x{elements[1]}']['mid_radius_cm_at_ratio'][r]:.4f} cm")
+                f" {found['mid_radius_cm_at_ratio'][r]:.4f} cm")
         if pictures is None or len(met) >= len(pictures[1]):
-            pictures = path, met, elements
+            pictures, best = (path, met, elements), found
     path, met, elements = pictures
     states = list(met.values())
-    draw_grids(path, [path.states[0], *states], ["H/h = 1", *(f"H/h = {r}" for r in met)], elements, args.out / "grids.png")
+    labels = ["H/h = 1", *(f"H/h = {r}" for r in met)]
+    draw_grids(path, [path.states[0], *states], labels, elements, args.out / "grids.png")
     figure, (left, middle, right) = plots.figure(3, width=4.4)
     left.plot(HALF_HEIGHT / (HALF_HEIGHT - path["travel"][1:]), NEWTON * path["tool_force"][1:], ".-")
     left.set(xlabel="H / h", ylabel="force, N", title="force on one plate", yscale="log")
@@ -76,7 +77,7 @@ def main():
     right.set(xlabel="r, cm", ylabel="normal stress, MPa", title="pressure on the plate", yscale="log", ylim=(0.3, 300))
     save(figure, args.out / "curves.png")
     path.to_csv(args.out / "path.csv")
-    summarise(args.out, {**summary, "versions": files.versions()})
+    summarise(args.out, {**best, "grids": grids, "versions": files.versions()})
 
 
 if __name__ == "__main__":

@@ -4,8 +4,7 @@ I1 and I2 constants 1.0, 0.1 MPa outside and 10.0, 1.0 MPa inside. The strip's h
 half height here. Beside it the block of one material, with the side kept free of the plates and with roll-over.
 """
 
-import numpy as np
-from common import parser, say, save, summarise
+from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, block, draw_grids, forces, press, where
 
 import formingx as fx
@@ -24,10 +23,10 @@ def main():
     layers = {"strip": STRIP, "block": HALF_HEIGHT - STRIP}
     travels = [HALF_HEIGHT * (1 - 1 / r) for r in RATIOS]
     summary, drawn = {}, {}
-    for name, materials, roll_over in (("sandwich", {"strip": stiff, "block": soft}, False),
-                                       ("homogeneous", {"strip": soft, "block": soft}, False),
-                                       ("homogeneous_roll_over", {"strip": soft, "block": soft}, True)):
-        path, end = press(block(materials, "stick", elements, roll_over=roll_over, layers=layers), travels, max_steps=300)
+    for name, strip, roll_over in (("sandwich", stiff, False), ("homogeneous", soft, False),
+                                   ("homogeneous_roll_over", soft, True)):
+        scene = block({"strip": strip, "block": soft}, "stick", elements, roll_over=roll_over, layers=layers)
+        path, end = press(scene, travels, max_steps=300)
         drawn[name] = path
         at = path.last
         radii = where(path, at, [(1.32, 0.0), (1.32, (STRIP + HALF_HEIGHT) / 2)])[:, 0]
@@ -45,12 +44,8 @@ def main():
     axes.set(xlabel="compression ratio H / h", ylabel="force, N", ylim=(0, None))
     axes.legend(frameon=False)
     save(figure, args.out / "force.png")
-    summarise(args.out, {**summary, "waist": bool(np.diff(list(radii_of(summary)))[0] > 0), "versions": files.versions()})
-
-
-def radii_of(summary):
-    """Radii of the sandwich at its middle and in its soft part, cm."""
-    return summary["sandwich"]["radius_cm_middle"], summary["sandwich"]["radius_cm_soft_part"]
+    waist = summary["sandwich"]["radius_cm_middle"] < summary["sandwich"]["radius_cm_soft_part"]
+    summarise(args.out, {**summary, "waist": bool(waist), "versions": files.versions()})
 
 
 if __name__ == "__main__":

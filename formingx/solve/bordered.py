@@ -75,8 +75,8 @@ class _Kinks:
 class Tolerances:
     """When a state counts as converged: all of these.
 
-    correction: the next correction that quadratic convergence predicts, over |x|.
-    residual: |F| over the norm of the support forces.
+    correction: the next correction that quadratic convergence predicts, over the norm of x.
+    residual: norm of F over the norm of the support forces.
     iterations: at most so many.
 
     Raises:
