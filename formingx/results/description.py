@@ -38,7 +38,7 @@ def summary(scene: Any) -> dict[str, str]:
         lines[f"material of {name}"] = text(material)
     for kind in ("supports", "loads", "contacts"):
         for k, thing in enumerate(getattr(scene, kind), 1):
-            lines[f"{kind[:-1]} {k}"] = text(thing) + (" (driven)" if thing is scene.driven else "")
+            lines[f"{kind[:-1]} {k}"] = text(thing) + (" (driven)" if thing in scene.drivable else "")
     return lines | {"model": text(scene.model), "kinematics": text(scene.kinematics),
                     "quadrature degree": str(scene.quadrature_degree)}
 

@@ -95,9 +95,7 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     """
     instance("solve: scene", scene, Scene, "a formingx.Scene")
     instance("solve: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
-    if scene.driven is None:
-        raise InputError("solve: nothing is driven: give one load no value, as Pressure('bottom'), or"
-                         " add a Displaced support")
+    scene.check_one_driven("solve")
     to, increments = finite("solve: to", to), count("solve: increments", increments)
     problem, began = Problem(scene), time.perf_counter()
     tolerances = tolerances or Tolerances()
