@@ -71,14 +71,14 @@ def test_plug_force_is_that_of_the_supports():
     support = values[dofs].sum() * forms.stress * forms.volume / forms.length
     pressed = 0.01 * np.pi * RIM**2                         # of a follower pressure inside a clamped rim, along -Z
     force = state.measures["tool_force"]
-    assert force > 0.5
+    assert force > 0.1
     assert support - pressed == pytest.approx(force, rel=1e-6)
 
 
 @pytest.mark.parametrize("stage", ["vacuum", "plug", "grip"])
 def test_derivative_by_control_after_a_change(stage):
     scene, plug, vacuum, rim = plug_scene(grip=True)
-    path = run(scene, ("vacuum", vacuum, fx.pressure(0.01)), ("plug", plug, fx.travel(1.0)),
+    path = run(scene, ("vacuum", vacuum, fx.pressure(0.001)), ("plug", plug, fx.travel(1.0)),
                ("grip", rim[0], fx.travel(0.1)))
     problem, state, h = path.problem, path.last, 1e-7
     thing = {"vacuum": vacuum, "plug": plug, "grip": rim[0]}[stage]
@@ -100,12 +100,13 @@ def test_derivative_by_control_after_a_change(stage):
 
 def test_a_tool_left_out_gives_no_force():
     scene, plug, vacuum, _ = plug_scene()
-    path = fx.Process(scene).run([fx.Stage("plug", plug, fx.travel(0.5)),
-                                  fx.Stage("vacuum", vacuum, fx.pressure(0.02), without=[plug])], progress=False)
+    stages = [fx.Stage("up", vacuum, fx.pressure(-0.02), without=without) for without in ([plug], [])]
+    path, stopped = (fx.Process(scene).run([stage], progress=False) for stage in stages)
     free = fx.Scene(mesh=scene.mesh, materials=scene.materials, loads=scene.loads, supports=scene.supports)
-    alone = fx.trace(free, until=fx.pressure(0.02), progress=False)
-    assert path.last.measures["tool_force"] == 0
+    alone = fx.trace(free, until=fx.pressure(-0.02), progress=False)
+    assert path.last.measures["tool_force"] == 0 and stopped.last.measures["tool_force"] > 0.1
     assert path.last.measures["pole_height"] == pytest.approx(alone["pole_height"][-1], rel=1e-8)
+
 
 
 def test_errors():
