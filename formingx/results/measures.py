@@ -222,11 +222,11 @@ class _Nodal(Bound):
 def standard(problem: Any) -> dict[str, Bound]:
     """The measures that every run records, by column name.
 
-    pressure (or travel: a length; <name>_pressure, <name>_travel where several are driven), pole_height (length), pole_stretch, enclosed_volume (length^3), strain_energy
-    (stress length^3), mass_error (volume over its original value, minus 1), volume_error (root mean square of
-    J - 1). Pole and volume are there where the scene has an axis and a driven pressure. With contacts: contact_length
-    (reference length in touch), penetration (of the deepest node, length), tool_force (along Z, of the body on all
-    tools).
+    pressure (or travel: a length; <name>_pressure, <name>_travel where several are driven), pole_height (length),
+    pole_stretch, enclosed_volume (length^3), strain_energy (stress length^3), mass_error (volume over its original
+    value, minus 1), volume_error (root mean square of J - 1). Pole and volume are there where the scene has an axis
+    and a driven pressure. With contacts: contact_length (reference length in touch), penetration (of the deepest node,
+    length), tool_force (along Z, of the body on all tools).
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
     pressure_driven, leaders = _driven_pressure(scene) is not None, dict.fromkeys(scene.drivable.values())

@@ -285,7 +285,8 @@ class Run:
         best = int(np.argmin([abs(v - self.until.value) for v in values]))
         limits = "".join(f" A limit point was passed at {path.describe(s)}." for s in path.limit_points)
         return ConvergenceError(
-            f"{f'Stage {self._stage!r}: ' * bool(self._stage)}{self.until} was not reached: {why} The nearest met was {values[best]:.6g}, at"
+            f"{f'Stage {self._stage!r}: ' * bool(self._stage)}{self.until}"
+            f" was not reached: {why} The nearest met was {values[best]:.6g}, at"
             f" {path.describe(states[best])}.{limits} The last good state is {path.describe(path.last)};"
             f" it is kept in the error's `path`.{'' if diagnosis.advice else _TRY}", path, diagnosis)
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..errors import ConvergenceError, InputError, count, finite, instance
+from ..errors import ConvergenceError, count, finite, instance
 from ..problem import Problem
 from ..results.path import Path
 from ..scene import Scene
