@@ -1,4 +1,4 @@
-"""The command line: python -m formingx [demo NAME ... | compare OURS THEIRS ...]."""
+"""The command line: python -m formingx [demo NAME ... | compare OURS THEIRS ... | open FOLDER | report FOLDER ...]."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from . import InputError, compare
+from . import InputError, checkpoint, compare
+from .results import report
 
 _COMPARE = """Compare a run's CSV file with another program's curve: differences, limit points, a picture.
 The header of THEIRS names its columns and may state units: pressure [psi]."""
@@ -25,8 +26,9 @@ def main(arguments: list[str] | None = None) -> int:
             _demo(words[1:])
         else:
             options = _parser().parse_args(words)
-            _compare(options) if options.command else _say(_overview())
-    except InputError as error:
+            {"compare": _compare, "open": _open, "report": _report, None: lambda _: _say(_overview())}[
+                options.command](options)
+    except (InputError, OSError) as error:
         if MPI.COMM_WORLD.rank == 0:
             print(f"formingx: {error}", file=sys.stderr)
         return 2
@@ -48,13 +50,23 @@ def _parser() -> argparse.ArgumentParser:
                      help="for a column of ours: a factor for theirs, or our unit if their header states theirs")
     two.add_argument("--out", type=Path, default=Path("results") / "compare",
                      help="folder for curves.png and pairs.csv (default: %(default)s)")
+    look = commands.add_parser("open", help="say what is in a checkpoint",
+                               description="Say what is in a checkpoint: the scene, the states, how the run ended.")
+    show = commands.add_parser("report", help="make a report of a checkpoint", description="Make one HTML file of a"
+                               " checkpoint: inputs, curves, thickness, convergence.")
+    for one in (look, show):
+        one.add_argument("folder", metavar="FOLDER", help="a checkpoint (trace(..., checkpoint=FOLDER), Path.save)")
+    show.add_argument("--out", type=Path, help="the HTML file (default: report.html in the checkpoint)")
+    show.add_argument("--title", default="", help="heading of the report")
     return parser
 
 
 def _overview() -> str:
     lines = ["formingx: how polymers are formed, simulated with finite elements.", "", "Commands:",
              "  demo NAME [OPTIONS]        run a demo (demo NAME --help: its options)",
-             "  compare OURS THEIRS        compare two curves (compare --help)", ""]
+             "  compare OURS THEIRS        compare two curves (compare --help)",
+             "  open FOLDER                say what is in a checkpoint",
+             "  report FOLDER              make one HTML file of a checkpoint (report --help)", ""]
     demos = _demos()
     if not demos:
         return "\n".join([*lines, "No demos here: they are in the folder demos/ of the checkout."])
@@ -112,6 +124,27 @@ def _compare(options: argparse.Namespace) -> None:
     if comm.rank == 0:
         found.plot().savefig(options.out / "curves.png", dpi=150)
     _say(f"Results are in {options.out}/: curves.png, pairs.csv")
+
+
+def _open(options: argparse.Namespace) -> None:
+    about, states = checkpoint.contents(options.folder)
+    record = report.of_checkpoint(about, states)
+    width = max(map(len, record.summary))
+    lines = [f"{part:{width}}  {line}" for part, line in record.summary.items()]
+    columns = [c for c in ("pressure", "travel", "pole_height", "pole_stretch", "contact_length")
+               if c in record.measures]
+    extra = [key for key in ("setting", "stage") if any(state.get(key) for state in states)]
+    lines += ["", f"{'state':>5}  {'kind':12}" + "".join(f"{c.replace('_', ' '):>16}" for c in columns)
+              + "".join(f"  {key}" for key in extra)]
+    lines += [f"{k:5}  {kind:12}" + "".join(f"{record.measures[c][k]:16.8g}" for c in columns)
+              + "".join(f"  {states[k].get(key)}" for key in extra) for k, kind in enumerate(record.kinds)]
+    _say("\n".join([*lines, "", *record.warnings()]).rstrip())
+
+
+def _report(options: argparse.Namespace) -> None:
+    out = options.out or Path(options.folder) / "report.html"
+    report.write(report.of_checkpoint(*checkpoint.contents(options.folder)), out, options.title, None, MPI.COMM_WORLD)
+    _say(f"The report is in {out}")
 
 
 def _pair(option: str, word: str, both: bool) -> tuple[str, str]:

@@ -6,6 +6,8 @@ from typing import Any
 
 import dolfinx
 
+from .errors import InputError
+
 if tuple(int(n) for n in dolfinx.__version__.split(".")[:2]) < (0, 9):
     raise ImportError(f"formingx needs DOLFINx >= 0.9, this is {dolfinx.__version__}; './fx CMD' provides one")
 
@@ -35,3 +37,17 @@ def tree_of_cells(mesh: Any, padding: float, cells: Any) -> Any:
     """Bounding boxes of cells (local numbers)."""
     from dolfinx import geometry
     return geometry.bb_tree(mesh, mesh.topology.dim, entities=cells, padding=padding)
+
+
+def adios4dolfinx() -> Any:
+    """The library that writes and reads checkpoints.
+
+    Raises:
+        InputError: it is not there, or cannot be used.
+    """
+    try:
+        import adios4dolfinx
+    except ImportError as error:
+        raise InputError(f"checkpoints need adios4dolfinx (Debian: python3-adios4dolfinx; to be imported before adios2,"
+                         f" or that is there without MPI): {error}") from None
+    return adios4dolfinx

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 
+from . import _compat
 from .errors import InputError
 from .problem import Problem
 from .results import files
@@ -61,8 +62,7 @@ class Checkpoint:
         if self._there is None:
             self._there = self._begin(path)
         for number in range(self._there, len(path)):
-            self._write_state(number, path.states[number], path.profile(path.states[number])
-                              if _has_profile(path) else None)
+            self._write_state(number, path.states[number], _profile(path, path.states[number]))
             self._there = number + 1
 
     def _begin(self, path: Path) -> int:
@@ -93,16 +93,15 @@ class Checkpoint:
         return files.on_root(problem.comm, lambda: _plainly(begin, folder, "cannot be begun"))
 
     def _write_state(self, number: int, state: State, profile: Any) -> None:
-        from adios4dolfinx import write_function_on_input_mesh
         problem, comm = self._problem, self._problem.comm
         place = self.folder / _name(number)
         part = place.with_name(place.name + ".part")
         n = problem.forms.space.dofmap.index_map.size_local
-        data = _plain_state(state) | {"memory": _gather_memory(problem, state), "profile": profile and _lists(profile)}
+        data = _plain_state(state) | {"memory": _gather_memory(problem, state), "profile": profile}
         for name in _FIELDS:
             tails = comm.allgather(getattr(state, name)[n:].tolist())
             data[f"{name}_tail"] = tails[-1]
-        what = f"state {number} could not be written; the states before it are kept"
+        library, what = _compat.adios4dolfinx(), f"state {number} could not be written; the states before it are kept"
 
         def prepare():
             shutil.rmtree(part, ignore_errors=True)
@@ -111,7 +110,7 @@ class Checkpoint:
         files.on_root(comm, lambda: _plainly(prepare, self.folder, what))
         for name in _FIELDS:
             self._w.x.array[:n] = getattr(state, name)[:n]
-            write_function_on_input_mesh(part / f"{name}.bp", self._w, name=name)
+            library.write_function_on_input_mesh(part / f"{name}.bp", self._w, name=name)
 
         def finish():
             data["checksums"] = _checksums(part, data)
@@ -171,12 +170,15 @@ def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """(what scene.json says, what each state.json says) of a checkpoint; no scene is needed.
 
     Raises:
-        InputError: there is no checkpoint, or it is damaged.
+        InputError: there is no checkpoint, it holds no state, or it is damaged.
     """
     folder = FilePath(os.fspath(folder))
     about = _read_json(folder / "scene.json")
     _check_format(folder, about)
-    return about, [_read_json(place / "state.json") for place in _states(folder)]
+    states = [_read_json(place / "state.json") for place in _states(folder)]
+    if not states:
+        raise InputError(f"checkpoint {str(folder)!r} holds no state")
+    return about, states
 
 
 def _check_format(folder: FilePath, about: dict) -> None:
@@ -195,13 +197,12 @@ def _check_scene(folder: FilePath, about: dict, scene: dict) -> None:
 
 
 def _read_state(place: FilePath, data: dict, problem: Any) -> State:
-    from adios4dolfinx import read_function
     data = dict(data)
     n, last = problem.forms.space.dofmap.index_map.size_local, problem.comm.rank == problem.comm.size - 1
     w = fem.Function(problem.forms.space)
     arrays = {}
     for name in _FIELDS:
-        read_function(place / f"{name}.bp", w, name=name)
+        _compat.adios4dolfinx().read_function(place / f"{name}.bp", w, name=name)
         arrays[name] = np.concatenate([w.x.array[:n], data.pop(f"{name}_tail") if last else []])
     met = data.pop("met")
     return State(**arrays, met=Target(met[0], met[1], None, met[2]) if met else None,
@@ -245,11 +246,12 @@ def _scatter_memory(problem: Any, memory: list[dict[str, Any]]) -> list[Any]:
     return found
 
 
-def _has_profile(path: Path) -> bool:
-    return {"bottom", "top"} <= set(path.problem.scene.mesh.boundaries)
-
-
-def _lists(profile: Any) -> dict[str, list]:
+def _profile(path: Path, state: State) -> dict[str, list] | None:
+    """The outline and the thickness of a sheet, so that a report needs no scene; None where there is no sheet."""
+    try:
+        profile = path.profile(state)
+    except InputError:
+        return None
     return {f.name: getattr(profile, f.name).tolist() for f in fields(profile)}
 
 

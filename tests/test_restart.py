@@ -18,7 +18,8 @@ import formingx as fx
 from formingx import checkpoint
 
 SCENES = {"hinged": (treloar, fx.pole_stretch(3.0)), "stick": (lambda: cup("stick"), fx.pressure(8.0)),
-          "coulomb": (lambda: cup(0.3), fx.pressure(8.0))}
+          "coulomb": (lambda: cup(0.3), fx.pressure(8.0)),
+          "membrane": (lambda: treloar(model=fx.Membrane()), fx.pole_stretch(3.0))}
 OTHER_RANKS = """
 import sys
 sys.path.insert(0, "tests")
@@ -62,8 +63,8 @@ def test_any_state_goes_on_to_the_same_path(name, whole):
             assert (again.counts.steps, again.counts.iterations) == (path.counts.steps, path.counts.iterations)
 
 
-@pytest.mark.parametrize("name", ["hinged", "stick"])
-@pytest.mark.parametrize("ranks", [(1, 2), (2, 1)])
+@pytest.mark.parametrize("name, ranks", [("hinged", (1, 2)), ("hinged", (2, 1)), ("stick", (1, 2)), ("stick", (2, 1)),
+                                         ("membrane", (1, 2))])
 def test_on_another_number_of_ranks(name, ranks, whole, tmp_path):
     folder, scene, path = whole[name]
     made = folder
@@ -137,7 +138,7 @@ def killed_after(seconds, folder):
 def test_killed_at_any_moment(whole, tmp_path):
     _, scene, path = whole["stick"]
     rng = np.random.default_rng(int.from_bytes(os.urandom(4), "little"))
-    for k in range(3):
+    for k in range(2):
         folder = tmp_path / f"run{k}"
         seconds = rng.uniform(0, 0.6)
         running = killed_after(seconds, folder)

@@ -145,7 +145,7 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
         if not size > 0 or not other > 0:
             raise InputError(f"compare: column {name!r} does not vary on {'our' if not size > 0 else 'their'} side")
     curve = np.column_stack(ours.curve(*names)) if hasattr(ours, "curve") else a
-    smooth = _Smooth(curve / scale)
+    smooth = Smooth(curve / scale)
     line = smooth.line * scale
     matched, partners = _pair(b / scale, smooth)
     if not len(matched):
@@ -200,7 +200,7 @@ def _arc_length(points: np.ndarray) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
 
 
-class _Smooth:
+class Smooth:
     """A curve through points, by arc length: Akima's, which a kink (a first contact) does not make wiggle.
 
     Attributes:
@@ -241,7 +241,7 @@ def _costs(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     return cost
 
 
-def _pair(points: np.ndarray, curve: _Smooth) -> tuple[np.ndarray, np.ndarray]:
+def _pair(points: np.ndarray, curve: Smooth) -> tuple[np.ndarray, np.ndarray]:
     """(indices of the points that have a partner, their partners on the curve); both run forward."""
     n, line = len(points), curve.line
     if n > _MOST:
@@ -294,7 +294,7 @@ def _resolution(points: np.ndarray) -> float:
     if len(points) < 5:
         return float("inf")
     kept = np.unique(np.append(np.arange(0, len(points), 2), len(points) - 1))
-    curve = _Smooth(points[kept])
+    curve = Smooth(points[kept])
     feet = [(curve.foot(points[k], int(np.argmin(((curve.line - points[k]) ** 2).sum(1))))[0], points[k])
             for k in np.setdiff1d(np.arange(len(points)), kept)]
     return float(max(np.linalg.norm(foot - point) for foot, point in feet))

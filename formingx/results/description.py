@@ -38,7 +38,9 @@ def summary(scene: Any) -> dict[str, str]:
         lines[f"material of {name}"] = text(material)
     for kind in ("supports", "loads", "contacts"):
         for k, thing in enumerate(getattr(scene, kind), 1):
-            lines[f"{kind[:-1]} {k}"] = text(thing) + (" (driven)" if thing in scene.drivable else "")
+            numbers = "".join(f", {name.replace('_', ' ')} {value!r}" for name, value in vars(thing).items()
+                              if isinstance(value, int | float) and repr(value) not in text(thing))
+            lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if thing in scene.drivable else "")
     return lines | {"model": text(scene.model), "kinematics": text(scene.kinematics),
                     "quadrature degree": str(scene.quadrature_degree)}
 

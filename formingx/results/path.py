@@ -30,7 +30,7 @@ class State:
         met: the target that it hits, or None.
         memory: what the problem remembers from here on (friction).
         stage: name of the stage of a `Process`; setting: what the control means in it (`Problem.setting`).
-        stepping: what a run goes on with: its next step and its counts; empty inside a step.
+        stepping: what a run goes on with: its next step, its counts and its target; empty inside a step.
     """
 
     x: np.ndarray
@@ -141,6 +141,18 @@ class Path:
         raise InputError(f"the path does not pass {target}: its values lie between"
                          f" {min(values) + target.value:.6g} and {max(values) + target.value:.6g}")
 
+    def between(self, a: State, b: State, fraction: float) -> tuple[np.ndarray, float]:
+        """(x, control) on the smooth (cubic) path from a state to the next; for drawing."""
+        return self._branch.interpolate(a, b, fraction)
+
+    def distance(self, a: State, b: State) -> float:
+        """Arc length from a state to the next along the tangent (dimensionless)."""
+        return self._branch.progress(a, b)
+
+    def measured(self, at: Any, *columns: str) -> list[float]:
+        """Columns at anything that has x and control."""
+        return [self.value(self._recorded[c], at) for c in columns]
+
     def curve(self, *columns: str, points: int = 12) -> list[np.ndarray]:
         """Columns along the smooth (cubic) path through the states, `points` to each piece; for drawing.
 
@@ -195,6 +207,45 @@ class Path:
         if any(state.stage for state in self.states):
             raise InputError("Path: save: the states of a process in stages cannot be saved yet")
         Checkpoint(folder, self.problem).write(self)
+
+    def to_vtx(self, folder: Any, states: Any = None) -> None:
+        """Write fields of states (default: the last) for ParaView, one time step each; see `formingx.results.fields`.
+
+        Args:
+            folder: its name ends in .bp.
+            states: a state, several in order, or "all".
+        """
+        from . import fields
+        fields.to_vtx(self, folder, states)
+
+    def to_xdmf(self, file: Any, states: Any = None) -> None:
+        """The same fields as `to_vtx`, for programs that do not read VTX; the name ends in .xdmf."""
+        from . import fields
+        fields.to_xdmf(self, file, states)
+
+    def animate(self, file: Any, frames: int = 60, seconds: float = 5.0) -> None:
+        """Draw the forming as a moving picture, a GIF: the section of the sheet and the loading curve (rank 0 draws).
+
+        The frames are evenly spread over the (cubic) path through the states; the last one stands for a second more.
+
+        Raises:
+            InputError: the name does not end in .gif, a number is not allowed, or the mesh is no sheet.
+        """
+        from . import animation
+        animation.animate(self, file, frames, seconds)
+
+    def report(self, file: Any, title: str = "", failure: Any = None) -> None:
+        """Write one HTML file that shows the run: inputs, curves, thickness, warnings, convergence (rank 0 writes).
+
+        Args:
+            title: its heading.
+            failure: the `ConvergenceError` that ended the run, if one did.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        from . import report
+        report.write(report.of_path(self), file, title, failure, self.problem.comm)
 
     def plot(self, y: str, x: str, axes: Any = None, **style: Any) -> Any:
         """Draw column `y` over column `x`; returns the matplotlib axes."""

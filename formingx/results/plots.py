@@ -46,6 +46,23 @@ def convergence(path: Any, axes: Any = None) -> Any:
     return axes
 
 
+def main_columns(columns: list[str]) -> tuple[str, str]:
+    """(x, y) of the loading curve: what is driven over how far the body has gone, or its force over the travel."""
+    if "travel" in columns:
+        return "travel", next(c for c in ("tool_force", "pole_height", "strain_energy") if c in columns)
+    return next(c for c in ("pole_height", "enclosed_volume", "strain_energy") if c in columns), "pressure"
+
+
+def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
+    """The deformed sheet as strips between its two faces; scale: factors of (r, z), colours: of the n nodes, (n, 4)."""
+    import numpy as np
+    from matplotlib.collections import PolyCollection
+    bottom, top = np.asarray(profile.bottom) * scale, np.asarray(profile.top) * scale
+    strips = np.stack([bottom[:-1], bottom[1:], top[1:], top[:-1]], 1)
+    faces = (colours[1:] + colours[:-1]) / 2
+    axes.add_collection(PolyCollection(strips, facecolors=faces, edgecolors=faces, linewidths=1.8, zorder=2))
+
+
 def outline(profile: Any, axes: Any, scale: float = 1.0, **style: Any) -> None:
     """The deformed sheet filled between its faces, r to the right, lengths times `scale`."""
     import numpy as np

@@ -1,0 +1,99 @@
+"""The forming as a moving picture: section and loading curve, frame by frame."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path as FilePath
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import InputError, count, positive
+from . import files, plots
+
+
+class _Frame(NamedTuple):
+    x: np.ndarray
+    control: float
+
+
+def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
+    """See `Path.animate`."""
+    file = FilePath(os.fspath(file))
+    if file.suffix.lower() != ".gif":
+        raise InputError(f"animate: file {str(file)!r}: its name must end in .gif")
+    frames, seconds = count("animate: frames", frames), positive("animate: seconds", seconds)
+    if len(path) < 2:
+        raise InputError(f"animate: the path has {len(path)} states: nothing moves")
+    x, y = plots.main_columns(path.columns)
+    shapes, tools, now = [], [], []
+    for a, b, fraction in _spread(path, frames):
+        at = _Frame(*path.between(a, b, fraction))
+        shapes.append(path.profile(at))
+        now.append(path.measured(at, x, y))
+        tools.append([_tool(path.problem, contact, at.control) for contact in path.problem.contacts])
+    curve = path.curve(x, y)
+    axisymmetric = path.problem.scene.kinematics.dimension_of_volume == 3
+
+    def draw(stream):
+        _draw(shapes, tools, np.array(now), curve, (x, y), axisymmetric, seconds, stream)
+    files.on_root(path.problem.comm, lambda: files.replace(file, draw, "wb"))
+
+
+def _spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
+    """(state, next state, fraction between them) of frames evenly spread over the arc length."""
+    lengths = [path.distance(a, b) for a, b in zip(path.states, path.states[1:])]
+    at = np.concatenate([[0.0], np.cumsum(lengths)])
+    found = []
+    for s in np.linspace(0, at[-1], frames) if frames > 1 else at[-1:]:
+        k = int(np.clip(np.searchsorted(at, s, side="right") - 1, 0, len(lengths) - 1))
+        found.append((path.states[k], path.states[k + 1], float((s - at[k]) / (lengths[k] or 1.0))))
+    return found
+
+
+def _tool(problem: Any, contact: Any, control: float) -> np.ndarray:
+    moves = np.array(contact.contact.moves or (0.0, 0.0))
+    return contact.contact.tool.outline() + problem.forms.control_scale * control * moves
+
+
+def _draw(shapes: list, tools: list, now: np.ndarray, curve: list, names: tuple, axisymmetric: bool, seconds: float,
+          stream: Any) -> None:
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from PIL import Image
+    points = np.vstack([np.vstack([s.bottom, s.top]) for s in shapes])
+    low, high = points.min(0), points.max(0)
+    sides = (1, -1) if axisymmetric or abs(low[0]) < 1e-9 * high[0] else (1,)
+    if len(sides) == 2:
+        low[0] = -high[0]
+    margin = 0.06 * max(high - low)
+    ratios = [s.thickness_ratio for s in shapes]
+    colours = Normalize(min(r.min() for r in ratios), max(r.max() for r in ratios))
+    figure, (left, right) = plots.figure(2, width=5.0, height=4.2, ratios=(1.5, 1))
+    bar = figure.colorbar(ScalarMappable(colours, "viridis_r"), ax=left, shrink=0.8, label="thickness / original")
+    bar.outline.set_visible(False)
+    right.plot(*curve, color="0.6")
+    right.set(xlabel=names[0].replace("_", " "), ylabel=names[1].replace("_", " "))
+    dot, = right.plot([], [], "o", color="tab:red")
+    text = right.set_title("", fontsize=10)
+    pictures: list[Any] = []
+    for shape, ratio, tool, at in zip(shapes, ratios, tools, now):
+        left.clear()
+        left.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin), xlabel="r",
+                 ylabel="z", aspect="equal")
+        left.spines[["top", "right"]].set_visible(False)
+        for side in sides:
+            for line in tool:
+                left.plot(side * line[:, 0], line[:, 1], color="0.35", linewidth=1.5)
+            plots.section(left, shape, (side, 1), colormaps["viridis_r"](colours(ratio)))
+        dot.set_data(at[:1], at[1:])
+        text.set_text(f"{names[1].replace('_', ' ')} {at[1]:.4g}")
+        figure.canvas.draw()
+        if not pictures:
+            figure.set_layout_engine("none")                # or the axes would shift from frame to frame
+        pictures.append(Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
+                        .quantize(256, dither=Image.Dither.NONE))
+    each = max(int(1000 * seconds / len(pictures)), 20)
+    pictures[0].save(stream, format="GIF", save_all=True, append_images=pictures[1:], loop=0, optimize=False,
+                     duration=[each] * (len(pictures) - 1) + [each + 1000])

@@ -1,0 +1,234 @@
+"""Files for ParaView, animations and reports: read back, and compared with what they were made from."""
+
+import base64
+from html.parser import HTMLParser
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from conftest import run, treloar
+from mpi4py import MPI
+from test_contact import cup
+
+import formingx as fx
+from formingx import _compat
+from formingx.__main__ import main
+from formingx.results import report
+from formingx.results.fields import Fields
+
+
+@pytest.fixture(scope="module")
+def inflated():
+    return fx.trace(treloar((10, 2)), until=fx.pole_stretch(2.5), through=[fx.pole_stretch(1.5)], progress=False)
+
+
+@pytest.fixture(scope="module")
+def formed():
+    return fx.trace(cup("none"), until=fx.pressure(8.0), progress=False)
+
+
+def steps_of(folder):
+    """[{name: array}] of a VTX folder, and its times."""
+    _compat.adios4dolfinx()
+    import adios2
+    with adios2.FileReader(str(folder)) as file:
+        count = file.num_steps()
+        return [{name: file.read(name, step_selection=[k, 1]) for name in file.available_variables()}
+                for k in range(count)]
+
+
+def test_vtx_read_back(inflated, tmp_path):
+    inflated.to_vtx(tmp_path / "run.bp", "all")
+    steps = steps_of(tmp_path / "run.bp")
+    assert [step["step"].item() for step in steps] == list(range(len(inflated)))
+    for k, state in ((0, inflated.states[0]), (len(inflated) - 1, inflated.last)):
+        step, profile = steps[k], inflated.profile(state)
+        points, u = step["geometry"][:, :2], step["displacement"][:, :2]
+        pole = np.flatnonzero(np.hypot(points[:, 0], points[:, 1] - 0.041) < 1e-9)
+        assert len(pole) and np.allclose(u[pole, 1], state.measures["pole_height"], rtol=1e-10)
+        for R, ratio in zip(profile.reference_radius, profile.thickness_ratio):
+            at = np.abs(points[:, 0] - R) < 1e-9
+            assert np.allclose(step["thickness_ratio"][at], ratio, rtol=1e-3)
+        at = np.unique(points, axis=0)[::7]
+        stress = inflated.stress(state).at(at)
+        for x, sigma, stretches in zip(at, stress.cauchy, stress.principal_stretches):
+            here = np.hypot(*(points - x).T) < 1e-9
+            assert np.allclose(step["cauchy_rr"][here], sigma[0, 0], atol=1e-9)
+            assert np.allclose(step["stretches"][here], stretches, rtol=1e-9)
+    assert all(np.isfinite(array).all() for step in steps for array in step.values())
+
+
+def test_an_interface_keeps_both_sides(tmp_path):
+    mesh = fx.mesh.disc(radius=1.0, thickness={"soft": 0.1, "hard": 0.1}, elements=(6, 1))
+    scene = fx.Scene(mesh=mesh, materials={"soft": fx.NeoHookean(c10=1.0), "hard": fx.NeoHookean(c10=10.0)},
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")])
+    path = fx.trace(scene, until=fx.pole_stretch(1.3), progress=False)
+    path.to_vtx(tmp_path / "two.bp")
+    step = steps_of(tmp_path / "two.bp")[0]
+    here = np.hypot(step["geometry"][:, 0] - 0.5, step["geometry"][:, 1] - 0.1) < 1e-9
+    found = step["cauchy_hoop"][here]
+    for layer in ("soft", "hard"):
+        exact = path.stress().at([(0.5, 0.1)], layer).cauchy[0, 2, 2]
+        assert np.abs(found - exact).min() < 1e-9 * abs(exact)
+    assert np.ptp(found) > 0.5 * np.abs(found).max()
+
+
+def test_contact_pressure_is_the_blowing_pressure_on_the_floor(formed):
+    """A stretched sheet that lies flat passes on the pressure: p = 8 per deformed area, and sigma_zz = -8."""
+    fields = Fields(formed)
+    values, X = fields.of(formed.last), fields.points
+    p, top = values["contact_pressure"][..., 0], np.abs(X[..., 1] - 0.3) < 1e-9
+    flat = top & (X[..., 0] > 0.9) & (X[..., 0] < 2.8)
+    assert flat.sum() > 10 and values["thickness_ratio"][flat].max() < 0.8
+    np.testing.assert_allclose(p[flat], 8.0, rtol=5e-4)
+    np.testing.assert_allclose(values["cauchy_zz"][flat], -8.0, rtol=0.02)
+    free = X[..., 0] > 4.0
+    assert p.min() >= 0 and np.all(p[free & (X[..., 0] < 9)] == 0) and np.all(p[~top] == 0)
+
+
+def test_xdmf_read_back(formed, tmp_path):
+    from dolfinx.io import XDMFFile
+    formed.to_xdmf(tmp_path / "run.xdmf", formed.states[-2:])
+    root = ElementTree.parse(tmp_path / "run.xdmf").getroot()
+    grids = [g for g in root.iter("Grid") if g.find("Time") is not None]
+    assert [float(g.find("Time").get("Value")) for g in grids] == [len(formed) - 2, len(formed) - 1]
+    names = {a.get("Name") for a in grids[0].findall("Attribute")}
+    assert {"displacement", "contact_pressure", "principal_stresses", "thickness"} <= names
+    assert all(item.text.startswith("run.h5:") for item in root.iter("DataItem")) and (tmp_path / "run.h5").exists()
+    with XDMFFile(MPI.COMM_SELF, tmp_path / "run.xdmf", "r") as file:
+        mesh = file.read_mesh()
+    assert len(mesh.geometry.x) == 6 * 80 and mesh.geometry.cmap.degree == 2
+
+
+def test_membrane_and_plane_strain(tmp_path):
+    path = fx.trace(treloar((10, 1), model=fx.Membrane()), until=fx.pole_stretch(2.0), progress=False)
+    path.to_vtx(tmp_path / "line.bp")
+    step = steps_of(tmp_path / "line.bp")[0]
+    assert step["thickness_ratio"].min() == pytest.approx(2.0 ** -2, rel=1e-9) and "cauchy_rr" not in step
+
+
+VTX = """
+import sys
+sys.path.insert(0, "tests")
+import formingx as fx
+from conftest import treloar
+path = fx.trace(treloar((10, 2)), until=fx.pole_stretch(2.5), through=[fx.pole_stretch(1.5)], progress=False)
+path.to_vtx(sys.argv[1], "all")
+try:
+    path.to_vtx("/proc/run.bp")
+except OSError as error:
+    print("could not" in str(error), flush=True)
+"""
+
+
+def test_on_two_ranks(inflated, tmp_path):
+    assert run("-c", VTX, tmp_path / "two.bp", ranks=2).count("True") == 2
+    inflated.to_vtx(tmp_path / "one.bp", "all")
+    one, two = steps_of(tmp_path / "one.bp")[-1], steps_of(tmp_path / "two.bp")[-1]
+    assert sorted(one) == sorted(two)
+    for name in ("displacement", "stretches", "cauchy_rr", "thickness"):
+        assert np.abs(one[name]).sum() == pytest.approx(np.abs(two[name]).sum(), rel=1e-8)
+
+
+def test_animation(formed, tmp_path):
+    from PIL import Image
+    formed.animate(tmp_path / "run.gif", frames=7, seconds=2.0)
+    with Image.open(tmp_path / "run.gif") as film:
+        assert film.n_frames == 7 and film.size == (1000, 420)
+        times, pictures = [], []
+        for k in range(7):
+            film.seek(k)
+            times.append(film.info["duration"])
+            pictures.append(np.asarray(film.convert("RGB"), dtype=float))
+    assert times == [280] * 6 + [1280]                     # hundredths of a second
+    assert all(np.abs(a - b).mean() > 0.1 for a, b in zip(pictures, pictures[1:]))
+    for given, message in (({"frames": 0}, "frames = 0"), ({"seconds": -1}, "seconds = -1")):
+        with pytest.raises(fx.InputError, match=message):
+            formed.animate(tmp_path / "run.gif", **given)
+    with pytest.raises(fx.InputError, match="must end in .gif"):
+        formed.animate(tmp_path / "run.mp4")
+
+
+class Links(HTMLParser):
+    """What a page would load or link to, and its text."""
+
+    def __init__(self):
+        super().__init__()
+        self.links, self.words, self.open = [], [], []
+
+    def handle_starttag(self, tag, attributes):
+        self.links += [value for name, value in attributes if name in ("src", "href", "data", "action")]
+        if tag not in ("meta", "img", "br"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+
+def page(file):
+    text = file.read_text(encoding="utf-8")
+    found = Links()
+    found.feed(text)
+    assert not found.open and "://" not in text and "@import" not in text and "url(" not in text
+    assert found.links and all(link.startswith("data:image/png;base64,") for link in found.links)
+    for link in found.links:
+        assert base64.b64decode(link.partition(",")[2]).startswith(b"\x89PNG")
+    return " ".join(found.words)
+
+
+def test_report_is_one_file(inflated, tmp_path):
+    inflated.report(tmp_path / "run.html", title="A <test>")
+    assert [f.name for f in tmp_path.iterdir()] == ["run.html"]
+    text = page(tmp_path / "run.html")
+    for words in ("A <test>", "NeoHookean(c10=2.0)", "SimplySupported('rim')", "Pressure('bottom') (driven)",
+                  "limit point 1", f"{inflated.limit_points[0].measures['pressure']:.6g}", "dolfinx", "No warnings"):
+        assert words in text
+
+
+def test_report_of_a_run_that_failed(tmp_path):
+    with pytest.raises(fx.ConvergenceError) as caught:
+        fx.trace(treloar(), until=fx.pole_stretch(8.0), max_steps=4, progress=False)
+    caught.value.path.report(tmp_path / "failed.html", failure=caught.value)
+    text = page(tmp_path / "failed.html")
+    assert "The run could not go on" in text and "4 states were accepted" in text
+    assert "The path ended early: it aimed at pole stretch 8" in text
+
+
+def test_warnings(formed):
+    record = report.of_path(formed)
+    assert record.warnings() == []
+    record.measures |= {"penetration": np.array([0.1]), "mass_error": np.array([-0.02])}
+    assert [w[:24] for w in record.warnings()] == ["The body penetrates a to", "The mass changes by up t"]
+
+
+def test_command_line(inflated, tmp_path, capsys):
+    folder = tmp_path / "run"
+    inflated.save(folder)
+    assert main(["open", str(folder)]) == 0
+    text = capsys.readouterr().out
+    assert "NeoHookean(c10=2.0)" in text and text.count("limit point") == 1
+    assert f"{inflated.last.measures['pressure']:.8g}" in text
+    assert main(["report", str(folder), "--title", "From a checkpoint"]) == 0
+    assert "From a checkpoint" in page(folder / "report.html") and "SimplySupported" in page(folder / "report.html")
+    assert main(["report", str(folder), "--out", "/proc/report.html"]) == 2
+    assert main(["open", str(tmp_path / "nothing")]) == 2
+    error = capsys.readouterr().err
+    assert "'/proc/report.html' could not be written" in error and "is not there" in error and "Trace" not in error
+
+
+@pytest.mark.parametrize("name, states, message", [
+    ("run.vtu", None, "must end in .bp"), ("run.bp", "some", "states = 'some'"), ("run.bp", [], "one or more states"),
+    ("run.bp", [3], "must be one or more states")])
+def test_vtx_bad_input(inflated, tmp_path, name, states, message):
+    with pytest.raises(fx.InputError, match=message):
+        inflated.to_vtx(tmp_path / name, states)
+
+
+@pytest.mark.parametrize("write", ["to_vtx", "to_xdmf", "to_csv", "animate", "report"])
+def test_unwritable(inflated, write):
+    suffix = {"to_vtx": "bp", "to_xdmf": "xdmf", "to_csv": "csv", "animate": "gif", "report": "html"}[write]
+    with pytest.raises(OSError, match=f"'/proc/run.{suffix}' could not be written"):
+        getattr(inflated, write)(f"/proc/run.{suffix}")
