@@ -24,4 +24,5 @@ from .scene import Scene
 from .solve.bordered import Tolerances
 from .solve.continuation import trace
 from .solve.newton import solve
+from .solve.process import Process, Stage
 from .solve.stepping import StepControl

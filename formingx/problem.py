@@ -6,6 +6,7 @@ each `MeanHeld` support.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,7 @@ class Problem:
         comm: communicator.
         x: a vector of unknowns to duplicate.
         matrix: the tangent, refilled by `tangent`.
-        contacts: the nodal forces of the scene's contacts (`NodalContact`).
+        contacts: the nodal forces of the scene's contacts (`NodalContact`) that are active.
         force_scale: norm of all support forces at the state whose residual was last computed.
     """
 
@@ -43,13 +44,15 @@ class Problem:
         self.comm = self.forms.comm
         forms = self.forms
         index_map = forms.space.dofmap.index_map
+        self._amplitudes = list(dict.fromkeys(forms.amplitudes.values()))
         self._n = index_map.size_local
         self._buffer = la.vector(index_map, 1)
         tangent = ufl.derivative(forms.residual, forms.w, ufl.TrialFunction(forms.space))
         self._residual = forms.compile(forms.residual)
         self._by_control = [forms.compile(f) for f in (forms.control_derivative,) if f is not None]
-        self.contacts = [NodalContact(forms, contact, self.assemble) for contact in scene.contacts]
+        self._contacts = [NodalContact(forms, contact, self.assemble) for contact in scene.contacts]
         self._hold(tangent)
+        self.drive(scene.driven, 0.0)
         self._matrix = ExtendedMatrix(forms.compile(tangent), index_map, self._bcs, self._rows, self.comm,
                                       self.symmetric)
         self.matrix = self._matrix.mat
@@ -68,6 +71,35 @@ class Problem:
         return all(getattr(x, "symmetric", False) for x in (*self.scene.loads, *self.scene.contacts))
 
     @property
+    def contacts(self) -> list[NodalContact]:
+        """The contacts that are active."""
+        return [contact for contact in self._contacts if contact.active]
+
+    @property
+    def setting(self) -> tuple:
+        """What a control means: what is driven, where everything else stands, which contacts are active."""
+        return (self.forms.driven, tuple(a.line for a in self._amplitudes),
+                tuple(contact.active for contact in self._contacts))
+
+    @setting.setter
+    def setting(self, setting: tuple) -> None:
+        self.forms.driven, lines, active = setting
+        for amplitude, line in zip(self._amplitudes, lines, strict=True):
+            amplitude.line = line
+        for contact, on in zip(self._contacts, active, strict=True):
+            contact.active = on
+        if self._lift is not None:
+            self._lift.x.array[self._lifted] = sum(a.rate * moved for a, moved in self._all_moves)
+
+    def drive(self, thing: Any, control: float, without: Sequence[Any] = ()) -> float:
+        """From a control on, `thing` is driven, all else stays where it is; returns the control that says the same."""
+        driven = self.forms.amplitudes.get(thing)
+        now = 0.0 if driven is None else driven.at(control)
+        self.setting = (thing, tuple((0.0, 1.0) if a is driven else (a.at(control), 0.0) for a in self._amplitudes),
+                        tuple(contact.contact not in without for contact in self._contacts))
+        return now
+
+    @property
     def has_kinks(self) -> bool:
         """True if F has kinks, where the tangent ahead of a state differs from that behind it (`tangent`)."""
         return bool(self.contacts)
@@ -80,11 +112,11 @@ class Problem:
     @property
     def memory(self) -> list[Any]:
         """What F depends on besides x and control: of every contact with friction, its last accepted state."""
-        return [contact.memory for contact in self.contacts if contact.memory is not None]
+        return [contact.memory for contact in self._contacts if contact.memory is not None]
 
     @memory.setter
     def memory(self, memory: list[Any]) -> None:
-        for contact, touch in zip([c for c in self.contacts if c.memory is not None], memory, strict=True):
+        for contact, touch in zip([c for c in self._contacts if c.memory is not None], memory, strict=True):
             contact.memory = touch
 
     @property
@@ -103,7 +135,7 @@ class Problem:
         self.force_scale = np.sqrt(self._dot(values, values))
         for multiplier, row in zip(multipliers, self._rows, strict=True):
             values += multiplier * row
-        values[self._held] = fields[self._held] - self._motion * control
+        values[self._held] = fields[self._held] - self._held_at(control)
         self.fill(out, values, [self._dot(row, fields) for row in self._rows])
 
     def begin(self) -> None:
@@ -135,12 +167,12 @@ class Problem:
         values = sum((self.assemble(form) for form in self._by_control), np.zeros(self._n))
         for contact in self.contacts:
             contact.add_control_derivative(values, x.array_r[: self._n], control)
-        values[self._held] = -self._motion
+        values[self._held] = -sum((a.rate * moved for a, moved in self._moves), np.zeros(len(self._held)))
         self.fill(out, values)
 
     def advance(self, x: np.ndarray, control: float) -> None:
         """A state is accepted: what has a history takes it up. x: own part, shape (n,)."""
-        for contact in self.contacts:
+        for contact in self._contacts:
             contact.advance(x[: self._n], control)
 
     def remember(self, state: Any) -> None:
@@ -167,7 +199,7 @@ class Problem:
     def motion(self, control: float) -> np.ndarray:
         """The held unknowns at their values for a control, all else 0, shape (owned part of x,)."""
         values = np.zeros(self.x.getLocalSize())
-        values[self._held] = self._motion * control
+        values[self._held] = self._held_at(control)
         return values
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
@@ -218,9 +250,10 @@ class Problem:
         self.x.destroy()
 
     def _hold(self, tangent: Any) -> None:
-        """Collect what is held: `_held` (owned dofs), `_motion` (their value per control), `_bcs`, `_rows`."""
+        """Collect what is held: `_held` (owned dofs), `_moves` ((amplitude, their value per it)), `_bcs`, `_rows`."""
         forms, zero = self.forms, PETSc.ScalarType(0)
-        self._bcs, dofs, motion, means = [], [np.zeros(0, dtype=np.int32)], [np.zeros(0)], []
+        self._bcs, dofs, owners, means = [], [np.zeros(0, dtype=np.int32)], [np.zeros(0, dtype=int)], []
+        movers = [x for x in forms.amplitudes if hasattr(x, "constraints")]
         for support in self.scene.supports:
             for item in forms.constraints(support):
                 if not isinstance(item, Held):
@@ -230,24 +263,28 @@ class Problem:
                 found = self._dofs_of(support, sub, item)
                 self._bcs.append(fem.dirichletbc(zero, found, sub))
                 dofs.append(found)
-                motion.append(np.full(len(found), forms.control_scale / forms.length * item.driven))
+                owner = movers.index(support) if item.driven else len(movers)
+                owners.append(np.full(len(found), owner))
         for sub, found in forms.idle_unknowns():
             self._bcs.append(fem.dirichletbc(zero, found, sub))
             dofs.append(found)
-            motion.append(np.zeros(len(found)))
-        numbers, motions = np.concatenate(dofs), np.concatenate(motion)
-        order = np.argsort(-np.abs(motions), kind="stable")     # where two supports meet, the driven one counts
+            owners.append(np.full(len(found), len(movers)))
+        numbers, owner = np.concatenate(dofs), np.concatenate(owners)
+        order = np.argsort(owner, kind="stable")                # where two supports meet, the driven one counts
         held, first = np.unique(numbers[order], return_index=True)
-        moved = motions[order][first]
-        own = held < self._n
-        self._held, self._motion = held[own], moved[own]
+        own, amplitudes = held < self._n, [forms.amplitudes[mover] for mover in movers]
+        self._all_moves = [(a, a.scale / forms.length * (owner[order][first] == i)) for i, a in enumerate(amplitudes)]
+        self._held, self._moves = held[own], [(a, moved[own]) for a, moved in self._all_moves]
         self._rows = [self.assemble(form) for form in means]
         for row in self._rows:
             row[self._held] = 0
-        if getattr(self.scene.driven, "constraints", None) is not None:
-            lift = fem.Function(forms.space)                     # held unknowns move the others through the tangent
-            lift.x.array[held] = moved
-            self._by_control.append(forms.compile(ufl.action(tangent, lift)))
+        self._lift, self._lifted = fem.Function(forms.space) if movers else None, held
+        if movers:                                               # held unknowns move the others through the tangent
+            self._by_control.append(forms.compile(ufl.action(tangent, self._lift)))
+
+    def _held_at(self, control: float) -> np.ndarray:
+        """Values of the owned held unknowns."""
+        return sum((a.at(control) * moved for a, moved in self._moves), np.zeros(len(self._held)))
 
     def _dofs_of(self, support: Any, sub: Any, item: Held) -> np.ndarray:
         if item.on is not None:

@@ -24,16 +24,17 @@ class Scene:
         mesh: from `formingx.mesh`.
         materials: {layer name: material}, or one material for all layers.
         supports: see `formingx.physics.supports`.
-        loads: see `formingx.physics.loads`. At most one load, support or tool is driven (controlled by the run).
-            (Contacts of one tool with several faces, of the same `moves`, count as one.)
+        loads: see `formingx.physics.loads`. One load, support or tool is driven (controlled by the run), or
+            several in the stages of a `Process`. (Contacts of one tool with several faces, of the same `moves` and
+            `name`, count as one.)
         contacts: faces of the body that rigid tools stop, see `formingx.Contact`.
         model: how the scene is modelled: `MixedPressure()` (default) or `DisplacementPenalty()`, a solid; `Membrane()`.
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
         quadrature_degree: of the energy; 5 (seven points) is the thesis' rule.
 
     Raises:
-        InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, more
-            than one driven object.
+        InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, two
+            driven things of one name.
     """
 
     def __init__(self, *, mesh: Mesh, materials: Material | Mapping[str, Material], supports: Sequence[Any],
@@ -71,11 +72,23 @@ class Scene:
         for contact in self.contacts:
             self._check_contact(contact)
         driven = [x for x in (*self.loads, *self.supports, *self.contacts) if getattr(x, "driven", False)]
-        together = len({getattr(x, "moves", None) for x in driven}) == 1 and getattr(driven[0], "moves", None)
-        if len(driven) > 1 and not together:                     # one tool that meets several faces moves as one
-            raise InputError(f"Scene: {', '.join(map(repr, driven))} are all driven: one control drives a run;"
-                             f" give the others a value")
-        self.driven = driven[0] if driven else None
+        leaders: dict = {}                                       # one tool that meets several faces moves as one
+        self.drivable = {x: leaders.setdefault((x.moves, x.name) if hasattr(x, "moves") else x, x) for x in driven}
+        names = [(thing.label, hasattr(thing, "virtual_work")) for thing in leaders.values()]
+        twice = next((name for name, _ in names if names.count((name, _)) > 1), None)
+        if twice is not None:
+            raise InputError(f"Scene: {', '.join(map(repr, driven))}: two of them are called {twice!r}: give each its"
+                             f" own name, as Displaced('rim', name='grip')")
+        self.driven = driven[0] if len(leaders) == 1 else None
+
+    def check_one_driven(self, name: str) -> None:
+        """Raise an `InputError` of the function `name` unless just one thing is driven."""
+        if not self.drivable:
+            raise InputError(f"{name}: nothing is driven: give one load no value, as Pressure('bottom'), or"
+                             " add a Displaced support")
+        if self.driven is None:
+            raise InputError(f"{name}: {', '.join(map(repr, self.drivable))} are all driven: one control drives a run;"
+                             f" give the others a value, or run a Process in stages")
 
     def _check_materials(self) -> None:
         layers = self.mesh.layers
@@ -112,7 +125,7 @@ class Scene:
         if depth[worst] > contact.tool.signed_distance(face).max() + near:
             raise InputError(f"{contact!r}: the tool is behind this face of the body: another face is closer to it;"
                              f" boundaries are {list(mesh.boundaries)}")
-        if any(load.driven and load.on == contact.on for load in self.loads):
+        if not contact.driven and any(load.driven and load.on == contact.on for load in self.loads):
             raise InputError(f"{contact!r}: the driven pressure acts on the same face and pushes it away from the tool:"
                              f" no tool faces the pressure")
 

@@ -19,6 +19,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from . import _compat
+from .amplitude import Amplitude
 from .physics import kinematics as kin
 
 
@@ -35,6 +36,7 @@ class Formulation(ABC):
         F, J: deformation gradient (UFL, shape (3, 3)) and its determinant.
         dx, weight: weight * dx is the element of reference volume.
         control: the `Constant` of the dimensionless control; control_scale times it is the user's.
+        amplitudes: {thing that can be driven: its `Amplitude`}.
         residual: dPi/dw - external virtual work (UFL, rank 1); control_derivative: its derivative by the control,
             or None.
         energy: strain energy over stress times volume (UFL, rank 0).
@@ -62,7 +64,9 @@ class Formulation(ABC):
         self.weight = self._weight()
         self.volume = self.integral(self.weight * self.dx)
         self._scale = self.constant(1 / (self.stress * self.volume))
-        self.control_scale = self._scale_of_control()
+        leaders = {leader: Amplitude(self._scale_of(leader), self.constant) for leader in scene.drivable.values()}
+        self.amplitudes = {thing: leaders[leader] for thing, leader in scene.drivable.items()}
+        self.driven = scene.driven
         self.F = self._deformation_gradient()
         self.J = kin.volume_ratio(self.F)
         self.energy = self._energy()
@@ -139,12 +143,14 @@ class Formulation(ABC):
         dx = ufl.dx(self.domain, metadata={"quadrature_degree": 4})
         return (v[0] + v[1]) * self.weight / self.constant(self.volume) * dx
 
-    def _scale_of_control(self) -> float:
+    @property
+    def control_scale(self) -> float:
+        """The user's value of what is driven, over the control."""
+        return self.length if self.driven is None else self.amplitudes[self.driven].scale
+
+    def _scale_of(self, thing: Any) -> float:
         """Pressure: stress times thickness over length, thickness being volume over loaded area. Motion: length."""
-        driven = self.scene.driven
-        if driven is None or not hasattr(driven, "virtual_work"):
-            return self.length
-        return self.stress * self.thickness(driven.on) / self.length
+        return self.stress * self.thickness(thing.on) / self.length if hasattr(thing, "virtual_work") else self.length
 
     def thickness(self, boundary: str) -> float:
         """Volume of the body over the area of a boundary, length."""
@@ -156,12 +162,13 @@ class Formulation(ABC):
         du = self.constant(self.length) * ufl.split(v)[0]
         control, driven = ufl.variable(self.control), None
         for load in self.scene.loads:
-            value = self.constant(self.control_scale) * control if load.driven else self.constant(load.value)
+            value = self.amplitudes[load].form(control) if load.driven else self.constant(load.value)
             N, ds = self.face(load.on, load.quadrature_degree)
             work = load.virtual_work(self.scene.kinematics, self.u, du, self.X, N, value)
             residual -= self._scale * work * ds
             if load.driven:
-                driven = -self._scale * ufl.diff(work, control) * ds
+                by_control = -self._scale * ufl.diff(work, control) * ds
+                driven = by_control if driven is None else driven + by_control
         return residual, driven
 
 

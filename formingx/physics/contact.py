@@ -44,14 +44,16 @@ class Contact:
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge).
             What sticks depends on when it touched: with more, thickness changes by some 0.1 % of itself.
         moves: (r, z) of the tool's motion per unit of travel: the tool is what the run controls; None: it stays.
+        name: of its column, <name>_travel, where several things are driven; default: the boundary's.
 
     Raises:
         InputError: an argument that is not allowed.
     """
 
     def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float = 2e4,
-                 ramp: float = 1e-5, nodes_per_step: int = 1, moves: tuple[float, float] | None = None):
-        name = f"Contact({on!r})"
+                 ramp: float = 1e-5, nodes_per_step: int = 1, moves: tuple[float, float] | None = None,
+                 name: str | None = None):
+        self.name, name = name, f"Contact({on!r})"
         if not isinstance(tool, Tool):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
         words = {"none": 0.0, "stick": math.inf}
@@ -69,6 +71,11 @@ class Contact:
     def driven(self) -> bool:
         """True if the run controls the motion of the tool."""
         return self.moves is not None
+
+    @property
+    def label(self) -> str:
+        """Its name, or that of its boundary."""
+        return self.name or self.on
 
     @property
     def symmetric(self) -> bool:

@@ -16,18 +16,24 @@ class Pressure:
     Args:
         on: name of the boundary. A positive pressure pushes into the body.
         value: a fixed pressure (stress); None: the pressure is what the run controls.
+        name: of its column, <name>_pressure, where several things are driven; default: the boundary's.
     """
 
     quadrature_degree = 5
 
-    def __init__(self, on: str, value: float | None = None):
-        self.on = on
+    def __init__(self, on: str, value: float | None = None, name: str | None = None):
+        self.on, self.name = on, name
         self.value = None if value is None else finite(f"Pressure({on!r}): value", value)
 
     @property
     def driven(self) -> bool:
         """True if the run controls this load."""
         return self.value is None
+
+    @property
+    def label(self) -> str:
+        """Its name, or that of its boundary."""
+        return self.name or self.on
 
     def virtual_work(self, kinematics, u, du, X, N, pressure):
         """Integrand on the reference boundary: u, du displacement and test function, N the outward normal."""

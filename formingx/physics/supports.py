@@ -113,17 +113,24 @@ class Displaced(_On):
     Args:
         on: name of the boundary.
         component: "r" or "z".
+        name: of its column, <name>_travel, where several things are driven; default: the boundary's.
     """
 
     driven = True
 
-    def __init__(self, on: str, component: str = "z"):
+    def __init__(self, on: str, component: str = "z", name: str | None = None):
         super().__init__(on)
+        self.name = name
         self.component = _component(f"Displaced({on!r}): component", component)
 
     def constraints(self):
         """What is held: a list of Held or MeanHeld."""
         return [Held(self.component, on=self.on, driven=True)]
+
+    @property
+    def label(self) -> str:
+        """Its name, or that of its boundary."""
+        return self.name or self.on
 
 
 def _component(name: str, value: str) -> int:

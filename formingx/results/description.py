@@ -40,7 +40,7 @@ def summary(scene: Any) -> dict[str, str]:
         for k, thing in enumerate(getattr(scene, kind), 1):
             numbers = "".join(f", {name.replace('_', ' ')} {value!r}" for name, value in vars(thing).items()
                               if isinstance(value, int | float) and repr(value) not in text(thing))
-            lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if thing is scene.driven else "")
+            lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if thing in scene.drivable else "")
     return lines | {"model": text(scene.model), "kinematics": text(scene.kinematics),
                     "quadrature degree": str(scene.quadrature_degree)}
 

@@ -15,9 +15,11 @@ import numpy as np
 
 
 def write_path(path: Any, file: Any) -> None:
-    """One row per state: kind, iterations, then every measure of the path."""
-    rows = [[s.kind, max(len(s.history) - 1, 0), *(s.measures[c] for c in path.columns)] for s in path.states]
-    write_rows(file, ["kind", "iterations", *path.columns], rows, path.problem.comm)
+    """One row per state: stage (of a process), kind, iterations, then every measure of the path."""
+    staged = any(s.stage for s in path.states)
+    rows = [[*[s.stage] * staged, s.kind, max(len(s.history) - 1, 0), *(s.measures[c] for c in path.columns)]
+            for s in path.states]
+    write_rows(file, [*["stage"] * staged, "kind", "iterations", *path.columns], rows, path.problem.comm)
 
 
 def write_profile(profile: Any, file: Any, comm: Any) -> None:

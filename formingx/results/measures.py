@@ -24,16 +24,20 @@ class Bound:
 
 
 class _Control(Bound):
-    def __init__(self, problem):
-        self.scale = problem.forms.control_scale
+    def __init__(self, problem, thing):
+        self.scale, self._amplitude = problem.forms.control_scale, problem.forms.amplitudes.get(thing)
+        if self._amplitude is not None:
+            self.scale = self._amplitude.scale
 
     def value(self, x, control):
-        return self.scale * control
+        return self.scale * (control if self._amplitude is None else self._amplitude.at(control))
 
     def equation(self, target):
         def c(x, control, gradient):
             gradient.set(0)
-            return control - target / self.scale, 1.0
+            if self._amplitude is None:
+                return control - target / self.scale, 1.0
+            return self._amplitude.at(control) - target / self.scale, self._amplitude.rate
         return c
 
 
@@ -143,7 +147,7 @@ def displacement(value: float, *, at: tuple[float, float], component: str = "z")
 
 def bind_control(problem: Any) -> Bound:
     """See `pressure` and `travel`."""
-    return _Control(problem)
+    return _Control(problem, problem.forms.driven)
 
 
 def bind_pole_height(problem: Any) -> Bound:
@@ -161,13 +165,23 @@ def bind_pole_stretch(problem: Any) -> Bound:
 
 def bind_volume(problem: Any) -> Bound:
     """See `enclosed_volume`: minus the integral of (z - z_lowest) n_z da over the driven face."""
-    driven, kinematics, forms = problem.scene.driven, problem.scene.kinematics, problem.forms
+    driven, kinematics, forms = _driven_pressure(problem.scene), problem.scene.kinematics, problem.forms
     z0 = forms.constant(problem.scene.mesh.nodes_of(driven.on)[:, 1].min())
     N, face = forms.face(driven.on, 5)
     area = kinematics.area_vector(forms.u, forms.X, N)
     scale = forms.length**kinematics.dimension_of_volume
     height = forms.X[1] + forms.u[1] - z0
     return _Form(problem, -height * area[1] / forms.constant(scale) * face, scale)
+
+
+def kind_of(thing: Any) -> str:
+    """"pressure" or "travel": which of both a thing that can be driven has."""
+    return "pressure" if hasattr(thing, "virtual_work") else "travel"
+
+
+def _driven_pressure(scene):
+    """The first driven pressure, or None."""
+    return next((x for x in scene.drivable if kind_of(x) == "pressure"), None)
 
 
 def _displacement(problem, points, factors):
@@ -199,24 +213,26 @@ class _Nodal(Bound):
     """A number of every contact, put together by `over`; recorded only."""
 
     def __init__(self, problem, of, over):
-        self._contacts, self._of, self._over = problem.contacts, of, over
+        self._problem, self._of, self._over = problem, of, over
 
     def value(self, x, control):
-        return float(self._over([self._of(contact, x.array_r, control) for contact in self._contacts]))
+        return float(self._over([0.0, *(self._of(contact, x.array_r, control) for contact in self._problem.contacts)]))
 
 
 def standard(problem: Any) -> dict[str, Bound]:
     """The measures that every run records, by column name.
 
-    pressure (or travel: a length), pole_height (length), pole_stretch, enclosed_volume (length^3), strain_energy
-    (stress length^3), mass_error (volume over its original value, minus 1), volume_error (root mean square of
-    J - 1). Pole and volume are there where the scene has an axis and a driven pressure. With contacts: contact_length
-    (reference length in touch), penetration (of the deepest node, length), tool_force (along Z, of the body on all
-    tools).
+    pressure (or travel: a length; <name>_pressure, <name>_travel where several are driven), pole_height (length),
+    pole_stretch, enclosed_volume (length^3), strain_energy (stress length^3), mass_error (volume over its original
+    value, minus 1), volume_error (root mean square of J - 1). Pole and volume are there where the scene has an axis
+    and a driven pressure. With contacts: contact_length (reference length in touch), penetration (of the deepest node,
+    length), tool_force (along Z, of the body on all tools).
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
-    pressure_driven = hasattr(scene.driven, "virtual_work")
+    pressure_driven, leaders = _driven_pressure(scene) is not None, dict.fromkeys(scene.drivable.values())
     found: dict[str, Bound] = {"pressure" if pressure_driven else "travel": bind_control(problem)}
+    if len(leaders) > 1:
+        found = {f"{x.label}_{kind_of(x)}": _Control(problem, x) for x in leaders}
     if "axis" in scene.mesh.boundaries:
         found["pole_height"] = bind_pole_height(problem)
         found["pole_stretch"] = bind_pole_stretch(problem)
@@ -227,7 +243,7 @@ def standard(problem: Any) -> dict[str, Bound]:
     found["mass_error"] = _Scalar(problem, change * forms.weight * forms.dx, lambda v: v / volume)
     found["volume_error"] = _Scalar(problem, change**2 * forms.weight * forms.dx,
                                     lambda v: (v / volume) ** 0.5)
-    if problem.contacts:
+    if scene.contacts:
         found["contact_length"] = _Nodal(problem, lambda c, *at: c.contact_length(*at), sum)
         found["penetration"] = _Nodal(problem, lambda c, *at: c.largest_penetration(*at), max)
         found["tool_force"] = _Nodal(problem, lambda c, *at: c.force(*at)[1], sum)

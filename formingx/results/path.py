@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,6 +29,7 @@ class State:
         kind: "start", "step", "target" or "limit point".
         met: the target that it hits, or None.
         memory: what the problem remembers from here on (friction).
+        stage: name of the stage of a `Process`; setting: what the control means in it (`Problem.setting`).
         stepping: what a run goes on with: its next step, its counts and its target; empty inside a step.
     """
 
@@ -39,6 +42,8 @@ class State:
     kind: str = "step"
     met: Target | None = None
     memory: list = field(default_factory=list)
+    stage: str = ""
+    setting: tuple = ()
     stepping: dict = field(default_factory=dict)
 
 
@@ -99,14 +104,15 @@ class Path:
     def record(self, state: State) -> None:
         """Take up a state: what has a history goes on from it; evaluate the measures there."""
         self.problem.advance(state.x, state.control)
-        state.memory = self.problem.memory
+        state.memory, state.setting = self.problem.memory, self.problem.setting
         state.measures = {name: self.value(bound, state) for name, bound in self._recorded.items()}
         self.states.append(state)
         self.counts.steps += state.kind != "start"
 
     def value(self, bound: Any, state: State) -> float:
         """A measure bound to this problem (`Target.bind`) at a state."""
-        return self._branch.value(bound, state.x, state.control)
+        with self._set_as(state):
+            return self._branch.value(bound, state.x, state.control)
 
     def at(self, target: Target, after: State | None = None) -> State:
         """The first state of the path that meets the target: solved for, not interpolated; the path stays as it is.
@@ -122,12 +128,14 @@ class Path:
         states = self.states[next((i for i, s in enumerate(self.states) if s is after), 0):]
         values = [self.value(bound, state) - target.value for state in states]
         for a, b, left, right in zip(values, values[1:], states, states[1:]):
-            if b == 0 or a * b < 0:
+            if b == 0 or a * b < 0 and right.kind != "start":
                 now, self.problem.memory = self.problem.memory, left.memory
                 try:
-                    found = self._branch.between(left, right, bound, target.value)
+                    with self._set_as(right):
+                        found = self._branch.between(left, right, bound, target.value)
                 finally:
                     self.problem.memory = now
+                found.stage, found.setting = right.stage, right.setting
                 found.measures = {name: self.value(m, found) for name, m in self._recorded.items()}
                 return found
         raise InputError(f"the path does not pass {target}: its values lie between"
@@ -152,9 +160,10 @@ class Path:
         """
         rows = [[self.states[0].measures[c] for c in columns]]
         for a, b in zip(self.states, self.states[1:]):
-            for k in range(1, points):
+            for k in range(1, points if b.kind != "start" else 1):
                 at = self._branch.interpolate(a, b, k / points)
-                rows.append([self._branch.value(self._recorded[c], *at) for c in columns])
+                with self._set_as(b):
+                    rows.append([self._branch.value(self._recorded[c], *at) for c in columns])
             rows.append([b.measures[c] for c in columns])
         return list(np.array(rows).T)
 
@@ -166,10 +175,21 @@ class Path:
         """Stresses and stretches at a state (default: the last), layer by layer."""
         return self._stresses.of(state or self.last)
 
+    @contextmanager
+    def _set_as(self, state: State) -> Iterator[None]:
+        """The control means for a while what it means in the stage of a state."""
+        now = self.problem.setting
+        self.problem.setting = state.setting or now
+        try:
+            yield
+        finally:
+            self.problem.setting = now
+
     def describe(self, state: State) -> str:
         """A state's main numbers in one line."""
         return ", ".join(f"{k.replace('_', ' ')} {state.measures[k]:.6g}"
-                         for k in ("pressure", "travel", "pole_height", "pole_stretch") if k in state.measures)
+                         for k in state.measures
+                         if k.endswith(("pressure", "travel")) or k in ("pole_height", "pole_stretch"))
 
     def to_csv(self, file: Any) -> None:
         """Write one row per state: kind, iterations and every measure (rank 0 writes)."""
@@ -184,6 +204,8 @@ class Path:
             OSError: it cannot be written.
         """
         from ..checkpoint import Checkpoint
+        if any(state.stage for state in self.states):
+            raise InputError("Path: save: the states of a process in stages cannot be saved yet")
         Checkpoint(folder, self.problem).write(self)
 
     def to_vtx(self, folder: Any, states: Any = None) -> None:

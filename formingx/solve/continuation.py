@@ -63,34 +63,56 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
     instance("trace: step", step, StepControl | None, "a StepControl or None")
     instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     max_steps = count("trace: max_steps", max_steps)
-    if scene.driven is None:
-        raise InputError("trace: nothing is driven: give one load no value, as Pressure('bottom'), or"
-                         " add a Displaced support")
+    scene.check_one_driven("trace")
     if start is not None and (not isinstance(start, Path) or start.problem.scene is not scene or not start.states):
         raise InputError("trace: start: must be a path of this very scene: fx.load(folder, scene), or what trace gave"
                          " back")
     problem = Problem(scene) if start is None else start.problem
-    run = _Run(problem, until, through, step, tolerances or Tolerances(), start, checkpoint)
+    run = Run(problem, tolerances or Tolerances(), start, checkpoint)
+    run.aim(until, through, step)
     return run.trace(max_steps, progress)
 
 
-class _Run:
-    """One run: the path that grows, and the targets still open."""
+class Run:
+    """One run: the path that grows, and the targets still open. First `aim`, then `trace`; again for a next stage."""
 
-    def __init__(self, problem: Problem, until: measures.Target, through: Sequence[measures.Target],
-                 step: StepControl | None, tolerances: Tolerances, start: Path | None, checkpoint: Any):
-        self.until, self._best, self._began = until, 0.0, time.perf_counter()
-        targets = [(target, target.bind(problem)) for target in (*through, until)]
-        self._aim = targets[-1][1]                          # the measure of `until`
+    def __init__(self, problem: Problem, tolerances: Tolerances, start: Path | None = None, checkpoint: Any = None):
+        self._began, self._first, self._stage = time.perf_counter(), 0, ""
         self.branch = Branch(problem, tolerances)
         path = self.path = Path(problem, self.branch)
         if start is not None:
             path.states, path.counts = list(start.states), replace(start.counts)
             self.branch.iterations = path.counts.iterations
-        self.open = [(target, bound) for target, bound in targets if path.met(target) is None]
+        self.checkpoint = Checkpoint(checkpoint, problem) if checkpoint is not None else None
+
+    def aim(self, until: measures.Target, through: Sequence[measures.Target], step: StepControl | None) -> None:
+        """Set the targets of the run, or of its next stage, and its first step."""
+        path, self.until, self._best = self.path, until, 0.0
+        targets = [(target, target.bind(path.problem)) for target in (*through, until)]
+        self._aim = targets[-1][1]                          # the measure of `until`
+        met = path.met if not self._stage else lambda target: None
+        self.open = [(target, bound) for target, bound in targets if met(target) is None]
         before: dict = next((s.stepping["step"] for s in reversed(path.states) if s.stepping), {})
         self.step = replace(step or StepControl(**before))
-        self.checkpoint = Checkpoint(checkpoint, problem) if checkpoint is not None else None
+
+    def stage(self, name: str, thing: Any, without: Sequence[Any], until: measures.Target,
+              through: Sequence[measures.Target], step: StepControl) -> None:
+        """Drive `thing` from the last state on, and aim at targets."""
+        path, problem, self._stage = self.path, self.path.problem, name
+        active = problem.setting[2]
+        control = problem.drive(thing, path.last.control if path.states else 0.0, without)
+        self.aim(until, through, step)
+        self._first = len(path.states)
+        if not path.states:
+            return
+        try:
+            start = self.branch.restart(path.last, control, problem.setting[2] != active)
+        except Failure as failure:
+            self._first -= 1
+            self._give_up(f"stage {name!r} found no equilibrium to start from: {failure.reason}", failure.attempt)
+        if abs(self.branch.value(self._aim, start.x, control) - until.value) <= 1e-12 * abs(until.value):
+            start.met = until
+        self._record(self._facing_target(start))
 
     def trace(self, max_steps: int, progress: bool) -> Path:
         path, before = self.path, self.path.counts.steps
@@ -98,7 +120,7 @@ class _Run:
         try:
             if path.states:
                 path.problem.remember(path.last)
-                self._best = max(map(self._gained, path.states))
+                self._best = max(map(self._gained, path.states[self._first:])) if self._is_open(self.until) else 0.0
             else:
                 self._record(self._facing_target(self.branch.start()))
             self._settle()
@@ -189,7 +211,7 @@ class _Run:
 
     def _gained(self, state: State) -> float:
         """How far a state has come, from the first state (0) to the target (1)."""
-        start = self.path.value(self._aim, self.path.states[0])
+        start = self.path.value(self._aim, self.path.states[self._first])
         return (self.path.value(self._aim, state) - start) / (self.until.value - start)
 
     def _within_reach(self, old: State, length: float) -> tuple:
@@ -231,7 +253,7 @@ class _Run:
 
     def _record(self, state: State) -> None:
         """Take up a state and close the target that it meets."""
-        path = self.path
+        path, state.stage = self.path, self._stage
         path.record(state)
         if path.problem.has_kinks:
             self.branch.look_ahead(state)
@@ -245,7 +267,7 @@ class _Run:
     def _pace(self, max_steps: int) -> str:
         """How far a run had come when its steps ran out."""
         path, aim = self.path, self.until.value
-        start, before, now = (path.value(self._aim, s) for s in (path.states[0], path.states[-2], path.last))
+        start, before, now = (path.value(self._aim, s) for s in (path.states[self._first], path.states[-2], path.last))
         part = (now - start) / ((aim - start) or 1.0)
         if not (aim - now) * (now - before) > 0:
             return f"max_steps = {max_steps} ran out, and the last step led away from the target"
@@ -254,19 +276,21 @@ class _Run:
                 f" {int(np.ceil((aim - now) / (now - before)))} steps more at that pace")
 
     def _give_up(self, why: str, attempt: Any = None, pace: str = "") -> None:
-        found = diagnose(self.branch, self.path.states, why, attempt, pace,
+        found = diagnose(self.branch, self.path.states[self._first:], why, attempt, pace,
                          self.until.value if self.until.bind is measures.bind_control else None)
         raise self._error(f"{why}.", found)
 
     def _error(self, why: str, diagnosis: Any) -> ConvergenceError:
         """What happened, what was met, what to try."""
         path = self.path
-        values = [path.value(self._aim, s) for s in path.states]
+        states = path.states[self._first:]
+        values = [path.value(self._aim, s) for s in states]
         best = int(np.argmin([abs(v - self.until.value) for v in values]))
         limits = "".join(f" A limit point was passed at {path.describe(s)}." for s in path.limit_points)
         return ConvergenceError(
-            f"{self.until} was not reached: {why} The nearest met was {values[best]:.6g}, at"
-            f" {path.describe(path.states[best])}.{limits} The last good state is {path.describe(path.last)};"
+            f"{f'Stage {self._stage!r}: ' * bool(self._stage)}{self.until}"
+            f" was not reached: {why} The nearest met was {values[best]:.6g}, at"
+            f" {path.describe(states[best])}.{limits} The last good state is {path.describe(path.last)};"
             f" it is kept in the error's `path`.{'' if diagnosis.advice else _TRY}", path, diagnosis)
 
 

@@ -42,8 +42,8 @@ def diagnose(branch: Any, states: list, reason: str, attempt: Attempt | None = N
     last = states[-1] if states else None
     facts: dict[str, Any] = {"reason": reason, "step": len(states) if states else 0,
                              "control": scale * last.control if last else 0.0,
-                             "what": "travel" if hasattr(problem.scene.driven, "constraints")
-                             or hasattr(problem.scene.driven, "moves") else "pressure"}
+                             "what": "travel" if hasattr(problem.forms.driven, "constraints")
+                             or hasattr(problem.forms.driven, "moves") else "pressure"}
     marks: list = []
     shape = None
     if last:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..errors import ConvergenceError, InputError, count, finite, instance
+from ..errors import ConvergenceError, count, finite, instance
 from ..problem import Problem
 from ..results.path import Path
 from ..scene import Scene
@@ -95,9 +95,7 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     """
     instance("solve: scene", scene, Scene, "a formingx.Scene")
     instance("solve: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
-    if scene.driven is None:
-        raise InputError("solve: nothing is driven: give one load no value, as Pressure('bottom'), or"
-                         " add a Displaced support")
+    scene.check_one_driven("solve")
     to, increments = finite("solve: to", to), count("solve: increments", increments)
     problem, began = Problem(scene), time.perf_counter()
     tolerances = tolerances or Tolerances()
