@@ -88,8 +88,8 @@ def _run(scene: Any, until: Any = None) -> None:
     fx.trace(scene, until=until or fx.pole_height(0.1), progress=False)
 
 
-def calls() -> list[Call]:
-    """Every public callable that takes what a user types."""
+def calls(made: fx.Scene, saved: str) -> list[Call]:
+    """Every public callable that takes what a user types; `saved`: a checkpoint of the scene `made`."""
     positive, number, word = ("positive", 1.0), ("number", 0.1), ("word", "bottom")
     materials = [Call(m.__name__, m, {k: (kind, v) for k, (kind, v) in args.items()}, lambda m: _scene(materials=m))
                  for m, args in ((fx.NeoHookean, {"c10": positive}), (fx.MooneyRivlin,
@@ -159,7 +159,8 @@ def calls() -> list[Call]:
         Call("trace", fx.trace, {
             "scene": ("thing", _scene()), "until": ("thing", fx.pole_height(0.1)), "through": ("several", ()),
             "step": ("optional thing", None), "tolerances": ("optional thing", None), "max_steps": ("count", 200),
-            "progress": ("flag", False)}),
+            "progress": ("flag", False), "start": ("optional thing", None), "checkpoint": ("folder", None)}),
+        Call("load", fx.load, {"folder": ("file", saved), "scene": ("thing", made), "state": ("state", None)}),
         Call("solve", fx.solve, {"scene": ("thing", _scene()), "to": number, "increments": ("count", 1),
                                  "tolerances": ("optional thing", None)}),
         Call("doctor", fx.doctor, {"scene": ("thing", _scene()), "targets": ("several", ())}),
@@ -169,6 +170,8 @@ def calls() -> list[Call]:
 BAD["pair or None"] = {k: v for k, v in BAD["pair"].items() if k != "None"}
 BAD["friction"] = {"unknown": "slippery", "nan": math.nan, "negative": -0.1, "a bool": True, "a list": [], "None": None}
 BAD["file"] = {"None": None, "a number": 3.5, "not there": "/nowhere/at all.msh", "a folder": "/", "empty": ""}
+BAD["folder"] = {"a number": 3.5, "nan": math.nan, "a list": [], "empty": "", "a bool": True, "not empty": "/"}
+BAD["state"] = {"a word": "x", "negative": -1, "a fraction": 0.5, "nan": math.nan, "too large": 1000, "a list": []}
 BAD["terms"] = {k: v for k, v in BAD["several"].items() if k not in ("a number", "a wrong entry")}
 BAD["step"] = {k: v for k, v in BAD["positive"].items() if k != "inf"}
 _LEFT_OUT = {"comm"}
@@ -176,11 +179,14 @@ _LEFT_OUT = {"comm"}
 
 def bad_input() -> list[Outcome]:
     """Every argument of every call wrong in turn, one left out, one unknown."""
+    made, folder = _scene(), tempfile.TemporaryDirectory()
+    saved = os.path.join(folder.name, "run")
+    fx.trace(made, until=fx.pole_height(0.05), progress=False).save(saved)
     start = branch.Branch.start
     branch.Branch.start = _stop                              # whatever gets that far was taken for good input
     found = []
     try:
-        for call in calls():
+        for call in calls(made, saved):
             parameters = inspect.signature(call.make).parameters
             left = set(parameters) - set(call.arguments) - _LEFT_OUT
             assert not left, f"{call.name}: no bad values are known for {left}"
@@ -197,6 +203,7 @@ def bad_input() -> list[Outcome]:
                                                                                  TypeError)))
     finally:
         branch.Branch.start = start
+        folder.cleanup()
     return found
 
 
@@ -255,6 +262,10 @@ def files() -> dict[str, str]:
     path = fx.trace(_scene(), until=fx.pole_height(0.05), progress=False)
     writers: dict[str, Callable] = {
         "path.to_csv": path.to_csv,
+        "path.save": path.save, "path.report": path.report,
+        "path.animate": lambda file: path.animate(file.with_suffix(".gif"), frames=3),
+        "path.to_vtx": lambda file: path.to_vtx(file.with_suffix(".bp"), "all"),
+        "path.to_xdmf": lambda file: path.to_xdmf(file.with_suffix(".xdmf"), "all"),
         "write_summary": lambda file: fx.results.files.write_summary(file, {"a": "x" * 200_000}, path.problem.comm)}
     found = {}
     for name, write in writers.items():
@@ -281,7 +292,7 @@ def _write(write: Callable, place: FilePath, _: Any) -> str:
             return "the earlier file was lost"
         if left:
             return f"{left[0]} was left behind"
-        return "right" if "old.csv" in str(error) or str(place) in str(error) else f"the file is not named: {error}"
+        return "right" if "old." in str(error) or str(place) in str(error) else f"the file is not named: {error}"
     except Exception as error:  # noqa: BLE001
         return f"{type(error).__name__}: {error}"
     return "no error"

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, count, positive
+from ..errors import InputError, count, place, positive
 from . import files, plots
 
 
@@ -19,7 +17,7 @@ class _Frame(NamedTuple):
 
 def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
     """See `Path.animate`."""
-    file = FilePath(os.fspath(file))
+    file = place("animate: file", file)
     if file.suffix.lower() != ".gif":
         raise InputError(f"animate: file {str(file)!r}: its name must end in .gif")
     frames, seconds = count("animate: frames", frames), positive("animate: seconds", seconds)
