@@ -1,13 +1,12 @@
 """How reliable the package is, in figures: bad input, ranks, and files that cannot be written.
 
-    python3 benchmarks/reliability.py [bad] [ranks] [files]
-
-Not counted yet: runs that are killed and restarted.
+    python3 benchmarks/reliability.py [bad] [ranks] [restarts] [files]
 
 bad: every public argument wrong in turn; counts how many gave an InputError (or a TypeError, for an unknown or a
 missing argument) before any solve. ranks: a free and a formed sheet on 1, 2, 3, 4 ranks; the largest relative
-difference of any measure of any state. files: a full disk, a folder that cannot be written: a clear error, and the
-earlier file is still there.
+difference of any measure of any state. restarts: a run killed (kill -9) at random moments, and gone on with from its
+checkpoint: how often it came to the same path. files: a full disk, a folder that cannot be written: a clear error, and
+the earlier file is still there.
 """
 
 from __future__ import annotations
@@ -22,6 +21,8 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
+
+import numpy as np
 
 import formingx as fx
 from formingx.solve import branch
@@ -257,6 +258,25 @@ def ranks(counts: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, float]:
     return worst
 
 
+def restarts(kills: int = 50) -> tuple[int, float]:
+    """(of so many runs killed at random moments, how many went on to the same path; largest relative difference)."""
+    sys.path.insert(0, str(FilePath(__file__).parents[1] / "tests"))
+    from test_restart import SCENES, killed_after, numbers
+    make, until = SCENES["stick"]
+    scene = make()
+    whole, same, worst = fx.trace(scene, until=until, progress=False), 0, 0.0
+    for seconds in np.random.default_rng(0).uniform(0, 1.2 * whole.counts.seconds, kills):
+        with tempfile.TemporaryDirectory() as folder:
+            run = FilePath(folder) / "run"
+            killed_after(seconds, run)
+            path = fx.trace(scene, until=until, start=fx.load(run, scene), progress=False)
+        a, b = numbers(whole), numbers(path)
+        if a.shape == b.shape:
+            same += 1
+            worst = max(worst, float((np.abs(a - b).max(0) / np.abs(a).max(0)).max()))
+    return same, worst
+
+
 def files() -> dict[str, str]:
     """{what was tried: "right" or what went wrong}: an error that names the file, and the earlier file stays."""
     path = fx.trace(_scene(), until=fx.pole_height(0.05), progress=False)
@@ -336,6 +356,9 @@ def main(what: list[str]) -> None:
     if not what or "ranks" in what:
         for name, worst in ranks().items():
             print(f"ranks 1, 2, 3, 4: {name} sheet: largest difference of a measure {worst:.1e}")
+    if not what or "restarts" in what:
+        same, worst = restarts()
+        print(f"50 runs killed at random moments: {same} went on to the same path; largest difference {worst:.1e}")
     if not what or "files" in what:
         for name, outcome in files().items():
             print(f"{name}: {outcome}")

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, count, place, positive
 from . import files, plots
-
-
-class _Frame(NamedTuple):
-    x: np.ndarray
-    control: float
 
 
 def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
@@ -26,7 +22,8 @@ def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
     x, y = plots.main_columns(path.columns)
     shapes, tools, now = [], [], []
     for a, b, fraction in _spread(path, frames):
-        at = _Frame(*path.between(a, b, fraction))
+        x_there, control = path.between(a, b, fraction)
+        at = replace(b, x=x_there, control=control)
         shapes.append(path.profile(at))
         now.append(path.measured(at, x, y))
         tools.append([_tool(path.problem, contact, at.control) for contact in path.problem.contacts])
