@@ -4,7 +4,7 @@ Neo-Hookean, I1 constant 0.10 MPa; R0 = 1.32 cm, H = 1.25 cm, pressed to h = 0.3
 """
 
 import numpy as np
-from common import parser, say, save, summarise
+from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, RADIUS, block, force, press
 
 import formingx as fx
@@ -27,7 +27,8 @@ def exact_stress(h):
 def main():
     args = parser("compression_homogeneous", __doc__.splitlines()[0]).parse_args()
     elements = (2, 2)                                        # eight triangles, as the thesis
-    path, end = press(block(fx.NeoHookean(c10=I1_CONSTANT), "none", elements), [HALF_HEIGHT - PRESSED])
+    scene = block(fx.NeoHookean(c10=I1_CONSTANT), "none", elements, penalty=2e7, ramp=1e-8)      # to see 1e-4 of (7.7)
+    path, end = press(scene, [HALF_HEIGHT - PRESSED])
     state = path.last
     stress = path.stress().at_quadrature_points().second_piola[:, 1, 1]
     profile = path.profile()

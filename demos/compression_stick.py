@@ -1,11 +1,11 @@
 """A block between plates with stick and friction, against Lindley and Tanner (Song 1993, section 7.3.2, fig. 7.3).
 
-I1 constant 1.0 MPa, I2 constant 0.1 MPa (chapter 7 reads C01 as the I1 constant), and the other reading. Total deflection
-is 2 (H - h). Stuck, with roll-over the side may lie down on the plates.
+I1 constant 1.0 MPa, I2 constant 0.1 MPa (chapter 7 reads C01 as the I1 constant), and the other reading. Total
+deflection is 2 (H - h). Stuck, with roll-over the side may lie down on the plates.
 """
 
 import numpy as np
-from common import parser, say, save, summarise
+from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, RADIUS, block, draw_grids, forces, press
 
 import formingx as fx
@@ -31,7 +31,7 @@ def tanner(deflection, c=1.1):
 
 def main():
     options = parser("compression_stick", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=16, help="elements along the radius, and along the half height")
+    options.add_argument("--elements", type=int, default=16, help="along the radius, and along the half height")
     args = options.parse_args()
     n = 6 if args.quick else args.elements
     travels = [d / 2 for d in DEFLECTIONS]
@@ -68,7 +68,7 @@ def main():
 
 
 def beyond(n, out) -> dict:
-    """Stuck, to a total deflection of 1.3 cm as the thesis, with roll-over and without, on its 64 triangles and on ours."""
+    """Stuck, to a total deflection of 1.3 cm as the thesis, with roll-over and without, on 64 triangles and on ours."""
     found = {}
     for elements in dict.fromkeys([(8, 4), (n, n)]):
         for roll_over in (True, False):

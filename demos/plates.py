@@ -1,6 +1,6 @@
 """What the demos of compression share: a block between two plates, its force, its material lines.
 
-Thesis chapter 7: radius R0 = 1.32 cm, half height H = 1.25 cm; a quarter of the section is meshed, Z = 0 being the middle.
+Thesis chapter 7: radius R0 = 1.32 cm, half height H = 1.25 cm; a quarter of the section is meshed, the middle at Z = 0.
 Forces are of the whole block on one plate. Chapter 7 reads C01 as the I1 constant: c10 = C01 and c01 = C10 here.
 """
 
@@ -15,8 +15,9 @@ RADIUS, HALF_HEIGHT = 1.32, 1.25                             # cm
 NEWTON = 100.0                                               # N in one MPa cm2
 
 
-def block(materials, friction, elements, *, roll_over=False, layers=HALF_HEIGHT, radius=RADIUS, kinematics=None, **options):
-    """A block under a plate that moves down. friction: "stick", "none" or mu; roll_over: the side may touch the plate."""
+def block(materials, friction, elements, *, roll_over=False, layers=HALF_HEIGHT, radius=RADIUS, kinematics=None,
+          **options):
+    """A block under a plate that moves down. friction: "stick", "none", mu; roll_over: the side may touch the plate."""
     mesh = fx.mesh.disc(radius=radius, thickness=layers, elements=elements)
     height = sum(layers.values()) if isinstance(layers, dict) else layers
     faces = ("top", "rim") if roll_over else ("top",)
@@ -29,8 +30,9 @@ def block(materials, friction, elements, *, roll_over=False, layers=HALF_HEIGHT,
 def press(scene, travels, **options):
     """(path, how it ended): to the last travel of the plate, through the others, or as far as the elements hold."""
     targets = [fx.travel(t) for t in travels]
+    options["step"] = fx.StepControl(target=8)
     try:
-        return fx.trace(scene, until=targets[-1], through=targets[:-1], step=fx.StepControl(target=8), **options), "done"
+        return fx.trace(scene, until=targets[-1], through=targets[:-1], **options), "done"
     except fx.ConvergenceError as error:
         return error.path, str(error)
 
@@ -67,9 +69,14 @@ def draw_lines(path, state, axes, elements, height=HALF_HEIGHT, radius=RADIUS, *
 
 
 def draw_grids(path, states, labels, elements, file, **size) -> None:
-    """Deformed grids side by side."""
-    figure, axes = plots.figure(len(states), width=3.2, height=3.0)
-    for a, state, label in zip(np.atleast_1d(axes), states, labels, strict=True):
+    """Deformed grids below one another, all on one scale."""
+    moved = [where(path, s, [(RADIUS, 0.0), (RADIUS, HALF_HEIGHT), (0.0, HALF_HEIGHT)]) for s in states]
+    wide, heights = max(m[:, 0].max() for m in moved) * 1.05, [m[:, 1].max() * 1.15 for m in moved]
+    figure, _ = plots.figure(1, width=5.2, height=5.2 / wide * sum(heights) + 0.45 * len(states))
+    figure.clear()
+    axes = figure.subplots(len(states), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+    for a, state, label, high in zip(axes, states, labels, heights, strict=True):
         draw_lines(path, state, a, elements, color="tab:blue", linewidth=0.7, **size)
-        a.set(title=label, xlabel="r, cm", ylabel="z, cm")
+        a.set(title=label, ylabel="z, cm", xlim=(0, wide), ylim=(0, high))
+    axes[-1].set_xlabel("r, cm")
     save(figure, file)

@@ -116,6 +116,21 @@ class Scene:
             raise InputError(f"{contact!r}: the driven pressure acts on the same face and pushes it away from the tool:"
                              f" no tool faces the pressure")
 
+    def check_travel(self, travel: float) -> None:
+        """An InputError if the driven tool's travel (length) would put a held boundary as a whole inside the tool."""
+        if not isinstance(self.driven, Contact) or self.driven.moves is None:
+            return
+        moves = np.array(self.driven.moves)
+        for support in self.supports:
+            for held in support.constraints():
+                if not isinstance(held, Held) or held.on is None or moves[held.component] == 0:
+                    continue
+                depth = self.driven.tool.signed_distance(self.mesh.nodes_of(held.on) - travel * moves)
+                if depth.min() >= 0:
+                    raise InputError(f"travel = {travel:g}: {self.driven!r} would go through the whole height of the"
+                                     f" body to {held.on!r}, which is held: the travel must be less than"
+                                     f" {travel - depth.max() / np.hypot(*moves):.6g}")
+
     def _check_axis(self) -> None:
         if not isinstance(self.kinematics, Axisymmetric):
             return

@@ -87,3 +87,29 @@ def test_male_mould_quick(tmp_path):
     assert found["vacuum_coulomb_0.3"]["pole_thickness_ratio_at_psi"]["60"] == pytest.approx(0.793, rel=2e-2)
     assert stick["min_thickness_ratio_at_psi"]["60"] == pytest.approx(0.480, rel=3e-2)
     assert (tmp_path / "vacuum_stick.png").stat().st_size > 10_000
+
+
+def test_compression_homogeneous(tmp_path):
+    found = summary("compression_homogeneous", tmp_path)
+    assert found["force_N"] == pytest.approx(1553.5, rel=1e-4) and found["volume_error"] < 1e-9
+    assert found["outer_radius_cm"] == pytest.approx(2.5737, rel=1e-4) and found["stress_error"] < 1e-4
+
+
+def test_compression_stick_quick(tmp_path):
+    found = summary("compression_stick", tmp_path, "--quick")
+    keys = {"stick", "mu_0.05", "mu_0.1", "mu_0.2", "mu_0.3", "frictionless"}
+    for group in (found, found["other_reading"]):
+        assert set(group["force_N_at_total_deflection_cm"]) == keys
+        assert all(set(v) == {"0.1", "0.2", "0.3", "0.4"} for v in group["force_N_at_total_deflection_cm"].values())
+    assert all(1.05 < v < 1.15 for v in found["stick_over_lindley"].values())
+
+
+def test_compression_roll_over_quick(tmp_path):
+    found = summary("compression_roll_over", tmp_path, "--quick")["8x4"]
+    assert found["ended"] == "done" and set(found["force_N_at_ratio"]) == {"1.19", "1.47", "1.87", "2.5", "3.4", "5.23"}
+    assert found["mid_radius_cm_at_ratio"]["1.87"] == pytest.approx(1.871, rel=5e-3)
+
+
+def test_compression_sandwich_quick(tmp_path):
+    found = summary("compression_sandwich", tmp_path, "--quick")
+    assert found["waist"] and found["sandwich"]["ended"] == "done"

@@ -58,6 +58,8 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
     through = several("trace: through", through, "targets, such as pole_stretch(3)")
     for target in (until, *through):
         instance("trace: target", target, measures.Target, "a target, such as pole_stretch(3)")
+        if target.name == "travel":
+            scene.check_travel(target.value)
     instance("trace: step", step, StepControl | None, "a StepControl or None")
     instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     max_steps = count("trace: max_steps", max_steps)

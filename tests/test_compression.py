@@ -1,0 +1,84 @@
+"""Blocks between plates: exact solutions, force balance, convergence, bad input."""
+
+import sys
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from test_contact import support_force
+
+import formingx as fx
+
+sys.path.insert(0, str(ROOT / "demos"))
+from plates import HALF_HEIGHT, RADIUS, block, force, press  # noqa: E402
+
+STIFF = {"penalty": 2e7, "ramp": 1e-8}
+
+
+def test_homogeneous_compression():
+    """Eqs. (7.6), (7.7), table 7.1; contact force equals the reaction of the symmetry plane."""
+    h, c = 0.3288, 0.1
+    path, _ = press(block(fx.NeoHookean(c10=c), "none", (2, 2), **STIFF), [HALF_HEIGHT - h], progress=False)
+    l2 = HALF_HEIGHT / h
+    exact = 100 * 2 * np.pi * RADIUS**2 * (l2**2 - 1 / l2) * c
+    assert exact == pytest.approx(1553.5, abs=0.1) and force(path.last) == pytest.approx(exact, rel=1e-4)
+    stress = path.stress().at_quadrature_points().second_piola[:, 1, 1]
+    np.testing.assert_allclose(stress, -2 * (l2**3 - 1) * c, rtol=1e-4)
+    assert abs(path.last.measures["mass_error"]) < 1e-9
+    reaction = support_force(path.problem, path.last, 1)
+    assert path.last.measures["tool_force"] == pytest.approx(reaction, rel=1e-6)
+
+
+def test_a_long_strip():
+    """Plane strain, free of friction: sigma_zz = mu (l^2 - 1/l^2) on a width R0 / l."""
+    l, c = 0.5, 0.2                                          # noqa: E741
+    scene = block(fx.NeoHookean(c10=c), "none", (2, 2), kinematics=fx.PlaneStrain(), **STIFF)
+    path, _ = press(scene, [HALF_HEIGHT * (1 - l)], progress=False)
+    assert path.last.measures["tool_force"] == pytest.approx(2 * c * (1 / l**2 - l**2) * RADIUS / l, rel=2e-4)
+
+
+@pytest.mark.parametrize("friction", ["stick", 0.2])
+def test_contact_force_is_the_reaction(friction):
+    path, _ = press(block(fx.MooneyRivlin(c10=1.0, c01=0.1), friction, (6, 6)), [0.2], progress=False)
+    assert path.last.measures["tool_force"] == pytest.approx(support_force(path.problem, path.last, 1), rel=1e-6)
+
+
+def test_friction_stiffens():
+    found = [force(press(block(fx.MooneyRivlin(c10=1.0, c01=0.1), mu, (6, 6)), [0.2], progress=False)[0].last)
+             for mu in ("none", 0.05, 0.1, 0.2, 0.3, "stick")]
+    assert found == sorted(found) and found[-1] > 1.1 * found[0]
+
+
+def test_mesh_refinement_softens_the_stuck_block():
+    """Its edge is singular: the force falls with the mesh, the slower the finer."""
+    found = [force(press(block(fx.MooneyRivlin(c10=1.0, c01=0.1), "stick", (n, n)), [0.2], progress=False)[0].last)
+             for n in (4, 8, 16)]
+    assert found[0] > found[1] > found[2] and found[1] - found[2] < 0.7 * (found[0] - found[1])
+    assert found[1] == pytest.approx(found[2], rel=5e-3)
+
+
+def test_equal_layers_are_one_block():
+    soft, same, stiff = (fx.MooneyRivlin(c10=c, c01=0.1 * c) for c in (1.0, 1.0, 10.0))
+    layers = {"strip": HALF_HEIGHT / 2, "block": HALF_HEIGHT / 2}
+    scenes = [block({"strip": s, "block": soft}, "stick", (6, 3), layers=layers) for s in (soft, same, stiff)]
+    one, two, sandwich = (force(press(scene, [0.2], progress=False)[0].last) for scene in scenes)
+    assert two == pytest.approx(one, rel=1e-8) and sandwich > 1.2 * one
+
+
+def test_the_side_rolls_onto_the_plate():
+    """The fold carries load: stiffer than a side that passes through the plate."""
+    material = fx.MooneyRivlin(c10=1.0, c01=0.1)
+    rolled, free = (press(block(material, "stick", (8, 4), roll_over=r), [0.58], progress=False)[0]
+                    for r in (True, False))
+    assert rolled.last.measures["contact_length"] > 1.02 * RADIUS
+    assert force(rolled.last) > force(free.last)
+
+
+@pytest.mark.parametrize("change, message", [
+    (lambda: fx.trace(block(fx.NeoHookean(c10=1.0), "none", (2, 2)), until=fx.travel(1.3)), "height"),
+    (lambda: block(fx.NeoHookean(c10=1.0), "none", (2, 2), layers={"strip": 0.5, "block": -0.1}), "greater than 0"),
+    (lambda: fx.travel(float("nan")), "finite"),
+])
+def test_bad_input(change, message):
+    with pytest.raises(fx.InputError, match=message):
+        change()
