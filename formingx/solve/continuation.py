@@ -117,6 +117,8 @@ class Run:
     def trace(self, max_steps: int, progress: bool) -> Path:
         path, before = self.path, self.path.counts.steps
         bar = _progress_bar(path.problem.comm, self.until, progress)
+        if self.checkpoint is not None:
+            self.checkpoint.begin(path)
         try:
             if path.states:
                 path.problem.remember(path.last)
