@@ -51,6 +51,8 @@ class Problem:
         self._residual = forms.compile(forms.residual)
         self._by_control = [forms.compile(f) for f in (forms.control_derivative,) if f is not None]
         self._contacts = [NodalContact(forms, contact, self.assemble) for contact in scene.contacts]
+        folded = ufl.conditional(ufl.gt(forms.J, forms.constant(0.0)), forms.constant(0.0), forms.constant(1.0))
+        self._folded = forms.compile(folded * forms.dx)
         self._hold(tangent)
         self.drive(scene.driven, 0.0)
         self._matrix = ExtendedMatrix(forms.compile(tangent), index_map, self._bcs, self._rows, self.comm,
@@ -137,6 +139,11 @@ class Problem:
             values += multiplier * row
         values[self._held] = fields[self._held] - self._held_at(control)
         self.fill(out, values, [self._dot(row, fields) for row in self._rows])
+
+    def folded(self, x: PETSc.Vec, control: float) -> bool:
+        """True if an element is turned inside out: J is not positive at some quadrature point."""
+        self.set_state(x, control)
+        return self.assemble_scalar(self._folded) > 0
 
     def begin(self) -> None:
         """Newton's method begins."""
