@@ -1,13 +1,12 @@
 """How reliable the package is, in figures: bad input, ranks, and files that cannot be written.
 
-    python3 benchmarks/reliability.py [bad] [ranks] [files]
-
-Not counted yet: runs that are killed and restarted.
+    python3 benchmarks/reliability.py [bad] [ranks] [restarts] [files]
 
 bad: every public argument wrong in turn; counts how many gave an InputError (or a TypeError, for an unknown or a
 missing argument) before any solve. ranks: a free and a formed sheet on 1, 2, 3, 4 ranks; the largest relative
-difference of any measure of any state. files: a full disk, a folder that cannot be written: a clear error, and the
-earlier file is still there.
+difference of any measure of any state. restarts: a run killed (kill -9) at random moments, and gone on with from its
+checkpoint: how often it came to the same path. files: a full disk, a folder that cannot be written: a clear error, and
+the earlier file is still there.
 """
 
 from __future__ import annotations
@@ -22,6 +21,8 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
+
+import numpy as np
 
 import formingx as fx
 from formingx.solve import branch
@@ -88,8 +89,8 @@ def _run(scene: Any, until: Any = None) -> None:
     fx.trace(scene, until=until or fx.pole_height(0.1), progress=False)
 
 
-def calls() -> list[Call]:
-    """Every public callable that takes what a user types."""
+def calls(made: fx.Scene, saved: str) -> list[Call]:
+    """Every public callable that takes what a user types; `saved`: a checkpoint of the scene `made`."""
     positive, number, word = ("positive", 1.0), ("number", 0.1), ("word", "bottom")
     materials = [Call(m.__name__, m, {k: (kind, v) for k, (kind, v) in args.items()}, lambda m: _scene(materials=m))
                  for m, args in ((fx.NeoHookean, {"c10": positive}), (fx.MooneyRivlin,
@@ -159,7 +160,8 @@ def calls() -> list[Call]:
         Call("trace", fx.trace, {
             "scene": ("thing", _scene()), "until": ("thing", fx.pole_height(0.1)), "through": ("several", ()),
             "step": ("optional thing", None), "tolerances": ("optional thing", None), "max_steps": ("count", 200),
-            "progress": ("flag", False)}),
+            "progress": ("flag", False), "start": ("optional thing", None), "checkpoint": ("folder", None)}),
+        Call("load", fx.load, {"folder": ("file", saved), "scene": ("thing", made), "state": ("state", None)}),
         Call("solve", fx.solve, {"scene": ("thing", _scene()), "to": number, "increments": ("count", 1),
                                  "tolerances": ("optional thing", None)}),
         Call("doctor", fx.doctor, {"scene": ("thing", _scene()), "targets": ("several", ())}),
@@ -169,6 +171,8 @@ def calls() -> list[Call]:
 BAD["pair or None"] = {k: v for k, v in BAD["pair"].items() if k != "None"}
 BAD["friction"] = {"unknown": "slippery", "nan": math.nan, "negative": -0.1, "a bool": True, "a list": [], "None": None}
 BAD["file"] = {"None": None, "a number": 3.5, "not there": "/nowhere/at all.msh", "a folder": "/", "empty": ""}
+BAD["folder"] = {"a number": 3.5, "nan": math.nan, "a list": [], "empty": "", "a bool": True, "not empty": "/"}
+BAD["state"] = {"a word": "x", "negative": -1, "a fraction": 0.5, "nan": math.nan, "too large": 1000, "a list": []}
 BAD["terms"] = {k: v for k, v in BAD["several"].items() if k not in ("a number", "a wrong entry")}
 BAD["step"] = {k: v for k, v in BAD["positive"].items() if k != "inf"}
 _LEFT_OUT = {"comm"}
@@ -176,11 +180,14 @@ _LEFT_OUT = {"comm"}
 
 def bad_input() -> list[Outcome]:
     """Every argument of every call wrong in turn, one left out, one unknown."""
+    made, folder = _scene(), tempfile.TemporaryDirectory()
+    saved = os.path.join(folder.name, "run")
+    fx.trace(made, until=fx.pole_height(0.05), progress=False).save(saved)
     start = branch.Branch.start
     branch.Branch.start = _stop                              # whatever gets that far was taken for good input
     found = []
     try:
-        for call in calls():
+        for call in calls(made, saved):
             parameters = inspect.signature(call.make).parameters
             left = set(parameters) - set(call.arguments) - _LEFT_OUT
             assert not left, f"{call.name}: no bad values are known for {left}"
@@ -197,6 +204,7 @@ def bad_input() -> list[Outcome]:
                                                                                  TypeError)))
     finally:
         branch.Branch.start = start
+        folder.cleanup()
     return found
 
 
@@ -250,11 +258,34 @@ def ranks(counts: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, float]:
     return worst
 
 
+def restarts(kills: int = 50) -> tuple[int, float]:
+    """(of so many runs killed at random moments, how many went on to the same path; largest relative difference)."""
+    sys.path.insert(0, str(FilePath(__file__).parents[1] / "tests"))
+    from test_restart import SCENES, killed_after, numbers
+    make, until = SCENES["stick"]
+    scene = make()
+    whole, same, worst = fx.trace(scene, until=until, progress=False), 0, 0.0
+    for seconds in np.random.default_rng(0).uniform(0, 1.2 * whole.counts.seconds, kills):
+        with tempfile.TemporaryDirectory() as folder:
+            run = FilePath(folder) / "run"
+            killed_after(seconds, run)
+            path = fx.trace(scene, until=until, start=fx.load(run, scene), progress=False)
+        a, b = numbers(whole), numbers(path)
+        if a.shape == b.shape:
+            same += 1
+            worst = max(worst, float((np.abs(a - b).max(0) / np.abs(a).max(0)).max()))
+    return same, worst
+
+
 def files() -> dict[str, str]:
     """{what was tried: "right" or what went wrong}: an error that names the file, and the earlier file stays."""
     path = fx.trace(_scene(), until=fx.pole_height(0.05), progress=False)
     writers: dict[str, Callable] = {
         "path.to_csv": path.to_csv,
+        "path.save": path.save, "path.report": path.report,
+        "path.animate": lambda file: path.animate(file.with_suffix(".gif"), frames=3),
+        "path.to_vtx": lambda file: path.to_vtx(file.with_suffix(".bp"), "all"),
+        "path.to_xdmf": lambda file: path.to_xdmf(file.with_suffix(".xdmf"), "all"),
         "write_summary": lambda file: fx.results.files.write_summary(file, {"a": "x" * 200_000}, path.problem.comm)}
     found = {}
     for name, write in writers.items():
@@ -281,7 +312,7 @@ def _write(write: Callable, place: FilePath, _: Any) -> str:
             return "the earlier file was lost"
         if left:
             return f"{left[0]} was left behind"
-        return "right" if "old.csv" in str(error) or str(place) in str(error) else f"the file is not named: {error}"
+        return "right" if "old." in str(error) or str(place) in str(error) else f"the file is not named: {error}"
     except Exception as error:  # noqa: BLE001
         return f"{type(error).__name__}: {error}"
     return "no error"
@@ -325,6 +356,9 @@ def main(what: list[str]) -> None:
     if not what or "ranks" in what:
         for name, worst in ranks().items():
             print(f"ranks 1, 2, 3, 4: {name} sheet: largest difference of a measure {worst:.1e}")
+    if not what or "restarts" in what:
+        same, worst = restarts()
+        print(f"50 runs killed at random moments: {same} went on to the same path; largest difference {worst:.1e}")
     if not what or "files" in what:
         for name, outcome in files().items():
             print(f"{name}: {outcome}")

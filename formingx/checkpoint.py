@@ -11,7 +11,6 @@ remembers, by the nodes' reference positions.
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import shutil
@@ -25,7 +24,7 @@ import numpy as np
 from dolfinx import fem
 
 from . import _compat
-from .errors import InputError
+from .errors import InputError, instance, place
 from .problem import Problem
 from .results import files
 from .results.description import describe, differences, summary
@@ -48,9 +47,14 @@ class Checkpoint:
     """
 
     def __init__(self, folder: Any, problem: Any):
-        self.folder, self._problem = FilePath(os.fspath(folder)), problem
+        self.folder, self._problem = place("checkpoint", folder), problem
         self._w = fem.Function(problem.forms.space)
         self._there: int | None = None                      # states in the folder
+
+    def begin(self, path: Path) -> None:
+        """Make the folder, or check that what is in it is the beginning of this path; collective; raises as `write`."""
+        if self._there is None:
+            self._there = self._begin(path)
 
     def write(self, path: Path) -> None:
         """Write the states of a path that are not in the folder yet; collective.
@@ -59,14 +63,13 @@ class Checkpoint:
             InputError: the folder holds another run.
             OSError: it cannot be written, or the disk is full; all states before are kept.
         """
-        if self._there is None:
-            self._there = self._begin(path)
-        for number in range(self._there, len(path)):
+        self.begin(path)
+        for number in range(self._there or 0, len(path)):
             self._write_state(number, path.states[number], _profile(path, path.states[number]))
             self._there = number + 1
 
     def _begin(self, path: Path) -> int:
-        """Make the folder, or check that what is in it is the beginning of this path; the number of states there."""
+        """See `begin`; the number of states there."""
         problem, folder = self._problem, self.folder
         scene = describe(problem)
         about = {"formingx": FORMAT, "versions": files.versions(), "scene": scene, "summary": summary(problem.scene)}
@@ -81,21 +84,21 @@ class Checkpoint:
             _check_scene(folder, _read_json(folder / "scene.json"), scene)
             there = _states(folder)
             held = [_read_json(state / "state.json") for state in there]
-            while len(held) > len(path) and not held[-1]["stepping"]:
-                held.pop()                                  # of a step that was not finished
-                shutil.rmtree(there.pop())
-            same = len(held) <= len(path) and all((h["control"], h["slope"]) == (s.control, s.slope)
-                                                  for h, s in zip(held, path.states))
-            if not same:
+            settled = max((k + 1 for k, data in enumerate(held) if data["stepping"]), default=len(held))
+            whole = held[:max(settled, len(path))]          # what is beyond is of a step that was not finished
+            if len(whole) > len(path) or any((h["control"], h["slope"]) != (s.control, s.slope)
+                                             for h, s in zip(whole, path.states)):
                 raise InputError(f"checkpoint {str(folder)!r} holds {len(held)} states of another run: go on from it"
                                  f" with start=fx.load({str(folder)!r}, scene), give another folder, or remove it")
-            return len(held)
+            for left in there[len(whole):]:
+                shutil.rmtree(left)
+            return len(whole)
         return files.on_root(problem.comm, lambda: _plainly(begin, folder, "cannot be begun"))
 
     def _write_state(self, number: int, state: State, profile: Any) -> None:
         problem, comm = self._problem, self._problem.comm
-        place = self.folder / _name(number)
-        part = place.with_name(place.name + ".part")
+        final = self.folder / _name(number)
+        part = final.with_name(final.name + ".part")
         n = problem.forms.space.dofmap.index_map.size_local
         data = _plain_state(state) | {"memory": _gather_memory(problem, state), "profile": profile}
         for name in _FIELDS:
@@ -106,7 +109,7 @@ class Checkpoint:
         def prepare():
             shutil.rmtree(part, ignore_errors=True)
             part.mkdir()
-            _reserve(part / "reserved", self._size(len(json.dumps(data))))
+            files.reserve(part / "reserved", self._size(len(json.dumps(data))))
         files.on_root(comm, lambda: _plainly(prepare, self.folder, what))
         for name in _FIELDS:
             self._w.x.array[:n] = getattr(state, name)[:n]
@@ -115,7 +118,7 @@ class Checkpoint:
         def finish():
             data["checksums"] = _checksums(part, data)
             files.replace(part / "state.json", lambda stream: json.dump(data, stream))
-            os.rename(part, place)
+            os.rename(part, final)
         files.on_root(comm, lambda: _plainly(finish, self.folder, what))
 
     def _size(self, more: int) -> int:
@@ -137,7 +140,7 @@ def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
         InputError: there is no checkpoint, it is damaged, or it is of another mesh or scene; the message says what
             differs.
     """
-    folder, problem = FilePath(os.fspath(folder)), Problem(scene)
+    folder, problem = place("load: folder", folder), Problem(instance("load: scene", scene, Scene, "a formingx.Scene"))
     about = describe(problem)
 
     def look():
@@ -147,13 +150,13 @@ def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
             raise InputError(f"checkpoint {str(folder)!r} holds no state")
         if state is not None and not (isinstance(state, int) and 0 <= state < len(there)):
             raise InputError(f"load: state = {state!r}: the checkpoint holds states 0 to {len(there) - 1}")
-        found = [_read_json(place / "state.json") for place in there[:None if state is None else state + 1]]
+        found = [_read_json(one / "state.json") for one in there[:None if state is None else state + 1]]
         settled = [k for k, data in enumerate(found) if data.get("stepping")]
         if state is None and settled:
             found = found[:settled[-1] + 1]
-        for place, data in zip(there, found):
-            if _checksums(place, data) != data.get("checksums"):
-                raise InputError(f"checkpoint {str(place)!r} is damaged: its files are not those that were written"
+        for one, data in zip(there, found):
+            if _checksums(one, data) != data.get("checksums"):
+                raise InputError(f"checkpoint {str(one)!r} is damaged: its files are not those that were written"
                                  f" (load's state= picks an earlier one)")
         return found
     found = files.on_root(problem.comm, look)
@@ -172,10 +175,10 @@ def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
     """
-    folder = FilePath(os.fspath(folder))
+    folder = place("checkpoint", folder)
     about = _read_json(folder / "scene.json")
     _check_format(folder, about)
-    states = [_read_json(place / "state.json") for place in _states(folder)]
+    states = [_read_json(one / "state.json") for one in _states(folder)]
     if not states:
         raise InputError(f"checkpoint {str(folder)!r} holds no state")
     return about, states
@@ -196,13 +199,13 @@ def _check_scene(folder: FilePath, about: dict, scene: dict) -> None:
         raise InputError(f"checkpoint {str(folder)!r} is of another scene: {shown}{more}")
 
 
-def _read_state(place: FilePath, data: dict, problem: Any) -> State:
+def _read_state(folder: FilePath, data: dict, problem: Any) -> State:
     data = dict(data)
     n, last = problem.forms.space.dofmap.index_map.size_local, problem.comm.rank == problem.comm.size - 1
     w = fem.Function(problem.forms.space)
     arrays = {}
     for name in _FIELDS:
-        _compat.adios4dolfinx().read_function(place / f"{name}.bp", w, name=name)
+        _compat.adios4dolfinx().read_function(folder / f"{name}.bp", w, name=name)
         arrays[name] = np.concatenate([w.x.array[:n], data.pop(f"{name}_tail") if last else []])
     met = data.pop("met")
     return State(**arrays, met=Target(met[0], met[1], None, met[2]) if met else None,
@@ -261,9 +264,9 @@ def _name(number: int) -> str:
 
 def _states(folder: FilePath) -> list[FilePath]:
     """The complete states in order."""
-    found = sorted((place for place in folder.iterdir() if place.name.isdigit()), key=lambda place: int(place.name))
-    for k, place in enumerate(found):
-        if int(place.name) != k:
+    found = sorted((one for one in folder.iterdir() if one.name.isdigit()), key=lambda one: int(one.name))
+    for k, one in enumerate(found):
+        if int(one.name) != k:
             raise InputError(f"checkpoint {str(folder)!r} is damaged: state {k} is missing")
     return found
 
@@ -283,25 +286,14 @@ def _read_json(file: FilePath) -> Any:
         raise InputError(f"checkpoint: {str(file)!r} is damaged or cannot be read: {error}") from None
 
 
-def _checksums(place: FilePath, data: dict) -> dict[str, int]:
+def _checksums(state: FilePath, data: dict) -> dict[str, int]:
     """{file: CRC-32} of the fields of a state and of its other data."""
     rest = {key: value for key, value in data.items() if key != "checksums"}
     found = {"state.json": zlib.crc32(json.dumps(rest, sort_keys=True).encode())}
     for name in _FIELDS:
         found |= {f"{name}.bp/{file.name}": zlib.crc32(file.read_bytes())
-                  for file in sorted((place / f"{name}.bp").glob("*"))}
+                  for file in sorted((state / f"{name}.bp").glob("*"))}
     return found
-
-
-def _reserve(file: FilePath, size: int) -> None:
-    """Raise an OSError unless there is room for so many bytes."""
-    with open(file, "wb") as stream:
-        try:
-            os.posix_fallocate(stream.fileno(), 0, size)
-        except OSError as error:
-            if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
-                raise
-    file.unlink()
 
 
 def _plainly(action: Callable[[], Any], folder: FilePath, what: str) -> Any:

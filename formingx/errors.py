@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Hashable, Iterable
+from pathlib import Path
 from typing import Any
 
 
@@ -81,6 +83,13 @@ def pair(name: str, values: Any) -> tuple[float, float]:
     if len(found) != 2:
         raise InputError(f"{name} = {values!r}: must be two numbers")
     return finite(name, found[0]), finite(name, found[1])
+
+
+def place(name: str, value: Any) -> Path:
+    """`value` as a path, or an InputError unless it is the name of a file or a folder."""
+    if not isinstance(value, str | os.PathLike) or not os.fspath(value):
+        raise InputError(f"{name} = {value!r}: must be the name of a file or a folder")
+    return Path(value)
 
 
 def known(kind: str, name: Any, names: Any) -> None:

@@ -51,6 +51,8 @@ class Problem:
         self._residual = forms.compile(forms.residual)
         self._by_control = forms.control_derivative and forms.compile(forms.control_derivative)
         self.contacts = [NodalContact(forms, contact, self.assemble) for contact in scene.contacts]
+        folded = ufl.conditional(ufl.gt(forms.J, forms.constant(0.0)), forms.constant(0.0), forms.constant(1.0))
+        self._folded = forms.compile(folded * forms.dx)
         self._collect()
         self._by_motion = self._lift = None
         if any(getattr(thing, "constraints", None) for thing in scene.drivable):
@@ -124,6 +126,11 @@ class Problem:
                                 in zip(self._rows, self._at, self._there, multipliers, strict=True)])
         if self._left is not None:
             out.axpy(control - 1, self._left)
+
+    def folded(self, x: PETSc.Vec, control: float) -> bool:
+        """True if an element is turned inside out: J is not positive at some quadrature point."""
+        self.set_state(x, control)
+        return self.assemble_scalar(self._folded) > 0
 
     def begin(self) -> None:
         """Newton's method begins."""

@@ -30,7 +30,7 @@ def plugged(friction="none", elements=(10, 1), more=(), **options):
 
 
 def run(scene, *stages, **options):
-    return fx.Process(scene, stages).run(progress=False, **options)
+    return fx.Process(scene).run(stages, progress=False, **options)
 
 
 def plug(name, travel, **options):
@@ -294,18 +294,18 @@ AT_REST = Stage("up", drive="air", until=fx.pressure(0.1))
     (lambda: Stage("a", follow={"air": [(0, 0, 1)]}), r"must be \[\(time, value\)"),
     (lambda: Stage("a", follow={}), "must be {thing"),
     (lambda: Stage("a", follow={"air": [(0, 0), (1, 1)]}, until=fx.pressure(1)), "until a process_time"),
-    (lambda: fx.Process(plugged(), []), "no stage"),
-    (lambda: fx.Process(plugged(), [AT_REST, AT_REST]), "two stages are called 'up'"),
-    (lambda: fx.Process(plugged(), [plug("a", 1), "b"]), "must be a formingx.Stage"),
-    (lambda: fx.Process(plugged(), [Stage("a", drive="ram", until=fx.travel(1))]), "'ram' is not in the scene.*'plug'"),
-    (lambda: fx.Process(plugged(), [Stage("a", drive=fx.Pressure("top"), until=fx.pressure(1))]), "not in the scene"),
-    (lambda: fx.Process(plugged(), [plug("a", 1, without=["seal"])]), "'seal' is not in the scene"),
-    (lambda: fx.Process(plugged(), [air("a", 1, without=["air"])]), "both driven and left out"),
-    (lambda: fx.Process(kinds(), [Stage("a", drive=kinds, until=fx.travel(1))]), "not in the scene"),
-    (lambda: fx.Process(gripped(), [air("a", 1, without=gripped().supports)]), "not in the scene"),
-    (lambda: (lambda s: fx.Process(s, [air("a", 1, without=s.supports[1:])]))(gripped()), "'a'.*free to move"),
-    (lambda: (lambda s: fx.Process(s, [air("a", 1, without=s.supports[:1])]))(gripped()), "'a'.*touches the axis"),
-    (lambda: (lambda s: fx.Process(s, [Stage("a", drive=s.supports[1], until=fx.travel(1))]))(plugged()),
+    (lambda: run(plugged()), "at least one Stage"),
+    (lambda: run(plugged(), AT_REST, AT_REST), "two stages are called 'up'"),
+    (lambda: run(plugged(), plug("a", 1), "b"), "must be a formingx.Stage"),
+    (lambda: run(plugged(), Stage("a", drive="ram", until=fx.travel(1))), "'ram' is not in the scene.*'plug'"),
+    (lambda: run(plugged(), Stage("a", drive=fx.Pressure("top"), until=fx.pressure(1))), "not in the scene"),
+    (lambda: run(plugged(), plug("a", 1, without=["seal"])), "'seal' is not in the scene"),
+    (lambda: run(plugged(), air("a", 1, without=["air"])), "both driven and left out"),
+    (lambda: run(kinds(), Stage("a", drive=kinds, until=fx.travel(1))), "not in the scene"),
+    (lambda: run(gripped(), air("a", 1, without=gripped().supports)), "not in the scene"),
+    (lambda: (lambda s: run(s, air("a", 1, without=s.supports[1:])))(gripped()), "'a'.*free to move"),
+    (lambda: (lambda s: run(s, air("a", 1, without=s.supports[:1])))(gripped()), "'a'.*touches the axis"),
+    (lambda: (lambda s: run(s, Stage("a", drive=s.supports[1], until=fx.travel(1))))(plugged()),
      "cannot be driven"),
     (lambda: run(plugged(), Stage("a", drive="air", until=fx.travel(1, of="plug"))), "does not drive that"),
     (lambda: run(plugged(), Stage("a", drive="air", until=fx.travel(1, of="hoop"))), "of = 'hoop' is not known"),

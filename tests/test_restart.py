@@ -135,6 +135,18 @@ def killed_after(seconds, folder):
     return running
 
 
+def test_a_shorter_path_takes_no_state_away(tmp_path):
+    scene = treloar()
+    fx.solve(scene, to=0.3, increments=3).save(tmp_path / "solved")
+    fx.trace(scene, until=fx.pole_stretch(1.5), progress=False, checkpoint=tmp_path / "traced")
+    for folder in (tmp_path / "solved", tmp_path / "traced"):
+        before = sorted(map(str, folder.rglob("*")))
+        for start in (None, fx.load(folder, scene, 1)):
+            with pytest.raises(fx.InputError, match="states of another run"):
+                fx.trace(scene, until=fx.pole_stretch(1.5), start=start, progress=False, checkpoint=folder)
+        assert sorted(map(str, folder.rglob("*"))) == before
+
+
 def test_killed_at_any_moment(whole, tmp_path):
     _, scene, path = whole["stick"]
     rng = np.random.default_rng(int.from_bytes(os.urandom(4), "little"))

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path as FilePath
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, count, positive
+from ..errors import InputError, count, place, positive
 from . import files, plots
-
-
-class _Frame(NamedTuple):
-    x: np.ndarray
-    control: float
-    setting: dict
 
 
 def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
     """See `Path.animate`."""
-    file = FilePath(os.fspath(file))
+    file = place("animate: file", file)
     if file.suffix.lower() != ".gif":
         raise InputError(f"animate: file {str(file)!r}: its name must end in .gif")
     frames, seconds = count("animate: frames", frames), positive("animate: seconds", seconds)
@@ -30,7 +23,8 @@ def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
     shapes, tools, now = [], [], []
     for a, b, fraction in _spread(path, frames):
         path.go_to(b)
-        at = _Frame(*path.between(a, b, fraction), b.setting)
+        x_there, control = path.between(a, b, fraction)
+        at = replace(b, x=x_there, control=control)
         shapes.append(path.profile(at))
         now.append(path.measured(at, x, y))
         tools.append([_tool(path.problem, contact, at.control) for contact in path.problem.touching])

@@ -29,7 +29,7 @@ from dolfinx import fem, has_adios2, io
 from dolfinx import mesh as dolfinx_mesh
 from mpi4py import MPI
 
-from ..errors import InputError
+from ..errors import InputError, place
 from . import files
 
 _NODES = {1: np.array([[0.0], [1.0], [0.5]]), 2: np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])}
@@ -88,12 +88,13 @@ class Fields:
         problem, pressure = self._problem, np.zeros(self.points.shape[:2])
         forms = problem.forms
         fields, near = state.x[: forms.space.dofmap.index_map.size_local], 1e-9 * forms.length
+        self._path.go_to(state)
         now, problem.memory = problem.memory, state.memory
         try:
-            tractions = [contact.traction(fields, state.control) for contact in problem.contacts]
+            tractions = [contact.traction(fields, state.control) for contact in problem.touching]
         finally:
             problem.memory = now
-        for contact, (points, values) in zip(problem.contacts, tractions):
+        for contact, (points, values) in zip(problem.touching, tractions):
             tree = cKDTree(points)
             total = np.zeros((len(points), 2))               # sum of area ratios, and of how many facets
             for cell, facet in self._facets(contact.contact.on):
@@ -141,7 +142,7 @@ def to_xdmf(path: Any, file: Any, states: Any = None) -> None:
 
 
 def _write(path: Any, file: Any, states: Any, suffix: str, write: Callable) -> None:
-    file, comm = FilePath(os.fspath(file)), path.problem.comm
+    file, comm = place("file", file), path.problem.comm
     if file.suffix != suffix:
         raise InputError(f"file {str(file)!r}: its name must end in {suffix}")
     chosen = _chosen(path, states)
@@ -153,11 +154,11 @@ def _write(path: Any, file: Any, states: Any, suffix: str, write: Callable) -> N
         steps.append((float(number), {name: _gather(v, comm) for name, v in values.items()}))
 
     def write_all():
+        size = 2**17 + sum(8 * (array.size + points.size) for _, values in steps for array in values.values())
         part = file.with_name(f"part-{file.name}")
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
-            (file.parent / f".{file.name}.test").touch()
-            (file.parent / f".{file.name}.test").unlink()
+            files.reserve(part, size)
             write(part, file, _Body(points, fields.dimension), steps)
         except OSError as error:
             _remove(part)
@@ -246,11 +247,11 @@ def _together(text: str) -> str:
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode")
 
 
-def _remove(place: FilePath) -> None:
-    if place.is_dir():
-        shutil.rmtree(place)
+def _remove(file: FilePath) -> None:
+    if file.is_dir():
+        shutil.rmtree(file)
     else:
-        place.unlink(missing_ok=True)
+        file.unlink(missing_ok=True)
 
 
 def _gather(values: np.ndarray, comm: Any) -> Any:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import errno
 import json
 import os
 import platform
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
+
+from ..errors import place
 
 
 def write_path(path: Any, file: Any) -> None:
@@ -76,7 +78,7 @@ def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:
     Raises:
         OSError: the file cannot be written; it names the file, and no part is left behind.
     """
-    file = FilePath(file)
+    file = place("file", file)
     part = file.with_name(file.name + ".part")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -87,3 +89,15 @@ def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:
         with contextlib.suppress(OSError):
             part.unlink()
         raise OSError(error.errno, f"{os.fspath(file)!r} could not be written: {error.strerror}") from None
+
+
+def reserve(file: Any, size: int) -> None:
+    """Raise an OSError unless there is room for so many bytes beside this name: ADIOS2 aborts on a full disk."""
+    with open(file, "wb") as stream:
+        try:
+            os.posix_fallocate(stream.fileno(), 0, size)
+        except OSError as error:
+            if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
+                raise
+        finally:
+            os.unlink(file)

@@ -73,6 +73,8 @@ class Branch:
             failure.attempt = self._attempt()
             raise
         self.iterations += len(history) - 1
+        if self.problem.folded(self._x, control):               # forces of 1/J know no sign
+            raise Failure("an element turned inside out", history)
         return self._state(control, history, kind, before)
 
     def adopt(self, x: Any, control: float, history: list, before: State) -> State:

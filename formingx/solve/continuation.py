@@ -72,7 +72,7 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
     branch = Branch(problem, tolerances or Tolerances())
     path = Path(problem, branch, start)
     targets = [(target, target.bind(problem)) for target in (*through, until)]
-    run = Run(path, branch, targets, step, checkpoint and Checkpoint(checkpoint, problem))
+    run = Run(path, branch, targets, step, None if checkpoint is None else Checkpoint(checkpoint, problem))
     run.trace(max_steps, progress, None if path.states else branch.start())
     return path
 
@@ -100,6 +100,8 @@ class Run:
         path, before = self.path, self.path.counts.steps
         self._first, kept = len(path.states), {}
         bar = _progress_bar(path.problem.comm, self.until, progress)
+        if self.checkpoint is not None:
+            self.checkpoint.begin(path)
         try:
             if start is None:
                 self._first -= sum(1 for _ in itertools.takewhile(lambda s: s.setting == path.last.setting,

@@ -112,7 +112,7 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
         lead = (control - old.control) / old.slope           # along the tangent, as far as the control asks
         problem.prepare(old.x, old.control, old.direction, old.slope, lead)
         x.array_w[:] = branch.guess_from_rest(old, control) if old.kind == "start" else old.x + lead * old.direction
-        converged = newton.solve(x, control)
+        converged = newton.solve(x, control) and not problem.folded(x, control)
         path.counts.iterations += len(newton.history) - 1
         if converged:
             path.record(branch.adopt(x, control, newton.history, old))

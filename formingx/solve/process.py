@@ -34,26 +34,25 @@ class Stage:
     """One stage of a process: it drives one thing to a target, follows tables, or only changes what takes part.
 
     Args:
-        name: what the stage is called.
-        drive: the load, support or tool to drive, itself or its name.
-        until: the target that ends the stage, hit exactly, from either side; with `follow` a `process_time`, or
-            None: the end of the tables.
+        name: of the stage, in the record.
+        drive: the load, support or contact to drive, itself or its name.
+        until: the target that ends the stage, hit exactly, from either side, e.g. `travel(6.0)` (from the reference, not
+            from here); with `follow` a `process_time`, or None: the end of the tables.
         through: more targets to hit exactly on the way; those that are not met are left out.
-        follow: instead of `drive`: {thing: [(time, value), ...]}, piecewise linear, values in the user's units (the
-            last one stays). A table that begins later than the stage is reached in a straight line from
+        without: what is not there during the stage, itself or its name: a support that is open, a tool that is away, a
+            load that is off. A support takes hold of the body where it is when it comes back.
+        follow: instead of `drive`: {thing: [(time, value), ...]}, piecewise linear in time, values in the user's units
+            (the last one stays). A table that begins later than the stage is reached in a straight line from
             where the thing stands. Process time is 0 at first and runs in such stages only.
-        without: what takes no part in this stage: a support that is open, a tool that is away, a load that is off. A
-            support takes hold of the body where it is then.
-        step: step control; default `StepControl()`.
-        max_steps: accepted states before the stage gives up.
+        step: step control of this stage; default that of the run.
 
     Raises:
         InputError: no target, both `drive` and `follow`, a table that goes back in time, an argument not allowed.
     """
 
-    def __init__(self, name: str, *, drive: Any = None, until: measures.Target | None = None,
-                 through: Sequence[measures.Target] = (), follow: Mapping[Any, Sequence] | None = None,
-                 without: Sequence[Any] = (), step: StepControl | None = None, max_steps: int = 200):
+    def __init__(self, name: str, drive: Any = None, until: measures.Target | None = None,
+                 through: Sequence[measures.Target] = (), without: Sequence[Any] = (), *,
+                 follow: Mapping[Any, Sequence] | None = None, step: StepControl | None = None):
         if not isinstance(name, str) or not name:
             raise InputError(f"Stage: name = {name!r}: must be a word")
         who = self.who = f"Stage {name!r}"
@@ -61,7 +60,6 @@ class Stage:
         self.through = several(f"{who}: through", through, "targets, such as pole_stretch(3)")
         self.without = several(f"{who}: without", without, "things of the scene")
         self.step = instance(f"{who}: step", step, StepControl | None, "a StepControl or None")
-        self.max_steps = count(f"{who}: max_steps", max_steps)
         for target in (*([] if until is None else [until]), *self.through):
             instance(f"{who}: target", target, measures.Target, "a target, such as pole_stretch(3)")
         if drive is not None and follow is not None:
@@ -97,42 +95,75 @@ class Stage:
 
 
 class Process:
-    """Stages of a scene, in order.
+    """Stages on one scene, run in order, each from where the one before ended.
+
+    A pressure, support or tool of the scene that can be driven (`Pressure` without value, `Displaced`, `Contact` with
+    `moves`) starts at 0, and stays where it is in stages that do not drive it.
 
     Args:
         scene: with any number of things that can be driven.
-        stages: list of `Stage`.
-
-    Raises:
-        InputError: a stage drives or leaves out something that the scene does not have, leaves the body free to move,
-            or lets tools overlap; a moving tool does not meet its face within the rim.
     """
 
-    def __init__(self, scene: Scene, stages: Sequence[Stage]):
+    def __init__(self, scene: Scene):
         self.scene = instance("Process: scene", scene, Scene, "a formingx.Scene")
-        self.stages = several("Process: stages", stages, "stages, such as Stage('plug', drive=..., until=...)")
-        if not self.stages:
-            raise InputError("Process: it has no stage")
-        for stage in self.stages:
+
+    def run(self, stages: Sequence[Stage], *, step: StepControl | None = None, tolerances: Tolerances | None = None,
+            max_steps: int = 200, progress: bool = True, start: Path | State | None = None,
+            checkpoint: Any = None) -> Path:
+        """Run the stages; one path holds the states of all of them, every stage from a state of kind "start" on.
+
+        Args:
+            stages: in order.
+            step: step control of the stages that have none of their own, at their start; default `StepControl()`.
+            tolerances: when a state counts as converged; default `Tolerances()`.
+            max_steps: accepted states of a stage (of a straight piece of its tables) before the run gives up.
+            progress: show a progress bar on what takes more than two seconds (rank 0).
+            start: a path of these stages to go on from, also one that `formingx.load` read, or a state of one.
+            checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
+
+        Raises:
+            InputError: a stage drives or leaves out something that the scene does not have, leaves the body free to
+                move, or lets tools overlap; a target does not fit its stage; a table does not begin where its thing
+                stands; a tool comes in where the body is; a moving tool does not meet its face within the rim.
+            ConvergenceError: a target was not reached. It carries the path so far and says what to try.
+            OSError: the checkpoint cannot be written; the states in it are kept.
+        """
+        stages = several("Process: stages", stages, "stages, such as Stage('vacuum', drive=vacuum, until=pressure(1))")
+        if not stages:
+            raise InputError("Process: stages = []: must have at least one Stage")
+        for stage in stages:
             instance("Process: stage", stage, Stage, "a formingx.Stage")
-        for stage in self.stages:
-            if sum(other.name == stage.name for other in self.stages) > 1:
+        for stage in stages:
+            if sum(other.name == stage.name for other in stages) > 1:
                 raise InputError(f"Process: two stages are called {stage.name!r}: names must differ")
-        self.plans = [self._plan(stage) for stage in self.stages]
-        clearance.check(scene, self.plans)
+        instance("Process: step", step, StepControl | None, "a StepControl or None")
+        instance("Process: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
+        instance("Process: start", start, Path | State | None, "a path, a state or None")
+        plans = [self._plan(stage) for stage in stages]
+        clearance.check(self.scene, [(p.stage.who, p.numbers, p.stage.until, p.tables, p.off) for p in plans])
+        if isinstance(start, Path) and start.problem.scene is not self.scene:
+            raise InputError("Process: start: must be a path of this very scene: fx.load(folder, scene), or what run gave"
+                             " back")
+        problem = start.problem if isinstance(start, Path) else Problem(self.scene)
+        for state in [start] if isinstance(start, State) else start.states[-1:] if start else []:
+            if len(state.x) != problem.x.getLocalSize() or not 0 <= state.setting.get("stage", -1) < len(stages):
+                raise InputError("Process: start: must be of this process: its last state is of another scene or stage")
+        execution = _Execution(self.scene, plans, problem, tolerances or Tolerances(), step, checkpoint, start)
+        return execution.run(count("Process: max_steps", max_steps), progress)
 
     def _plan(self, stage: Stage) -> _Plan:
         scene, who = self.scene, stage.who
-        off = sorted({scene.number(f"{who}: without", thing) for thing in stage.without})
+        off = sorted({i for thing in stage.without for i in scene.together(scene.number(f"{who}: without", thing))})
         driven = [stage.drive] if stage.drive is not None else [thing for thing, _ in stage.tables]
         numbers = [scene.number(who, thing) for thing in driven]
         for number in numbers:
-            if not getattr(scene.things[number], "driven", False):
-                raise InputError(f"{who}: {scene.things[number]!r} cannot be driven: a Pressure without value, a Displaced"
-                                 f" support, or a Contact that moves can")
-            if number in off and not hasattr(scene.things[number], "moves"):    # a tool may go home while it is away
-                raise InputError(f"{who}: {scene.things[number]!r} is both driven and left out")
-        if len(set(numbers)) < len(numbers):
+            thing = scene.things[number]
+            if not getattr(thing, "driven", False):
+                raise InputError(f"{who}: {thing!r} cannot be driven: a Pressure without value, a Displaced support, or a"
+                                 f" Contact that moves can")
+            if number in off and not hasattr(thing, "moves"):                  # a tool may go home while it is away
+                raise InputError(f"{who}: {thing!r} is both driven and left out")
+        if len({scene.together(number)[0] for number in numbers}) < len(numbers):
             raise InputError(f"{who}: one thing has two tables")
         there = [thing for i, thing in enumerate(scene.things) if i not in off]
         try:
@@ -141,33 +172,6 @@ class Process:
             raise InputError(f"{who}: {error}") from None
         tables = [(i, table) for number, (_, table) in zip(numbers, stage.tables) for i in scene.together(number)]
         return _Plan(stage, scene.together(numbers[0]) if stage.drive is not None else [], tables, off)
-
-    def run(self, *, tolerances: Tolerances | None = None, progress: bool = True,
-            start: Path | State | None = None, checkpoint: Any = None) -> Path:
-        """Run the stages; one path holds the states of all of them, every stage from a state of kind "start" on.
-
-        Args:
-            tolerances: when a state counts as converged; default `Tolerances()`.
-            progress: show a progress bar on what takes more than two seconds (rank 0).
-            start: a path of this process to go on from, also one that `formingx.load` read, or a state of one.
-            checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
-
-        Raises:
-            InputError: a target does not fit its stage, a table does not begin where its thing stands, a tool comes in
-                where the body is.
-            ConvergenceError: a target was not reached. It carries the path so far and says what to try.
-            OSError: the checkpoint cannot be written; the states in it are kept.
-        """
-        instance("Process: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
-        instance("Process: start", start, Path | State | None, "a path, a state or None")
-        if isinstance(start, Path) and start.problem.scene is not self.scene:
-            raise InputError("Process: start: must be a path of this very scene: fx.load(folder, scene), or what run gave"
-                             " back")
-        problem = start.problem if isinstance(start, Path) else Problem(self.scene)
-        for state in [start] if isinstance(start, State) else start.states[-1:] if start else []:
-            if len(state.x) != problem.x.getLocalSize() or not 0 <= state.setting.get("stage", -1) < len(self.stages):
-                raise InputError("Process: start: must be of this process: its last state is of another scene or stage")
-        return _Execution(self, problem, tolerances or Tolerances(), progress, checkpoint, start).run()
 
 
 class _Plan(NamedTuple):
@@ -185,20 +189,21 @@ class _Execution:
     Piece 0 of a stage changes what takes part, pieces from 1 on drive; each has one `Setting`.
     """
 
-    def __init__(self, process: Process, problem: Problem, tolerances: Tolerances, progress: bool, checkpoint: Any,
-                 start: Path | State | None):
-        self.scene, self.plans, self.problem, self.progress = process.scene, process.plans, problem, progress
+    def __init__(self, scene: Scene, plans: list[_Plan], problem: Problem, tolerances: Tolerances,
+                 step: StepControl | None, checkpoint: Any, start: Path | State | None):
+        self.scene, self.plans, self.problem, self._step = scene, plans, problem, step
         self.branch, self._balanced = Branch(problem, tolerances), tolerances.residual
-        timed = any(plan.tables for plan in self.plans)
+        timed = any(plan.tables for plan in plans)
         self.path = Path(problem, self.branch, start if isinstance(start, Path) else None, timed)
         self.path.states += [start] if isinstance(start, State) else []
         self.checkpoint = None if checkpoint is None else Checkpoint(checkpoint, problem)
         self._rest = np.zeros(problem.x.getLocalSize())
-        self._targets = [self._bind(plan) for plan in self.plans]   # so that nothing is compiled between stages
-        problem.enter(Setting.first(process.scene), self._rest, 0.0)
+        self._targets = [self._bind(plan) for plan in plans]    # so that nothing is compiled between stages
+        problem.enter(Setting.first(scene), self._rest, 0.0)
 
-    def run(self) -> Path:
+    def run(self, max_steps: int, progress: bool) -> Path:
         """All stages that are left."""
+        self._max_steps, self._progress = max_steps, progress
         last = self.path.last.setting if self.path.states else {"stage": 0, "piece": -1}
         if self.path.states:
             self.problem.remember(self.path.last)
@@ -258,8 +263,9 @@ class _Execution:
 
     def _trace(self, targets: list, control: float | None, turns: bool = True) -> list:
         """Follow the path from a control (None: on from the last state); returns the targets that are still open."""
-        run = Run(self.path, self.branch, targets, self._stage.step, self.checkpoint, turns)
-        run.trace(self._stage.max_steps, self.progress, None if control is None else self._resumed(control))
+        run = Run(self.path, self.branch, targets, self._stage.step or self._step, self.checkpoint, turns)
+        start = None if control is None else self._resumed(control)
+        run.trace(self._max_steps, self._progress, start)
         return run.open
 
     def _change(self, begun: bool) -> None:
