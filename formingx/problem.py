@@ -53,6 +53,8 @@ class Problem:
         self.contacts = [NodalContact(forms, contact, self.assemble) for contact in scene.contacts]
         folded = ufl.conditional(ufl.gt(forms.J, forms.constant(0.0)), forms.constant(0.0), forms.constant(1.0))
         self._folded = forms.compile(folded * forms.dx)
+        self._left: Any = None
+        self._motors: list[int] = []
         self._collect()
         self._by_motion = self._lift = None
         if any(getattr(thing, "constraints", None) for thing in scene.drivable):
@@ -299,7 +301,6 @@ class Problem:
         forms, zero = self.forms, PETSc.ScalarType(0)
         self._holds: list[tuple[int, Any, np.ndarray, bool]] = []
         self._means: list[tuple[int, np.ndarray]] = []
-        self._left: Any = None
         for i, support in enumerate(self.scene.things):
             if getattr(support, "constraints", None) is None:
                 continue

@@ -80,7 +80,8 @@ class Scene:
     @property
     def drivable(self) -> list[Any]:
         """What can be driven; of a tool that meets several faces its first contact."""
-        return [thing for i, thing in enumerate(self.things) if getattr(thing, "driven", False) and self.together(i)[0] == i]
+        return [thing for i, thing in enumerate(self.things)
+                if getattr(thing, "driven", False) and self.together(i)[0] == i]
 
     def together(self, number: int) -> list[int]:
         """Numbers of the things that move as this one does: contacts with the same `moves` and name are of one tool."""
@@ -131,8 +132,8 @@ class Scene:
         for name in names:
             if not isinstance(name, str) or not name:
                 raise InputError(f"Scene: name = {name!r}: must be a word")
-            same = [i for i, thing in enumerate(self.things) if getattr(thing, "name", None) == name]
-            if same != self.together(same[0]) and len(same) > 1:
+            called = [i for i, thing in enumerate(self.things) if getattr(thing, "name", None) == name]
+            if called != self.together(called[0]) and len(called) > 1:
                 raise InputError(f"Scene: two things are called {name!r}: names must differ")
         columns = [self.column(thing) for thing in self.drivable]
         for column in columns:
@@ -180,18 +181,16 @@ class Scene:
             raise InputError(f"{contact!r}: the driven pressure acts on the same face and pushes it away from the tool:"
                              f" no tool faces the pressure")
 
-    def check_travel(self, travel: float) -> None:
-        """An InputError if the driven tool's travel (length) would put a held boundary as a whole inside the tool."""
-        if not isinstance(self.driven, Contact) or self.driven.moves is None:
-            return
-        moves = np.array(self.driven.moves)
+    def check_travel(self, contact: Contact, travel: float) -> None:
+        """An InputError if a tool's travel (length) would put a held boundary as a whole inside the tool."""
+        moves = np.array(contact.moves)
         for support in self.supports:
             for held in support.constraints():
                 if not isinstance(held, Held) or held.on is None or moves[held.component] == 0:
                     continue
-                depth = self.driven.tool.signed_distance(self.mesh.nodes_of(held.on) - travel * moves)
+                depth = contact.tool.signed_distance(self.mesh.nodes_of(held.on) - travel * moves)
                 if depth.min() >= 0:
-                    raise InputError(f"travel = {travel:g}: {self.driven!r} would go through the whole height of the"
+                    raise InputError(f"travel = {travel:g}: {contact!r} would go through the whole height of the"
                                      f" body to {held.on!r}, which is held: the travel must be less than"
                                      f" {travel - depth.max() / np.hypot(*moves):.6g}")
 

@@ -16,17 +16,18 @@ from formingx.solid import Formulation
 Stage, tools = fx.Stage, fx.tools
 STEP = fx.StepControl(target=8)
 PLUG = tools.sphere(radius=3, z=0.5)
+FLOOR = fx.Contact("bottom", tools.plane(1.5).mirrored(), "stick", name="floor")    # everything below Z = -1.5
 
 
 def disc(elements=(10, 1)):
     return fx.mesh.disc(radius=10.0, thickness=0.5, elements=elements)
 
 
-def plugged(friction="none", elements=(10, 1), more=(), **options):
+def plugged(friction="none", elements=(10, 1), more=(), plug=PLUG, **options):
     """A clamped disc under pressure from below, and a round plug above it."""
     return fx.Scene(mesh=disc(elements), materials=fx.NeoHookean(c10=1.0), **options,
                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")],
-                    contacts=[fx.Contact("top", PLUG, friction, moves=(0, -1), name="plug"), *more])
+                    contacts=[fx.Contact("top", plug, friction, moves=(0, -1), name="plug"), *more])
 
 
 def run(scene, *stages, **options):
@@ -51,16 +52,16 @@ def end(path, stage):
 
 @pytest.fixture(scope="module")
 def there_and_back():
-    return run(plugged(), air("low", 0.02), plug("down", 2.0), air("high", 0.05), plug("up", 0.0), air("low again", 0.02),
-               plug("away", -3.0), air("release", 0.0))
+    return run(plugged(), air("low", 0.02), plug("down", 2.0), air("high", 0.05), plug("up", 0.0),
+               air("low again", 0.02), plug("away", -3.0), air("release", 0.0))
 
 
 def test_an_elastic_process_returns(there_and_back):
     path = there_and_back
     assert same(end(path, "low again"), end(path, "low"))
     assert np.abs(path.last.x).max() < 1e-8 and path.last.measures["air_pressure"] == 0
-    for stage, column, value in (("down", "plug_travel", 2.0), ("up", "plug_travel", 0.0), ("high", "air_pressure", 0.05),
-                                 ("away", "plug_travel", -3.0)):
+    for stage, column, value in (("down", "plug_travel", 2.0), ("up", "plug_travel", 0.0),
+                                 ("away", "plug_travel", -3.0), ("high", "air_pressure", 0.05)):
         assert end(path, stage).measures[column] == pytest.approx(value, abs=1e-12)
     assert end(path, "high").measures["plug_travel"] == 2.0
 
@@ -74,7 +75,8 @@ def test_one_stage_is_a_trace():
     scene = fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
     targets = {"until": fx.pole_stretch(2.0), "through": [fx.pressure(0.05)]}
-    traced, staged = fx.trace(scene, progress=False, **targets), run(scene, Stage("up", drive=scene.loads[0], **targets))
+    traced = fx.trace(scene, progress=False, **targets)
+    staged = run(scene, Stage("up", drive=scene.loads[0], **targets))
     assert [s.control for s in traced.states] == [s.control for s in staged.states]
     assert traced.columns == staged.columns and np.array_equal(traced.last.x, staged.last.x)
 
@@ -85,7 +87,8 @@ def test_beyond_a_limit_point_and_back():
     p = fx.Pressure("bottom")
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=2.0), loads=[p],
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
-    path = run(scene, Stage("blow", drive=p, until=fx.pole_stretch(4.0)), Stage("back", drive=p, until=fx.pole_height(0.1)))
+    path = run(scene, Stage("blow", drive=p, until=fx.pole_stretch(4.0)),
+               Stage("back", drive=p, until=fx.pole_height(0.1)))
     first, second = path.limit_points
     assert (first.stage, second.stage) == ("blow", "back")
     assert first.measures["pressure"] == pytest.approx(second.measures["pressure"], rel=1e-9)
@@ -112,8 +115,9 @@ def test_tables():
 
 def test_a_table_beyond_a_limit_point_is_refused():
     p = fx.Pressure("bottom")
-    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1)), materials=fx.NeoHookean(c10=2.0),
-                     loads=[p], supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    mesh = fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1))
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=2.0), loads=[p],
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
     with pytest.raises(fx.ConvergenceError, match="Stage 'blow'.*limit point") as error:
         run(scene, Stage("blow", follow={p: [(0, 0), (1, 0.6)]}))
     assert error.value.path.last.measures["pressure"] == pytest.approx(0.4933, rel=0.02)
@@ -135,7 +139,8 @@ def kinds():
     return fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0),
                     supports=[fx.Clamped("rim"), fx.Displaced("inner", name="pin")],
                     loads=[fx.Pressure("bottom", name="air"), fx.Pressure("top", 0.001)],
-                    contacts=[fx.Contact("top", tools.sphere(radius=1, r=4.0, z=0.5), "stick", moves=(0, -1), name="bar")],
+                    contacts=[fx.Contact("top", tools.sphere(radius=1, r=4.0, z=0.5), "stick", moves=(0, -1),
+                                         name="bar")],
                     kinematics=fx.PlaneStrain())
 
 
@@ -143,7 +148,8 @@ def kinds():
 def test_derivative_by_control_after_a_change_of_stage(number):
     """dF/dcontrol, and with it everything driven at once by a table, is the derivative of F."""
     path = run(kinds(), Stage("bar", drive="bar", until=fx.travel(0.5), step=STEP),
-               Stage("pin", drive="pin", until=fx.travel(-0.3), step=STEP), Stage("air", drive="air", until=fx.pressure(0.01)))
+               Stage("pin", drive="pin", until=fx.travel(-0.3), step=STEP),
+               Stage("air", drive="air", until=fx.pressure(0.01)))
     problem, state, h = path.problem, path.last, 1e-8 if number in (1, 4) else 1e-6      # a ramp is narrow
     rate = [0.0] * 6
     rate[number] = 1.0
@@ -180,14 +186,13 @@ def test_forces_balance(friction):
 
 
 def test_tools_on_both_faces_with_their_own_friction():
-    mould = fx.Contact("bottom", tools.plane(1.5).mirrored(), "stick", name="mould")          # everything below Z = -1.5
-    path = run(plugged(0.2, (20, 2), more=[mould]), plug("down", 1.8), air("vacuum", -0.02))
+    path = run(plugged(0.2, (20, 2), more=[FLOOR]), plug("down", 1.8), air("vacuum", -0.02))
     last = path.last.measures
-    assert last["mould_force"] < -0.1 and last["plug_force"] > 0.1
-    assert last["tool_force"] == pytest.approx(last["mould_force"] + last["plug_force"])
+    assert last["floor_force"] < -0.1 and last["plug_force"] > 0.1
+    assert last["tool_force"] == pytest.approx(last["floor_force"] + last["plug_force"])
     path.go_to(path.last)
     assert support_force(path.problem, path.last, 1) - 0.02 * np.pi * 100 == pytest.approx(last["tool_force"], rel=1e-5)
-    assert end(path, "down").measures["mould_force"] < 0
+    assert end(path, "down").measures["floor_force"] < 0
 
 
 def test_two_tools_on_one_face():
@@ -223,7 +228,8 @@ def test_supports_that_open_and_close():
                air("down", 0.0, without=[hinge]), Stage("loose", without=[grip]))
     plain = run(hinged, air("up", 0.05, without=[grip]))
     held, opened = path.problem, end(path, "open")
-    assert same(opened, plain.last) and same(end(path, "close"), plain.last, n=held._n)     # n: without the hinge's force
+    assert same(opened, plain.last)
+    assert same(end(path, "close"), plain.last, n=held._n)          # without the hinge's force
     held.enter(Setting(**end(path, "down").setting), end(path, "down").x, 0.0)
     assert np.abs(end(path, "down").x - opened.x)[held._held].max() < 1e-14
     assert end(path, "down").measures["pole_height"] > 0.1                  # the turned rim keeps it bent
@@ -248,8 +254,9 @@ def test_a_process_goes_on_from_any_state():
     for k, state in enumerate(whole.states):
         if not state.stepping:
             continue
-        kept = State(state.x, state.control, state.direction, state.slope, dict(state.measures), state.history, state.kind,
-                        state.met, state.memory, stage=state.stage, setting=json.loads(json.dumps(state.setting)),
+        kept = State(state.x, state.control, state.direction, state.slope, dict(state.measures), state.history,
+                        state.kind, state.met, state.memory, stage=state.stage,
+                        setting=json.loads(json.dumps(state.setting)),
                         stepping=json.loads(json.dumps(state.stepping)))
         rest = run(plugged("stick"), *STAGES, start=kept)
         assert [s.stage for s in rest.states] == [s.stage for s in whole.states[k:]], k
@@ -314,6 +321,10 @@ AT_REST = Stage("up", drive="air", until=fx.pressure(0.1))
      "process time is 1 already"),
     (lambda: fx.trace(plugged(), until=fx.pressure(1)), "one control drives a run"),
     (lambda: fx.solve(plugged(), to=1), "one control drives a run"),
+    (lambda: run(plugged(more=[FLOOR]), plug("a", 1), plug("b", 2.5)),
+     "'b': tools overlap.*at travel 2.0.*into the other"),
+    (lambda: run(plugged(more=[FLOOR]), Stage("b", follow={"plug": [(1, 2.5)]}, step=STEP)), "'b': tools overlap"),
+    (lambda: run(plugged(plug=tools.cylinder(radius=12, z=0.5)), plug("a", 1)), "'a'.*whole height.*'rim'"),
     (lambda: plugged(more=[fx.Contact("top", PLUG, moves=(1, -1), name="plug")]), "two things are called 'plug'"),
 ])
 def test_bad_input(make, words):

@@ -136,14 +136,16 @@ def changed() -> Target:
 def _driven(quantity: str, value: float, of: str | None) -> Target:
     def bind(problem):
         scene, rate = problem.scene, problem.setting.rate
-        found = [i for i, t in enumerate(scene.things) if any(t is d for d in scene.drivable) and t.quantity == quantity]
+        found = [i for i, t in enumerate(scene.things)
+                 if any(t is d for d in scene.drivable) and t.quantity == quantity]
         if of is not None:
             known(f"{quantity}: of =", of, [n for n in (scene.things[i].name for i in found) if n])
             return Amplitude(problem, next(i for i in found if scene.things[i].name == of))
         moving = [i for i in found if rate[i]] or found
         if len(moving) != 1:
-            raise InputError(f"{quantity} = {value:g}: the scene has {len(moving) or 'no'} {quantity} that can be driven"
-                             + (", say which with of=..." if moving else f": what can be is {scene.drivable}"))
+            raise InputError(f"{quantity} = {value:g}: the scene has {len(moving) or 'no'} {quantity} that can be"
+                             " driven" + (", say which with of=..." if moving
+                                          else f": what can be is {scene.drivable}"))
         return Amplitude(problem, moving[0])
     return Target(quantity if of is None else f"{of}_{quantity}", finite(quantity, value), bind)
 

@@ -71,7 +71,7 @@ class Path:
         self._recorded = measures.standard(problem, timed)
         self._profiles, self._stresses = Profiles(problem), Stresses(problem)
         self.states: list[State] = list(start.states) if start else []
-        self.counts = replace(start.counts) if start else Counts()
+        self.counts: Counts = replace(start.counts) if start else Counts()
         branch.iterations += self.counts.iterations
 
     def __len__(self) -> int:

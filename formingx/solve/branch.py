@@ -60,7 +60,7 @@ class Branch:
         self._x.array_w[:] = x
         self.problem.residual(self._x, control, self.newton.F)
         if not self.newton.tangent(self._x, control):
-            raise Failure("the tangent is singular: something in the body is not held any more, or has no stiffness", [])
+            raise Failure("the tangent is singular: something in the body is held no more, or has no stiffness", [])
         return self._state(control, [], "start", None)
 
     def solve(self, x: np.ndarray, control: float, constraint: Callable, kind: str, before: State) -> State:

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..checkpoint import Checkpoint
 from ..errors import ConvergenceError, InputError, count, instance, several
+from ..physics.contact import Contact
 from ..problem import Problem
 from ..results import measures
 from ..results.path import Path, State
@@ -59,8 +60,8 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
     through = several("trace: through", through, "targets, such as pole_stretch(3)")
     for target in (until, *through):
         instance("trace: target", target, measures.Target, "a target, such as pole_stretch(3)")
-        if target.name == "travel":
-            scene.check_travel(target.value)
+        if target.name == "travel" and isinstance(scene.driven, Contact):
+            scene.check_travel(scene.driven, target.value)
     instance("trace: step", step, StepControl | None, "a StepControl or None")
     instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     max_steps = count("trace: max_steps", max_steps)
@@ -98,7 +99,8 @@ class Run:
     def trace(self, max_steps: int, progress: bool, start: State | None) -> None:
         """Follow the path from a state, or on from the last one, until the last target is met."""
         path, before = self.path, self.path.counts.steps
-        self._first, kept = len(path.states), {}
+        kept: dict[str, Any] = {}
+        self._first = len(path.states)
         bar = _progress_bar(path.problem.comm, self.until, progress)
         if self.checkpoint is not None:
             self.checkpoint.begin(path)
@@ -293,9 +295,10 @@ class Run:
         best = int(np.argmin([abs(v - self.until.value) for v in values]))
         limits = "".join(f" A limit point was passed at {path.describe(s)}." for s in states if s.kind == "limit point")
         return ConvergenceError(
-            f"{f'Stage {path.stage!r}: ' * bool(path.stage)}{self.until} was not reached: {why} The nearest met was {values[best]:.6g}, at"
-            f" {path.describe(states[best])}.{limits} The last good state is {path.describe(path.last)};"
-            f" it is kept in the error's `path`.{'' if diagnosis.advice else _TRY}", path, diagnosis)
+            f"{f'Stage {path.stage!r}: ' * bool(path.stage)}{self.until} was not reached: {why} The nearest met was"
+            f" {values[best]:.6g}, at {path.describe(states[best])}.{limits} The last good state is"
+            f" {path.describe(path.last)}; it is kept in the error's `path`."
+            + ("" if diagnosis.advice else _TRY), path, diagnosis)
 
 
 def settle(path: Path, step: StepControl, until: measures.Target, checkpoint: Checkpoint | None) -> None:

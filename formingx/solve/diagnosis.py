@@ -174,7 +174,8 @@ def _tangents(branch: Any, states: list, x: Any) -> dict[str, Any]:
         problem.tangent(x, state.control)
         return solver.sign() if solver.factorise() else 0
 
-    facts: dict[str, Any] = {"limit_points": tuple(problem.shown(s.control)[1] for s in states if s.kind == "limit point")}
+    limits = tuple(problem.shown(s.control)[1] for s in states if s.kind == "limit point")
+    facts: dict[str, Any] = {"limit_points": limits}
     turned = []
     usable = [s for s in states[1 if problem.forms.slack_at_rest else 0:] if s.kind != "limit point"]
     end = sign(states[-1])

@@ -36,8 +36,8 @@ class Stage:
     Args:
         name: of the stage, in the record.
         drive: the load, support or contact to drive, itself or its name.
-        until: the target that ends the stage, hit exactly, from either side, e.g. `travel(6.0)` (from the reference, not
-            from here); with `follow` a `process_time`, or None: the end of the tables.
+        until: the target that ends the stage, hit exactly, from either side, e.g. `travel(6.0)` (from the reference,
+            not from here); with `follow` a `process_time`, or None: the end of the tables.
         through: more targets to hit exactly on the way; those that are not met are left out.
         without: what is not there during the stage, itself or its name: a support that is open, a tool that is away, a
             load that is off. A support takes hold of the body where it is when it comes back.
@@ -140,10 +140,10 @@ class Process:
         instance("Process: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
         instance("Process: start", start, Path | State | None, "a path, a state or None")
         plans = [self._plan(stage) for stage in stages]
-        clearance.check(self.scene, [(p.stage.who, p.numbers, p.stage.until, p.tables, p.off) for p in plans])
+        clearance.check(self.scene, plans)
         if isinstance(start, Path) and start.problem.scene is not self.scene:
-            raise InputError("Process: start: must be a path of this very scene: fx.load(folder, scene), or what run gave"
-                             " back")
+            raise InputError("Process: start: must be a path of this very scene: fx.load(folder, scene), or what run"
+                             " gave back")
         problem = start.problem if isinstance(start, Path) else Problem(self.scene)
         for state in [start] if isinstance(start, State) else start.states[-1:] if start else []:
             if len(state.x) != problem.x.getLocalSize() or not 0 <= state.setting.get("stage", -1) < len(stages):
@@ -159,8 +159,8 @@ class Process:
         for number in numbers:
             thing = scene.things[number]
             if not getattr(thing, "driven", False):
-                raise InputError(f"{who}: {thing!r} cannot be driven: a Pressure without value, a Displaced support, or a"
-                                 f" Contact that moves can")
+                raise InputError(f"{who}: {thing!r} cannot be driven: a Pressure without value, a Displaced support, or"
+                                 f" a Contact that moves can")
             if number in off and not hasattr(thing, "moves"):                  # a tool may go home while it is away
                 raise InputError(f"{who}: {thing!r} is both driven and left out")
         if len({scene.together(number)[0] for number in numbers}) < len(numbers):
@@ -175,7 +175,7 @@ class Process:
 
 
 class _Plan(NamedTuple):
-    """A stage with the things of the scene by their numbers: what it drives, [(number, its table)], what is left out."""
+    """A stage with the things of the scene by their numbers: what it drives, [(number, table)], what is left out."""
 
     stage: Stage
     numbers: list[int]
@@ -237,7 +237,6 @@ class _Execution:
             found.append((target, bound))
         return found
 
-
     def _standing(self) -> tuple[Setting, np.ndarray, float]:
         """The setting, the unknowns and the control where the process stands now."""
         last = self.path.last if self.path.states else None
@@ -289,8 +288,8 @@ class _Execution:
                 contact.forget(x, control)
                 depth = contact.largest_penetration(x, control)
                 if depth > 1e-6 * self.problem.forms.length:
-                    raise InputError(f"{self._stage.who}: {thing!r} comes in where the body is, which reaches {depth:.6g}"
-                                     f" into the tool")
+                    raise InputError(f"{self._stage.who}: {thing!r} comes in where the body is, which reaches"
+                                     f" {depth:.6g} into the tool")
 
     def _out_of_balance(self, x: np.ndarray) -> bool:
         self.problem.x.array_w[:] = x
@@ -326,7 +325,7 @@ class _Execution:
             now, begun = then, False
 
     def _enter_line(self, tables: list, now: float, then: float, piece: int) -> None:
-        """All tables are straight between these times; the control is the time, scaled so that no amplitude is faster."""
+        """All tables are straight between these times; the control is the time, scaled: no amplitude is faster."""
         before, _, control = self._standing()
         base, scales = before.standing(control), self.problem.forms.scales
         change = [0.0] * len(base)
@@ -354,13 +353,14 @@ class _Execution:
     def _check_beginning(self, tables: list[tuple[int, np.ndarray]], now: float, end: float) -> None:
         who, (before, _, control) = self._stage.who, self._standing()
         if end <= now:
-            raise InputError(f"{who}: ends at time {end:g}, but the process time is {now:g} already: time cannot go back")
+            raise InputError(f"{who}: ends at time {end:g}, but the process time is {now:g} already: time cannot go"
+                             f" back")
         for i, table in tables:
             name, first = repr(self.scene.things[i]), table[0]
             if first[0] < now - _SAME * abs(now):
-                raise InputError(f"{who}: the table of {name} begins at time {first[0]:g}, but the process time is {now:g}"
-                                 f" already: it goes back in time")
+                raise InputError(f"{who}: the table of {name} begins at time {first[0]:g}, but the process time is"
+                                 f" {now:g} already: it goes back in time")
             stands = before.amplitude(i, control) * self.problem.forms.scales[i]
             if first[0] <= now + _SAME * abs(now) and abs(stands - first[1]) > 1e-9 * max(abs(stands), abs(first[1])):
-                raise InputError(f"{who}: the table of {name} begins with {first[1]:g} at time {first[0]:g}, but it stands"
-                                 f" at {stands:g} then")
+                raise InputError(f"{who}: the table of {name} begins with {first[1]:g} at time {first[0]:g}, but it"
+                                 f" stands at {stands:g} then")
