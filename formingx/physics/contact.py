@@ -79,7 +79,7 @@ class Contact:
 
     @property
     def symmetric(self) -> bool:
-        """True if contact has an energy: without friction."""
+        """True without friction: contact then has an energy."""
         return self.mu == 0
 
     def law(self, k: float, theta: float, points: np.ndarray) -> Law:
