@@ -17,6 +17,7 @@ def test_blocks_run(page, tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().out
 
 
+@pytest.mark.quick
 def test_sphinx_warns_of_nothing(tmp_path):
     run("-m", "sphinx", "-W", "--keep-going", "-q", "docs", tmp_path / "html")
     assert "formingx.trace" in (tmp_path / "html" / "api.html").read_text()
