@@ -119,7 +119,8 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
                          "size": positive}),
         (fx.tools.sphere, size | {"z": number, "r": number}))]
     disc = {"radius": positive, "thickness": ("positive", 0.1), "accuracy": ("word", "draft"),
-            "elements": ("pair or None", (4, 1)), "grading": positive, "inner_radius": ("not negative", 0.0)}
+            "elements": ("pair or None", (4, 1)), "grading": positive, "inner_radius": ("not negative", 0.0),
+            "concentrate": ("optional thing", None)}
     sphere = {"inner_radius": positive, "thickness": positive, "elements": ("pair", (4, 2)), "grading": positive}
     contact = {"on": ("word", "top"), "tool": ("thing", fx.tools.plane(0.3)), "friction": ("friction", "stick"),
                "penalty": positive, "ramp": positive, "nodes_per_step": ("count", 1), "moves": ("pair or None", None)}

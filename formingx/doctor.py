@@ -118,7 +118,7 @@ def _folded(nodes: np.ndarray) -> np.ndarray:
 
 
 def _driven(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
-    if not scene.drivable:
+    if scene.driven is None:
         yield Finding("error", "loads", "nothing is driven, so there is no run: give one load no value, as"
                                         " Pressure('bottom'), or add a Displaced support")
 

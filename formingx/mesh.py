@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from . import _compat, grid
-from .errors import InputError, count, known, non_negative, positive
+from .errors import InputError, count, finite, known, non_negative, positive
 
 
 @dataclass(frozen=True)
@@ -94,8 +94,8 @@ ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
 
 
 def disc(*, radius: float, thickness: float | Mapping[str, float], accuracy: str = "standard",
-         elements: tuple | None = None, grading: float = 1.0, inner_radius: float = 0.0,
-         comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
+         elements: tuple | None = None, grading: float = 1.0, concentrate: Mapping[float, float] | None = None,
+         inner_radius: float = 0.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     """A flat disc (or ring) in the (R, Z) plane, bottom face on Z = 0.
 
     Boundaries: `axis` (R = inner_radius; called `inner` if that is above 0), `rim`, `bottom`, `top`.
@@ -107,9 +107,12 @@ def disc(*, radius: float, thickness: float | Mapping[str, float], accuracy: str
         elements: (along the radius, through each layer), in place of `accuracy`; the latter may be a tuple, one count
             per layer. Each rectangle is two triangles.
         grading: size of the last element at the rim over that of the first at the axis.
+        concentrate: in place of `grading`, {reference radius: size of the elements there over that of the largest}, for
+            example around a plug's edge. Sizes grow linearly with the distance from these radii; nodes lie on them.
 
     Raises:
-        InputError: a size that is not positive, or a count that is not a whole number of at least 1.
+        InputError: a size that is not positive, a count that is not a whole number of at least 1, a radius to
+            concentrate at that is not on the disc, or fewer elements than there are parts between such radii.
     """
     radius = positive("disc: radius", radius)
     grading = positive("disc: grading", grading)
@@ -119,7 +122,51 @@ def disc(*, radius: float, thickness: float | Mapping[str, float], accuracy: str
     sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
     known("disc: accuracy", accuracy, ACCURACY)
     elements = ACCURACY[accuracy] if elements is None else elements
-    return _layered("disc", (inner_radius, radius), 0.0, thickness, elements, grading, sides, comm)
+    sizes = None if concentrate is None else _sizes(concentrate, inner_radius, radius)
+    if sizes and grading != 1:
+        raise InputError(f"disc: grading = {grading!r} and concentrate = {concentrate!r}: give one of them")
+    mesh = _layered("disc", (inner_radius, radius), 0.0, thickness, elements, grading, sides, comm)
+    if sizes:
+        x, along = mesh.domain.geometry.x, int(elements[0])
+        half = np.rint(2 * along * (x[:, 0] - inner_radius) / (radius - inner_radius))      # gmsh has some 12 digits
+        x[:, 0] = np.interp(half / 2, np.arange(along + 1), _concentrated(inner_radius, radius, along, sizes))
+    return mesh
+
+
+def _sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
+    """`concentrate` of a disc, checked, sorted by radius."""
+    if not isinstance(concentrate, Mapping) or not concentrate:
+        raise InputError(f"disc: concentrate = {concentrate!r}: must be {{reference radius: relative size}}")
+    sizes = {}
+    for radius, size in concentrate.items():
+        radius, size = finite("disc: concentrate: radius", radius), positive(f"disc: concentrate at {radius!r}", size)
+        if not low <= radius <= high:
+            raise InputError(f"disc: concentrate: radius = {radius!r}: must be from {low!r} to {high!r}")
+        if not 1e-6 <= size <= 1:
+            raise InputError(f"disc: concentrate at {radius!r} = {size!r}: must be from 1e-6 to 1")
+        sizes[radius] = size
+    return dict(sorted(sizes.items()))
+
+
+def _concentrated(low: float, high: float, along: int, sizes: dict[float, float]) -> np.ndarray:
+    """Ends of `along` elements from low to high, shape (along + 1,), with relative `sizes` at some radii."""
+    at, small = np.array(list(sizes)), np.array(list(sizes.values()))
+    ends = np.unique([low, *at, high])
+    if along < len(ends) - 1:
+        raise InputError(f"disc: elements along the radius = {along}: must be at least {len(ends) - 1}, one between"
+                         f" each two radii of concentrate = {sizes!r}")
+    steps = np.geomspace(1e-9, 1, 4001) * (high - low)      # fine where elements are small
+    R = np.unique(np.clip([*ends, *np.add.outer(at, steps).ravel(), *np.subtract.outer(at, steps).ravel()], low, high))
+    away = np.abs(np.subtract.outer(R, at))
+    size = (small + (1 - small) * away / away.min(1).max()).min(1)
+    number = np.concatenate([[0.0], np.cumsum(np.diff(R) * (1 / size[1:] + 1 / size[:-1]) / 2)])
+    at_ends = np.interp(ends, R, number)
+    marks = np.round(along * at_ends / number[-1]).astype(int)
+    spare = np.arange(len(ends))                             # at least one element between two ends
+    marks = np.minimum(np.maximum.accumulate(marks - spare) + spare, along - spare[::-1])
+    joints = np.interp(np.interp(np.arange(along + 1), marks, at_ends), number, R)
+    joints[marks] = ends
+    return joints
 
 
 def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], elements: tuple = (16, 8),

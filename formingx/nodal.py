@@ -42,9 +42,8 @@ class NodalContact:
         self.law = contact.law(contact.penalty * solid.stress / self.thickness, contact.ramp * self.thickness,
                                self.points)
         self._scale = solid.length / (solid.stress * solid.volume) * self.area
-        self._amplitude = solid.amplitudes.get(contact)       # None: the tool stays
-        self._motion = np.array(contact.moves or (0.0, 0.0)) * (self._amplitude.scale if self._amplitude else 0.0)
-        self.active = True
+        self._motion = solid.length * np.array(contact.moves or (0.0, 0.0))
+        self.base, self.rate = 0.0, float(contact.driven)   # of the travel by the control (`Setting`)
         self._last: Any = None                              # positions and tractions last computed
         self._accepted: Any = None                          # positions at the last accepted state
         self._iterate: Any = None                           # `Motion` at the iteration before
@@ -57,16 +56,7 @@ class NodalContact:
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Nodes seen from the tool, shape (n, 2), length; `fields`: owned unknowns."""
-        return self.points + self._length * fields[self.dofs] - self._travel(control)
-
-    def _travel(self, control: float) -> np.ndarray:
-        """How far the tool has come, shape (2,), length."""
-        return self._motion * (self._amplitude.at(control) if self._amplitude else 0.0)
-
-    @property
-    def _velocity(self) -> np.ndarray:
-        """Motion of the tool per control, shape (2,), length."""
-        return self._motion * (self._amplitude.rate if self._amplitude else 0.0)
+        return self.points + self._length * fields[self.dofs] - (self.base + self.rate * control) * self._motion
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
         """What the law gives at a state, computed once for it."""
@@ -93,6 +83,12 @@ class NodalContact:
         """Which nodes touch and slide, of the tractions last computed."""
         last = self._last[1]
         return (last.sense + 4 * (last.normal != 0)).astype(np.int8).tobytes()
+
+    def forget(self, fields: np.ndarray, control: float) -> None:
+        """The tool comes in: nothing has touched it yet."""
+        self._accepted, self._arrived[:] = None, False
+        if self._memory is not None:
+            self.memory = self.law.start(self.positions(fields, control))
 
     def begin(self) -> None:
         """Newton's method begins at a guess ahead of the last accepted state."""
@@ -122,9 +118,9 @@ class NodalContact:
 
     def add_control_derivative(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Add the derivative of the nodal forces by the control: the tool moves."""
-        if self.contact.driven:
+        if self.rate:
             by_position = self._scale[:, None, None] * self.tractions(fields, control).stiffness
-            values[self.dofs] -= by_position @ self._velocity
+            values[self.dofs] -= by_position @ (self.rate * self._motion)
 
     def advance(self, fields: np.ndarray, control: float) -> None:
         """A state is accepted: remember it."""
@@ -150,7 +146,7 @@ class NodalContact:
         A step that would bring a whole region into contact at once would decide by its own length where it sticks.
         """
         start = self.positions(fields, control)
-        velocity = self._length * direction[self.dofs] - slope * self._velocity
+        velocity = self._length * direction[self.dofs] - slope * self.rate * self._motion
         free = self.law.distance(start) <= -self.law.theta
         times = self._arrivals(start, velocity, length)
         ahead = (times > 0.02 * length) & (times < length)         # nearer ones are as good as in touch
@@ -162,7 +158,7 @@ class NodalContact:
     def prepare(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> None:
         """A step of this length along a tangent is about to be taken: foretell where nodes arrive."""
         start = self.positions(fields, control)
-        velocity = self._length * direction[self.dofs] - slope * self._velocity
+        velocity = self._length * direction[self.dofs] - slope * self.rate * self._motion
         times = self._arrivals(start, velocity, length)
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         if self._memory is not None:

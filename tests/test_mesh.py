@@ -25,6 +25,40 @@ def test_grading():
     assert sizes[-1] / sizes[0] == pytest.approx(0.2) and np.all(np.diff(sizes) < 0)
 
 
+@pytest.mark.parametrize("sizes, along", [
+    ({0.3: 0.05}, 24), ({0.3: 0.1, 1.0: 0.02}, 40), ({0.0: 0.5}, 9), ({0.4: 1}, 2)])
+def test_concentrate(sizes, along):
+    """Smallest at the radii, which are nodes; sizes grow linearly from them, in the ratio asked for."""
+    mesh = fx.mesh.disc(radius=1.0, thickness=0.1, elements=(along, 2), concentrate=sizes)
+    R = mesh.nodes_of("top")[:, 0]
+    joints, middles, length = R[::2], R[1::2], np.diff(R[::2])
+    assert len(joints) == along + 1 and joints[[0, -1]] == pytest.approx([0, 1], abs=1e-15)
+    assert middles == pytest.approx((joints[1:] + joints[:-1]) / 2, rel=1e-12)
+    assert mesh.nodes_of("bottom")[:, 0] == pytest.approx(R, rel=1e-12)
+    away = np.abs(np.subtract.outer(joints, list(sizes)))
+    assert away.min(0) == pytest.approx(0, abs=1e-15)
+    if along > 10:
+        farthest = np.abs(np.subtract.outer(np.linspace(0, 1, 10001), list(sizes))).min(1).max()
+        away = np.abs(np.subtract.outer(middles, list(sizes)))
+        small = np.array(list(sizes.values()))
+        wanted = (small + (1 - small) * away / farthest).min(1)
+        assert length / length.sum() == pytest.approx(wanted / wanted.sum(), rel=0.12)
+
+
+@pytest.mark.parametrize("wrong, words", [
+    ({"concentrate": 0.3}, r"concentrate = 0.3: must be \{reference radius: relative size\}"),
+    ({"concentrate": {}}, "concentrate = {}: must be"),
+    ({"concentrate": {1.2: 0.1}}, "concentrate: radius = 1.2: must be from 0.0 to 1.0"),
+    ({"concentrate": {0.3: 0}}, "concentrate at 0.3 = 0: must be greater than 0"),
+    ({"concentrate": {0.3: 1.5}}, "concentrate at 0.3 = 1.5: must be from 1e-6 to 1"),
+    ({"concentrate": {"here": 0.1}}, "concentrate: radius = 'here': must be a number"),
+    ({"concentrate": {0.3: 0.1}, "grading": 0.5}, "grading = 0.5 and concentrate = {0.3: 0.1}: give one"),
+    ({"concentrate": {0.3: 0.1, 0.6: 0.1}, "elements": (2, 1)}, "along the radius = 2: must be at least 3")])
+def test_concentrate_refuses(wrong, words):
+    with pytest.raises(fx.InputError, match=words):
+        fx.mesh.disc(**{"radius": 1.0, "thickness": 0.1, "elements": (10, 1), **wrong})
+
+
 def test_sphere_is_curved_to_second_order():
     """Every node, mid-edge nodes too, on its circle; the volume converges with the fourth power of the size."""
     errors = []

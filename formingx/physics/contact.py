@@ -44,7 +44,7 @@ class Contact:
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge).
             What sticks depends on when it touched: with more, thickness changes by some 0.1 % of itself.
         moves: (r, z) of the tool's motion per unit of travel: the tool is what the run controls; None: it stays.
-        name: of its column, <name>_travel, where several things are driven; default: the boundary's.
+        name: what it is called in a process and in its columns.
 
     Raises:
         InputError: an argument that is not allowed.
@@ -67,15 +67,12 @@ class Contact:
         if self.moves == (0.0, 0.0):
             raise InputError(f"{name}: moves = (0, 0): must name a direction, or be None")
 
+    quantity = "travel"
+
     @property
     def driven(self) -> bool:
         """True if the run controls the motion of the tool."""
         return self.moves is not None
-
-    @property
-    def label(self) -> str:
-        """Its name, or that of its boundary."""
-        return self.name or self.on
 
     @property
     def symmetric(self) -> bool:

@@ -22,11 +22,12 @@ def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
     x, y = plots.main_columns(path.columns)
     shapes, tools, now = [], [], []
     for a, b, fraction in _spread(path, frames):
+        path.go_to(b)
         x_there, control = path.between(a, b, fraction)
         at = replace(b, x=x_there, control=control)
         shapes.append(path.profile(at))
         now.append(path.measured(at, x, y))
-        tools.append([_tool(path.problem, contact, at.control) for contact in path.problem.contacts])
+        tools.append([_tool(path.problem, contact, at.control) for contact in path.problem.touching])
     curve = path.curve(x, y)
     axisymmetric = path.problem.scene.kinematics.dimension_of_volume == 3
 
@@ -48,7 +49,7 @@ def _spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
 
 def _tool(problem: Any, contact: Any, control: float) -> np.ndarray:
     moves = np.array(contact.contact.moves or (0.0, 0.0))
-    return contact.contact.tool.outline() + problem.forms.control_scale * control * moves
+    return contact.contact.tool.outline() + problem.forms.length * (contact.base + contact.rate * control) * moves
 
 
 def _draw(shapes: list, tools: list, now: np.ndarray, curve: list, names: tuple, axisymmetric: bool, seconds: float,

@@ -22,7 +22,7 @@ def describe(problem: Any) -> dict[str, Any]:
     their number; then every part of the scene by its public attributes.
     """
     scene = problem.scene
-    known = set(_PARTS) | {"mesh", "driven"}
+    known = set(_PARTS) | {"mesh"}
     extra = sorted(name for name in vars(scene) if name not in known and not name.startswith("_"))
     return {"mesh": _mesh(problem), "unknowns": problem.n_unknowns,
             **{name: plain(getattr(scene, name)) for name in (*_PARTS, *extra)}}
@@ -42,7 +42,7 @@ def summary(scene: Any) -> dict[str, str]:
         for k, thing in enumerate(getattr(scene, kind), 1):
             numbers = "".join(f", {name.replace('_', ' ')} {value!r}" for name, value in vars(thing).items()
                               if isinstance(value, int | float) and repr(value) not in text(thing))
-            lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if thing in scene.drivable else "")
+            lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if getattr(thing, "driven", False) else "")
     return lines | {"model": text(scene.model), "kinematics": text(scene.kinematics),
                     "quadrature degree": str(scene.quadrature_degree)}
 
