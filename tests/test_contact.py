@@ -36,6 +36,7 @@ def test_force_is_derivative_of_energy():
     np.testing.assert_allclose(derivative(law.energy, x, 1e-6), force, atol=1e-7 * K)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("mu", [0.0, 0.3, 5.0, np.inf])
 @pytest.mark.parametrize("slip", [0.0, 1e-4, -0.01, 0.2])
 @pytest.mark.parametrize("touched", [True, False])
@@ -113,6 +114,7 @@ def support_force(problem, state, component):
     return values[dofs].sum() * forms.stress * forms.volume / forms.length
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("friction", ["none", "stick", 0.3])
 def test_forces_balance(friction):
     path = fx.trace(cup(friction), until=fx.pressure(8.0), step=fx.StepControl(target=8), progress=False,
@@ -184,6 +186,7 @@ def bent_strip(radius, thickness, tail, elements):
     return mesh
 
 
+@pytest.mark.quick
 def test_capstan():
     """Tension over a round bar grows as exp(mu angle) (with the lever arms of a strip of finite thickness)."""
     mu, radius, h = 0.3, 1.0, 0.02
@@ -230,6 +233,7 @@ def test_a_scene_pays_for_what_is_in_it():
     assert len(Problem(cup("stick", (4, 1))).memory) == 1
 
 
+@pytest.mark.quick
 def test_a_moving_tool():
     """A round plug pushes a clamped disc; the derivative by the control is that of the residual."""
     mesh = fx.mesh.disc(radius=10.0, thickness=0.5, elements=(20, 2))

@@ -6,6 +6,8 @@ import pytest
 import formingx as fx
 from formingx.problem import Problem
 
+pytestmark = pytest.mark.quick
+
 MATERIALS = [
     fx.NeoHookean(c10=2.0),
     fx.MooneyRivlin(c10=1.5, c01=0.4),

@@ -85,7 +85,7 @@ class Contact:
 
     @property
     def symmetric(self) -> bool:
-        """True if contact has an energy: without friction or memory."""
+        """True without friction or memory: contact then has an energy."""
         return self.mu == 0 and self.separates
 
     def law(self, k: float, theta: float, points: np.ndarray) -> Law:

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from .. import _compat
+
 _PARTS = ("materials", "supports", "loads", "contacts", "model", "kinematics", "quadrature_degree")
 
 
@@ -89,7 +91,7 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
 def _mesh(problem: Any) -> dict[str, Any]:
     mesh, domain, comm = problem.scene.mesh, problem.forms.domain, problem.comm
     cells = domain.topology.index_map(domain.topology.dim).size_local
-    x = domain.geometry.x[domain.geometry.dofmap[:cells]][:, :, :2] / problem.forms.length
+    x = domain.geometry.x[_compat.cell_nodes(domain)[:cells]][:, :, :2] / problem.forms.length
     number = domain.topology.original_cell_index[:cells]
     weights = np.sin(1.0 + number)[:, None] * np.sin(1.0 + np.arange(x.shape[1]))
     total = comm.allreduce(cells, MPI.SUM)
