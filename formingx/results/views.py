@@ -76,7 +76,7 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
         surface["ratio"] = np.tile(values, (len(stations), 1)).ravel(order="F")
         return surface
 
-    ratio = profile.thickness_ratio
+    ratio = profile.wall_ratio
     rim = np.linspace(profile.bottom[-1], profile.top[-1], 3)[1:-1]
     line = np.vstack([profile.bottom, rim, profile.top[::-1]])
     values = np.concatenate([ratio, np.full(len(rim), ratio[-1]), ratio[::-1]])
