@@ -47,11 +47,11 @@ class NodalContact:
         self._last: Any = None                              # positions and tractions last computed
         self._accepted: Any = None                          # positions at the last accepted state
         self._iterate: Any = None                           # `Motion` at the iteration before
-        self.memory = None if contact.mu == 0 else self.law.start(self.points)
+        self.memory = self.law.start(self.points) if self.law.remembers else None
         self._sense: Any = None                             # of sliding, of the iteration before
         self._arrived = np.zeros(len(self.points), dtype=bool)     # in the step before the last accepted state
         # without history only the step's own convergence limits how much may touch in it
-        self._allowed = contact.nodes_per_step * (1 if contact.mu else 10)
+        self._allowed = contact.nodes_per_step * (1 if self.law.remembers else 10)
         self._foreseen = 0
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
@@ -147,7 +147,7 @@ class NodalContact:
         """
         start = self.positions(fields, control)
         velocity = self._length * direction[self.dofs] - slope * self.rate * self._motion
-        free = self.law.distance(start) <= -self.law.theta
+        free = ~self.law.touching(start, self._memory)
         times = self._arrivals(start, velocity, length)
         ahead = (times > 0.02 * length) & (times < length)         # nearer ones are as good as in touch
         times = np.sort(np.concatenate(self._comm.allgather(times[ahead])))
@@ -167,7 +167,7 @@ class NodalContact:
     def _arrivals(self, start: np.ndarray, velocity: np.ndarray, length: float) -> np.ndarray:
         """Arc length at which free nodes meet the ramp, `length` if they do not before, shape (n,)."""
         before = -self.law.theta - self.law.distance(start)
-        free, at, times = (before > 0) & (self.area > 0), 0.0, np.full(len(start), length)
+        free, at, times = ~self.law.touching(start, self._memory) & (self.area > 0), 0.0, np.full(len(start), length)
         for s in length * np.linspace(0, 1, 17)[1:]:
             now = -self.law.theta - self.law.distance(start + s * velocity)
             hit = free & (now <= 0)
@@ -183,6 +183,10 @@ class NodalContact:
         found = int(np.sum((a <= -self.law.theta - HOVERING * self.thickness) & (b > -self.law.theta)))
         return self._comm.allreduce(found, MPI.SUM) > 2 * max(self._allowed, self._foreseen) + 2
 
+    def touching(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Which nodes touch, or are held, shape (n,)."""
+        return self.law.touching(self.positions(fields, control), self._memory)
+
     def largest_penetration(self, fields: np.ndarray, control: float) -> float:
         """Depth of the deepest node inside the tool, 0 if none is, length, all ranks."""
         d = self.contact.tool.signed_distance(self.positions(fields, control))
@@ -190,8 +194,7 @@ class NodalContact:
 
     def contact_length(self, fields: np.ndarray, control: float) -> float:
         """Reference length of the face that is in touch, all ranks."""
-        d = self.law.distance(self.positions(fields, control))
-        return self._comm.allreduce(float(self.lengths[d > -self.law.theta].sum()), MPI.SUM)
+        return self._comm.allreduce(float(self.lengths[self.touching(fields, control)].sum()), MPI.SUM)
 
     def traction(self, fields: np.ndarray, control: float) -> tuple[np.ndarray, np.ndarray]:
         """(reference points (m, 2), normal and tangential traction per reference area (m, 2)) of all ranks, by R."""

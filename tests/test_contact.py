@@ -51,6 +51,22 @@ def test_stiffness_is_derivative_of_force(mu, slip, touched):
     assert np.all(np.abs(found.tangential) <= mu * found.normal + 1e-12 if np.isfinite(mu) else True)
 
 
+@pytest.mark.parametrize("mu", [0.0, np.inf])
+@pytest.mark.parametrize("touched", [True, False])
+def test_a_tool_that_holds(mu, touched):
+    """Stiffness is the derivative of the force; what has touched is pulled back, what has not is free."""
+    law = Law(TOOL, mu, K, THETA, separates=False)
+    x, tangent = points_near(TOOL, [-5 * THETA, -(1 + 1e-3) * THETA, -0.5 * THETA, 2 * THETA])
+    before = x - 0.01 * tangent
+    old = Touch(before, np.full(len(x), -0.5 * THETA if touched else -2 * THETA), np.full(len(x), 1e-4), before)
+    found, d = law.tractions(x, old), law.distance(x)
+    exact = derivative(lambda y: law.tractions(y, old).force, x, 1e-7)
+    np.testing.assert_allclose(exact, found.stiffness, atol=1e-5 * K)
+    np.testing.assert_allclose(found.normal, K * (d + THETA if touched else np.maximum(d + THETA, 0)), atol=1e-9 * K)
+    assert np.all(law.touching(x, old) == (touched | (d > -THETA)))
+    assert np.all(law.touching(x, found.touch) == law.touching(x, old))
+
+
 @pytest.mark.parametrize("mu", [0.0, 0.3, np.inf])
 def test_force_is_continuous(mu):
     law, step = Law(TOOL, mu, K, THETA), 1e-9
@@ -236,7 +252,25 @@ def test_a_moving_tool():
     np.testing.assert_allclose((plus.array - minus.array) / (2 * h), exact.array, atol=1e-5 * np.abs(exact.array).max())
 
 
+@pytest.mark.parametrize("friction", ["none", "stick"])
+def test_a_plate_that_holds_pulls(friction):
+    """Free to slide, the block is in uniaxial tension: N = 2 A (l - 1/l^2) (c10 + c01 / l); stuck, it is stiffer."""
+    c10, c01, l = 1.0, 0.2, 1.4                               # noqa: E741
+    mesh = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(4, 4))
+    plate = fx.Contact("top", tools.plane(1.0), friction, moves=(0, -1), separates=False, penalty=2e6, ramp=1e-7)
+    scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=c10, c01=c01), contacts=[plate],
+                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")])
+    path = fx.trace(scene, until=fx.travel(1 - l), progress=False)
+    exact = -2 * np.pi * (l - l**-2) * (c10 + c01 / l)
+    force = path.last.measures["tool_force"]
+    assert force == pytest.approx(exact, rel=1e-5) if friction == "none" else force < 1.02 * exact
+    assert force == pytest.approx(support_force(path.problem, path.last, 1), rel=1e-6)
+    assert path.last.measures["contact_length"] == pytest.approx(1.0)
+
+
 @pytest.mark.parametrize("change, message", [
+    (lambda: fx.Contact("top", TOOL, 0.3, separates=False), "has no Coulomb friction"),
+    (lambda: fx.Contact("top", TOOL, separates="no"), "must be True or False"),
     (lambda: fx.Contact("top", TOOL, -0.1), "must not be negative"),
     (lambda: fx.Contact("top", TOOL, "glue"), "must be 'stick', 'none' or a coefficient"),
     (lambda: fx.Contact("top", "cup"), "must be a tool"),

@@ -6,6 +6,7 @@ Every triangle gets six nodes of its own, so that nothing is smeared over an int
     stretches               the larger and the smaller in the plane, and the hoop stretch (`Stress.principal_stretches`)
     principal_stresses      of the Cauchy stress, from the largest to the smallest, stress
     cauchy_rr, _zz, _rz, _hoop  its components; hydrostatic_pressure: minus a third of its trace, stress
+    stress_error            its estimated error, one value in each triangle (`StressError.mean`), stress
     contact_pressure        normal traction per deformed area at the face, stress, of all tools; where there are any
                             (the first two nodes from the axis share their areas: there it is less accurate)
     thickness, thickness_ratio  of the sheet there, where the mesh has two faces that face each other
@@ -60,11 +61,13 @@ class Fields:
         found = {"displacement": self._eval(self._u)}
         moved = self.points + found["displacement"]
         if self.dimension == 2:
-            stress = self._path.stress(state).in_cells(_NODES[2])
+            field = self._path.stress(state)
+            stress = field.in_cells(_NODES[2])
             sigma = stress.cauchy
             found |= {"stretches": stress.principal_stretches, "principal_stresses": stress.principal_stresses,
                       "cauchy_rr": sigma[:, 0, 0], "cauchy_zz": sigma[:, 1, 1], "cauchy_rz": sigma[:, 0, 1],
-                      "cauchy_hoop": sigma[:, 2, 2], "hydrostatic_pressure": stress.hydrostatic_pressure}
+                      "cauchy_hoop": sigma[:, 2, 2], "hydrostatic_pressure": stress.hydrostatic_pressure,
+                      "stress_error": np.repeat(field.error_in_cells(), len(_NODES[2]))}
             if problem.contacts:
                 found["contact_pressure"] = self._contact_pressure(state, moved)
         try:

@@ -143,8 +143,7 @@ def _moved(problem: Any, state: Any, point: np.ndarray) -> np.ndarray:
 
 def _touching(problem: Any, x: np.ndarray, control: float) -> list[np.ndarray]:
     """For every contact: True for each own node in touch, shape (n,)."""
-    return [c.law.distance(c.positions(x[: problem.forms.space.dofmap.index_map.size_local], control)) > -c.law.theta
-            for c in problem.touching]
+    return [c.touching(x[: problem.forms.space.dofmap.index_map.size_local], control) for c in problem.touching]
 
 
 def _flips(problem: Any, attempt: Attempt) -> int | None:

@@ -1,0 +1,68 @@
+"""Fields that are known at the quadrature points of cells, smoothed: a cubic for each cell, fitted to its patch.
+
+The patch of a cell is the cells of its layer that share a corner with it, so nothing is smeared over an interface; a
+cubic in (R, Z) is fitted to the values on it by least squares. In the manner of the patches around nodes of Zienkiewicz
+and Zhu, Int. J. Numer. Meth. Engng 33 (1992) 1331 (doi:10.1002/nme.1620330702), but one for each cell: so no boundary
+needs a rule of its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+_POWERS = np.array([(i, n - i) for n in range(4) for i in range(n, -1, -1)])
+"""Exponents of (R, Z) in a cubic, shape (10, 2)."""
+_CHUNK = 2048                  # cells at a time: some 30 MB
+
+
+class Patches:
+    """The patches of `mine`, some of n cells; of all of them the points are known.
+
+    Args:
+        points: quadrature points (R, Z), shape (n, q, 2).
+        corners: numbers of the corners of the cells, shape (n, 3).
+        layer: number of the layer of each cell, shape (n,).
+        mine: numbers of the cells to fit, shape (m,).
+    """
+
+    def __init__(self, points: np.ndarray, corners: np.ndarray, layer: np.ndarray, mine: np.ndarray):
+        self._points = points
+        at: dict[tuple[int, int], list[int]] = {}
+        for cell, (three, where) in enumerate(zip(corners.tolist(), layer.tolist(), strict=True)):
+            for corner in three:
+                at.setdefault((where, corner), []).append(cell)
+        patches = [sorted({c for corner in corners[cell].tolist() for c in at[int(layer[cell]), corner]})
+                   for cell in mine]
+        self._patch = np.full((len(mine), max(map(len, patches), default=0)), -1)
+        for row, patch in zip(self._patch, patches, strict=True):
+            row[: len(patch)] = patch
+        self._origin = points[mine].mean(1)
+        self._size = np.ones((len(mine), 2))
+        for some in self._chunks():
+            away = np.abs(points[self._patch[some]] - self._origin[some, None, None])
+            self._size[some] = np.where(self._patch[some, :, None, None] < 0, 0.0, away).max((1, 2))
+
+    def fit(self, values: np.ndarray) -> np.ndarray:
+        """Coefficients of the cubics, shape (m, 10, k), of values at the points of all cells, shape (n, q, k)."""
+        found = np.zeros((len(self._patch), len(_POWERS), values.shape[-1]))
+        for some in self._chunks():
+            patch = self._patch[some]
+            basis = self._basis(some, self._points[patch]) * (patch >= 0)[..., None, None]
+            basis = basis.reshape(len(patch), -1, len(_POWERS))
+            # too few cells for a cubic: the smallest coefficients that fit
+            inverse = np.linalg.pinv(basis.transpose(0, 2, 1) @ basis, rcond=1e-12, hermitian=True)
+            found[some] = inverse @ (basis.transpose(0, 2, 1) @ values[patch].reshape(*basis.shape[:2], -1))
+        return found
+
+    def at(self, coefficients: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Values of the cubics at points of each cell, shape (m, p, 2): shape (m, p, k)."""
+        return self._basis(slice(None), points) @ coefficients
+
+    def _basis(self, some: slice, points: np.ndarray) -> np.ndarray:
+        """The monomials at points (cells, ..., 2), shape (cells, ..., 10)."""
+        between = (slice(None), *[None] * (points.ndim - 2))
+        x = (points - self._origin[some][between]) / self._size[some][between]
+        return np.prod(x[..., None, :] ** _POWERS, axis=-1)
+
+    def _chunks(self) -> list[slice]:
+        return [slice(k, k + _CHUNK) for k in range(0, len(self._patch), _CHUNK)]
