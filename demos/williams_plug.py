@@ -78,7 +78,7 @@ def draw(paths, tool, limit):
     forces.axhline(limit, color="k", linestyle=":", linewidth=1)
     forces.text(20, limit, r"$4\pi r_p c_{10} h_0$", ha="right", va="bottom")
     forces.set(xlabel="travel, cm", ylabel="force on the plug, N", title="force", ylim=(0, None))
-    thickness.set(xlabel="reference radius R, cm", ylabel="wall / original thickness", title="thickness", ylim=(0, 1.02))
+    thickness.set(xlabel="reference radius R, cm", ylabel="wall / original", title="thickness", ylim=(0, 1.02))
     thickness.axvline(PLUG, color="0.7", linewidth=1)
     for axes in (forces, thickness):
         axes.legend(frameon=False, fontsize="small")
