@@ -9,7 +9,7 @@ holds     What touches plug or mould stays on it, as on a cold tool: 20 psi lay 
           back to 6 psi, the plug lets go, 60 psi fill the corner.
 carries   The same, but before it lets go the plug carries the base to the bottom.
 
-Then a map of the last two over plug radius and the travel at which the plug lets go: base, corner, thinnest place; in
+Then a map over plug radius and travel, for plugs that hold and plugs that carry: base, corner, thinnest place; in
 parallel processes, or with mpirun over the ranks. Lengths in cm, stresses in psi.
 """
 
@@ -24,15 +24,17 @@ from formingx.results import files, plots
 
 DEPTH, DRAFT, FILLET, EDGE = 10.0, 5.0, 2.0, 1.5
 SHARE, SEAL, LOW = 0.6, 20.0, 6.0                            # of the depth; psi, to lay the wall; psi, to let go
-RADII, SHARES = (3.0, 4.0, 5.0, 6.0, 7.0), (0.6, 0.8, 1.0)   # of the map; 1: the base is on the bottom
+RADII = (3.0, 4.0, 5.0, 6.0, 7.0)                            # of the map, and its (share of the depth, way)
+WAYS = ((0.4, "holds"), (0.6, "holds"), (0.8, "holds"), (0.6, "carries"))
 STEP = fx.StepControl(target=8)
 MOULD = fx.tools.cup(radius=RADIUS, depth=DEPTH, mouth=THICKNESS, draft=DRAFT, fillet=FILLET)
 LABELS = {"straight": "straight vacuum", "lifts": "plug, sheet lifts off", "holds": "plug holds to 60 %",
           "carries": "plug carries the base"}
 
 
-def plug_then_vacuum(radius, share, elements, lifts=False, comm=COMM, progress=True):
-    """The path of the process; the plug lets go at a share of the depth, or the sheet lifts off it."""
+def plug_then_vacuum(way, radius, share, elements, comm=COMM, progress=True):
+    """The path of the process, the plug travelling to a share of the depth first."""
+    lifts = way == "lifts"
     mesh = fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=elements, comm=comm)
     plug = fx.tools.male(radius=radius, height=40.0, base=-40.0, fillet=EDGE)
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0),
@@ -41,7 +43,7 @@ def plug_then_vacuum(radius, share, elements, lifts=False, comm=COMM, progress=T
                                fx.Contact("bottom", plug, 0.3 if lifts else "stick", separates=lifts, moves=(0, 1),
                                           name="plug")])
     full = [fx.pressure(p) for p in PRESSURES]
-    stages = [fx.Stage("plug", drive="plug", until=fx.travel(SHARE * DEPTH))]
+    stages = [fx.Stage("plug", drive="plug", until=fx.travel(share * DEPTH))]
     if lifts:
         stages += [fx.Stage("vacuum", drive="vacuum", until=full[-1], through=full[:-1]),
                    fx.Stage("plug out", drive="plug", until=fx.travel(0.0))]
@@ -50,9 +52,9 @@ def plug_then_vacuum(radius, share, elements, lifts=False, comm=COMM, progress=T
                fx.Stage("relax", drive="vacuum", until=fx.pressure(LOW))]
     process = fx.Process(scene)
     path = process.run(stages, step=STEP, progress=progress)
-    if share > SHARE:                                        # the base on the bottom is pressed by h0/100
+    if way == "carries":                                     # the base is pressed to the bottom by h0/100
         bottom = DEPTH + 1.01 * THICKNESS - path.profile().thickness[0]
-        stages += [fx.Stage("plug on", drive="plug", until=fx.travel(bottom if share == 1 else share * DEPTH))]
+        stages += [fx.Stage("plug on", drive="plug", until=fx.travel(bottom))]
     stages += [fx.Stage("plug off", without=["plug"]),
                fx.Stage("vacuum", drive="vacuum", until=full[-1], through=full[2:-1], without=["plug"])]
     return process.run(stages, step=STEP, max_steps=800, start=path, progress=progress)
@@ -76,9 +78,9 @@ def thickness(path, state) -> dict:
 
 def case(arguments):
     """One point of the map, on this process alone: its thickness, or why there is none."""
-    radius, share, elements = arguments
+    way, radius, share, elements = arguments
     try:
-        path = plug_then_vacuum(radius, share, elements, comm=MPI.COMM_SELF, progress=False)
+        path = plug_then_vacuum(way, radius, share, elements, MPI.COMM_SELF, progress=False)
     except (fx.ConvergenceError, fx.InputError) as error:
         return str(error)
     return thickness(path, path.last)
@@ -92,28 +94,27 @@ def main():
     args = options.parse_args()
     elements = (30, 1) if args.quick else (args.elements, args.layers)
     paths = {"straight": form("stick", elements, DEPTH, DRAFT, FILLET)[0]}
-    paths["lifts"] = plug_then_vacuum(args.radius, SHARE, elements, lifts=True)
-    paths["holds"], paths["carries"] = (plug_then_vacuum(args.radius, share, elements) for share in (SHARE, 1.0))
+    paths |= {way: plug_then_vacuum(way, args.radius, SHARE, elements) for way in ("lifts", "holds", "carries")}
     summary: dict = {name: thickness(path, path.last) | cost(path) for name, path in paths.items()}
     for name, n in summary.items():
         say(f"{name}: base {n['base']:.4f}, corner {n['corner']:.4f}, thinnest {n['least']:.4f} of h0 at R ="
             f" {n['least_at_R_cm']:.3g} cm; {n['steps']} states, {n['newton_iterations']} Newton iterations,"
             f" {n['cutbacks']} cut back, {n['solve_seconds']:.1f} s")
         paths[name].to_csv(args.out / f"{name}.csv")
-    radii, shares = (RADII[1::2], SHARES[::2]) if args.quick else (RADII, SHARES)
-    cases = [(r, share, (30, 1) if args.quick else (40, 1)) for r in radii for share in shares]
+    radii, ways = (RADII[1::2], WAYS[1::2]) if args.quick else (RADII, WAYS)
+    cases = [(way, r, share, (30, 1) if args.quick else (40, 1)) for r in radii for share, way in ways]
     found = sweep(case, cases)
-    summary["map"] = [{"radius_cm": r, "share_of_depth": share, **(n if isinstance(n, dict) else {"ended": n})}
-                      for (r, share, _), n in zip(cases, found)]
+    summary["map"] = [{"way": way, "radius_cm": r, "travel_cm": share * DEPTH,
+                       **(n if isinstance(n, dict) else {"ended": n})} for (way, r, share, _), n in zip(cases, found)]
     for n in summary["map"]:
-        say(f"plug radius {n['radius_cm']:g} cm, lets go at {n['share_of_depth']:.0%}: " + (
+        say(f"plug of radius {n['radius_cm']:g} cm {n['way']} at {n['travel_cm']:g} cm: " + (
             n["ended"][:200] if "ended" in n else f"base {n['base']:.4f}, corner {n['corner']:.4f}, thinnest"
             f" {n['least']:.4f} at R = {n['least_at_R_cm']:.3g} cm"))
     summary["most_even"] = best = max((n for n in summary["map"] if "least" in n), key=lambda n: n["least"])
-    say(f"most even wall: plug radius {best['radius_cm']:g} cm, let go at {best['share_of_depth']:.0%}: thinnest"
-        f" {best['least']:.4f} of h0 (straight vacuum: {summary['straight']['least']:.4f})")
+    say(f"most even wall: a plug of radius {best['radius_cm']:g} cm that {best['way']} at {best['travel_cm']:g} cm:"
+        f" thinnest {best['least']:.4f} of h0 (straight vacuum: {summary['straight']['least']:.4f})")
     save(draw(paths, args.radius), args.out / "plug_and_vacuum.png")
-    save(draw_map(summary["map"], radii, shares), args.out / "map.png")
+    save(draw_map(summary["map"], radii, ways), args.out / "map.png")
     if not args.quick:
         paths["carries"].view3d(args.out / "plug_and_vacuum_3d.png")
     summarise(args.out, {**summary, "mesh": {"radius_elements": elements[0], "thickness_elements": elements[1]},
@@ -140,16 +141,17 @@ def draw(paths, radius):
     return figure
 
 
-def draw_map(found, radii, shares):
-    """Base, corner and thinnest place over plug radius and the share of the depth at which the plug lets go."""
+def draw_map(found, radii, ways):
+    """Base, corner and thinnest place over plug radius, for every travel and way."""
     figure, axes = plots.figure(3, width=3.8)
     for ax, key in zip(axes, ("base", "corner", "least")):
-        for share in shares:
-            n = [next(m for m in found if (m["radius_cm"], m["share_of_depth"]) == (r, share)) for r in radii]
-            ax.plot(radii, [m.get(key, np.nan) for m in n], "o-", label=f"{share:.0%}")
+        for share, way in ways:
+            n = [next(m for m in found if (m["way"], m["radius_cm"], m["travel_cm"]) == (way, r, share * DEPTH))
+                 for r in radii]
+            ax.plot(radii, [m.get(key, np.nan) for m in n], "o-", label=f"{share * DEPTH:g} cm, {way}")
         ax.set(xlabel="plug radius, cm", ylabel="thickness / original",
                title={"least": "thinnest place"}.get(key, key), ylim=(0, None))
-    axes[0].legend(frameon=False, title="lets go at")
+    axes[0].legend(frameon=False, title="plug travel")
     return figure
 
 

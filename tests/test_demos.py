@@ -114,3 +114,32 @@ def test_compression_roll_over_quick(tmp_path):
 def test_compression_sandwich_quick(tmp_path):
     found = summary("compression_sandwich", tmp_path, "--quick")
     assert found["waist"] and found["sandwich"]["ended"] == "done"
+
+
+def test_williams_plug_quick(tmp_path):
+    found = summary("williams_plug", tmp_path, "--quick")
+    held, slips, hinged = found["held"], found["frictionless"], found["held_hinged"]
+    forces = list(held["force_N_at_travel_cm"].values())
+    assert held["ended"] == "done" and len(forces) == 10 and forces == sorted(forces)
+    # 40 x 2, 60 x 2 and 80 x 3 elements: 4512, 4519, 4479 N; figure 6.10: the rim matters little to the force
+    assert forces[-1] == pytest.approx(4500, rel=1e-2)
+    assert hinged["force_N_at_travel_cm"]["20"] == pytest.approx(forces[-1], rel=5e-3)
+    # a frictionless plug cannot pull harder than the sheet under it
+    assert 0.85 < slips["largest_force_N"] / found["force_limit_without_friction_N"] < 1
+    stretch = slips["stretches_at_pole"]
+    assert stretch["meridional"] == pytest.approx(stretch["hoop"], rel=5e-3) and stretch["hoop"] > 1.9
+    assert held["mean_hoop_deviation_outside_plug"] < 0.06                  # thesis: 6 %
+    for picture in ("williams_plug", "rims"):
+        assert (tmp_path / f"{picture}.png").stat().st_size > 10_000
+
+
+def test_plug_and_vacuum_quick(tmp_path):
+    found = summary("plug_and_vacuum", tmp_path, "--quick")
+    straight, lifts, holds, carries = (found[name] for name in ("straight", "lifts", "holds", "carries"))
+    for place in ("base", "corner", "least"):                # an elastic sheet that leaves the plug forgets it
+        assert lifts[place] == pytest.approx(straight[place], rel=3e-3)
+        assert holds[place] > straight[place]
+    assert carries["base"] > 2 * straight["base"] and carries["least"] < straight["least"]
+    assert len(found["map"]) == 4 and not any("ended" in point for point in found["map"])
+    for picture in ("plug_and_vacuum", "map"):
+        assert (tmp_path / f"{picture}.png").stat().st_size > 10_000
