@@ -71,7 +71,7 @@ def thickness(path, state) -> dict:
     angle = arc.start + arc.sweep / 2
     profile = path.profile(state)
     corner = np.hypot(*(profile.top - arc.centre - arc.radius * np.array([np.cos(angle), np.sin(angle)])).T).argmin()
-    ratio = profile.thickness_ratio
+    ratio = profile.wall_ratio
     return {"base": float(ratio[0]), "corner": float(ratio[corner]), "least": float(ratio.min()),
             "least_at_R_cm": float(profile.reference_radius[ratio.argmin()])}
 
@@ -132,11 +132,11 @@ def draw(paths, radius):
     shapes.plot(*(tool + [0, SHARE * DEPTH]).T, "0.5", linewidth=1)
     shapes.set(xlabel="r, cm", ylabel="z, cm", xlim=(0, 1.05 * RADIUS), ylim=(-0.5, 1.1 * DEPTH))
     shapes.set_aspect("equal")
-    shapes.legend(frameon=False, fontsize="small", loc="center right")
+    shapes.legend(frameon=False, fontsize="small", loc="lower left")
     for (name, path), style in zip(paths.items(), ("k", "C1--", "C2", "C3")):
         profile = path.profile()
-        ratios.plot(profile.reference_radius, profile.thickness_ratio, style, label=LABELS[name])
-    ratios.set(xlabel="reference radius R, cm", ylabel="thickness / original", ylim=(0, 1.02))
+        ratios.plot(profile.reference_radius, profile.wall_ratio, style, label=LABELS[name])
+    ratios.set(xlabel="reference radius R, cm", ylabel="wall / original", ylim=(0, 1.02))
     ratios.legend(frameon=False)
     return figure
 
@@ -150,7 +150,7 @@ def draw_map(found, radii, ways):
                  for r in radii]
             ax.plot(radii, [m.get(key, np.nan) for m in n], "o-", label=f"{share * DEPTH:g} cm, {way}")
         ax.set(xlabel="plug radius, cm", ylabel="thickness / original",
-               title={"least": "thinnest place"}.get(key, key), ylim=(0, None))
+               title={"least": "thinnest place"}.get(key, key))
     axes[0].legend(frameon=False, title="plug travel")
     return figure
 
