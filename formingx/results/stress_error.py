@@ -85,8 +85,8 @@ class StressPeak(NamedTuple):
         if self.converged:
             return largest
         return (f"the stress peak at {_show(self.doubtful_point)} has not converged: sigma_1 is {self.doubtful:.4g}"
-                f" there, its estimated error {self.doubtful_error:.2g} ({largest}). Refine the mesh there; where a tool has a"
-                f" sharp edge, a clamp begins or sticking contact ends, stress has no limit")
+                f" there, its estimated error {self.doubtful_error:.2g} ({largest}). Refine the mesh there; where a"
+                f" tool has a sharp edge, a clamp begins or sticking contact ends, stress has no limit")
 
 
 def _show(point: np.ndarray) -> str:
