@@ -184,12 +184,14 @@ class StressField:
         Raises:
             InputError: an unknown layer, or no cell between the radii.
         """
-        comm, fitted, error = self._recovery.problem.comm, self._fitted, self._fitted.error()
+        comm, fitted = self._recovery.problem.comm, self._fitted
         mine = self._recovery.of_layer(layer)
         if radii is not None:
             low, high = pair("stress peak: radii", radii)
-            mine &= (low <= error.points[:, 0]) & (error.points[:, 0] <= high)
-        cells = [np.concatenate(comm.allgather(v[mine])) for v in (fitted.largest, fitted.at, error.mean)]
+            R = fitted.points[:, :, 0].mean(1)
+            mine &= (low <= R) & (high >= R)
+        errors = np.sqrt(((fitted.smooth - fitted.raw) ** 2).sum((2, 3))).max(1, initial=0.0)
+        cells = [np.concatenate(comm.allgather(v[mine])) for v in (fitted.largest, fitted.at, errors)]
         if not len(cells[0]):
             raise InputError(f"stress peak: radii = {radii!r}: no cell has its middle between them")
         peak = StressPeak.among(*cells)

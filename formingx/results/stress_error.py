@@ -54,10 +54,10 @@ class StressPeak(NamedTuple):
     Attributes:
         value: the largest sigma_1 of the fitted stress sigma* at a corner of a cell, stress.
         point: the reference point (R, Z) where it is, shape (2,), length.
-        error: `StressError.mean` of the cells there, the largest, stress.
-        doubtful: sigma_1 in the cell where sigma_1 and the cell's error add up to most, stress.
+        error: the largest |sigma* - sigma_h| at a quadrature point of the cells there, stress.
+        doubtful: sigma_1 in the cell where sigma_1 and such an error add up to most, stress.
         doubtful_point: the corner (R, Z) of that cell where it is, shape (2,), length.
-        doubtful_error: `StressError.mean` of that cell, stress.
+        doubtful_error: the error of that cell, stress.
     """
 
     value: float
@@ -69,7 +69,7 @@ class StressPeak(NamedTuple):
 
     @classmethod
     def among(cls, sigma: np.ndarray, at: np.ndarray, error: np.ndarray) -> StressPeak:
-        """The peak of n cells: largest sigma_1, shape (n,), the corner where it is, shape (n, 2), mean error, (n,)."""
+        """The peak of n cells: largest sigma_1, shape (n,), the corner where it is, (n, 2), largest error, (n,)."""
         top, worst = int(np.argmax(sigma)), int(np.argmax(sigma + error))
         there = np.hypot(*(at - at[top]).T) <= 1e-9 * np.abs(at).max()
         return cls(float(sigma[top]), at[top], float(error[there].max()), float(sigma[worst]), at[worst],
