@@ -123,7 +123,8 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
             "concentrate": ("optional thing", None)}
     sphere = {"inner_radius": positive, "thickness": positive, "elements": ("pair", (4, 2)), "grading": positive}
     contact = {"on": ("word", "top"), "tool": ("thing", fx.tools.plane(0.3)), "friction": ("friction", "stick"),
-               "penalty": positive, "ramp": positive, "nodes_per_step": ("count", 1), "moves": ("pair or None", None)}
+               "penalty": positive, "ramp": positive, "nodes_per_step": ("count", 1), "separates": ("flag", True),
+               "moves": ("pair or None", None)}
     return [
         *materials, *boundary, *targets, *tools,
         Call("Ogden", fx.Ogden, {"mu": ("terms", (1.0,)), "alpha": ("terms", (2.0,))},

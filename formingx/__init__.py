@@ -15,7 +15,7 @@ from .physics.materials import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, Ne
 from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Symmetry
 from .physics.tools import Tool
 from .results.compare import Comparison, compare
-from .results.measures import displacement, enclosed_volume, pole_height, pole_stretch, pressure, travel
+from .results.measures import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel
 from .results.nodal import NodalComparison, compare_nodes, write_nodes
 from .results.path import Path, State
 from .results.profile import Profile

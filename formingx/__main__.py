@@ -133,7 +133,7 @@ def _open(options: argparse.Namespace) -> None:
     lines = [f"{part:{width}}  {line}" for part, line in record.summary.items()]
     columns = [c for c in ("pressure", "travel", "pole_height", "pole_stretch", "contact_length")
                if c in record.measures]
-    extra = [key for key in ("setting", "stage") if any(state.get(key) for state in states)]
+    extra = [key for key in ("stage",) if any(state.get(key) for state in states)]
     lines += ["", f"{'state':>5}  {'kind':12}" + "".join(f"{c.replace('_', ' '):>16}" for c in columns)
               + "".join(f"  {key}" for key in extra)]
     lines += [f"{k:5}  {kind:12}" + "".join(f"{record.measures[c][k]:16.8g}" for c in columns)

@@ -33,6 +33,12 @@ def coordinate_map(mesh: Any) -> Any:
     return geometry.cmaps[0] if hasattr(geometry, "cmaps") else geometry.cmap
 
 
+def cell_nodes(mesh: Any) -> Any:
+    """Numbers of the points (rows of `geometry.x`) of the cells, shape (cells, nodes of a cell)."""
+    geometry = mesh.geometry
+    return geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
+
+
 def tree_of_cells(mesh: Any, padding: float, cells: Any) -> Any:
     """Bounding boxes of cells (local numbers)."""
     from dolfinx import geometry

@@ -216,14 +216,14 @@ def _read_state(folder: FilePath, data: dict, problem: Any) -> State:
 
 def _plain_state(state: State) -> dict[str, Any]:
     """Everything in a state that JSON can hold as it is."""
-    left = (*_FIELDS, "memory", "met", "history", "stage", "setting")
+    left = (*_FIELDS, "memory", "met", "history")
     data = {f.name: getattr(state, f.name) for f in fields(State) if f.name not in left}
     return data | {"met": state.met and [state.met.name, state.met.value, state.met.signed],
                    "history": [list(i) for i in state.history]}
 
 
 def _remembering(problem: Any) -> list[Any]:
-    return [contact for contact in problem._contacts if contact.memory is not None]
+    return [contact for contact in problem.contacts if contact.memory is not None]
 
 
 def _gather_memory(problem: Any, state: State) -> list[dict[str, Any]]:

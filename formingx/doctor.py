@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
+from . import _compat
 from .errors import instance, several
 from .physics.incompressibility import DisplacementPenalty, Membrane
 from .physics.tools import Arc
@@ -81,14 +82,13 @@ class _Sheet:
 
     def __init__(self, scene: Scene):
         mesh, comm = scene.mesh, scene.mesh.domain.comm
-        geometry = mesh.domain.geometry
         n = mesh.domain.topology.index_map(2).size_local
         names = np.full(n, "", dtype=object)
         for name, tag in mesh.layers.items():
             found = mesh.cells.find(tag)
             names[found[found < n]] = name
-        corners = geometry.x[geometry.dofmap[:n, :3].ravel(), :2].reshape(n, 3, 2)
-        nodes = geometry.x[geometry.dofmap[:n].ravel(), :2].reshape(n, -1, 2)
+        nodes = mesh.domain.geometry.x[_compat.cell_nodes(mesh.domain)[:n], :2]
+        corners = nodes[:, :3]
         parts = comm.allgather((corners, names.tolist(), _folded(nodes)))
         self.corners = np.concatenate([c for c, _, _ in parts])
         self.layer = np.array([name for _, part, _ in parts for name in part])
@@ -118,7 +118,7 @@ def _folded(nodes: np.ndarray) -> np.ndarray:
 
 
 def _driven(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
-    if not scene.drivable:
+    if scene.driven is None:
         yield Finding("error", "loads", "nothing is driven, so there is no run: give one load no value, as"
                                         " Pressure('bottom'), or add a Displaced support")
 

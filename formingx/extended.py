@@ -18,25 +18,15 @@ class ExtendedMatrix:
     """Created once, refilled for every tangent.
 
     Args:
-        form: compiled bilinear form of K; index_map: of its space (block size 1); bcs: held unknowns (their rows and
-            columns become those of the identity).
-        rows: the rows of C, each the owned part, shape (n,).
+        form: compiled bilinear form of K; index_map: of its space (block size 1); bcs, rows: see `hold`; what is held
+            later must be among them.
     """
 
     def __init__(self, form: Any, index_map: Any, bcs: list, rows: list[np.ndarray], comm: Any, symmetric: bool):
-        self._form, self._bcs = form, bcs
+        self._form, self._index_map, self._comm = form, index_map, comm
         self._first = index_map.size_global
-        self._held = np.zeros(index_map.size_local + index_map.num_ghosts, dtype=bool)
-        for bc in bcs:
-            self._held[bc.dof_indices()[0]] = True
         self._last_rank = comm.rank == comm.size - 1
-        offset = index_map.local_range[0]
-        self._entries = []              # (own numbers, own weights, all numbers, all weights) of each row of C
-        for row in rows:
-            mine = np.flatnonzero(row)
-            parts = comm.allgather((mine + offset, row[mine]))
-            self._entries.append((mine + offset, row[mine], np.concatenate([n for n, _ in parts]),
-                                  np.concatenate([w for _, w in parts])))
+        self.hold(bcs, rows)
         n, m = index_map.size_local, len(rows)
         size = n + (m if self._last_rank else 0)
         indptr, columns = self._pattern(rows, m)
@@ -48,6 +38,23 @@ class ExtendedMatrix:
         mapping.destroy()
         if symmetric:
             self.mat.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+
+    def hold(self, bcs: list, rows: list[np.ndarray]) -> None:
+        """What is held from now on.
+
+        bcs: held unknowns (their rows and columns become those of the identity); rows: of C, each the owned part,
+        shape (n,); one that is 0 on all ranks leaves its multiplier alone, as unknowns held are.
+        """
+        self._bcs, size, offset = bcs, self._index_map.size_local, self._index_map.local_range[0]
+        self._held = np.zeros(size + self._index_map.num_ghosts, dtype=bool)
+        for bc in bcs:
+            self._held[bc.dof_indices()[0]] = True
+        self._entries = []              # (own numbers, own weights, all numbers, all weights) of each row of C
+        for row in rows:
+            mine = np.flatnonzero(row)
+            parts = self._comm.allgather((mine + offset, row[mine]))
+            self._entries.append((mine + offset, row[mine], np.concatenate([n for n, _ in parts]),
+                                  np.concatenate([w for _, w in parts])))
 
     def fill(self, blocks: Sequence[tuple[np.ndarray, np.ndarray]] = ()) -> PETSc.Mat:
         """The matrix at the state that the form's functions hold now.
@@ -68,6 +75,7 @@ class ExtendedMatrix:
                 A.setValues(mine.astype(PETSc.IntType), [self._first + k], weights, addv=add)
             if self._last_rank:
                 A.setValues([self._first + k], everyone.astype(PETSc.IntType), all_weights, addv=add)
+                A.setValue(self._first + k, self._first + k, float(len(everyone) == 0), addv=add)
         A.assemble()
         return A
 

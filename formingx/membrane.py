@@ -17,6 +17,7 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dolfinx_mesh
 
+from . import _compat
 from .errors import InputError
 from .mesh import Mesh
 from .physics.supports import Held
@@ -85,7 +86,7 @@ class MidSurface(Formulation):
         self._layers = {name: np.maximum(high - low, 0.0) for name, (low, high) in faces.items()}
         if np.any(np.diff(R) < near) or not np.all(self._high - self._low > near):
             raise InputError("Membrane: the sheet must have a single lower and upper point at each R")
-        degree = mesh.domain.geometry.cmap.degree
+        degree = _compat.coordinate_map(mesh.domain).degree
         first = np.arange(0, len(R) - degree, degree)
         cells = np.column_stack([first, first + degree, *([first + 1] if degree == 2 else [])])
         points = np.column_stack([R, (self._low + self._high) / 2])
@@ -147,7 +148,7 @@ def _faces(mesh: Mesh, layer: str, R: np.ndarray, near: float) -> tuple[np.ndarr
     """Lowest and highest Z of a layer at each of the ascending R, shape (n,); (inf, -inf) where it is absent."""
     geometry, owned = mesh.domain.geometry, mesh.domain.topology.index_map(2).size_local
     cells = mesh.cells.find(mesh.layers[layer])
-    nodes = geometry.dofmap[cells[cells < owned]]
+    nodes = _compat.cell_nodes(mesh.domain)[cells[cells < owned]]
     edges = [(1, 2, 3), (0, 2, 4), (0, 1, 5)]                                  # ends, and the node between them
     halves = [(a, b) for a, b, _ in edges]
     if nodes.shape[1] == 6:

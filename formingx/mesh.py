@@ -62,7 +62,7 @@ class Mesh:
         domain = self.domain
         domain.topology.create_connectivity(1, 2)
         domain.topology.create_connectivity(2, 1)
-        mid_edge = domain.geometry.dofmap.shape[1] == 6
+        mid_edge = _compat.coordinate_map(domain).degree == 2
         # of an edge: its two ends and, on second-order geometry, its middle
         nodes = entities_to_geometry(domain, 1, self.facets_of(boundary)).reshape(-1, 3 if mid_edge else 2)
         edges = np.concatenate(domain.comm.allgather(domain.geometry.x[nodes][..., :2]))
@@ -339,7 +339,7 @@ def to_grid(mesh: Mesh) -> grid.Grid:
         raise InputError("the nodes of a mesh are numbered and written on one rank only: run this on one")
     domain.topology.create_connectivity(1, 2)
     points = domain.geometry.x[:, :2].copy()
-    triangles = np.asarray(domain.geometry.dofmap)
+    triangles = np.asarray(_compat.cell_nodes(domain))
     # DOLFINx numbers a mid-edge node like the opposite corner; here edges are 01, 12, 20
     triangles = grid.counter_clockwise(points, triangles[:, [0, 1, 2, 5, 3, 4][: triangles.shape[1]]])
     corners = ((0, 1, 3), (1, 2, 4), (2, 0, 5))

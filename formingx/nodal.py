@@ -42,31 +42,21 @@ class NodalContact:
         self.law = contact.law(contact.penalty * solid.stress / self.thickness, contact.ramp * self.thickness,
                                self.points)
         self._scale = solid.length / (solid.stress * solid.volume) * self.area
-        self._amplitude = solid.amplitudes.get(contact)       # None: the tool stays
-        self._motion = np.array(contact.moves or (0.0, 0.0)) * (self._amplitude.scale if self._amplitude else 0.0)
-        self.active = True
+        self._motion = solid.length * np.array(contact.moves or (0.0, 0.0))
+        self.base, self.rate = 0.0, float(contact.driven)   # of the travel by the control (`Setting`)
         self._last: Any = None                              # positions and tractions last computed
         self._accepted: Any = None                          # positions at the last accepted state
         self._iterate: Any = None                           # `Motion` at the iteration before
-        self.memory = None if contact.mu == 0 else self.law.start(self.points)
+        self.memory = self.law.start(self.points) if self.law.remembers else None
         self._sense: Any = None                             # of sliding, of the iteration before
         self._arrived = np.zeros(len(self.points), dtype=bool)     # in the step before the last accepted state
         # without history only the step's own convergence limits how much may touch in it
-        self._allowed = contact.nodes_per_step * (1 if contact.mu else 10)
+        self._allowed = contact.nodes_per_step * (1 if self.law.remembers else 10)
         self._foreseen = 0
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Nodes seen from the tool, shape (n, 2), length; `fields`: owned unknowns."""
-        return self.points + self._length * fields[self.dofs] - self._travel(control)
-
-    def _travel(self, control: float) -> np.ndarray:
-        """How far the tool has come, shape (2,), length."""
-        return self._motion * (self._amplitude.at(control) if self._amplitude else 0.0)
-
-    @property
-    def _velocity(self) -> np.ndarray:
-        """Motion of the tool per control, shape (2,), length."""
-        return self._motion * (self._amplitude.rate if self._amplitude else 0.0)
+        return self.points + self._length * fields[self.dofs] - (self.base + self.rate * control) * self._motion
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
         """What the law gives at a state, computed once for it."""
@@ -93,6 +83,12 @@ class NodalContact:
         """Which nodes touch and slide, of the tractions last computed."""
         last = self._last[1]
         return (last.sense + 4 * (last.normal != 0)).astype(np.int8).tobytes()
+
+    def forget(self, fields: np.ndarray, control: float) -> None:
+        """The tool comes in: nothing has touched it yet."""
+        self._accepted, self._arrived[:] = None, False
+        if self._memory is not None:
+            self.memory = self.law.start(self.positions(fields, control))
 
     def begin(self) -> None:
         """Newton's method begins at a guess ahead of the last accepted state."""
@@ -122,9 +118,9 @@ class NodalContact:
 
     def add_control_derivative(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Add the derivative of the nodal forces by the control: the tool moves."""
-        if self.contact.driven:
+        if self.rate:
             by_position = self._scale[:, None, None] * self.tractions(fields, control).stiffness
-            values[self.dofs] -= by_position @ self._velocity
+            values[self.dofs] -= by_position @ (self.rate * self._motion)
 
     def advance(self, fields: np.ndarray, control: float) -> None:
         """A state is accepted: remember it."""
@@ -150,8 +146,8 @@ class NodalContact:
         A step that would bring a whole region into contact at once would decide by its own length where it sticks.
         """
         start = self.positions(fields, control)
-        velocity = self._length * direction[self.dofs] - slope * self._velocity
-        free = self.law.distance(start) <= -self.law.theta
+        velocity = self._length * direction[self.dofs] - slope * self.rate * self._motion
+        free = ~self.law.touching(start, self._memory)
         times = self._arrivals(start, velocity, length)
         ahead = (times > 0.02 * length) & (times < length)         # nearer ones are as good as in touch
         times = np.sort(np.concatenate(self._comm.allgather(times[ahead])))
@@ -162,7 +158,7 @@ class NodalContact:
     def prepare(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> None:
         """A step of this length along a tangent is about to be taken: foretell where nodes arrive."""
         start = self.positions(fields, control)
-        velocity = self._length * direction[self.dofs] - slope * self._velocity
+        velocity = self._length * direction[self.dofs] - slope * self.rate * self._motion
         times = self._arrivals(start, velocity, length)
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         if self._memory is not None:
@@ -171,7 +167,7 @@ class NodalContact:
     def _arrivals(self, start: np.ndarray, velocity: np.ndarray, length: float) -> np.ndarray:
         """Arc length at which free nodes meet the ramp, `length` if they do not before, shape (n,)."""
         before = -self.law.theta - self.law.distance(start)
-        free, at, times = (before > 0) & (self.area > 0), 0.0, np.full(len(start), length)
+        free, at, times = ~self.law.touching(start, self._memory) & (self.area > 0), 0.0, np.full(len(start), length)
         for s in length * np.linspace(0, 1, 17)[1:]:
             now = -self.law.theta - self.law.distance(start + s * velocity)
             hit = free & (now <= 0)
@@ -187,6 +183,10 @@ class NodalContact:
         found = int(np.sum((a <= -self.law.theta - HOVERING * self.thickness) & (b > -self.law.theta)))
         return self._comm.allreduce(found, MPI.SUM) > 2 * max(self._allowed, self._foreseen) + 2
 
+    def touching(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Which nodes touch, or are held, shape (n,)."""
+        return self.law.touching(self.positions(fields, control), self._memory)
+
     def largest_penetration(self, fields: np.ndarray, control: float) -> float:
         """Depth of the deepest node inside the tool, 0 if none is, length, all ranks."""
         d = self.contact.tool.signed_distance(self.positions(fields, control))
@@ -194,8 +194,7 @@ class NodalContact:
 
     def contact_length(self, fields: np.ndarray, control: float) -> float:
         """Reference length of the face that is in touch, all ranks."""
-        d = self.law.distance(self.positions(fields, control))
-        return self._comm.allreduce(float(self.lengths[d > -self.law.theta].sum()), MPI.SUM)
+        return self._comm.allreduce(float(self.lengths[self.touching(fields, control)].sum()), MPI.SUM)
 
     def traction(self, fields: np.ndarray, control: float) -> tuple[np.ndarray, np.ndarray]:
         """(reference points (m, 2), normal and tangential traction per reference area (m, 2)) of all ranks, by R."""

@@ -24,9 +24,9 @@ class Scene:
         mesh: from `formingx.mesh`.
         materials: {layer name: material}, or one material for all layers.
         supports: see `formingx.physics.supports`.
-        loads: see `formingx.physics.loads`. One load, support or tool is driven (controlled by the run), or
-            several in the stages of a `Process`. (Contacts of one tool with several faces, of the same `moves` and
-            `name`, count as one.)
+        loads: see `formingx.physics.loads`. One load, support or tool may be driven (controlled by the run), several by
+            a `formingx.Process`.
+            (Contacts of one tool with several faces, of the same `moves` and name, count as one.)
         contacts: faces of the body that rigid tools stop, see `formingx.Contact`.
         model: how the scene is modelled: `MixedPressure()` (default) or `DisplacementPenalty()`, a solid; `Membrane()`.
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
@@ -34,7 +34,7 @@ class Scene:
 
     Raises:
         InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, two
-            driven things of one name.
+            driven objects that no name tells apart.
     """
 
     def __init__(self, *, mesh: Mesh, materials: Material | Mapping[str, Material], supports: Sequence[Any],
@@ -58,10 +58,10 @@ class Scene:
         if not hasattr(self.kinematics, "dimension_of_volume") or isinstance(self.kinematics, type):
             raise InputError(f"Scene: kinematics = {kinematics!r}: must be Axisymmetric() or PlaneStrain()")
         self.quadrature_degree = count("Scene: quadrature_degree", quadrature_degree)
+        self._check_names()
         self._check_materials()
         self._check_boundaries()
-        self._check_axis()
-        self._check_rigid_body()
+        self.check_held(self.supports)
         if isinstance(self.model, Membrane):
             self.model.check(self)
         else:
@@ -71,24 +71,76 @@ class Scene:
                              f" MixedPressure() for one")
         for contact in self.contacts:
             self._check_contact(contact)
-        driven = [x for x in (*self.loads, *self.supports, *self.contacts) if getattr(x, "driven", False)]
-        leaders: dict = {}                                       # one tool that meets several faces moves as one
-        self.drivable = {x: leaders.setdefault((x.moves, x.name) if hasattr(x, "moves") else x, x) for x in driven}
-        names = [(thing.label, hasattr(thing, "virtual_work")) for thing in leaders.values()]
-        twice = next((name for name, _ in names if names.count((name, _)) > 1), None)
-        if twice is not None:
-            raise InputError(f"Scene: {', '.join(map(repr, driven))}: two of them are called {twice!r}: give each its"
-                             f" own name, as Displaced('rim', name='grip')")
-        self.driven = driven[0] if len(leaders) == 1 else None
 
-    def check_one_driven(self, name: str) -> None:
-        """Raise an `InputError` of the function `name` unless just one thing is driven."""
+    @property
+    def things(self) -> list[Any]:
+        """Loads, supports and contacts, in order."""
+        return [*self.loads, *self.supports, *self.contacts]
+
+    @property
+    def drivable(self) -> list[Any]:
+        """What can be driven; of a tool that meets several faces its first contact."""
+        return [thing for i, thing in enumerate(self.things)
+                if getattr(thing, "driven", False) and self.together(i)[0] == i]
+
+    def together(self, number: int) -> list[int]:
+        """Numbers of the things that move as this one does: contacts with the same `moves` and name are of one tool."""
+        thing = self.things[number]
+        if getattr(thing, "moves", None) is None:
+            return [number]
+        return [i for i, other in enumerate(self.things)
+                if (getattr(other, "moves", None), getattr(other, "name", None)) == (thing.moves, thing.name)]
+
+    @property
+    def driven(self) -> Any:
+        """What a run with one control drives: the only thing that can be driven, or None."""
+        drivable = self.drivable
+        return drivable[0] if len(drivable) == 1 else None
+
+    def only_driven(self, who: str) -> Any:
+        """`driven`, or an InputError unless one thing can be driven."""
         if not self.drivable:
-            raise InputError(f"{name}: nothing is driven: give one load no value, as Pressure('bottom'), or"
+            raise InputError(f"{who}: nothing is driven: give one load no value, as Pressure('bottom'), or"
                              " add a Displaced support")
-        if self.driven is None:
-            raise InputError(f"{name}: {', '.join(map(repr, self.drivable))} are all driven: one control drives a run;"
-                             f" give the others a value, or run a Process in stages")
+        if len(self.drivable) > 1:
+            raise InputError(f"{who}: {', '.join(map(repr, self.drivable))} are all driven: one control drives a run;"
+                             f" give the others a value, or drive them in stages with formingx.Process")
+        return self.driven
+
+    def number(self, who: str, thing: Any) -> int:
+        """The place in `things` of a thing, given as itself or by its name; an InputError if it is not there."""
+        for i, known_thing in enumerate(self.things):
+            if thing is known_thing or isinstance(thing, str) and thing == getattr(known_thing, "name", None):
+                return i
+        names = [t.name for t in self.things if getattr(t, "name", None)]
+        raise InputError(f"{who}: {thing!r} is not in the scene; it has {', '.join(map(repr, self.things))}"
+                         + (f", of which some are called {', '.join(map(repr, names))}" if names else ""))
+
+    def column(self, thing: Any) -> str:
+        """Name of the column of what can be driven: "pressure" or "travel", its name in front if there are several."""
+        alone = len(self.drivable) == 1 or not thing.name
+        return thing.quantity if alone else f"{thing.name}_{thing.quantity}"
+
+    def check_held(self, supports: Sequence[Any], touched: bool = False) -> None:
+        """Raise an InputError unless these supports hold the axis and, if no tool touches, every rigid motion."""
+        self._check_axis(supports)
+        if not touched:
+            self._check_rigid_body(supports)
+
+    def _check_names(self) -> None:
+        names = [thing.name for thing in self.things if getattr(thing, "name", None) is not None]
+        for name in names:
+            if not isinstance(name, str) or not name:
+                raise InputError(f"Scene: name = {name!r}: must be a word")
+            called = [i for i, thing in enumerate(self.things) if getattr(thing, "name", None) == name]
+            if called != self.together(called[0]) and len(called) > 1:
+                raise InputError(f"Scene: two things are called {name!r}: names must differ")
+        columns = [self.column(thing) for thing in self.drivable]
+        for column in columns:
+            if columns.count(column) > 1:
+                same = [repr(t) for t in self.drivable if self.column(t) == column]
+                raise InputError(f"Scene: {', '.join(same)} are all driven: one control drives a run: give the others a"
+                                 f" value, or each a name=... and drive them in stages with formingx.Process")
 
     def _check_materials(self) -> None:
         layers = self.mesh.layers
@@ -125,26 +177,24 @@ class Scene:
         if depth[worst] > contact.tool.signed_distance(face).max() + near:
             raise InputError(f"{contact!r}: the tool is behind this face of the body: another face is closer to it;"
                              f" boundaries are {list(mesh.boundaries)}")
-        if not contact.driven and any(load.driven and load.on == contact.on for load in self.loads):
+        if any(load is self.driven and load.on == contact.on for load in self.loads):
             raise InputError(f"{contact!r}: the driven pressure acts on the same face and pushes it away from the tool:"
                              f" no tool faces the pressure")
 
-    def check_travel(self, travel: float) -> None:
-        """An InputError if the driven tool's travel (length) would put a held boundary as a whole inside the tool."""
-        if not isinstance(self.driven, Contact) or self.driven.moves is None:
-            return
-        moves = np.array(self.driven.moves)
+    def check_travel(self, contact: Contact, travel: float) -> None:
+        """An InputError if a tool's travel (length) would put a held boundary as a whole inside the tool."""
+        moves = np.array(contact.moves)
         for support in self.supports:
             for held in support.constraints():
                 if not isinstance(held, Held) or held.on is None or moves[held.component] == 0:
                     continue
-                depth = self.driven.tool.signed_distance(self.mesh.nodes_of(held.on) - travel * moves)
+                depth = contact.tool.signed_distance(self.mesh.nodes_of(held.on) - travel * moves)
                 if depth.min() >= 0:
-                    raise InputError(f"travel = {travel:g}: {self.driven!r} would go through the whole height of the"
+                    raise InputError(f"travel = {travel:g}: {contact!r} would go through the whole height of the"
                                      f" body to {held.on!r}, which is held: the travel must be less than"
                                      f" {travel - depth.max() / np.hypot(*moves):.6g}")
 
-    def _check_axis(self) -> None:
+    def _check_axis(self, supports: Sequence[Any]) -> None:
         if not isinstance(self.kinematics, Axisymmetric):
             return
         geometry = self.mesh.domain.geometry
@@ -155,7 +205,7 @@ class Scene:
             raise InputError(f"Scene: the mesh crosses the axis: its smallest R is {low:.6g}, must be at least 0")
         if low > 1e-12 * size:
             return
-        for support in self.supports:
+        for support in supports:
             for held in support.constraints():
                 if isinstance(held, Held) and held.component == 0 and held.on is not None \
                         and np.all(self.mesh.nodes_of(held.on)[:, 0] <= 1e-12 * size):
@@ -163,7 +213,7 @@ class Scene:
         raise InputError(f"Scene: the mesh touches the axis R = 0, but no support holds u_r there: add"
                          f" Symmetry of one of {list(self.mesh.boundaries)}")
 
-    def _check_rigid_body(self) -> None:
+    def _check_rigid_body(self, supports: Sequence[Any]) -> None:
         """The supports must hold every rigid motion that the kinematics allows."""
         if isinstance(self.kinematics, Axisymmetric):
             names, modes = ["translation along Z"], [lambda X: np.stack([0 * X[:, 0], 1 + 0 * X[:, 0]], 1)]
@@ -174,7 +224,7 @@ class Scene:
                      lambda X: np.stack([-X[:, 1], X[:, 0]], 1)]
         gram = np.zeros((len(modes), len(modes)))
         size = max(self.extent)
-        for support in self.supports:
+        for support in supports:
             for held in support.constraints():
                 point = getattr(held, "point", None)
                 X = (np.array([point]) if point is not None else self.mesh.nodes_of(held.on)) / size
@@ -186,7 +236,7 @@ class Scene:
         if values[0] < 1e-12:
             free = names[int(np.argmax(np.abs(vectors[:, 0])))]
             raise InputError(f"Scene: too little support: the body is free to move as a rigid body ({free});"
-                             f" supports are {self.supports!r}; hold that motion, with Clamped or SimplySupported"
+                             f" supports are {supports!r}; hold that motion, with Clamped or SimplySupported"
                              f" for one")
 
     def _check_hinges(self) -> None:

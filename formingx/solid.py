@@ -19,7 +19,6 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from . import _compat
-from .amplitude import Amplitude
 from .physics import kinematics as kin
 
 
@@ -35,8 +34,9 @@ class Formulation(ABC):
         u, X: displacement and reference position (UFL, user's unit of length, shape (2,)).
         F, J: deformation gradient (UFL, shape (3, 3)) and its determinant.
         dx, weight: weight * dx is the element of reference volume.
-        control: the `Constant` of the dimensionless control; control_scale times it is the user's.
-        amplitudes: {thing that can be driven: its `Amplitude`}.
+        control: the `Constant` of the dimensionless control.
+        scales: the user's pressure or travel over the amplitude (`Setting`), for every thing of the scene; last, 1
+            for the time. control_scale: that of the only driven thing, or L.
         residual: dPi/dw - external virtual work (UFL, rank 1); control_derivative: its derivative by the control,
             or None.
         energy: strain energy over stress times volume (UFL, rank 0).
@@ -64,9 +64,8 @@ class Formulation(ABC):
         self.weight = self._weight()
         self.volume = self.integral(self.weight * self.dx)
         self._scale = self.constant(1 / (self.stress * self.volume))
-        leaders = {leader: Amplitude(self._scale_of(leader), self.constant) for leader in scene.drivable.values()}
-        self.amplitudes = {thing: leaders[leader] for thing, leader in scene.drivable.items()}
-        self.driven = scene.driven
+        self.scales = [self._scale_of(thing) for thing in scene.things] + [1.0]
+        self.control_scale = next((s for s, t in zip(self.scales, scene.things) if t is scene.driven), self.length)
         self.F = self._deformation_gradient()
         self.J = kin.volume_ratio(self.F)
         self.energy = self._energy()
@@ -143,14 +142,11 @@ class Formulation(ABC):
         dx = ufl.dx(self.domain, metadata={"quadrature_degree": 4})
         return (v[0] + v[1]) * self.weight / self.constant(self.volume) * dx
 
-    @property
-    def control_scale(self) -> float:
-        """The user's value of what is driven, over the control."""
-        return self.length if self.driven is None else self.amplitudes[self.driven].scale
-
     def _scale_of(self, thing: Any) -> float:
         """Pressure: stress times thickness over length, thickness being volume over loaded area. Motion: length."""
-        return self.stress * self.thickness(thing.on) / self.length if hasattr(thing, "virtual_work") else self.length
+        if not getattr(thing, "driven", False) or not hasattr(thing, "virtual_work"):
+            return self.length
+        return self.stress * self.thickness(thing.on) / self.length
 
     def thickness(self, boundary: str) -> float:
         """Volume of the body over the area of a boundary, length."""
@@ -161,8 +157,11 @@ class Formulation(ABC):
         residual = ufl.derivative(self.energy, self.w, v)
         du = self.constant(self.length) * ufl.split(v)[0]
         control, driven = ufl.variable(self.control), None
-        for load in self.scene.loads:
-            value = self.amplitudes[load].form(control) if load.driven else self.constant(load.value)
+        self._loads = []
+        for load, scale in zip(self.scene.loads, self.scales):
+            base, rate = self.constant(0.0 if load.driven else load.value), self.constant(0.0)
+            self._loads.append((load, base, rate))
+            value = self.constant(scale) * (base + rate * control) if load.driven else base
             N, ds = self.face(load.on, load.quadrature_degree)
             work = load.virtual_work(self.scene.kinematics, self.u, du, self.X, N, value)
             residual -= self._scale * work * ds
@@ -170,6 +169,13 @@ class Formulation(ABC):
                 by_control = -self._scale * ufl.diff(work, control) * ds
                 driven = by_control if driven is None else driven + by_control
         return residual, driven
+
+    def set_loads(self, setting: Any) -> None:
+        """Loads as a `Setting` wants them."""
+        for i, (load, base, rate) in enumerate(self._loads):
+            there = i not in setting.off
+            base.value = there * (setting.base[i] if load.driven else load.value)
+            rate.value = there * setting.rate[i]
 
 
 class Solid(Formulation):

@@ -14,6 +14,7 @@ def cylinder(material, model=None):
                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"), fx.Displaced("top", "z")])
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("stretch", [0.4, 3.0])
 @pytest.mark.parametrize("material, energy", [
     (fx.NeoHookean(c10=2.0), lambda s: 2.0 * (s**2 + 2 / s - 3)),
@@ -75,6 +76,7 @@ def exact_tube(stretch, modulus):
     return modulus * (np.log(stretch / outer) + (outer**-2 - stretch**-2) / 2)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("material", [fx.NeoHookean(c10=1.5), fx.MooneyRivlin(c10=1.0, c01=0.5)],
                          ids=lambda m: type(m).__name__)
 def test_thick_tube_converges(material):

@@ -36,6 +36,7 @@ def test_force_is_derivative_of_energy():
     np.testing.assert_allclose(derivative(law.energy, x, 1e-6), force, atol=1e-7 * K)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("mu", [0.0, 0.3, 5.0, np.inf])
 @pytest.mark.parametrize("slip", [0.0, 1e-4, -0.01, 0.2])
 @pytest.mark.parametrize("touched", [True, False])
@@ -48,6 +49,22 @@ def test_stiffness_is_derivative_of_force(mu, slip, touched):
     exact = derivative(lambda y: law.tractions(y, old).force, x, 1e-7)
     np.testing.assert_allclose(exact, found.stiffness, atol=1e-5 * K)
     assert np.all(np.abs(found.tangential) <= mu * found.normal + 1e-12 if np.isfinite(mu) else True)
+
+
+@pytest.mark.parametrize("mu", [0.0, np.inf])
+@pytest.mark.parametrize("touched", [True, False])
+def test_a_tool_that_holds(mu, touched):
+    """Stiffness is the derivative of the force; what has touched is pulled back, what has not is free."""
+    law = Law(TOOL, mu, K, THETA, separates=False)
+    x, tangent = points_near(TOOL, [-5 * THETA, -(1 + 1e-3) * THETA, -0.5 * THETA, 2 * THETA])
+    before = x - 0.01 * tangent
+    old = Touch(before, np.full(len(x), -0.5 * THETA if touched else -2 * THETA), np.full(len(x), 1e-4), before)
+    found, d = law.tractions(x, old), law.distance(x)
+    exact = derivative(lambda y: law.tractions(y, old).force, x, 1e-7)
+    np.testing.assert_allclose(exact, found.stiffness, atol=1e-5 * K)
+    np.testing.assert_allclose(found.normal, K * (d + THETA if touched else np.maximum(d + THETA, 0)), atol=1e-9 * K)
+    assert np.all(law.touching(x, old) == (touched | (d > -THETA)))
+    assert np.all(law.touching(x, found.touch) == law.touching(x, old))
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.3, np.inf])
@@ -97,6 +114,7 @@ def support_force(problem, state, component):
     return values[dofs].sum() * forms.stress * forms.volume / forms.length
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("friction", ["none", "stick", 0.3])
 def test_forces_balance(friction):
     path = fx.trace(cup(friction), until=fx.pressure(8.0), step=fx.StepControl(target=8), progress=False,
@@ -168,6 +186,7 @@ def bent_strip(radius, thickness, tail, elements):
     return mesh
 
 
+@pytest.mark.quick
 def test_capstan():
     """Tension over a round bar grows as exp(mu angle) (with the lever arms of a strip of finite thickness)."""
     mu, radius, h = 0.3, 1.0, 0.02
@@ -214,6 +233,7 @@ def test_a_scene_pays_for_what_is_in_it():
     assert len(Problem(cup("stick", (4, 1))).memory) == 1
 
 
+@pytest.mark.quick
 def test_a_moving_tool():
     """A round plug pushes a clamped disc; the derivative by the control is that of the residual."""
     mesh = fx.mesh.disc(radius=10.0, thickness=0.5, elements=(20, 2))
@@ -232,7 +252,25 @@ def test_a_moving_tool():
     np.testing.assert_allclose((plus.array - minus.array) / (2 * h), exact.array, atol=1e-5 * np.abs(exact.array).max())
 
 
+@pytest.mark.parametrize("friction", ["none", "stick"])
+def test_a_plate_that_holds_pulls(friction):
+    """Free to slide, the block is in uniaxial tension: N = 2 A (l - 1/l^2) (c10 + c01 / l); stuck, it is stiffer."""
+    c10, c01, l = 1.0, 0.2, 1.4                               # noqa: E741
+    mesh = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(4, 4))
+    plate = fx.Contact("top", tools.plane(1.0), friction, moves=(0, -1), separates=False, penalty=2e6, ramp=1e-7)
+    scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=c10, c01=c01), contacts=[plate],
+                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")])
+    path = fx.trace(scene, until=fx.travel(1 - l), progress=False)
+    exact = -2 * np.pi * (l - l**-2) * (c10 + c01 / l)
+    force = path.last.measures["tool_force"]
+    assert force == pytest.approx(exact, rel=1e-5) if friction == "none" else force < 1.02 * exact
+    assert force == pytest.approx(support_force(path.problem, path.last, 1), rel=1e-6)
+    assert path.last.measures["contact_length"] == pytest.approx(1.0)
+
+
 @pytest.mark.parametrize("change, message", [
+    (lambda: fx.Contact("top", TOOL, 0.3, separates=False), "has no Coulomb friction"),
+    (lambda: fx.Contact("top", TOOL, separates="no"), "must be True or False"),
     (lambda: fx.Contact("top", TOOL, -0.1), "must not be negative"),
     (lambda: fx.Contact("top", TOOL, "glue"), "must be 'stick', 'none' or a coefficient"),
     (lambda: fx.Contact("top", "cup"), "must be a tool"),

@@ -1,11 +1,11 @@
-"""Every code block of the guide runs, one after the other."""
+"""Every code block of the guide runs, one after the other; Sphinx builds the pages without a warning."""
 
 import re
-from pathlib import Path
 
 import pytest
+from conftest import ROOT, run
 
-PAGES = sorted((Path(__file__).parents[1] / "docs").glob("*.md"))
+PAGES = sorted((ROOT / "docs").glob("*.md"))
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if "```python" in p.read_text()], ids=lambda p: p.stem)
@@ -16,6 +16,11 @@ def test_blocks_run(page, tmp_path, monkeypatch, capsys):
         exec(compile(block, page.name, "exec"), names)
     assert capsys.readouterr().out
 
+
+@pytest.mark.quick
+def test_sphinx_warns_of_nothing(tmp_path):
+    run("-m", "sphinx", "-W", "--keep-going", "-q", "docs", tmp_path / "html")
+    assert "formingx.trace" in (tmp_path / "html" / "api.html").read_text()
 
 
 def test_public_names_are_documented():

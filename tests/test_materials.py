@@ -61,6 +61,7 @@ MATERIAL = pytest.mark.parametrize("material, exact", CASES, ids=lambda x: type(
                                    [m for m, _ in CASES] else "")
 
 
+@pytest.mark.quick
 @MATERIAL
 @pytest.mark.parametrize("mode", MODES)
 def test_stress_is_the_closed_form(material, exact, mode):
@@ -71,6 +72,7 @@ def test_stress_is_the_closed_form(material, exact, mode):
     assert np.abs(material.stress(mode, l) - wanted)[near].max() < 1e-14
 
 
+@pytest.mark.quick
 @MATERIAL
 def test_modulus_and_stress_at_rest(material, exact):
     h = 1e-5
@@ -80,6 +82,7 @@ def test_modulus_and_stress_at_rest(material, exact):
     assert material.stress("uniaxial", [[1.5, 2.0]]).shape == (1, 2) and np.ndim(material.stress("uniaxial", 2)) == 0
 
 
+@pytest.mark.quick
 @MATERIAL
 def test_compiled_energy_has_the_closed_form_stress(material, exact):
     """The form that a scene compiles, on a block stretched equibiaxially: dW/dl = 2 P."""

@@ -9,6 +9,7 @@ from dolfinx import fem
 from test_derivatives import assert_derivatives, random_state, scene
 
 import formingx as fx
+from formingx import _compat
 from formingx.problem import Problem
 from formingx.results.probes import probe
 
@@ -100,7 +101,7 @@ def test_probe_reads_the_element_of_the_displacement(space):
     x, _ = random_state(problem)
     problem.set_state(x, 0.0)
     geometry = problem.forms.domain.geometry
-    corners = geometry.x[geometry.dofmap[0][:3], :2]
+    corners = geometry.x[_compat.cell_nodes(problem.forms.domain)[0][:3], :2]
     points = np.array([corners.mean(axis=0), corners[:2].mean(axis=0), [0.5, 0.3, 0.2] @ corners])
     reference = np.array([[1 / 3, 1 / 3], [0.5, 0.0], [0.3, 0.2]])
     exact = fem.Expression(problem.forms.u, reference).eval(problem.forms.domain, np.array([0], dtype=np.int32))

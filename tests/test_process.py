@@ -1,127 +1,352 @@
-"""Processes in stages: exact targets, no memory without friction, derivatives after a change, forces, bad input."""
+"""Processes in stages: what they end in does not depend on how they were staged, and nothing is made twice."""
 
-import csv
+import json
 
 import numpy as np
 import pytest
+from conftest import run_json
+from test_contact import support_force
 
 import formingx as fx
+from formingx.problem import Problem
+from formingx.results.path import State
+from formingx.setting import Setting
+from formingx.solid import Formulation
 
-RIM = 10.0
-
-
-def plug_scene(grip=False):
-    """A clamped sheet, a round plug above it, a pressure on its top and, if asked, a rim that can be moved."""
-    vacuum = fx.Pressure("top", name="vacuum")
-    plug = fx.Contact("top", fx.tools.sphere(radius=3, z=0.5), "none", moves=(0, -1), name="plug")
-    rim = [fx.Displaced("rim", "r", name="grip")] if grip else []
-    scene = fx.Scene(mesh=fx.mesh.disc(radius=RIM, thickness=0.5, elements=(16, 1)), materials=fx.NeoHookean(c10=1.0),
-                     loads=[vacuum], supports=[fx.Symmetry("axis"), fx.Clamped("rim"), *rim], contacts=[plug])
-    return scene, plug, vacuum, rim
+Stage, tools = fx.Stage, fx.tools
+STEP = fx.StepControl(target=8)
+PLUG = tools.sphere(radius=3, z=0.5)
+FLOOR = fx.Contact("bottom", tools.plane(1.5).mirrored(), "stick", name="floor")    # everything below Z = -1.5
 
 
-def run(scene, *stages):
-    return fx.Process(scene).run([fx.Stage(*stage) for stage in stages], step=fx.StepControl(target=8), progress=False)
+def disc(elements=(10, 1)):
+    return fx.mesh.disc(radius=10.0, thickness=0.5, elements=elements)
+
+
+def plugged(friction="none", elements=(10, 1), more=(), plug=PLUG, **options):
+    """A clamped disc under pressure from below, and a round plug above it."""
+    return fx.Scene(mesh=disc(elements), materials=fx.NeoHookean(c10=1.0), **options,
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")],
+                    contacts=[fx.Contact("top", plug, friction, moves=(0, -1), name="plug"), *more])
+
+
+def run(scene, *stages, **options):
+    return fx.Process(scene).run(stages, progress=False, **options)
+
+
+def plug(name, travel, **options):
+    return Stage(name, drive="plug", until=fx.travel(travel), step=STEP, **options)
+
+
+def air(name, pressure, **options):
+    return Stage(name, drive="air", until=fx.pressure(pressure), step=STEP, **options)
+
+
+def same(a, b, size=1e-8, n=None):
+    return np.abs(a.x - b.x)[:n].max() < size * np.abs(b.x).max()
+
+
+def end(path, stage):
+    return [s for s in path.states if s.stage == stage][-1]
 
 
 @pytest.fixture(scope="module")
 def there_and_back():
-    scene, plug, vacuum, _ = plug_scene()
-    return run(scene, ("vacuum", vacuum, fx.pressure(0.03)), ("plug", plug, fx.travel(2.5)),
-               ("plug out", plug, fx.travel(0.0)), ("release", vacuum, fx.pressure(0.0)))
+    return run(plugged(), air("low", 0.02), plug("down", 2.0), air("high", 0.05), plug("up", 0.0),
+               air("low again", 0.02), plug("away", -3.0), air("release", 0.0))
 
 
-def last_of(path, stage):
-    return [state for state in path.states if state.stage == stage][-1]
-
-
-def test_targets_are_hit_exactly_and_rest_is_found_again(there_and_back, tmp_path):
+def test_an_elastic_process_returns(there_and_back):
     path = there_and_back
-    for stage, pressure, travel in (("vacuum", 0.03, 0), ("plug", 0.03, 2.5), ("plug out", 0.03, 0), ("release", 0, 0)):
-        found = last_of(path, stage).measures
-        assert found["vacuum_pressure"] == pytest.approx(pressure, abs=1e-14)
-        assert found["plug_travel"] == pytest.approx(travel, abs=1e-12)
-    assert np.abs(last_of(path, "plug out").x - last_of(path, "vacuum").x).max() < 1e-8
+    assert same(end(path, "low again"), end(path, "low"))
+    assert np.abs(path.last.x).max() < 1e-8 and path.last.measures["air_pressure"] == 0
+    for stage, column, value in (("down", "plug_travel", 2.0), ("up", "plug_travel", 0.0),
+                                 ("away", "plug_travel", -3.0), ("high", "air_pressure", 0.05)):
+        assert end(path, stage).measures[column] == pytest.approx(value, abs=1e-12)
+    assert end(path, "high").measures["plug_travel"] == 2.0
+
+
+def test_the_order_of_stages_does_not_matter_without_friction(there_and_back):
+    other = run(plugged(), plug("down", 2.0), air("high", 0.05))
+    assert same(other.last, end(there_and_back, "high"))
+
+
+def test_one_stage_is_a_trace():
+    scene = fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
+    targets = {"until": fx.pole_stretch(2.0), "through": [fx.pressure(0.05)]}
+    traced = fx.trace(scene, progress=False, **targets)
+    staged = run(scene, Stage("up", drive=scene.loads[0], **targets))
+    assert [s.control for s in traced.states] == [s.control for s in staged.states]
+    assert traced.columns == staged.columns and np.array_equal(traced.last.x, staged.last.x)
+
+
+def test_beyond_a_limit_point_and_back():
+    """A stage that ends on the falling branch; the next goes back by pole height, through the maximum, to rest."""
+    mesh = fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1))
+    p = fx.Pressure("bottom")
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=2.0), loads=[p],
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    path = run(scene, Stage("blow", drive=p, until=fx.pole_stretch(4.0)),
+               Stage("back", drive=p, until=fx.pole_height(0.1)))
+    first, second = path.limit_points
+    assert (first.stage, second.stage) == ("blow", "back")
+    assert first.measures["pressure"] == pytest.approx(second.measures["pressure"], rel=1e-9)
+    assert path.at(fx.pole_height(0.1)).measures["pressure"] == pytest.approx(path.last.measures["pressure"], rel=1e-9)
+
+
+def test_tables():
+    """Knots are hit exactly; the end is that of driving one thing after the other; what waits stays."""
+    tables = {"plug": [(0, 0), (1, 1.0), (2, 1.0), (4, 2.0)], "air": [(2.5, 0.0), (3, 0.02), (5, 0.05)]}
+    path = run(plugged(), Stage("machine", follow=tables, through=[fx.process_time(3.5)], step=STEP))
+    times, met = path["process_time"], [s for s in path.states if s.kind == "target"]
+    assert np.all(np.diff(times) >= 0)
+    assert [s.measures["process_time"] for s in met] == pytest.approx([1, 2, 2.5, 3, 3.5, 4, 5], abs=1e-12)
+    for column, thing in (("plug_travel", "plug"), ("air_pressure", "air")):
+        exact = np.interp(times, *np.transpose(tables[thing]))
+        assert path[column] == pytest.approx(exact, abs=1e-12)
+    assert same(path.last, run(plugged(), plug("down", 2.0), air("high", 0.05)).last)
+    half = run(plugged(), Stage("a", follow={"plug": [(1, 1.0), (3, 2.0)]}, until=fx.process_time(2), step=STEP),
+               Stage("b", follow={"plug": [(4, 2.0)]}, step=STEP))
+    assert end(half, "a").measures["plug_travel"] == pytest.approx(1.5, abs=1e-12)
+    assert half.last.measures["plug_travel"] == pytest.approx(2.0, abs=1e-12)
+    assert half.last.measures["process_time"] == pytest.approx(4.0, abs=1e-12)
+
+
+def test_a_table_beyond_a_limit_point_is_refused():
+    p = fx.Pressure("bottom")
+    mesh = fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1))
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=2.0), loads=[p],
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    with pytest.raises(fx.ConvergenceError, match="Stage 'blow'.*limit point") as error:
+        run(scene, Stage("blow", follow={p: [(0, 0), (1, 0.6)]}))
+    assert error.value.path.last.measures["pressure"] == pytest.approx(0.4933, rel=0.02)
+
+
+def test_nothing_is_compiled_between_stages(monkeypatch):
+    compiled, compile_ = [], Formulation.compile
+    monkeypatch.setattr(Formulation, "compile", lambda self, form: compiled.append(1) or compile_(self, form))
+    scene = plugged()
+    run(scene, air("a", 0.02))
+    one = len(compiled)
+    run(scene, air("a", 0.02), plug("b", 1.0), Stage("c", follow={"plug": [(1, 0.0)]}, step=STEP), air("d", 0.01))
+    assert len(compiled) == 2 * one
+
+
+def kinds():
+    """A scene in which a pressure, a support and a tool can be driven."""
+    mesh = fx.mesh.disc(radius=10.0, inner_radius=1.0, thickness=0.5, elements=(10, 1))
+    return fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0),
+                    supports=[fx.Clamped("rim"), fx.Displaced("inner", name="pin")],
+                    loads=[fx.Pressure("bottom", name="air"), fx.Pressure("top", 0.001)],
+                    contacts=[fx.Contact("top", tools.sphere(radius=1, r=4.0, z=0.5), "stick", moves=(0, -1),
+                                         name="bar")],
+                    kinematics=fx.PlaneStrain())
+
+
+@pytest.mark.parametrize("number", range(5), ids=["air", "none", "clamp", "pin", "bar"])
+def test_derivative_by_control_after_a_change_of_stage(number):
+    """dF/dcontrol, and with it everything driven at once by a table, is the derivative of F."""
+    path = run(kinds(), Stage("bar", drive="bar", until=fx.travel(0.5), step=STEP),
+               Stage("pin", drive="pin", until=fx.travel(-0.3), step=STEP),
+               Stage("air", drive="air", until=fx.pressure(0.01)))
+    problem, state, h = path.problem, path.last, 1e-8 if number in (1, 4) else 1e-6      # a ramp is narrow
+    rate = [0.0] * 6
+    rate[number] = 1.0
+    if number == 1:                                                         # all together
+        rate = [0.3, 0.0, 0.0, -0.5, 0.2, 0.1]
+    base = Setting(**state.setting).standing(state.control)
+    problem.enter(Setting(base, rate, [], stage=9), state.x, 0.0)
+    plus, minus, exact, x = (problem.x.duplicate() for _ in range(4))
+    for out, control in ((plus, h), (minus, -h)):
+        x.setArray(state.x)
+        x.array_w[problem._held] += control * problem._motion
+        problem.residual(x, control, out)
+    x.setArray(state.x)
+    problem.residual(x, 0.0, exact)
+    assert exact.norm() < 1e-8 * problem.force_scale
+    problem.control_derivative(x, 0.0, exact)
+    free = np.setdiff1d(np.arange(len(state.x)), problem._held)
+    numeric = (plus.array - minus.array) / (2 * h)
+    assert np.abs(exact.array[free]).max() > 1e-4 or number == 2
+    np.testing.assert_allclose(numeric[free], exact.array[free], atol=1e-5 * np.abs(exact.array).max())
+    assert np.array_equal(exact.array[problem._held], -problem._motion)
+
+
+@pytest.mark.parametrize("friction", ["none", "stick", 0.3])
+def test_forces_balance(friction):
+    """The plug's force from its tractions is that of the supports less the resultant of the pressure."""
+    path = run(plugged(friction, (20, 2)), plug("down", 2.0), air("press", 0.02),
+               tolerances=fx.Tolerances(residual=1e-10))
+    pressure = 0.02 * np.pi * 10.0**2                       # of a follower pressure inside a clamped rim, along Z
+    force = path.last.measures["tool_force"]
+    path.go_to(path.last)
+    assert force > 0.5
+    assert support_force(path.problem, path.last, 1) + pressure == pytest.approx(force, rel=1e-6)
+
+
+def test_tools_on_both_faces_with_their_own_friction():
+    path = run(plugged(0.2, (20, 2), more=[FLOOR]), plug("down", 1.8), air("vacuum", -0.02))
+    last = path.last.measures
+    assert last["floor_force"] < -0.1 and last["plug_force"] > 0.1
+    assert last["tool_force"] == pytest.approx(last["floor_force"] + last["plug_force"])
+    path.go_to(path.last)
+    assert support_force(path.problem, path.last, 1) - 0.02 * np.pi * 100 == pytest.approx(last["tool_force"], rel=1e-5)
+    assert end(path, "down").measures["floor_force"] < 0
+
+
+def test_two_tools_on_one_face():
+    ring = fx.Contact("top", tools.sphere(radius=1.0, r=6.0, z=0.5), 0.1, moves=(0, -1), name="ring")
+    path = run(plugged("stick", (20, 2), more=[ring]), plug("plug", 1.0), Stage("ring", drive="ring", step=STEP,
+                                                                                until=fx.travel(1.0, of="ring")))
+    assert path.last.measures["ring_travel"] == 1.0 == path.last.measures["plug_travel"]
+    assert path.last.measures["ring_force"] > 0.01 and end(path, "plug").measures["ring_force"] == 0
+
+
+def test_a_tool_that_leaves():
+    """Its force fades away; the sheet is then as if it had never been there; it comes back only where no body is."""
+    path = run(plugged("stick"), plug("down", 2.0), Stage("gone", without=["plug"], step=STEP),
+               air("blow", 0.02, without=["plug"]), plug("home", -4.0, without=["plug"]), plug("again", -1.0))
+    alone = run(plugged(), air("blow", 0.02, without=["plug"]))
+    assert np.abs(end(path, "gone").x).max() < 1e-8
+    assert same(end(path, "blow"), alone.last) and same(end(path, "home"), end(path, "blow"), 1e-12)
+    assert end(path, "gone").measures["tool_force"] == 0 < path.last.measures["tool_force"]
+    with pytest.raises(fx.InputError, match="Stage 'again'.*comes in where the body is, which reaches 2.51"):
+        run(plugged("stick"), air("blow", 0.02, without=["plug"]), plug("again", 1.0))
+
+
+def gripped():
+    return fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom", name="air")],
+                    supports=[fx.Symmetry("axis"), fx.SimplySupported("rim"), fx.Clamped("rim")])
+
+
+def test_supports_that_open_and_close():
+    """A grip that opens leaves the hinge's state; one that closes holds the rim as it is then."""
+    hinged, grip = gripped(), 2
+    grip, hinge = hinged.supports[2], hinged.supports[1]
+    path = run(hinged, air("up", 0.05, without=[hinge]), Stage("open", without=[grip]), Stage("close", without=[hinge]),
+               air("down", 0.0, without=[hinge]), Stage("loose", without=[grip]))
+    plain = run(hinged, air("up", 0.05, without=[grip]))
+    held, opened = path.problem, end(path, "open")
+    assert same(opened, plain.last)
+    assert same(end(path, "close"), plain.last, n=held._n)          # without the hinge's force
+    held.enter(Setting(**end(path, "down").setting), end(path, "down").x, 0.0)
+    assert np.abs(end(path, "down").x - opened.x)[held._held].max() < 1e-14
+    assert end(path, "down").measures["pole_height"] > 0.1                  # the turned rim keeps it bent
     assert np.abs(path.last.x).max() < 1e-8
-    for column in ("vacuum_pressure", "plug_travel"):       # read again at the end: a control means what it meant
-        again = [path.value(path._recorded[column], state) for state in path.states]
-        np.testing.assert_allclose(again, path[column], atol=1e-14)
-    path.to_csv(tmp_path / "path.csv")
-    with open(tmp_path / "path.csv") as file:
-        rows = list(csv.DictReader(file))
-    assert [row["stage"] for row in rows] == [state.stage for state in path.states]
 
 
-def test_order_does_not_matter_without_friction(there_and_back):
-    scene, plug, vacuum, _ = plug_scene()
-    other = run(scene, ("plug", plug, fx.travel(2.5)), ("vacuum", vacuum, fx.pressure(0.03)))
-    assert np.abs(other.last.x - last_of(there_and_back, "plug").x).max() < 1e-8
+def test_a_hold_records_its_state():
+    path = run(plugged(), plug("down", 1.0), Stage("hold"), plug("up", 0.5))
+    held = [s for s in path.states if s.stage == "hold"]
+    assert len(held) == 1 and np.array_equal(held[0].x, end(path, "down").x) and held[0].setting["rate"] == [0.0] * 5
 
 
-def test_plug_force_is_that_of_the_supports():
-    scene, plug, vacuum, _ = plug_scene()
-    path = run(scene, ("vacuum", vacuum, fx.pressure(0.01)), ("plug", plug, fx.travel(2.5)))
-    problem, state = path.problem, path.last
-    x = problem.x.duplicate()
-    x.setArray(state.x)
-    problem.set_state(x, state.control)
-    values = problem.assemble(problem._residual)
-    dofs = np.intersect1d(problem.forms.space.sub(0).sub(1).collapse()[1], problem._held)
-    forms = problem.forms
-    support = values[dofs].sum() * forms.stress * forms.volume / forms.length
-    pressed = 0.01 * np.pi * RIM**2                         # of a follower pressure inside a clamped rim, along -Z
-    force = state.measures["tool_force"]
-    assert force > 0.1
-    assert support - pressed == pytest.approx(force, rel=1e-6)
+STAGES = [plug("down", 1.0, through=[fx.travel(0.5)]), Stage("gone", without=["plug"], step=STEP),
+          Stage("hold", without=["plug"]),
+          Stage("tables", follow={"air": [(0, 0), (1, 0.01), (2, 0.01), (3, 0.02)]}, without=["plug"], step=STEP),
+          plug("home", -4.0, without=["plug"]), plug("again", -1.5)]
 
 
-@pytest.mark.parametrize("stage", ["vacuum", "plug", "grip"])
-def test_derivative_by_control_after_a_change(stage):
-    scene, plug, vacuum, rim = plug_scene(grip=True)
-    path = run(scene, ("vacuum", vacuum, fx.pressure(0.001)), ("plug", plug, fx.travel(1.0)),
-               ("grip", rim[0], fx.travel(0.1)))
-    problem, state, h = path.problem, path.last, 1e-7
-    thing = {"vacuum": vacuum, "plug": plug, "grip": rim[0]}[stage]
-    x, plus, minus, exact = (problem.x.duplicate() for _ in range(4))
-    x.setArray(state.x)
-    control = problem.drive(thing, state.control)
-    problem.residual(x, control, exact)
-    assert exact.norm() < 1e-7 * problem.force_scale        # the same state
-    shift = problem.motion(1.0) - problem.motion(0.0)       # held unknowns follow the control in x as well
-    for side, out in ((h, plus), (-h, minus)):
-        x.setArray(state.x + side * shift)
-        problem.residual(x, control + side, out)
-    x.setArray(state.x)
-    problem.control_derivative(x, control, exact)
-    exact.array[problem._held] = 0
-    assert np.abs(exact.array).max() > 0
-    np.testing.assert_allclose((plus.array - minus.array) / (2 * h), exact.array, atol=1e-5 * np.abs(exact.array).max())
+def test_a_process_goes_on_from_any_state():
+    """From every state whose step was complete, as plain data: the same states follow."""
+    whole = run(plugged("stick"), *STAGES)
+    for k, state in enumerate(whole.states):
+        if not state.stepping:
+            continue
+        kept = State(state.x, state.control, state.direction, state.slope, dict(state.measures), state.history,
+                        state.kind, state.met, state.memory, stage=state.stage,
+                        setting=json.loads(json.dumps(state.setting)),
+                        stepping=json.loads(json.dumps(state.stepping)))
+        rest = run(plugged("stick"), *STAGES, start=kept)
+        assert [s.stage for s in rest.states] == [s.stage for s in whole.states[k:]], k
+        assert same(rest.last, whole.last, 1e-10), k
 
 
-def test_a_tool_left_out_gives_no_force():
-    scene, plug, vacuum, _ = plug_scene()
-    stages = [fx.Stage("up", vacuum, fx.pressure(-0.02), without=without) for without in ([plug], [])]
-    path, stopped = (fx.Process(scene).run([stage], progress=False) for stage in stages)
-    free = fx.Scene(mesh=scene.mesh, materials=scene.materials, loads=scene.loads, supports=scene.supports)
-    alone = fx.trace(free, until=fx.pressure(-0.02), progress=False)
-    assert path.last.measures["tool_force"] == 0 and stopped.last.measures["tool_force"] > 0.1
-    assert path.last.measures["pole_height"] == pytest.approx(alone["pole_height"][-1], rel=1e-8)
+def test_checkpoint(tmp_path):
+    whole = run(plugged("stick"), *STAGES, checkpoint=tmp_path / "whole")
+    scene = plugged("stick")
+    for k in (3, len(whole) // 2, None):
+        path = run(scene, *STAGES, start=fx.load(tmp_path / "whole", scene, state=k))
+        assert len(path) == len(whole) and same(path.last, whole.last, 1e-10)
 
 
+def test_the_record(tmp_path, there_and_back):
+    path = there_and_back
+    assert {"plug_travel", "air_pressure", "tool_force"} <= set(path.columns)
+    path.to_csv(tmp_path / "process.csv")
+    rows = [line.split(",") for line in (tmp_path / "process.csv").read_text().splitlines()]
+    assert rows[0][:3] == ["stage", "kind", "iterations"] and len(rows) == len(path) + 1
+    assert [row[0] for row in rows[1:]] == [s.stage for s in path.states]
+    found = path.at(fx.travel(1.0, of="plug"))
+    assert found.stage == "down" and found.measures["plug_travel"] == pytest.approx(1.0, abs=1e-10)
+    assert found.measures["air_pressure"] == pytest.approx(0.02)
+    travel, pole = path.curve("plug_travel", "pole_height", points=3)
+    assert len(travel) > len(path) and travel.min() == -3.0
+    # measures of an earlier state are those of its own stage
+    assert path.value(path._recorded["tool_force"], end(path, "high")) == end(path, "high").measures["tool_force"]
 
-def test_errors():
-    scene, plug, vacuum, _ = plug_scene()
-    for stage, message in [(fx.Stage("a", plug), "needs a target"),
-                           (fx.Stage("a", fx.Pressure("top"), fx.pressure(1)), "something of the scene"),
-                           (fx.Stage("a", plug, fx.pressure(1.0)), "which has a travel"),
-                           (fx.Stage("a", plug, fx.travel(1.0), without=[vacuum]), "a contact of the scene"),
-                           (fx.Stage("", plug, fx.travel(1.0)), "name")]:
-        with pytest.raises(fx.InputError, match=message):
-            fx.Process(scene).run([stage])
-    with pytest.raises(fx.InputError, match="at least one Stage"):
-        fx.Process(scene).run([])
-    with pytest.raises(fx.InputError, match="all driven"):
-        fx.trace(scene, until=fx.travel(1.0))
-    with pytest.raises(fx.InputError, match="two of them are called"):
-        fx.Scene(mesh=scene.mesh, materials=scene.materials, loads=[vacuum, fx.Pressure("bottom", name="vacuum")],
-                 supports=scene.supports)
+
+AT_REST = Stage("up", drive="air", until=fx.pressure(0.1))
+
+
+@pytest.mark.parametrize("make, words", [
+    (lambda: Stage("a", drive="plug"), "without a target"),
+    (lambda: Stage("a", until=fx.travel(1)), "drives nothing"),
+    (lambda: Stage("a", drive="plug", until=3.0), "must be a target"),
+    (lambda: Stage("a", drive="plug", follow={"air": [(0, 0)]}), "both drive and follow"),
+    (lambda: Stage("", drive="plug", until=fx.travel(1)), "must be a word"),
+    (lambda: Stage("a", follow={"air": [(0, 0), (2, 1), (1, 2)]}), "goes back in time.*1 after 2"),
+    (lambda: Stage("a", follow={"air": [(0, 0), (0, 1)]}), "goes back in time"),
+    (lambda: Stage("a", follow={"air": [(0, 0, 1)]}), r"must be \[\(time, value\)"),
+    (lambda: Stage("a", follow={}), "must be {thing"),
+    (lambda: Stage("a", follow={"air": [(0, 0), (1, 1)]}, until=fx.pressure(1)), "until a process_time"),
+    (lambda: run(plugged()), "at least one Stage"),
+    (lambda: run(plugged(), AT_REST, AT_REST), "two stages are called 'up'"),
+    (lambda: run(plugged(), plug("a", 1), "b"), "must be a formingx.Stage"),
+    (lambda: run(plugged(), Stage("a", drive="ram", until=fx.travel(1))), "'ram' is not in the scene.*'plug'"),
+    (lambda: run(plugged(), Stage("a", drive=fx.Pressure("top"), until=fx.pressure(1))), "not in the scene"),
+    (lambda: run(plugged(), plug("a", 1, without=["seal"])), "'seal' is not in the scene"),
+    (lambda: run(plugged(), air("a", 1, without=["air"])), "both driven and left out"),
+    (lambda: run(kinds(), Stage("a", drive=kinds, until=fx.travel(1))), "not in the scene"),
+    (lambda: run(gripped(), air("a", 1, without=gripped().supports)), "not in the scene"),
+    (lambda: (lambda s: run(s, air("a", 1, without=s.supports[1:])))(gripped()), "'a'.*free to move"),
+    (lambda: (lambda s: run(s, air("a", 1, without=s.supports[:1])))(gripped()), "'a'.*touches the axis"),
+    (lambda: (lambda s: run(s, Stage("a", drive=s.supports[1], until=fx.travel(1))))(plugged()),
+     "cannot be driven"),
+    (lambda: run(plugged(), Stage("a", drive="air", until=fx.travel(1, of="plug"))), "does not drive that"),
+    (lambda: run(plugged(), Stage("a", drive="air", until=fx.travel(1, of="hoop"))), "of = 'hoop' is not known"),
+    (lambda: run(plugged(), air("a", 0.01), Stage("b", follow={"air": [(0, 0), (1, 1)]})), "it stands at 0.01"),
+    (lambda: run(plugged(), Stage("a", follow={"air": [(1, 0.01)]}), Stage("b", follow={"air": [(0.5, 0), (3, 1)]})),
+     "process time is 1 already"),
+    (lambda: fx.trace(plugged(), until=fx.pressure(1)), "one control drives a run"),
+    (lambda: fx.solve(plugged(), to=1), "one control drives a run"),
+    (lambda: run(plugged(more=[FLOOR]), plug("a", 1), plug("b", 2.5)),
+     "'b': tools overlap.*at travel 2.0.*into the other"),
+    (lambda: run(plugged(more=[FLOOR]), Stage("b", follow={"plug": [(1, 2.5)]}, step=STEP)), "'b': tools overlap"),
+    (lambda: run(plugged(plug=tools.cylinder(radius=12, z=0.5)), plug("a", 1)), "'a'.*whole height.*'rim'"),
+    (lambda: plugged(more=[fx.Contact("top", PLUG, moves=(1, -1), name="plug")]), "two things are called 'plug'"),
+])
+def test_bad_input(make, words):
+    with pytest.raises(fx.InputError, match=words):
+        make()
+
+
+RANKS = """
+import json, sys
+sys.path.insert(0, "tests")
+from test_process import STAGES, plugged, run
+path = run(plugged("stick"), *STAGES)
+found = [[s.measures[k] for k in ("pole_height", "tool_force", "air_pressure", "plug_travel")] for s in path.states]
+if path.problem.comm.rank == 0:
+    print(json.dumps([path.counts.steps, path.counts.iterations, *sum(found, [])]))
+"""
+
+
+def test_ranks_agree():
+    one, two = (run_json(RANKS, ranks) for ranks in (1, 2))
+    assert two == pytest.approx(one, rel=1e-8, abs=1e-10)
+
+
+def test_a_scene_pays_for_what_is_in_it():
+    assert Problem(plugged()).memory == [] and Problem(gripped()).contacts == []

@@ -40,6 +40,7 @@ def test_ranks_agree(support):
         assert other["numbers"] == pytest.approx(serial["numbers"], rel=1e-8)
 
 
+@pytest.mark.quick
 def test_errors_come_on_all_ranks():
     lines = run("-c", BAD, ranks=2)
     for words in ("not there", "too little support"):

@@ -6,6 +6,7 @@ from reference import element
 from reference.body import Body, follow, read
 
 import formingx as fx
+from formingx import _compat
 from formingx.physics.kinematics import sum_of_powers
 from formingx.problem import Problem
 
@@ -34,10 +35,11 @@ def pair(scene, law, folder):
     dofs = np.empty(nodes.size, dtype=int)
     for i in (0, 1):
         sub = problem.forms.space.sub(0).sub(i)
-        dofs[2 * np.asarray(scene.mesh.domain.geometry.dofmap) + i] = sub.dofmap.list
+        dofs[2 * np.asarray(_compat.cell_nodes(scene.mesh.domain)) + i] = sub.dofmap.list
     return problem, body, dofs
 
 
+@pytest.mark.quick
 @LAWS
 @pytest.mark.parametrize("points", [3, 4, 7])
 def test_residual_and_tangent(material, law, points, tmp_path):

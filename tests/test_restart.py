@@ -52,6 +52,7 @@ def whole(tmp_path_factory):
     return found
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", SCENES)
 def test_any_state_goes_on_to_the_same_path(name, whole):
     folder, scene, path = whole[name]
@@ -63,6 +64,7 @@ def test_any_state_goes_on_to_the_same_path(name, whole):
             assert (again.counts.steps, again.counts.iterations) == (path.counts.steps, path.counts.iterations)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name, ranks", [("hinged", (1, 2)), ("hinged", (2, 1)), ("stick", (1, 2)), ("stick", (2, 1)),
                                          ("membrane", (1, 2))])
 def test_on_another_number_of_ranks(name, ranks, whole, tmp_path):

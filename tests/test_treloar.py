@@ -17,6 +17,7 @@ def path():
     return fx.trace(treloar((40, 2)), until=fx.pole_stretch(8.5), through=[fx.pole_stretch(s) for s in STRETCHES])
 
 
+@pytest.mark.quick
 def test_limit_point(path):
     """The converged limit pressure, 0.493271 kg/cm2; membrane theory is 0.04 % below, as bending is left out."""
     limit, = path.limit_points
@@ -35,6 +36,7 @@ def test_limit_pressure_is_the_largest_on_the_path(path):
         assert (found.measures["pole_stretch"] > limit.measures["pole_stretch"]) == (after is limit)
 
 
+@pytest.mark.quick
 def test_targets_are_hit_exactly(path):
     for stretch in (*STRETCHES, 8.5):
         assert path.met(fx.pole_stretch(stretch)).measures["pole_stretch"] == pytest.approx(stretch, rel=1e-9)
@@ -52,6 +54,7 @@ def test_pole_stretch_is_that_of_the_mid_fibre(path):
         assert fibre == pytest.approx(state.measures["pole_stretch"], rel=1.4e-3)
 
 
+@pytest.mark.quick
 def test_mass_is_kept(path):
     assert np.abs(path["mass_error"]).max() < 1e-9
     profile = path.profile()
@@ -67,6 +70,7 @@ def test_cost_does_not_depend_on_the_penalty(eps, support):
     assert path.counts.steps <= 25 and path.counts.iterations <= 150, path.counts
 
 
+@pytest.mark.quick
 def test_newton_is_quadratic(path):
     """In the last iterations of a step the correction goes as the square of the one before."""
     orders = []
@@ -77,6 +81,7 @@ def test_newton_is_quadratic(path):
     assert len(orders) > 5 and np.median(orders) > 1.7, orders
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("length, stress", [(100.0, 1 / 98066.5), (0.1, 98066.5e-9 ** -1)],
                          ids=["m and Pa", "mm and GPa"])
 def test_units_change_nothing(path, length, stress):
@@ -112,6 +117,7 @@ def test_work_of_the_pressure_is_the_energy_gained():
     assert work == pytest.approx(gained, rel=1e-5)
 
 
+@pytest.mark.quick
 def test_fixed_control_meets_the_same_states(path):
     """SNES at fixed pressure and the continuation agree."""
     fixed = fx.solve(path.problem.scene, to=0.4, increments=10).last.measures
@@ -133,6 +139,7 @@ def test_target_never_reached_names_the_maximum():
     assert caught.value.path.limit_points
 
 
+@pytest.mark.quick
 def test_layers_of_one_material_are_one_body():
     """Two layers with the same material object give the numbers of one layer."""
     rubber = fx.NeoHookean(c10=2.0)
@@ -147,6 +154,7 @@ def test_layers_of_one_material_are_one_body():
     assert heights[0] == pytest.approx(heights[1], rel=1e-4)        # the diagonals differ
 
 
+@pytest.mark.quick
 def test_pressure_jumps_between_layers():
     """Continuous pressures: layers of different material have fields of their own; three layers need only two."""
     mesh = fx.mesh.disc(radius=1.0, thickness={"a": 0.1, "b": 0.1, "c": 0.1}, elements=(6, 1))

@@ -10,6 +10,9 @@ is mu = inf, frictionless mu = 0. A point that was out of touch at the last acce
 inside the step, which the tangent of the path foretells: taken from the end of the step, the slip would depend on its
 length.
 
+A tool that the body does not separate from holds what has touched it: F(d) = d + theta for such a point, of either
+sign, and max(d + theta, 0) for the others, which carries on without a jump when one arrives.
+
 Contact acts at the nodes of six-node triangles, which are the points of the Gauss-Lobatto rule on a facet (exact
 for the lumped area): there history is read where it lives.
 """
@@ -21,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, count, non_negative, pair, positive
+from ..errors import InputError, count, instance, non_negative, pair, positive
 from .tools import Nearest, Tool
 
 SOFTER = 0.01
@@ -41,18 +44,20 @@ class Contact:
             law (5.9), from 0 (none).
         penalty: k over shear modulus / thickness of the sheet.
         ramp: theta over thickness of the sheet.
+        separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
+            start); with "stick" or "none".
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge).
             What sticks depends on when it touched: with more, thickness changes by some 0.1 % of itself.
         moves: (r, z) of the tool's motion per unit of travel: the tool is what the run controls; None: it stays.
-        name: of its column, <name>_travel, where several things are driven; default: the boundary's.
+        name: what it is called in a process and in its columns.
 
     Raises:
         InputError: an argument that is not allowed.
     """
 
     def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float = 2e4,
-                 ramp: float = 1e-5, nodes_per_step: int = 1, moves: tuple[float, float] | None = None,
-                 name: str | None = None):
+                 ramp: float = 1e-5, separates: bool = True, nodes_per_step: int = 1,
+                 moves: tuple[float, float] | None = None, name: str | None = None):
         self.name, name = name, f"Contact({on!r})"
         if not isinstance(tool, Tool):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
@@ -62,10 +67,16 @@ class Contact:
         self.on, self.tool, self.friction = on, tool, friction
         self.mu = words[friction] if isinstance(friction, str) else non_negative(f"{name}: friction", friction)
         self.penalty, self.ramp = positive(f"{name}: penalty", penalty), positive(f"{name}: ramp", ramp)
+        self.separates = instance(f"{name}: separates", separates, bool, "True or False")
+        if not separates and 0 < self.mu < math.inf:
+            raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
+                             f" Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = count(f"{name}: nodes_per_step", nodes_per_step)
         self.moves = None if moves is None else pair(f"{name}: moves", moves)
         if self.moves == (0.0, 0.0):
             raise InputError(f"{name}: moves = (0, 0): must name a direction, or be None")
+
+    quantity = "travel"
 
     @property
     def driven(self) -> bool:
@@ -73,19 +84,14 @@ class Contact:
         return self.moves is not None
 
     @property
-    def label(self) -> str:
-        """Its name, or that of its boundary."""
-        return self.name or self.on
-
-    @property
     def symmetric(self) -> bool:
-        """True if contact has an energy: without friction."""
-        return self.mu == 0
+        """True without friction or memory: contact then has an energy."""
+        return self.mu == 0 and self.separates
 
     def law(self, k: float, theta: float, points: np.ndarray) -> Law:
         """Tractions for a penalty k (stress/length) and a ramp theta (length), at points, shape (n, 2)."""
         depth = self.tool.signed_distance(points)
-        return Law(self.tool, self.mu, k, theta, np.maximum(depth + (1 - 1e-7) * theta, 0.0))
+        return Law(self.tool, self.mu, k, theta, np.maximum(depth + (1 - 1e-7) * theta, 0.0), self.separates)
 
     def __repr__(self) -> str:
         return f"Contact({self.on!r}, {self.tool!r}, {self.friction!r})"
@@ -146,8 +152,22 @@ class Law:
     ramp, free of stress.
     """
 
-    def __init__(self, tool: Tool, mu: float, k: float, theta: float, shift: np.ndarray | float = 0.0):
-        self.tool, self.mu, self.k, self.theta, self.shift = tool, mu, k, theta, shift
+    def __init__(self, tool: Tool, mu: float, k: float, theta: float, shift: np.ndarray | float = 0.0,
+                 separates: bool = True):
+        self.tool, self.mu, self.k, self.theta, self.shift, self.separates = tool, mu, k, theta, shift, separates
+
+    @property
+    def remembers(self) -> bool:
+        """True if tractions depend on what points remember."""
+        return self.mu > 0 or not self.separates
+
+    def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
+        """Which points at x touch, or are held, shape (n,)."""
+        return (self.distance(x) > -self.theta) | self._held(old)
+
+    def _held(self, old: Touch | None) -> np.ndarray | bool:
+        """Which points may not let go, shape (n,)."""
+        return False if self.separates or old is None else old.distance > -self.theta
 
     def distance(self, x: np.ndarray) -> np.ndarray:
         """Signed distance less the shift of points x, shape (n,), length."""
@@ -158,8 +178,11 @@ class Law:
         near = self.tool.nearest(x)
         return near._replace(distance=near.distance - self.shift)
 
-    def ramp(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """F(d), eq. (5.13), and its derivative."""
+    def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """F(d), eq. (5.13) if the body separates from the tool, and its derivative."""
+        if not self.separates:
+            slope = np.where(held | (d > -self.theta), 1.0, 0.0)
+            return slope * (d + self.theta), slope
         slope = np.clip((d + self.theta) / (2 * self.theta), 0.0, 1.0)
         return np.where(d < self.theta, self.theta * slope**2, d), slope
 
@@ -188,17 +211,19 @@ class Law:
         near, k = self.nearest(x), self.k
         d, n, t, bend = near.distance, near.normal, near.tangent, near.curvature
         at = d if expected is None else expected.distance
-        F, slope = self.ramp(at)
+        held = self._held(old)
+        F, slope = self.ramp(at, held)
         pressed, ahead = k * F, d - at
         N = pressed + k * slope * ahead
         force = N[:, None] * n
         stiffness = _outer(k * slope, n, n) + _outer(pressed * bend, t, t)
         zero = np.zeros(len(x))
+        kept_at = np.where(held, np.maximum(d, 0.0), d)         # held for ever
         if self.mu == 0:
-            return Tractions(force, stiffness, _touch(x, d, zero), N, zero, zero)
+            return Tractions(force, stiffness, _touch(x, kept_at, zero), N, zero, zero)
         assert old is not None
         g, dg = self._slip(x, near, old)
-        rising = (np.abs(at) < self.theta) * k / (2 * self.theta)
+        rising = (np.abs(at) < self.theta) * k / (2 * self.theta) * self.separates
         kt = k if self.mu == math.inf else SOFTER * k
         rising *= kt / k
         T, dT = (kt * slope + rising * ahead) * g, (kt * slope)[:, None] * dg
@@ -215,7 +240,7 @@ class Law:
         stiffness = stiffness + np.einsum("ni,nj->nij", t, dT) - _outer(bent * bend, n, t)
         kept = np.divide(T, kt * slope, out=zero.copy(), where=slope > 0)
         kept *= 1 + 1e-9 * np.abs(sense_now)                 # what slides goes on sliding, whatever round-off says
-        return Tractions(force, stiffness, _touch(x, d, kept), N, T, sense_now)
+        return Tractions(force, stiffness, _touch(x, kept_at, kept), N, T, sense_now)
 
     def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
         """Distance and slip of points x, shape (n, 2), and their gradients."""
@@ -232,7 +257,8 @@ class Law:
         touching = (arrived | (np.abs(near.distance / self.theta + 1.025) < 0.025)) & (now.sense == 0)
         press = np.where(touching, np.maximum(-0.5 * self.theta - near.distance, 0.0), 0.0)
         if old is not None:
-            old = old._replace(distance=near.distance + press, position=x)
+            distance = np.where(self._held(old), old.distance, near.distance + press)
+            old = old._replace(distance=distance, position=x)
         pressed = self.tractions(x + press[:, None] * near.normal, old)
         return np.where((press > 0)[:, None, None], pressed.stiffness, now.stiffness)
 

@@ -16,10 +16,11 @@ class Pressure:
     Args:
         on: name of the boundary. A positive pressure pushes into the body.
         value: a fixed pressure (stress); None: the pressure is what the run controls.
-        name: of its column, <name>_pressure, where several things are driven; default: the boundary's.
+        name: what it is called in a process and in its columns.
     """
 
     quadrature_degree = 5
+    quantity = "pressure"
 
     def __init__(self, on: str, value: float | None = None, name: str | None = None):
         self.on, self.name = on, name
@@ -29,11 +30,6 @@ class Pressure:
     def driven(self) -> bool:
         """True if the run controls this load."""
         return self.value is None
-
-    @property
-    def label(self) -> str:
-        """Its name, or that of its boundary."""
-        return self.name or self.on
 
     def virtual_work(self, kinematics, u, du, X, N, pressure):
         """Integrand on the reference boundary: u, du displacement and test function, N the outward normal."""

@@ -232,7 +232,7 @@ class Ogden(Material):
                 for some in itertools.combinations(exponents, n)]
 
     def coordinates(self):
-        """mu_k and alpha_k keep their signs; |alpha_k| <= 30."""
+        """mu_k and alpha_k keep their signs; alpha_k lies between -30 and 30."""
         values = list(self.parameters.values())
         largest = [math.inf] * (len(values) // 2) + [30.0] * (len(values) // 2)
         return [(x, 0, top) if x > 0 else (x, -top, 0) for x, top in zip(values, largest, strict=True)]
@@ -242,8 +242,8 @@ class Hyperelastic(Material):
     """Any energy, written as a function of the invariants or of F.
 
     Args:
-        energy: called as energy(I1, I2, **constants) or energy(F, **constants); returns a UFL scalar. Where it must not
-            be used it should be infinite or not a number, with its derivatives: a step that gets there is halved.
+        energy: called as `energy(I1, I2, **constants)` or `energy(F, **constants)`; returns a UFL scalar. Where it must
+            not be used it should be infinite or not a number, with its derivatives: a step that gets there is halved.
         of: "invariants" or "F" (shape (3, 3)).
         constants: the energy's named constants. Exponents and the like may be among them.
 

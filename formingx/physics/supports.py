@@ -33,6 +33,8 @@ class MeanHeld(NamedTuple):
 
 
 class _On:
+    name: str | None = None
+
     def __init__(self, on: str):
         self.on = on
 
@@ -113,10 +115,11 @@ class Displaced(_On):
     Args:
         on: name of the boundary.
         component: "r" or "z".
-        name: of its column, <name>_travel, where several things are driven; default: the boundary's.
+        name: what it is called in a process and in its columns.
     """
 
     driven = True
+    quantity = "travel"
 
     def __init__(self, on: str, component: str = "z", name: str | None = None):
         super().__init__(on)
@@ -126,11 +129,6 @@ class Displaced(_On):
     def constraints(self):
         """What is held: a list of Held or MeanHeld."""
         return [Held(self.component, on=self.on, driven=True)]
-
-    @property
-    def label(self) -> str:
-        """Its name, or that of its boundary."""
-        return self.name or self.on
 
 
 def _component(name: str, value: str) -> int:

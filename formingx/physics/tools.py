@@ -83,12 +83,13 @@ class Tool:
 
     Args:
         points: corners (R, Z), shape (n, 2), in the mesh's unit of length, the solid to their left.
-        fillets: radius at every corner, or one for all; 0 leaves it sharp. Ends of an open profile have none, but an
-            end on R = 0 may (the tip of a cone).
+        fillets: radius at each point, 0 leaves it sharp; or one for all corners. Ends of an open profile have none,
+            but an end on R = 0 may (the tip of a cone).
         closed: the last point is joined to the first.
 
     Raises:
-        InputError: fewer than two different points, a fillet too large for its corner, a profile that crosses itself.
+        InputError: fewer than two different points, a fillet without a corner or too large for it, a profile that
+            crosses itself.
     """
 
     def __init__(self, points: Sequence[Sequence[float]], fillets: float | Sequence[float] = 0.0, closed: bool = False):
@@ -97,12 +98,17 @@ class Tool:
             raise InputError(f"Tool: {len(points)} points: a{' closed' if closed else 'n open'} profile needs at least"
                              f" {3 if closed else 2}")
         n = len(points)
-        radii: list = list(np.asarray(fillets)) if np.ndim(fillets) else [
+        each = np.ndim(fillets) > 0
+        radii: list = list(np.asarray(fillets)) if each else [
             fillets if closed or 0 < i < n - 1 else 0.0 for i in range(n)]
         if len(radii) != n:
             raise InputError(f"Tool: {len(radii)} fillets for {n} points: give one number, or one for each point")
         radii = [non_negative(f"Tool: fillet at point {i}", r) for i, r in enumerate(radii)]
-        self._set(_rounded(points, radii, closed), closed)
+        pieces = _rounded(points, radii, closed, each)
+        if not each and non_negative("Tool: fillets", fillets) > 0 and not any(isinstance(p, Arc) for p in pieces):
+            raise InputError(f"Tool: fillets = {fillets!r}: the profile has no corner to round (an end on R = 0 is"
+                             f" rounded by a list with a radius for each point)")
+        self._set(pieces, closed)
 
     @classmethod
     def of_pieces(cls, pieces: Sequence[Line | Arc], closed: bool = False) -> Tool:
@@ -173,8 +179,11 @@ class Tool:
 
     def __repr__(self) -> str:
         arcs = sum(isinstance(p, Arc) for p in self.pieces)
-        first, last = self.pieces[0].ends[0], self.pieces[-1].ends[1]
-        return f"Tool({len(self.pieces) - arcs} lines and {arcs} arcs from {_show(first)} to {_show(last)})"
+        numbers = ((len(self.pieces) - arcs, "line"), (arcs, "arc"))
+        kinds = " and ".join(f"{n} {kind}{'s' * (n > 1)}" for n, kind in numbers if n)
+        ends = np.array([self.pieces[0].ends[0], self.pieces[-1].ends[1]])
+        first, last = np.where(np.abs(ends) < 1e-12 * self.size, 0.0, ends)
+        return f"Tool({kinds}{', closed, from' if self.closed else ' from'} {_show(first)} to {_show(last)})"
 
     def _with(self, pieces: list) -> Tool:
         return Tool.of_pieces(pieces, self.closed)
@@ -394,8 +403,8 @@ def _piece_through(points: np.ndarray, name: str) -> Line | Arc:
                      + (f" (of a mesh, {n} nodes; four are needed to know an arc)" if n < 4 else ""))
 
 
-def _rounded(points: np.ndarray, radii: list[float], closed: bool) -> list[Line | Arc]:
-    """Lines and tangent arcs through corners with fillets."""
+def _rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) -> list[Line | Arc]:
+    """Lines and tangent arcs through corners with fillets; each: a point with a fillet must be a corner."""
     n, size = len(points), float(np.ptp(points, axis=0).max())
     edges = [(i, (i + 1) % n) for i in range(n if closed else n - 1)]
     lengths = {e: math.dist(points[e[0]], points[e[1]]) for e in edges}
@@ -417,6 +426,9 @@ def _rounded(points: np.ndarray, radii: list[float], closed: bool) -> list[Line 
             out, come = (-come if out is None else out), (-out if come is None else come)   # type: ignore[operator]
         turn = _turn(come, out)
         if abs(turn) < _FLAT:
+            if each:
+                raise InputError(f"Tool: fillet at point {i} = {radius!r}: the profile runs straight on there: it has"
+                                 f" no corner to round")
             continue
         cut[i] = radius * math.tan(abs(turn) / 2)
         left = math.copysign(1.0, turn)

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from .. import _compat
+
 _PARTS = ("materials", "supports", "loads", "contacts", "model", "kinematics", "quadrature_degree")
 
 
@@ -20,7 +22,7 @@ def describe(problem: Any) -> dict[str, Any]:
     their number; then every part of the scene by its public attributes.
     """
     scene = problem.scene
-    known = set(_PARTS) | {"mesh", "driven"}
+    known = set(_PARTS) | {"mesh"}
     extra = sorted(name for name in vars(scene) if name not in known and not name.startswith("_"))
     return {"mesh": _mesh(problem), "unknowns": problem.n_unknowns,
             **{name: plain(getattr(scene, name)) for name in (*_PARTS, *extra)}}
@@ -40,7 +42,7 @@ def summary(scene: Any) -> dict[str, str]:
         for k, thing in enumerate(getattr(scene, kind), 1):
             numbers = "".join(f", {name.replace('_', ' ')} {value!r}" for name, value in vars(thing).items()
                               if isinstance(value, int | float) and repr(value) not in text(thing))
-            lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if thing in scene.drivable else "")
+            lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if getattr(thing, "driven", False) else "")
     return lines | {"model": text(scene.model), "kinematics": text(scene.kinematics),
                     "quadrature degree": str(scene.quadrature_degree)}
 
@@ -89,7 +91,7 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
 def _mesh(problem: Any) -> dict[str, Any]:
     mesh, domain, comm = problem.scene.mesh, problem.forms.domain, problem.comm
     cells = domain.topology.index_map(domain.topology.dim).size_local
-    x = domain.geometry.x[domain.geometry.dofmap[:cells]][:, :, :2] / problem.forms.length
+    x = domain.geometry.x[_compat.cell_nodes(domain)[:cells]][:, :, :2] / problem.forms.length
     number = domain.topology.original_cell_index[:cells]
     weights = np.sin(1.0 + number)[:, None] * np.sin(1.0 + np.arange(x.shape[1]))
     total = comm.allreduce(cells, MPI.SUM)

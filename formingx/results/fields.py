@@ -91,12 +91,13 @@ class Fields:
         problem, pressure = self._problem, np.zeros(self.points.shape[:2])
         forms = problem.forms
         fields, near = state.x[: forms.space.dofmap.index_map.size_local], 1e-9 * forms.length
+        self._path.go_to(state)
         now, problem.memory = problem.memory, state.memory
         try:
-            tractions = [contact.traction(fields, state.control) for contact in problem.contacts]
+            tractions = [contact.traction(fields, state.control) for contact in problem.touching]
         finally:
             problem.memory = now
-        for contact, (points, values) in zip(problem.contacts, tractions):
+        for contact, (points, values) in zip(problem.touching, tractions):
             tree = cKDTree(points)
             total = np.zeros((len(points), 2))               # sum of area ratios, and of how many facets
             for cell, facet in self._facets(contact.contact.on):

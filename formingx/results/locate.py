@@ -34,7 +34,7 @@ def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None 
         InputError: a point that lies in none of the cells.
     """
     comm, X, cmap, dim = mesh.comm, mesh.geometry.x, _compat.coordinate_map(mesh), mesh.topology.dim
-    owned = mesh.topology.index_map(dim).size_local
+    nodes, owned = _compat.cell_nodes(mesh), mesh.topology.index_map(dim).size_local
     cells = np.arange(owned, dtype=np.int32) if cells is None else cells[cells < owned]
     padded = np.zeros((len(points), 3))
     padded[:, :2] = points
@@ -47,7 +47,7 @@ def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None 
         for i, point in enumerate(padded):
             for cell in candidates.links(i):
                 try:
-                    place = cmap.pull_back(point[None], X[mesh.geometry.dofmap[cell]])[0, :dim]
+                    place = cmap.pull_back(point[None], X[nodes[cell]])[0, :dim]
                 except RuntimeError:                 # a curved cell that the point is far from
                     continue
                 inside = min(*place, 1 - place.sum())

@@ -7,12 +7,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import ufl
 
-from ..errors import InputError, finite, pair, positive
+from ..errors import InputError, finite, known, pair, positive
 from .probes import probe
 
 
 class Bound:
-    """A measure of one problem: its value, and the equation measure = target for a run that aims at it."""
+    """A measure of one problem: its value, and the equation measure = target for a run that aims at it.
+
+    Attributes:
+        size: what counts as one of it, in the user's units: 1e-12 of that is nothing.
+    """
+
+    size = 0.0
 
     def value(self, x: Any, control: float) -> float:
         """The measure at a state, in the user's units."""
@@ -23,21 +29,30 @@ class Bound:
         raise NotImplementedError
 
 
-class _Control(Bound):
-    def __init__(self, problem, thing):
-        self.scale, self._amplitude = problem.forms.control_scale, problem.forms.amplitudes.get(thing)
-        if self._amplitude is not None:
-            self.scale = self._amplitude.scale
+class Amplitude(Bound):
+    """Of a thing that can be driven (by its number in the scene), of the process time (-1), or the control (None)."""
+
+    def __init__(self, problem: Any, number: int | None):
+        self._problem, self._number = problem, number
+        self._scale = self.size = 1.0 if number is None else problem.forms.scales[number]
+
+    @property
+    def moves(self) -> bool:
+        """True if the control changes it now."""
+        return self._number is None or self._problem.setting.rate[self._number] != 0
+
+    def _amplitude(self, control: float) -> float:
+        return control if self._number is None else self._problem.setting.amplitude(self._number, control)
 
     def value(self, x, control):
-        return self.scale * (control if self._amplitude is None else self._amplitude.at(control))
+        return self._scale * self._amplitude(control)
 
     def equation(self, target):
+        slope = 1.0 if self._number is None else self._problem.setting.rate[self._number]
+
         def c(x, control, gradient):
             gradient.set(0)
-            if self._amplitude is None:
-                return control - target / self.scale, 1.0
-            return self._amplitude.at(control) - target / self.scale, self._amplitude.rate
+            return self._amplitude(control) - target / self._scale, slope
         return c
 
 
@@ -98,14 +113,41 @@ class Target(NamedTuple):
         return f"{self.name.replace('_', ' ')} = {self.value:g}"
 
 
-def pressure(value: float) -> Target:
-    """The driven pressure reaches `value` (stress)."""
-    return Target("pressure", finite("pressure", value), bind_control)
+def pressure(value: float, *, of: str | None = None) -> Target:
+    """The driven pressure, or the one called `of`, reaches `value` (stress)."""
+    return _driven("pressure", value, of)
 
 
-def travel(value: float) -> Target:
-    """The driven support has moved by `value` (a length)."""
-    return Target("travel", finite("travel", value), bind_control)
+def travel(value: float, *, of: str | None = None) -> Target:
+    """The driven support or tool, or the one called `of`, has moved by `value` (a length)."""
+    return _driven("travel", value, of)
+
+
+def process_time(value: float) -> Target:
+    """The time of a process, as its tables give it, reaches `value`."""
+    return Target("process_time", finite("process_time", value), lambda problem: Amplitude(problem, -1))
+
+
+def changed() -> Target:
+    """What has left the scene, or come into it, has done so wholly (`Setting.fading`)."""
+    return Target("change", 1.0, lambda problem: Amplitude(problem, None))
+
+
+def _driven(quantity: str, value: float, of: str | None) -> Target:
+    def bind(problem):
+        scene, rate = problem.scene, problem.setting.rate
+        found = [i for i, t in enumerate(scene.things)
+                 if any(t is d for d in scene.drivable) and t.quantity == quantity]
+        if of is not None:
+            known(f"{quantity}: of =", of, [n for n in (scene.things[i].name for i in found) if n])
+            return Amplitude(problem, next(i for i in found if scene.things[i].name == of))
+        moving = [i for i in found if rate[i]] or found
+        if len(moving) != 1:
+            raise InputError(f"{quantity} = {value:g}: the scene has {len(moving) or 'no'} {quantity} that can be"
+                             " driven" + (", say which with of=..." if moving
+                                          else f": what can be is {scene.drivable}"))
+        return Amplitude(problem, moving[0])
+    return Target(quantity if of is None else f"{of}_{quantity}", finite(quantity, value), bind)
 
 
 def pole_height(value: float) -> Target:
@@ -145,11 +187,6 @@ def displacement(value: float, *, at: tuple[float, float], component: str = "z")
     return Target(f"u_{component}_at_{at[0]:g}_{at[1]:g}", finite("displacement", value), bind)
 
 
-def bind_control(problem: Any) -> Bound:
-    """See `pressure` and `travel`."""
-    return _Control(problem, problem.forms.driven)
-
-
 def bind_pole_height(problem: Any) -> Bound:
     """See `pole_height`."""
     low, high = _pole(problem)
@@ -164,24 +201,17 @@ def bind_pole_stretch(problem: Any) -> Bound:
 
 
 def bind_volume(problem: Any) -> Bound:
-    """See `enclosed_volume`: minus the integral of (z - z_lowest) n_z da over the driven face."""
-    driven, kinematics, forms = _driven_pressure(problem.scene), problem.scene.kinematics, problem.forms
+    """See `enclosed_volume`: minus the integral of (z - z_lowest) n_z da over the face of the (first) driven load."""
+    driven = next((t for t in problem.scene.drivable if t.quantity == "pressure"), problem.scene.driven)
+    if driven is None:
+        raise InputError("enclosed_volume: the scene has no driven pressure whose face would enclose it")
+    kinematics, forms = problem.scene.kinematics, problem.forms
     z0 = forms.constant(problem.scene.mesh.nodes_of(driven.on)[:, 1].min())
     N, face = forms.face(driven.on, 5)
     area = kinematics.area_vector(forms.u, forms.X, N)
     scale = forms.length**kinematics.dimension_of_volume
     height = forms.X[1] + forms.u[1] - z0
     return _Form(problem, -height * area[1] / forms.constant(scale) * face, scale)
-
-
-def kind_of(thing: Any) -> str:
-    """"pressure" or "travel": which of both a thing that can be driven has."""
-    return "pressure" if hasattr(thing, "virtual_work") else "travel"
-
-
-def _driven_pressure(scene):
-    """The first driven pressure, or None."""
-    return next((x for x in scene.drivable if kind_of(x) == "pressure"), None)
 
 
 def _displacement(problem, points, factors):
@@ -212,39 +242,46 @@ class _Scalar(Bound):
 class _Nodal(Bound):
     """A number of every contact, put together by `over`; recorded only."""
 
-    def __init__(self, problem, of, over):
+    def __init__(self, problem, of, over, contacts=None):
         self._problem, self._of, self._over = problem, of, over
+        self._contacts = problem.contacts if contacts is None else contacts
 
     def value(self, x, control):
-        return float(self._over([0.0, *(self._of(contact, x.array_r, control) for contact in self._problem.contacts)]))
+        there = [c for c in self._contacts if c in self._problem.touching]
+        return float(self._over([0.0, *(self._of(contact, x.array_r, control) for contact in there)]))
 
 
-def standard(problem: Any) -> dict[str, Bound]:
+def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     """The measures that every run records, by column name.
 
-    pressure (or travel: a length; <name>_pressure, <name>_travel where several are driven), pole_height (length),
-    pole_stretch, enclosed_volume (length^3), strain_energy (stress length^3), mass_error (volume over its original
-    value, minus 1), volume_error (root mean square of J - 1). Pole and volume are there where the scene has an axis
-    and a driven pressure. With contacts: contact_length (reference length in touch), penetration (of the deepest node,
-    length), tool_force (along Z, of the body on all tools).
+    pressure (or travel: a length), pole_height (length), pole_stretch, enclosed_volume (length^3), strain_energy
+    (stress length^3), mass_error (volume over its original value, minus 1), volume_error (root mean square of
+    J - 1). Pole and volume are there where the scene has an axis and a driven pressure. With contacts: contact_length
+    (reference length in touch), penetration (of the deepest node, length), tool_force (along Z, of the body on all
+    tools). Where several things can be driven each has its column, plug_travel for one named "plug" (`Scene.column`),
+    and where there are several contacts those with a name have a force, plug_force. `timed`: process_time too.
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
-    pressure_driven, leaders = _driven_pressure(scene) is not None, dict.fromkeys(scene.drivable.values())
-    found: dict[str, Bound] = {"pressure" if pressure_driven else "travel": bind_control(problem)}
-    if len(leaders) > 1:
-        found = {f"{x.label}_{kind_of(x)}": _Control(problem, x) for x in leaders}
+    found: dict[str, Bound] = {"process_time": Amplitude(problem, -1)} if timed else {}
+    for i, thing in enumerate(scene.things):
+        if any(thing is t for t in scene.drivable):
+            found[scene.column(thing)] = Amplitude(problem, i)
     if "axis" in scene.mesh.boundaries:
         found["pole_height"] = bind_pole_height(problem)
         found["pole_stretch"] = bind_pole_stretch(problem)
-    if pressure_driven:
+    if any(thing.quantity == "pressure" for thing in scene.drivable):
         found["enclosed_volume"] = bind_volume(problem)
     change = forms.J - 1
     found["strain_energy"] = _Scalar(problem, forms.energy, lambda v: v * forms.stress * volume)
     found["mass_error"] = _Scalar(problem, change * forms.weight * forms.dx, lambda v: v / volume)
     found["volume_error"] = _Scalar(problem, change**2 * forms.weight * forms.dx,
                                     lambda v: (v / volume) ** 0.5)
-    if scene.contacts:
+    if problem.contacts:
         found["contact_length"] = _Nodal(problem, lambda c, *at: c.contact_length(*at), sum)
         found["penetration"] = _Nodal(problem, lambda c, *at: c.largest_penetration(*at), max)
         found["tool_force"] = _Nodal(problem, lambda c, *at: c.force(*at)[1], sum)
+        names = [c.contact.name for c in problem.contacts]
+        for name in dict.fromkeys(filter(None, names)) if len(set(names)) > 1 else ():
+            of_tool = [c for c in problem.contacts if c.contact.name == name]
+            found[f"{name}_force"] = _Nodal(problem, lambda c, *at: c.force(*at)[1], sum, of_tool)
     return found

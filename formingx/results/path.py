@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
+from ..setting import Setting
 from . import measures
 from .measures import Target
 from .profile import Profile, Profiles
@@ -29,7 +28,7 @@ class State:
         kind: "start", "step", "target" or "limit point".
         met: the target that it hits, or None.
         memory: what the problem remembers from here on (friction).
-        stage: name of the stage of a `Process`; setting: what the control means in it (`Problem.setting`).
+        stage: name of the stage of a process; setting: what the stage had set, as plain data (`Setting`).
         stepping: what a run goes on with: its next step, its counts and its target; empty inside a step.
     """
 
@@ -43,7 +42,7 @@ class State:
     met: Target | None = None
     memory: list = field(default_factory=list)
     stage: str = ""
-    setting: tuple = ()
+    setting: dict = field(default_factory=dict)
     stepping: dict = field(default_factory=dict)
 
 
@@ -64,14 +63,16 @@ class Path:
         states: all accepted states, in order along the path.
         counts: what the run cost (`Counts`).
         problem: the `Problem`, for further evaluation.
+        stage: name of the stage that is being recorded.
     """
 
-    def __init__(self, problem: Any, branch: Any):
-        self.problem, self._branch = problem, branch
-        self._recorded = measures.standard(problem)
+    def __init__(self, problem: Any, branch: Any, start: Path | None = None, timed: bool = False):
+        self.problem, self._branch, self.stage = problem, branch, ""
+        self._recorded = measures.standard(problem, timed)
         self._profiles, self._stresses = Profiles(problem), Stresses(problem)
-        self.states: list[State] = []
-        self.counts = Counts()
+        self.states: list[State] = list(start.states) if start else []
+        self.counts: Counts = replace(start.counts) if start else Counts()
+        branch.iterations += self.counts.iterations
 
     def __len__(self) -> int:
         return len(self.states)
@@ -104,15 +105,20 @@ class Path:
     def record(self, state: State) -> None:
         """Take up a state: what has a history goes on from it; evaluate the measures there."""
         self.problem.advance(state.x, state.control)
-        state.memory, state.setting = self.problem.memory, self.problem.setting
+        state.memory, state.stage, state.setting = self.problem.memory, self.stage, asdict(self.problem.setting)
         state.measures = {name: self.value(bound, state) for name, bound in self._recorded.items()}
         self.states.append(state)
         self.counts.steps += state.kind != "start"
 
     def value(self, bound: Any, state: State) -> float:
         """A measure bound to this problem (`Target.bind`) at a state."""
-        with self._set_as(state):
-            return self._branch.value(bound, state.x, state.control)
+        self.go_to(state)
+        return self._branch.value(bound, state.x, state.control)
+
+    def go_to(self, state: State) -> None:
+        """Make the problem that of the state's stage."""
+        if state.setting:
+            self.problem.enter(Setting(**state.setting), state.x, state.control)
 
     def at(self, target: Target, after: State | None = None) -> State:
         """The first state of the path that meets the target: solved for, not interpolated; the path stays as it is.
@@ -128,14 +134,14 @@ class Path:
         states = self.states[next((i for i, s in enumerate(self.states) if s is after), 0):]
         values = [self.value(bound, state) - target.value for state in states]
         for a, b, left, right in zip(values, values[1:], states, states[1:]):
-            if b == 0 or a * b < 0 and right.kind != "start":
+            if left.setting == right.setting and (b == 0 or a * b < 0):
                 now, self.problem.memory = self.problem.memory, left.memory
                 try:
-                    with self._set_as(right):
-                        found = self._branch.between(left, right, bound, target.value)
+                    self.go_to(left)
+                    found = self._branch.between(left, right, bound, target.value)
                 finally:
                     self.problem.memory = now
-                found.stage, found.setting = right.stage, right.setting
+                found.stage, found.setting = left.stage, left.setting
                 found.measures = {name: self.value(m, found) for name, m in self._recorded.items()}
                 return found
         raise InputError(f"the path does not pass {target}: its values lie between"
@@ -143,14 +149,16 @@ class Path:
 
     def between(self, a: State, b: State, fraction: float) -> tuple[np.ndarray, float]:
         """(x, control) on the smooth (cubic) path from a state to the next; for drawing."""
+        if a.setting != b.setting:                           # a stage begins
+            return b.x, b.control
         return self._branch.interpolate(a, b, fraction)
 
     def distance(self, a: State, b: State) -> float:
         """Arc length from a state to the next along the tangent (dimensionless)."""
-        return self._branch.progress(a, b)
+        return self._branch.progress(a, b) if a.setting == b.setting else 0.0
 
     def measured(self, at: Any, *columns: str) -> list[float]:
-        """Columns at anything that has x and control."""
+        """Columns at anything that has x, control and setting."""
         return [self.value(self._recorded[c], at) for c in columns]
 
     def curve(self, *columns: str, points: int = 12) -> list[np.ndarray]:
@@ -160,10 +168,10 @@ class Path:
         """
         rows = [[self.states[0].measures[c] for c in columns]]
         for a, b in zip(self.states, self.states[1:]):
-            for k in range(1, points if b.kind != "start" else 1):
+            self.go_to(b)
+            for k in range(1, points if a.setting == b.setting else 0):
                 at = self._branch.interpolate(a, b, k / points)
-                with self._set_as(b):
-                    rows.append([self._branch.value(self._recorded[c], *at) for c in columns])
+                rows.append([self._branch.value(self._recorded[c], *at) for c in columns])
             rows.append([b.measures[c] for c in columns])
         return list(np.array(rows).T)
 
@@ -175,24 +183,15 @@ class Path:
         """Stresses and stretches at a state (default: the last), layer by layer."""
         return self._stresses.of(state or self.last)
 
-    @contextmanager
-    def _set_as(self, state: State) -> Iterator[None]:
-        """The control means for a while what it means in the stage of a state."""
-        now = self.problem.setting
-        self.problem.setting = state.setting or now
-        try:
-            yield
-        finally:
-            self.problem.setting = now
-
     def describe(self, state: State) -> str:
         """A state's main numbers in one line."""
-        return ", ".join(f"{k.replace('_', ' ')} {state.measures[k]:.6g}"
-                         for k in state.measures
-                         if k.endswith(("pressure", "travel")) or k in ("pole_height", "pole_stretch"))
+        scene = self.problem.scene
+        columns = ("process_time", *map(scene.column, scene.drivable), "pole_height", "pole_stretch")
+        return f"stage {state.stage!r}, " * bool(state.stage) + ", ".join(
+            f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in columns if k in state.measures)
 
     def to_csv(self, file: Any) -> None:
-        """Write one row per state: kind, iterations and every measure (rank 0 writes)."""
+        """Write one row per state: stage (of a process), kind, iterations and every measure (rank 0 writes)."""
         from . import files
         files.write_path(self, file)
 
@@ -204,8 +203,6 @@ class Path:
             OSError: it cannot be written.
         """
         from ..checkpoint import Checkpoint
-        if any(state.stage for state in self.states):
-            raise InputError("Path: save: the states of a process in stages cannot be saved yet")
         Checkpoint(folder, self.problem).write(self)
 
     def to_vtx(self, folder: Any, states: Any = None) -> None:

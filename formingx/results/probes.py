@@ -83,8 +83,7 @@ class MidSurfaceProbe(Probe):
     def __init__(self, problem: Any, points: np.ndarray):
         super().__init__(problem, points)
         element, domain = problem.forms.displacement_element, problem.forms.domain
-        nodes = domain.geometry.x[domain.geometry.dofmap[self._cells].ravel(), :2]
-        nodes = nodes.reshape(len(self._cells), domain.geometry.dofmap.shape[1], 2)
+        nodes = domain.geometry.x[_compat.cell_nodes(domain)[self._cells], :2]
         geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(domain).degree, shape=())
         self._middle = np.einsum("kj,kji->ki", _basis(geometry, 0, self._reference), nodes)
         tangent = np.einsum("kj,kji->ki", _basis(geometry, 1, self._reference), nodes)       # dX/dxi

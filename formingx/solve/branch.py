@@ -40,7 +40,7 @@ class Branch:
         self.problem.residual(self._x, 0.0, self.newton.F)
         if self.newton.F.norm() > Tolerances().residual * (self.problem.force_scale + UNLOADED):
             try:
-                _, history = self.newton.correct(self._x, 0.0, _held_control(0.0))
+                _, history = self.newton.correct(self._x, 0.0, _no_control)
             except Failure as failure:
                 found = diagnose(self, [], failure.reason, self._attempt())
                 raise ConvergenceError("no equilibrium was found before anything is driven, under the loads that have"
@@ -55,16 +55,12 @@ class Branch:
             self._x.set(0)
         return self._state(0.0, history, "start", None)
 
-    def restart(self, before: State, control: float, disturbed: bool) -> State:
-        """A state again, now that something else is driven; `disturbed`: equilibrium is to be found anew first.
-
-        Raises `Failure` if there is none near.
-        """
-        if disturbed:
-            return self.solve(before.x, control, _held_control(control), "start", before)
-        self._x.array_w[:] = before.x
-        if not self.newton.tangent(self._x, control, ahead=self.problem.has_kinks):
-            raise Failure("the tangent matrix is singular", [])
+    def resume(self, x: np.ndarray, control: float) -> State:
+        """A state once more, under the setting that the problem has taken, and the tangent there."""
+        self._x.array_w[:] = x
+        self.problem.residual(self._x, control, self.newton.F)
+        if not self.newton.tangent(self._x, control):
+            raise Failure("the tangent is singular: something in the body is held no more, or has no stiffness", [])
         return self._state(control, [], "start", None)
 
     def solve(self, x: np.ndarray, control: float, constraint: Callable, kind: str, before: State) -> State:
@@ -211,12 +207,10 @@ class Branch:
         return c
 
 
-def _held_control(value: float) -> Callable:
-    """The constraint control = value."""
-    def c(x, control, gradient):
-        gradient.set(0)
-        return control - value, 1.0
-    return c
+def _no_control(x: Any, control: float, gradient: Any) -> tuple[float, float]:
+    """The constraint control = 0."""
+    gradient.set(0)
+    return control, 1.0
 
 
 def _stationary(a: State, b: State, chord: float) -> float:

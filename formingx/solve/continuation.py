@@ -6,6 +6,7 @@ mesh nor the units. Targets are hit exactly: within reach, the equation "measure
 
 from __future__ import annotations
 
+import itertools
 import logging
 import time
 from collections.abc import Sequence
@@ -16,6 +17,7 @@ import numpy as np
 
 from ..checkpoint import Checkpoint
 from ..errors import ConvergenceError, InputError, count, instance, several
+from ..physics.contact import Contact
 from ..problem import Problem
 from ..results import measures
 from ..results.path import Path, State
@@ -58,88 +60,84 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
     through = several("trace: through", through, "targets, such as pole_stretch(3)")
     for target in (until, *through):
         instance("trace: target", target, measures.Target, "a target, such as pole_stretch(3)")
-        if target.name == "travel":
-            scene.check_travel(target.value)
+        if target.name == "travel" and isinstance(scene.driven, Contact):
+            scene.check_travel(scene.driven, target.value)
     instance("trace: step", step, StepControl | None, "a StepControl or None")
     instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     max_steps = count("trace: max_steps", max_steps)
-    scene.check_one_driven("trace")
+    scene.only_driven("trace")
     if start is not None and (not isinstance(start, Path) or start.problem.scene is not scene or not start.states):
         raise InputError("trace: start: must be a path of this very scene: fx.load(folder, scene), or what trace gave"
                          " back")
     problem = Problem(scene) if start is None else start.problem
-    run = Run(problem, tolerances or Tolerances(), start, checkpoint)
-    run.aim(until, through, step)
-    return run.trace(max_steps, progress)
+    branch = Branch(problem, tolerances or Tolerances())
+    path = Path(problem, branch, start)
+    targets = [(target, target.bind(problem)) for target in (*through, until)]
+    run = Run(path, branch, targets, step, None if checkpoint is None else Checkpoint(checkpoint, problem))
+    run.trace(max_steps, progress, None if path.states else branch.start())
+    return path
 
 
 class Run:
-    """One run: the path that grows, and the targets still open. First `aim`, then `trace`; again for a next stage."""
+    """A path that grows with one control, and the targets still open.
 
-    def __init__(self, problem: Problem, tolerances: Tolerances, start: Path | None = None, checkpoint: Any = None):
-        self._began, self._first, self._stage = time.perf_counter(), 0, ""
-        self.branch = Branch(problem, tolerances)
-        path = self.path = Path(problem, self.branch)
-        if start is not None:
-            path.states, path.counts = list(start.states), replace(start.counts)
-            self.branch.iterations = path.counts.iterations
-        self.checkpoint = Checkpoint(checkpoint, problem) if checkpoint is not None else None
+    Args:
+        path: where the states go; branch: solves for them.
+        targets: (target, its measure): the last one ends the run, the others are met on the way.
+        step: step control; default that of the path's last states, or `StepControl()`.
+        checkpoint: where states are written after each step, or None.
+        turns: False: the control must not turn back (it is the time).
+    """
 
-    def aim(self, until: measures.Target, through: Sequence[measures.Target], step: StepControl | None) -> None:
-        """Set the targets of the run, or of its next stage, and its first step."""
-        path, self.until, self._best = self.path, until, 0.0
-        targets = [(target, target.bind(path.problem)) for target in (*through, until)]
-        self._aim = targets[-1][1]                          # the measure of `until`
-        met = path.met if not self._stage else lambda target: None
-        self.open = [(target, bound) for target, bound in targets if met(target) is None]
-        before: dict = next((s.stepping["step"] for s in reversed(path.states) if s.stepping), {})
-        self.step = replace(step or StepControl(**before))
+    def __init__(self, path: Path, branch: Branch, targets: Sequence[tuple[measures.Target, measures.Bound]],
+                 step: StepControl | None, checkpoint: Checkpoint | None, turns: bool = True):
+        self.path, self.branch, self.checkpoint, self._turns = path, branch, checkpoint, turns
+        self.open = list(targets)
+        self.until, self._aim = self.open[-1]
+        self._step, self._best, self._began = step, 0.0, time.perf_counter()
 
-    def stage(self, name: str, thing: Any, without: Sequence[Any], until: measures.Target,
-              through: Sequence[measures.Target], step: StepControl) -> None:
-        """Drive `thing` from the last state on, and aim at targets."""
-        path, problem, self._stage = self.path, self.path.problem, name
-        active = problem.setting[2]
-        control = problem.drive(thing, path.last.control if path.states else 0.0, without)
-        self.aim(until, through, step)
-        self._first = len(path.states)
-        if not path.states:
-            return
-        try:
-            start = self.branch.restart(path.last, control, problem.setting[2] != active)
-        except Failure as failure:
-            self._first -= 1
-            self._give_up(f"stage {name!r} found no equilibrium to start from: {failure.reason}", failure.attempt)
-        if abs(self.branch.value(self._aim, start.x, control) - until.value) <= 1e-12 * abs(until.value):
-            start.met = until
-        self._record(self._facing_target(start))
-
-    def trace(self, max_steps: int, progress: bool) -> Path:
+    def trace(self, max_steps: int, progress: bool, start: State | None) -> None:
+        """Follow the path from a state, or on from the last one, until the last target is met."""
         path, before = self.path, self.path.counts.steps
+        kept: dict[str, Any] = {}
+        self._first = len(path.states)
         bar = _progress_bar(path.problem.comm, self.until, progress)
         if self.checkpoint is not None:
             self.checkpoint.begin(path)
         try:
-            if path.states:
+            if start is None:
+                self._first -= sum(1 for _ in itertools.takewhile(lambda s: s.setting == path.last.setting,
+                                                                  reversed(path.states)))
+                kept = next((s.stepping["step"] for s in reversed(self.states) if s.stepping), {})
                 path.problem.remember(path.last)
-                self._best = max(map(self._gained, path.states[self._first:])) if self._is_open(self.until) else 0.0
+                self._best = max(map(self._gained, self.states))
+                met = [s.met[:2] for s in self.states if s.met]
+                self.open = [(target, bound) for target, bound in self.open if target[:2] not in met]
             else:
-                self._record(self._facing_target(self.branch.start()))
+                self._record(self._facing_target(start))
+            self.step = replace(self._step or StepControl(**kept))
+            self._close_met(path.last)
             self._settle()
             while self._is_open(self.until):
                 if path.counts.steps - before >= max_steps:
                     self._give_up(f"{max_steps} states were accepted before it", pace=self._pace(max_steps))
                 for state in self._next(path.last):
                     self._record(state)
+                    if state.kind == "limit point" and not self._turns:
+                        self._give_up("no state follows in time: what the tables drive has a limit point here")
                     if path.problem.memory or not self._is_open(self.until) and state.met is self.until:
                         break                           # with a history, the rest of the step starts from here
                 self._settle()
                 self._check_direction()
-                _show(bar, path, self.until)
+                _show(bar, self.states, self.until)
         finally:
             bar.close()
             path.counts.seconds += self._elapsed()
-        return path
+
+    @property
+    def states(self) -> list[State]:
+        """Those of this run."""
+        return self.path.states[self._first:]
 
     def _elapsed(self) -> float:
         """Seconds since this was last asked."""
@@ -148,21 +146,28 @@ class Run:
 
     def _settle(self) -> None:
         """A step is complete: note how the run goes on from here, on disk too."""
-        path = self.path
-        path.counts.seconds += self._elapsed()
-        path.last.stepping = {"step": asdict(self.step), "counts": asdict(path.counts),
-                               "until": [self.until.name, self.until.value]}
-        if self.checkpoint is not None:
-            self.checkpoint.write(path)
+        self.path.counts.seconds += self._elapsed()
+        settle(self.path, self.step, self.until, self.checkpoint)
 
     def _facing_target(self, start: State) -> State:
-        """The start, its tangent turned if a target that changes sign with the control lies the other way."""
-        if self.until.signed:
+        """The start, its tangent turned if the target lies the other way.
+
+        (At rest a target that does not change sign with the control may be reached both ways.)
+        """
+        if self.until.signed or self.path.states:
+            size = 1.0 if self.until.signed else 1e-3
             now = self.branch.value(self._aim, start.x, start.control)
-            ahead = self.branch.value(self._aim, start.x + start.direction, start.control + start.slope)
+            ahead = self.branch.value(self._aim, start.x + size * start.direction, start.control + size * start.slope)
             if (ahead - now) * (self.until.value - now) < 0:
                 start.direction, start.slope = -start.direction, -start.slope
         return start
+
+    def _close_met(self, start: State) -> None:
+        """Close the targets that hold at the start already, to round-off."""
+        for target, bound in list(self.open):
+            if is_met(target, bound, self.branch.value(bound, start.x, start.control)):
+                start.met = start.met or target
+                self.open = [(t, b) for t, b in self.open if t is not target]
 
     def _next(self, old: State) -> list[State]:
         """The next states: one at a target within reach, or one step ahead, and what lies on the way to it.
@@ -206,15 +211,15 @@ class Run:
             return
         gained = self._gained(self.path.last)
         self._best = max(self._best, gained)
-        kept = 0.0 if self.until.bind is measures.bind_control else 0.5
+        kept = 0.0 if isinstance(self._aim, measures.Amplitude) else 0.5
         if self._best > 0.05 and gained < kept * self._best or gained < -0.05:
             self._give_up("the path turned back, which a crease at a singular corner (a clamped rim on a fine mesh) can"
                           " cause")
 
     def _gained(self, state: State) -> float:
         """How far a state has come, from the first state (0) to the target (1)."""
-        start = self.path.value(self._aim, self.path.states[self._first])
-        return (self.path.value(self._aim, state) - start) / (self.until.value - start)
+        start = self.path.value(self._aim, self.states[0])
+        return (self.path.value(self._aim, state) - start) / ((self.until.value - start) or 1.0)
 
     def _within_reach(self, old: State, length: float) -> tuple:
         """(target, its measure, distance) of the first open target that the tangent meets within `length`."""
@@ -255,7 +260,7 @@ class Run:
 
     def _record(self, state: State) -> None:
         """Take up a state and close the target that it meets."""
-        path, state.stage = self.path, self._stage
+        path = self.path
         path.record(state)
         if path.problem.has_kinks:
             self.branch.look_ahead(state)
@@ -269,7 +274,7 @@ class Run:
     def _pace(self, max_steps: int) -> str:
         """How far a run had come when its steps ran out."""
         path, aim = self.path, self.until.value
-        start, before, now = (path.value(self._aim, s) for s in (path.states[self._first], path.states[-2], path.last))
+        start, before, now = (path.value(self._aim, s) for s in (self.states[0], path.states[-2], path.last))
         part = (now - start) / ((aim - start) or 1.0)
         if not (aim - now) * (now - before) > 0:
             return f"max_steps = {max_steps} ran out, and the last step led away from the target"
@@ -278,22 +283,34 @@ class Run:
                 f" {int(np.ceil((aim - now) / (now - before)))} steps more at that pace")
 
     def _give_up(self, why: str, attempt: Any = None, pace: str = "") -> None:
-        found = diagnose(self.branch, self.path.states[self._first:], why, attempt, pace,
-                         self.until.value if self.until.bind is measures.bind_control else None)
+        found = diagnose(self.branch, self.states, why, attempt, pace,
+                         self.until.value if isinstance(self._aim, measures.Amplitude) else None)
         raise self._error(f"{why}.", found)
 
     def _error(self, why: str, diagnosis: Any) -> ConvergenceError:
         """What happened, what was met, what to try."""
         path = self.path
-        states = path.states[self._first:]
+        states = self.states
         values = [path.value(self._aim, s) for s in states]
         best = int(np.argmin([abs(v - self.until.value) for v in values]))
-        limits = "".join(f" A limit point was passed at {path.describe(s)}." for s in path.limit_points)
+        limits = "".join(f" A limit point was passed at {path.describe(s)}." for s in states if s.kind == "limit point")
         return ConvergenceError(
-            f"{f'Stage {self._stage!r}: ' * bool(self._stage)}{self.until}"
-            f" was not reached: {why} The nearest met was {values[best]:.6g}, at"
-            f" {path.describe(states[best])}.{limits} The last good state is {path.describe(path.last)};"
-            f" it is kept in the error's `path`.{'' if diagnosis.advice else _TRY}", path, diagnosis)
+            f"{f'Stage {path.stage!r}: ' * bool(path.stage)}{self.until} was not reached: {why} The nearest met was"
+            f" {values[best]:.6g}, at {path.describe(states[best])}.{limits} The last good state is"
+            f" {path.describe(path.last)}; it is kept in the error's `path`."
+            + ("" if diagnosis.advice else _TRY), path, diagnosis)
+
+
+def settle(path: Path, step: StepControl, until: measures.Target, checkpoint: Checkpoint | None) -> None:
+    """Note in the last state of a path how the run goes on from it, on disk too."""
+    path.last.stepping = {"step": asdict(step), "counts": asdict(path.counts), "until": [until.name, until.value]}
+    if checkpoint is not None:
+        checkpoint.write(path)
+
+
+def is_met(target: measures.Target, bound: measures.Bound, value: float) -> bool:
+    """True if a value of the target's measure is the target's, to round-off."""
+    return abs(value - target.value) <= 1e-12 * max(abs(value), abs(target.value), bound.size)
 
 
 def _progress_bar(comm: Any, until: measures.Target, progress: bool) -> Any:
@@ -302,10 +319,10 @@ def _progress_bar(comm: Any, until: measures.Target, progress: bool) -> Any:
                 bar_format="{desc}: {percentage:3.0f}% |{bar}| {elapsed}{postfix}")
 
 
-def _show(bar: Any, path: Path, until: measures.Target) -> None:
-    now = path.last.measures.get(until.name)
+def _show(bar: Any, states: list[State], until: measures.Target) -> None:
+    now = states[-1].measures.get(until.name)
     if not bar.disable and now is not None:
-        first = path.states[0].measures[until.name]
+        first = states[0].measures[until.name]
         bar.n = min(max((now - first) / ((until.value - first) or 1.0), 0.0), 1.0)
-        bar.set_postfix_str(f"state {path.counts.steps}", refresh=False)
+        bar.set_postfix_str(f"state {len(states)}", refresh=False)
         bar.update(0)

@@ -8,6 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..results.diagnosis import Body, Diagnosis, Place, body, place
+from ..results.tooling import Tooling
 from .direct import DirectSolver, condition
 
 
@@ -37,13 +38,12 @@ def diagnose(branch: Any, states: list, reason: str, attempt: Attempt | None = N
         pace: what more is known if the run was ended in good health. target: of the control (the user's units), if that
             is what the run aims at. fixed_control: the run cannot pass a limit point.
     """
-    problem, scale = branch.problem, branch.problem.forms.control_scale
+    problem = branch.problem
     x, keep = problem.x.duplicate(), problem.memory
     last = states[-1] if states else None
     facts: dict[str, Any] = {"reason": reason, "step": len(states) if states else 0,
-                             "control": scale * last.control if last else 0.0,
-                             "what": "travel" if hasattr(problem.forms.driven, "constraints")
-                             or hasattr(problem.forms.driven, "moves") else "pressure"}
+                             "control": problem.shown(last.control)[1] if last else 0.0,
+                             "what": problem.shown(0.0)[0]}
     marks: list = []
     shape = None
     if last:
@@ -52,7 +52,7 @@ def diagnose(branch: Any, states: list, reason: str, attempt: Attempt | None = N
         if shape:
             facts |= _worst_of(problem, shape, marks)
     if attempt is not None:
-        facts["aimed"] = scale * attempt.control
+        facts["aimed"] = problem.shown(attempt.control)[1]
         x.array_w[:] = attempt.x
         failed = body(problem, x, attempt.control)
         finite = failed is None or bool(np.isfinite(failed.J).all())
@@ -70,7 +70,9 @@ def diagnose(branch: Any, states: list, reason: str, attempt: Attempt | None = N
         problem.memory = keep
     causes, advice = _verdict(facts, fixed_control, pace, target)
     x.destroy()
-    data = (problem.comm.rank, shape, marks) if shape else None
+    tooling = Tooling.of_problem(problem)
+    tools = tooling.placed(tooling.travels(last.setting, last.control)) if last else []
+    data = (problem.comm.rank, shape, marks, tools) if shape else None
     return Diagnosis(**facts, causes=tuple(causes), advice=tuple(advice), picture_data=data)
 
 
@@ -141,17 +143,16 @@ def _moved(problem: Any, state: Any, point: np.ndarray) -> np.ndarray:
 
 def _touching(problem: Any, x: np.ndarray, control: float) -> list[np.ndarray]:
     """For every contact: True for each own node in touch, shape (n,)."""
-    return [c.law.distance(c.positions(x[: problem.forms.space.dofmap.index_map.size_local], control)) > -c.law.theta
-            for c in problem.contacts]
+    return [c.touching(x[: problem.forms.space.dofmap.index_map.size_local], control) for c in problem.touching]
 
 
 def _flips(problem: Any, attempt: Attempt) -> int | None:
     """Nodes whose contact changed in the last iteration; None without contact."""
-    if not problem.contacts:
+    if not problem.touching:
         return None
     n, count = problem.forms.space.dofmap.index_map.size_local, 0
     before = attempt.x - attempt.dx, attempt.control - attempt.dcontrol
-    for contact, a, b in zip(problem.contacts, _touching(problem, *before),
+    for contact, a, b in zip(problem.touching, _touching(problem, *before),
                              _touching(problem, attempt.x, attempt.control), strict=True):
         slides = [contact.law.tractions(contact.positions(x[:n], c), contact.memory).sense
                   for x, c in (before, (attempt.x, attempt.control))]
@@ -166,7 +167,7 @@ def _tangents(branch: Any, states: list, x: Any) -> dict[str, Any]:
     without that, another branch starts. The sign at two states says whether there was an odd number of changes
     between them; bisection finds one.
     """
-    problem, scale = branch.problem, branch.problem.forms.control_scale
+    problem = branch.problem
     solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
 
     def sign(state):
@@ -175,7 +176,8 @@ def _tangents(branch: Any, states: list, x: Any) -> dict[str, Any]:
         problem.tangent(x, state.control)
         return solver.sign() if solver.factorise() else 0
 
-    facts: dict[str, Any] = {"limit_points": tuple(scale * s.control for s in states if s.kind == "limit point")}
+    limits = tuple(problem.shown(s.control)[1] for s in states if s.kind == "limit point")
+    facts: dict[str, Any] = {"limit_points": limits}
     turned = []
     usable = [s for s in states[1 if problem.forms.slack_at_rest else 0:] if s.kind != "limit point"]
     end = sign(states[-1])
@@ -184,14 +186,15 @@ def _tangents(branch: Any, states: list, x: Any) -> dict[str, Any]:
     if len(usable) > 1 and not problem.memory:
         # one sign per stretch between limit points: there it cannot change unless another branch starts
         turned = _changes(states, usable, sign)
-    facts["turned"] = tuple((scale * a.control, scale * b.control) for a, b in turned)
+    facts["turned"] = tuple((problem.shown(a.control)[1], problem.shown(b.control)[1]) for a, b in turned)
     solver.destroy()
     if len(states) > 2:
         a, b = states[-2:]
         drop = a.slope**2 - b.slope**2                    # slope^2 falls in proportion to the control left
         most = max(abs(s.slope) for s in states)
         if drop > 0 and a.slope * b.slope > 0 and abs(b.slope) < 0.3 * most:
-            facts["limit_ahead"] = scale * (b.control + (b.control - a.control) * b.slope**2 / drop)
+            ahead = b.control + (b.control - a.control) * b.slope**2 / drop
+            facts["limit_ahead"] = problem.shown(ahead)[1]
     return facts
 
 

@@ -95,7 +95,7 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     """
     instance("solve: scene", scene, Scene, "a formingx.Scene")
     instance("solve: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
-    scene.check_one_driven("solve")
+    scene.only_driven("solve")
     to, increments = finite("solve: to", to), count("solve: increments", increments)
     problem, began = Problem(scene), time.perf_counter()
     tolerances = tolerances or Tolerances()
