@@ -32,6 +32,12 @@ def exact(kind, displacement, R=None):
     return thick_wall(kind, stretch(displacement), inner_radius=INNER, outer_radius=OUTER, R=R, **CONSTANTS[kind])
 
 
+def exact_stress(kind, displacement, points):
+    """The exact Cauchy stress (psi) at reference points, shape (n, 3, 3)."""
+    R = points[:, 0] if kind == "tube" else np.hypot(*points.T)
+    return exact(kind, displacement, R).cauchy((1.0, 0.0) if kind == "tube" else points)
+
+
 def inner(displacement, mesh):
     """The target: displacement of the inner face, in cm."""
     R, Z = mesh.nodes_of("inner")[-1]                          # the sphere's node on the equator
@@ -70,7 +76,7 @@ def errors(kind, path, targets):
     """Errors over the size of the exact solution: largest of the five pressures; displacement and stress at 10 cm.
 
     Displacement: at the exact pressure, root mean square through the wall; stress (radial, hoop, pressure): at the
-    quadrature points.
+    quadrature points. Last, the estimated over the true error of the stress (effectivity), both integrated.
     """
     pressure = max(abs(path.met(t).measures["pressure"] / exact(kind, d).pressure - 1) for d, t in targets.items())
     points, R, direction = through(kind, path.problem.scene.mesh, 101)
@@ -78,13 +84,15 @@ def errors(kind, path, targets):
     state = path.at(fx.pressure(reference.pressure))           # before the sphere's maximum
     bounds = [fx.displacement(0.0, at=tuple(p), component="r").bind(path.problem) for p in points]
     u, true = np.array([path.value(b, state) for b in bounds]) / direction[0], reference.r - reference.R
-    stress = path.stress(path.met(targets["10"])).at_quadrature_points()
+    field = path.stress(path.met(targets["10"]))
+    stress = field.at_quadrature_points()
     R = stress.points[:, 0] if kind == "tube" else np.hypot(*stress.points.T)
     face, reference = stress.on_face(direction if kind == "tube" else stress.points), exact(kind, "10", R)
     found = np.array([face.normal, face.hoop, stress.hydrostatic_pressure])
     sought = np.array([reference.radial, reference.hoop, reference.hydrostatic_pressure])
     return {"pressure": pressure, "displacement": float(np.sqrt(np.mean((u - true) ** 2) / np.mean(true**2))),
-            "stress": float(np.sqrt(np.mean((found - sought) ** 2) / np.mean(sought**2)))}
+            "stress": float(np.sqrt(np.mean((found - sought) ** 2) / np.mean(sought**2))),
+            "effectivity": field.error().total / field.error(exact=lambda X: exact_stress(kind, "10", X)).total}
 
 
 def study(kind, counts):
@@ -102,7 +110,7 @@ def study(kind, counts):
         "largest_relative_error_of_pressure": runs[counts[-1]]["pressure"],
         "relative_errors_at_elements_through_wall": {str(n): e for n, e in runs.items()},
         "observed_order": {k: float(np.log(runs[counts[-2]][k] / runs[counts[-1]][k])
-                                    / np.log(counts[-1] / counts[-2])) for k in runs[counts[-1]]},
+                                    / np.log(counts[-1] / counts[-2])) for k in ("pressure", "displacement", "stress")},
         "newton_iterations": path.counts.iterations, "steps": path.counts.steps,
     }
     if kind == "sphere":
@@ -154,10 +162,12 @@ def table(cylinder, grids, sphere):
     lines.append(f"thesis: about {THESIS_PRESSURE} MPa at 50 cm. This wall cannot carry more than"
                  f" {2 * (C10 + C01) * PSI * np.log(OUTER / INNER):.3f} MPa; an outer radius of {outer:.2f} in, or an"
                  f" inner one of {inside:.2f} in, would give it")
-    lines.append(f"{'relative errors, elements through the wall':48}{'pressure':>14}{'displacement':>14}{'stress':>14}")
+    lines.append(f"{'relative errors, elements through the wall':48}{'pressure':>14}{'displacement':>14}{'stress':>14}"
+                 f"{'estimated/true':>16}")
     for name, numbers in (("cylinder", cylinder), ("sphere", sphere)):
         for n, e in numbers["relative_errors_at_elements_through_wall"].items():
-            lines.append(f"{name + ', ' + n:48}" + "".join(f"{v:14.2e}" for v in e.values()))
+            lines.append(f"{name + ', ' + n:48}" + "".join(f"{e[k]:14.2e}" for k in numbers["observed_order"])
+                         + f"{e['effectivity']:16.3f}")
         lines.append(f"{'  order':48}" + "".join(f"{v:14.2f}" for v in numbers["observed_order"].values()))
     return lines
 

@@ -122,6 +122,21 @@ class ThickWallState:
         """-(s_rr + s_hoop + s_third)/3, shape (n,), stress."""
         return -(self.radial + self.hoop + self.third) / 3
 
+    def cauchy(self, direction: Any) -> np.ndarray:
+        """The Cauchy stress in components r, z, hoop, shape (n, 3, 3), stress.
+
+        Args:
+            direction: from the inside out in the (r, z) plane, of any length, shape (2,) or (n, 2): (1, 0) for a tube.
+        """
+        radial = np.broadcast_to(np.asarray(direction, dtype=float), (len(self.R), 2))
+        radial = radial / np.linalg.norm(radial, axis=1)[:, None]
+        along = np.column_stack([-radial[:, 1], radial[:, 0]])
+        sigma = np.zeros((len(self.R), 3, 3))
+        sigma[:, 2, 2] = self.hoop
+        for value, way in ((self.radial, radial), (self.third, along)):
+            sigma[:, :2, :2] += np.einsum("n,ni,nj->nij", value, way, way)
+        return sigma
+
 
 def thick_wall(kind: str, inner_stretch: float, *, inner_radius: float, outer_radius: float, c10: float,
                c01: float = 0.0, R: Any = None) -> ThickWallState:

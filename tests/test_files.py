@@ -76,6 +76,9 @@ def test_an_interface_keeps_both_sides(tmp_path):
         exact = path.stress().at([(0.5, 0.1)], layer).cauchy[0, 2, 2]
         assert np.abs(found - exact).min() < 1e-9 * abs(exact)
     assert np.ptp(found) > 0.5 * np.abs(found).max()
+    errors = step["stress_error"].reshape(-1, 6)                # a value for each triangle
+    assert np.ptp(errors, axis=1).max() == 0
+    assert np.sort(errors[:, 0]) == pytest.approx(np.sort(path.stress().error().mean), rel=1e-12)
 
 
 def test_contact_pressure_is_the_blowing_pressure_on_the_floor(formed):

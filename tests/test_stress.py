@@ -219,7 +219,13 @@ ball = fx.mesh.sphere(inner_radius=1.0, thickness={"x": 0.5, "y": 0.5}, elements
 scene = fx.Scene(mesh=ball, materials={"x": soft, "y": hard}, loads=[fx.Pressure("inner")],
                  supports=[fx.Symmetry("axis"), fx.Symmetry("equator", normal="z")])
 path = fx.trace(scene, until=fx.displacement(0.5, at=(1.0, 0.0), component="r"), progress=False)
-numbers += [path.last.measures["pressure"], *path.stress().at([(0.9, 1.2)], "x").hydrostatic_pressure]
+field = path.stress()
+numbers += [path.last.measures["pressure"], *field.at([(0.9, 1.2)], "x").hydrostatic_pressure]
+for error in (field.error(), field.error("y")):
+    order = np.lexsort(np.round(error.points, 9).T)
+    numbers += [error.total, error.relative, *error.cells[order], *error.volume[order]]
+peak = field.peak()
+numbers += [peak.value, *peak.point, peak.error, peak.doubtful_error, *field.peak(radii=(0.8, 1.6)).doubtful_point]
 if path.problem.comm.rank == 0:
     print(json.dumps([float(n) for n in numbers]))
 """

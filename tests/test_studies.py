@@ -32,6 +32,9 @@ def test_thick_cylinder(tmp_path):
         assert numbers["largest_relative_error_of_pressure"] < 1e-4
         order = numbers["observed_order"]
         assert order["displacement"] > 2.8 and order["pressure"] > 2.8 and order["stress"] > 1.8, order
+        found = [e["effectivity"] for e in numbers["relative_errors_at_elements_through_wall"].values()]
+        # 3, 6, 12 elements through the wall: 1.17, 1.06, 1.01 (cylinder), 4.2, 1.95, 1.14 (sphere)
+        assert all(b < 1 + (a - 1) / 2 for a, b in zip(found, found[1:])) and 0.9 < found[2] < 1.2, found
     assert sphere["limit_pressure_MPa"] == pytest.approx(sphere["exact_limit_pressure_MPa"], rel=1e-5)
     assert sphere["exact_limit_pressure_MPa"] == pytest.approx(1.0633799, rel=1e-7)
     assert sphere["inner_displacement_cm_at_limit"] == pytest.approx(19.977, rel=1e-3)

@@ -13,6 +13,7 @@ and S (`patches`), whose order is higher; projected fields are not nearer to the
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -148,7 +149,7 @@ class StressField:
         """Stresses as they are at the quadrature points of a layer, all ranks' together; collective."""
         return self._recovery.raw(self._state, self._recovery.layer(layer))
 
-    def error(self, layer: str | None = None) -> StressError:
+    def error(self, layer: str | None = None, exact: Callable | None = None) -> StressError:
         """How far the stresses at the quadrature points are off, by estimate: in each cell and in all; collective.
 
         sigma_h is the stress there, sigma* that of the fitted F and S (see the module); the integrals are sums over
@@ -157,17 +158,18 @@ class StressField:
 
         Args:
             layer: the cells of one layer only.
+            exact: the true Cauchy stress, shape (n, 3, 3), as a function of reference points, shape (n, 2): it takes
+                the place of sigma*, and the errors are the true ones.
 
         Raises:
-            InputError: an unknown layer.
+            InputError: an unknown layer, or an `exact` that is no function or gives another shape.
         """
-        gather = self._recovery.problem.comm.allgather
-        mine = self._recovery.of_layer(layer)
-        return StressError(*(np.concatenate(gather(v[mine])) for v in self._fitted.error))
+        mine, gather = self._recovery.of_layer(layer), self._recovery.problem.comm.allgather
+        return StressError(*(np.concatenate(gather(v[mine])) for v in self._fitted.error(exact)))
 
     def error_in_cells(self) -> np.ndarray:
         """`StressError.mean` of this rank's cells, shape (m,), stress; collective."""
-        return self._fitted.error.mean
+        return self._fitted.error().mean
 
     def peak(self, layer: str | None = None, radii: tuple[float, float] | None = None) -> StressPeak:
         """The largest principal Cauchy stress, and whether the mesh resolves it; collective.
@@ -186,9 +188,10 @@ class StressField:
         mine = self._recovery.of_layer(layer)
         if radii is not None:
             low, high = pair("stress peak: radii", radii)
-            mine &= (low <= fitted.error.points[:, 0]) & (fitted.error.points[:, 0] <= high)
-        cells = [np.concatenate(comm.allgather(v[mine])) for v in (
-            fitted.largest, fitted.at, fitted.error.mean, fitted.error.points)]
+            R = fitted.points[:, :, 0].mean(1)
+            mine &= (low <= R) & (high >= R)
+        errors = np.sqrt(((fitted.smooth - fitted.raw) ** 2).sum((2, 3))).max(1, initial=0.0)
+        cells = [np.concatenate(comm.allgather(v[mine])) for v in (fitted.largest, fitted.at, errors)]
         if not len(cells[0]):
             raise InputError(f"stress peak: radii = {radii!r}: no cell has its middle between them")
         peak = StressPeak.among(*cells)
@@ -268,14 +271,12 @@ class Stresses:
         cubics = self._patches.fit(np.concatenate(comm.allgather(values)))
 
         def cauchy(values):
-            return _unpack(np.zeros((values[..., 0].size, 2)), values.reshape(-1, _COUNT)).cauchy
-        sigma = cauchy(values)
-        difference = cauchy(self._patches.at(cubics, points)) - sigma
-        integrals = (np.sqrt((volume * (v**2).sum((1, 2)).reshape(volume.shape)).sum(1)) for v in (difference, sigma))
+            flat = values.reshape(-1, _COUNT)
+            return _unpack(np.zeros((len(flat), 2)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
         X = geometry.x[corners, :2]
-        largest = np.linalg.eigvalsh(cauchy(self._patches.at(cubics, X)))[:, -1].reshape(-1, 3)
+        largest = np.linalg.eigvalsh(cauchy(self._patches.at(cubics, X)))[..., -1]
         top = (np.arange(own), largest.argmax(1))
-        return Fitted(StressError(points.mean(1), volume.sum(1), *integrals), largest[top], X[top])
+        return Fitted(points, volume, cauchy(values), cauchy(self._patches.at(cubics, points)), largest[top], X[top])
 
     def of_layer(self, name: str | None) -> np.ndarray:
         """Which of this rank's own cells are of a layer (None: of any), shape (m,)."""
