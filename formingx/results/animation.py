@@ -58,7 +58,7 @@ def _draw(shapes: list, tools: list, now: np.ndarray, curve: list, names: tuple,
     r = np.concatenate([s.bottom[:, 0] for s in shapes])
     sides = (1, -1) if axisymmetric or abs(r.min()) < 1e-9 * r.max() else (1,)
     low, high = plots.span(shapes, mirrored=len(sides) == 2)
-    ratios = [s.thickness_ratio for s in shapes]
+    ratios = [s.wall_ratio for s in shapes]
     colours = Normalize(min(r.min() for r in ratios), max(r.max() for r in ratios))
     figure, (left, right) = plots.figure(2, width=5.0, height=4.2, ratios=(1.5, 1))
     bar = figure.colorbar(ScalarMappable(colours, "viridis_r"), ax=left, shrink=0.8, label="thickness / original")

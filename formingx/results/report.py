@@ -191,7 +191,7 @@ def _key_numbers(record: Record) -> str:
     chosen.append(len(record.kinds) - 1)
     rows = [[_words(name), *(_number(values[k]) for k in chosen)] for name, values in record.measures.items()]
     if record.profiles[-1] is not None:
-        ratios = [record.profiles[k].thickness_ratio for k in chosen]
+        ratios = [record.profiles[k].wall_ratio for k in chosen]
         rows.append(["smallest thickness / original", *(_number(r.min()) for r in ratios)])
         rows.append(["largest thickness / original", *(_number(r.max()) for r in ratios)])
     return _table(head, rows)
@@ -228,7 +228,7 @@ def _shapes(record: Record) -> Any:
         profile = record.profiles[k]
         label = ", ".join(f"{_words(c)} {record.measures[c][k]:.4g}" for c in driven)
         plots.outline(profile, left, color=colour, label=label)
-        right.plot(profile.arc_length, profile.thickness_ratio, color=colour, label=label)
+        right.plot(profile.arc_length, profile.wall_ratio, color=colour, label=label)
     left.set(xlabel="r", ylabel="z")
     if record.tooling.contacts:
         _draw_tools(record, left, chosen, colours)
