@@ -1,7 +1,7 @@
 """A stuck sandwich block: a strip ten times as stiff in its middle (Song 1993, section 7.4, figs. 7.12 and 7.13).
 
 I1 and I2 constants 1.0, 0.1 MPa outside and 10.0, 1.0 MPa inside. The strip's height is not printed: 0.3125 cm of the
-half height here. Beside it the block of one material, with the side kept free of the plates and with roll-over.
+half height here. Beside it the block of one material, with roll-over and with a side that the plates do not touch.
 """
 
 from common import parser, save, say, summarise
@@ -23,7 +23,7 @@ def main():
     layers = {"strip": STRIP, "block": HALF_HEIGHT - STRIP}
     travels = [HALF_HEIGHT * (1 - 1 / r) for r in RATIOS]
     summary, drawn = {}, {}
-    for name, strip, roll_over in (("sandwich", stiff, False), ("homogeneous", soft, False),
+    for name, strip, roll_over in (("sandwich", stiff, True), ("homogeneous", soft, False),
                                    ("homogeneous_roll_over", soft, True)):
         scene = block({"strip": strip, "block": soft}, "stick", elements, roll_over=roll_over, layers=layers)
         path, end = press(scene, travels, max_steps=300)
@@ -36,7 +36,9 @@ def main():
         say(f"{name}: " + "  ".join(f"{r}: {v:.1f} N" for r, v in summary[name]["force_N_at_ratio"].items())
             + f"; radius at the middle {radii[0]:.3f} cm, in the soft part {radii[1]:.3f} cm"
             + ("" if end == "done" else f"; {end[:200]}"))
-    draw_grids(drawn["sandwich"], [drawn["sandwich"].last], [f"H/h = {RATIOS[-1]}"], elements, args.out / "grid.png")
+    last = drawn["sandwich"].last
+    ratio = HALF_HEIGHT / (HALF_HEIGHT - last.measures["travel"])
+    draw_grids(drawn["sandwich"], [last], [f"H/h = {ratio:.4g}"], elements, args.out / "grid.png")
     figure, axes = plots.figure(width=6.2)
     for name, path in drawn.items():
         axes.plot(HALF_HEIGHT / (HALF_HEIGHT - path["travel"]), NEWTON * path["tool_force"], ".-",

@@ -70,7 +70,8 @@ def draw_lines(path, state, axes, elements, height=HALF_HEIGHT, radius=RADIUS, *
 
 def draw_grids(path, states, labels, elements, file, **size) -> None:
     """Deformed grids below one another, all on one scale."""
-    moved = [where(path, s, [(RADIUS, 0.0), (RADIUS, HALF_HEIGHT), (0.0, HALF_HEIGHT)]) for s in states]
+    side = [(RADIUS, Z) for Z in np.linspace(0, HALF_HEIGHT, 41)]
+    moved = [where(path, s, [*side, (0.0, HALF_HEIGHT)]) for s in states]
     wide, heights = max(m[:, 0].max() for m in moved) * 1.05, [m[:, 1].max() * 1.15 for m in moved]
     figure, _ = plots.figure(1, width=5.2, height=5.2 / wide * sum(heights) + 0.45 * len(states))
     figure.clear()
