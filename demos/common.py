@@ -1,6 +1,9 @@
 """What every demo needs: its options, its folder, rank-0 output."""
 
 import argparse
+import os
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 from mpi4py import MPI
@@ -30,6 +33,18 @@ def save(figure, file: Path) -> None:
     if COMM.rank == 0:
         file.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(file, dpi=150)
+
+
+def sweep(function, cases: list) -> list:
+    """function(case) of every case, in parallel: over the ranks, or on one rank in processes of their own.
+
+    The function must work on `MPI.COMM_SELF` and be importable by name.
+    """
+    if COMM.size > 1:
+        found = COMM.allgather({k: function(cases[k]) for k in range(COMM.rank, len(cases), COMM.size)})
+        return [next(part[k] for part in found if k in part) for k in range(len(cases))]
+    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
+        return list(pool.map(function, cases))
 
 
 def summarise(out: Path, summary: dict) -> None:

@@ -5,6 +5,7 @@ from common import COMM, save, say
 
 import formingx as fx
 from formingx.results import files, plots
+from formingx.results.profile import distance_to_line
 
 
 def name_of(friction) -> str:
@@ -14,9 +15,7 @@ def name_of(friction) -> str:
 
 def largest_gap(profile, corner: np.ndarray) -> float:
     """Largest distance of points of a mould, shape (n, 2), to the facing side of a sheet."""
-    a, b = profile.top[:-1], profile.top[1:]
-    t = np.clip(np.einsum("cij,ij->ci", corner[:, None] - a, b - a) / np.einsum("ij,ij->i", b - a, b - a), 0, 1)
-    return float(np.hypot(*np.moveaxis(corner[:, None] - a - t[..., None] * (b - a), -1, 0)).min(1).max())
+    return float(distance_to_line(corner, profile.top).max())
 
 
 def filled_at(path, corner: np.ndarray, gap: float) -> float | None:

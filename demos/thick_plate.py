@@ -109,7 +109,7 @@ def draw(paths, grid, out, quick):
     axes.plot(p, linear(p, "simply_supported"), "--", color="tab:blue", linewidth=1,
               label="linear theory, simply supported")
     axes.set(xlabel="pressure, psi", ylabel="pole height, in", xlim=(0, 42), ylim=(0, 12))
-    axes.legend(frameon=False, loc="upper left", fontsize=9)
+    axes.legend(frameon=False, loc="lower right", fontsize=9)
     save(figure, out / "loading_curve.png")
 
     figure, axes = plots.figure(width=5, height=6)

@@ -1,11 +1,13 @@
 """Files for ParaView, animations and reports: read back, and compared with what they were made from."""
 
 import base64
+import json
 from html.parser import HTMLParser
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import test_process
 from conftest import run, treloar
 from mpi4py import MPI
 from test_contact import cup
@@ -13,8 +15,10 @@ from test_contact import cup
 import formingx as fx
 from formingx import _compat
 from formingx.__main__ import main
-from formingx.results import report
+from formingx.results import plots, report
+from formingx.results.description import describe
 from formingx.results.fields import Fields
+from formingx.results.tooling import Tooling
 
 
 @pytest.fixture(scope="module")
@@ -200,6 +204,52 @@ def test_report_of_a_run_that_failed(tmp_path):
     text = page(tmp_path / "failed.html")
     assert "The run could not go on" in text and "4 states were accepted" in text
     assert "The path ended early: it aimed at pole stretch 8" in text
+
+
+@pytest.fixture(scope="module")
+def plugged():
+    """A plug goes down with the floor taken away, and back up with it there."""
+    scene = test_process.plugged(more=[test_process.FLOOR])
+    return test_process.run(scene, test_process.plug("down", 1.0, without=["floor"]), test_process.plug("up", 0.5))
+
+
+def test_tools_are_drawn_where_they_are(plugged):
+    path, there = plugged, Tooling.of_problem(plugged.problem)
+    again = Tooling.of_description(json.loads(json.dumps(describe(path.problem))))
+    for state, travelled in zip(path.states, path["plug_travel"]):
+        travels = there.travels(state.setting, state.control)
+        assert travels == again.travels(state.setting, state.control)
+        assert travels == [pytest.approx(travelled, abs=1e-12), None if state.stage == "down" else 0.0]
+        placed, top = there.placed(travels), path.profile(state).top
+        for (tool, shift), (other, _) in zip(placed, again.placed(travels)):
+            assert repr(tool) == repr(other)
+            depth = tool.signed_distance(top - shift)
+            np.testing.assert_allclose(other.signed_distance(top - shift), depth, rtol=1e-12)
+        tool, shift = placed[0]
+        ramp = path.problem.contacts[0].law.theta
+        deepest = tool.signed_distance(top - shift).max()
+        assert deepest == pytest.approx(state.measures["penetration"], abs=1.01 * ramp)
+    assert path["penetration"].max() > 0
+
+
+def test_report_of_tools(plugged, formed, tmp_path):
+    plugged.report(tmp_path / "run.html")
+    text = page(tmp_path / "run.html")
+    force = f"{plugged.last.measures['plug_force']:.6g}"
+    for words in ("plug", "1 arc, closed", "moves along (0, -1)", force, "floor", "1 line from", "stays",
+                  "the tools along the path"):
+        assert words in text
+    plugged.save(tmp_path / "run")
+    assert main(["report", str(tmp_path / "run"), "--out", str(tmp_path / "again.html")]) == 0
+    assert (tmp_path / "again.html").read_text() == (tmp_path / "run.html").read_text()
+
+
+def test_forces_of_tools_do_not_leap_between_states(formed):
+    force, penetration = plots.line(formed, "tool_force", "penetration")
+    assert np.array_equal(force, formed["tool_force"]) and np.array_equal(penetration, formed["penetration"])
+    assert len(plots.line(formed, "pressure", "pole_height")[0]) > 2 * len(formed)
+    drawn = formed.plot("tool_force", "pressure").lines[0].get_ydata()
+    assert drawn.max() == formed["tool_force"].max()
 
 
 def test_warnings(formed):

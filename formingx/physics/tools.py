@@ -179,8 +179,11 @@ class Tool:
 
     def __repr__(self) -> str:
         arcs = sum(isinstance(p, Arc) for p in self.pieces)
-        first, last = self.pieces[0].ends[0], self.pieces[-1].ends[1]
-        return f"Tool({len(self.pieces) - arcs} lines and {arcs} arcs from {_show(first)} to {_show(last)})"
+        numbers = ((len(self.pieces) - arcs, "line"), (arcs, "arc"))
+        kinds = " and ".join(f"{n} {kind}{'s' * (n > 1)}" for n, kind in numbers if n)
+        ends = np.array([self.pieces[0].ends[0], self.pieces[-1].ends[1]])
+        first, last = np.where(np.abs(ends) < 1e-12 * self.size, 0.0, ends)
+        return f"Tool({kinds}{', closed, from' if self.closed else ' from'} {_show(first)} to {_show(last)})"
 
     def _with(self, pieces: list) -> Tool:
         return Tool.of_pieces(pieces, self.closed)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError, count, place, positive
 from . import files, plots
+from .tooling import Tooling
 
 
 def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
@@ -20,15 +21,16 @@ def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
     if len(path) < 2:
         raise InputError(f"animate: the path has {len(path)} states: nothing moves")
     x, y = plots.main_columns(path.columns)
-    shapes, tools, now = [], [], []
+    shapes, tools, now, tooling = [], [], [], Tooling.of_problem(path.problem)
     for a, b, fraction in _spread(path, frames):
         path.go_to(b)
         x_there, control = path.between(a, b, fraction)
         at = replace(b, x=x_there, control=control)
         shapes.append(path.profile(at))
-        now.append(path.measured(at, x, y))
-        tools.append([_tool(path.problem, contact, at.control) for contact in path.problem.touching])
-    curve = path.curve(x, y)
+        now.append([a.measures[c] + fraction * (b.measures[c] - a.measures[c]) if plots.of_contact(c) else value
+                    for c, value in zip((x, y), path.measured(at, x, y))])
+        tools.append(tooling.placed(tooling.travels(at.setting, at.control)))
+    curve = plots.line(path, x, y)
     axisymmetric = path.problem.scene.kinematics.dimension_of_volume == 3
 
     def draw(stream):
@@ -47,24 +49,16 @@ def _spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
     return found
 
 
-def _tool(problem: Any, contact: Any, control: float) -> np.ndarray:
-    moves = np.array(contact.contact.moves or (0.0, 0.0))
-    return contact.contact.tool.outline() + problem.forms.length * (contact.base + contact.rate * control) * moves
-
-
 def _draw(shapes: list, tools: list, now: np.ndarray, curve: list, names: tuple, axisymmetric: bool, seconds: float,
           stream: Any) -> None:
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
     from PIL import Image
-    points = np.vstack([np.vstack([s.bottom, s.top]) for s in shapes])
-    low, high = points.min(0), points.max(0)
-    sides = (1, -1) if axisymmetric or abs(low[0]) < 1e-9 * high[0] else (1,)
-    if len(sides) == 2:
-        low[0] = -high[0]
-    margin = 0.06 * max(high - low)
-    ratios = [s.thickness_ratio for s in shapes]
+    r = np.concatenate([s.bottom[:, 0] for s in shapes])
+    sides = (1, -1) if axisymmetric or abs(r.min()) < 1e-9 * r.max() else (1,)
+    low, high = plots.span(shapes, mirrored=len(sides) == 2)
+    ratios = [s.wall_ratio for s in shapes]
     colours = Normalize(min(r.min() for r in ratios), max(r.max() for r in ratios))
     figure, (left, right) = plots.figure(2, width=5.0, height=4.2, ratios=(1.5, 1))
     bar = figure.colorbar(ScalarMappable(colours, "viridis_r"), ax=left, shrink=0.8, label="thickness / original")
@@ -76,12 +70,10 @@ def _draw(shapes: list, tools: list, now: np.ndarray, curve: list, names: tuple,
     pictures: list[Any] = []
     for shape, ratio, tool, at in zip(shapes, ratios, tools, now):
         left.clear()
-        left.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin), xlabel="r",
-                 ylabel="z", aspect="equal")
+        left.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="r", ylabel="z", aspect="equal")
         left.spines[["top", "right"]].set_visible(False)
+        plots.tools(left, tool, low, high, mirror=len(sides) == 2)
         for side in sides:
-            for line in tool:
-                left.plot(side * line[:, 0], line[:, 1], color="0.35", linewidth=1.5)
             plots.section(left, shape, (side, 1), colormaps["viridis_r"](colours(ratio)))
         dot.set_data(at[:1], at[1:])
         text.set_text(f"{names[1].replace('_', ' ')} {at[1]:.4g}")

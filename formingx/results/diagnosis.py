@@ -176,7 +176,9 @@ class Diagnosis:
         return "\n".join(lines)
 
     def picture(self, file: Any) -> None:
-        """Draw the last good state, deformed, its elements coloured by J, the worst places marked (rank 0 draws).
+        """Draw the last good state, deformed, its elements coloured by J, the worst places marked, and the tools.
+
+        Rank 0 draws.
 
         Raises:
             InputError: a membrane has no elements to draw, nor has a run without a good state.
@@ -184,13 +186,13 @@ class Diagnosis:
         if self.picture_data is None:
             raise InputError("Diagnosis.picture: there are no elements to draw: a membrane has none across its"
                              " thickness, and without a good state there is no shape")
-        rank, shape, marks = self.picture_data
+        rank, shape, marks, tools = self.picture_data
         if rank == 0:
             os.makedirs(os.path.dirname(os.path.abspath(file)), exist_ok=True)
-            _draw(shape, marks, f"last good state: {self.what} {self.control:.5g}", file)
+            _draw(shape, marks, tools, f"last good state: {self.what} {self.control:.5g}", file)
 
 
-def _draw(shape: Body, marks: list, title: str, file: Any) -> None:
+def _draw(shape: Body, marks: list, tools: list, title: str, file: Any) -> None:
     from matplotlib.collections import PolyCollection
     size = np.ptp(shape.outline.reshape(-1, 2), axis=0)
     wide = size[0] > 4 * size[1]
@@ -212,4 +214,8 @@ def _draw(shape: Body, marks: list, title: str, file: Any) -> None:
     figure.colorbar(drawn, ax=axes, label="J where it is farthest from 1 in the element", shrink=0.85, extend="both")
     if marks:
         figure.legend(loc="outside lower center", ncols=len(marks), frameon=False, fontsize=9)
+    figure.draw_without_rendering()                        # the aspect changes the limits
+    axes.autoscale(False)
+    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+    plots.tools(axes, tools, low, high, mirror=shape.outline[..., 0].min() > -1e-9 * size[0])
     figure.savefig(file, dpi=150)

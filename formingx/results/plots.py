@@ -19,16 +19,26 @@ def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: An
     return drawing, axes[0] if columns == 1 else axes
 
 
+def of_contact(column: str) -> bool:
+    """True of what a stiff contact gives: meaningless between states, where the body is but guessed."""
+    return column.endswith(("force", "penetration", "contact_length"))
+
+
+def line(path: Any, *columns: str) -> list[Any]:
+    """Columns along a path: the smooth curve through its states; the states alone if one of them is `of_contact`."""
+    return [path[c] for c in columns] if any(map(of_contact, columns)) else path.curve(*columns)
+
+
 def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
     """Column y over column x of a path: the states as dots, the path as a line, limit points ringed.
 
     Returns the axes; `axes.figure.savefig` saves.
     """
     axes = axes if axes is not None else figure()[1]
-    line, = axes.plot(*path.curve(x, y), **style)
-    axes.plot(path[x], path[y], ".", color=line.get_color())
+    drawn, = axes.plot(*line(path, x, y), **style)
+    axes.plot(path[x], path[y], ".", color=drawn.get_color())
     for state in path.limit_points:
-        axes.plot(state.measures[x], state.measures[y], "o", color=line.get_color(), fillstyle="none", markersize=9)
+        axes.plot(state.measures[x], state.measures[y], "o", color=drawn.get_color(), fillstyle="none", markersize=9)
     axes.set_xlabel(axes.get_xlabel() or x.replace("_", " "))
     axes.set_ylabel(axes.get_ylabel() or y.replace("_", " "))
     return axes
@@ -63,6 +73,37 @@ def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
     strips = np.stack([bottom[:-1], bottom[1:], top[1:], top[:-1]], 1)
     faces = (colours[1:] + colours[:-1]) / 2
     axes.add_collection(PolyCollection(strips, facecolors=faces, edgecolors=faces, linewidths=1.8, zorder=2))
+
+
+def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:
+    """Corners (r, z), low and high, of a box around sheets (and their mirror images at r = 0), with some room."""
+    import numpy as np
+    points = np.vstack([side for profile in profiles for side in (profile.bottom, profile.top)])
+    low, high = points.min(0), points.max(0)
+    if mirrored:
+        low[0] = -high[0]
+    margin = 0.06 * max(high - low)
+    return low - margin, high + margin
+
+
+def tools(axes: Any, placed: Any, low: Any, high: Any, mirror: bool = False, colour: str = "0.35",
+          filled: bool = True) -> None:
+    """Rigid tools, as far as they reach into the box from `low` to `high`, (r, z); their solid grey if `filled`.
+
+    placed: [(tool, its shift (r, z))]; mirror: with their mirror images at r = 0.
+    """
+    import numpy as np
+    box = np.array([low, high], dtype=float)
+    n = np.maximum(300 * (box[1] - box[0]) / np.max(box[1] - box[0]), 40).astype(int)
+    r, z = (np.linspace(*box[:, k], n[k]) for k in (0, 1))
+    points = np.stack(np.meshgrid(np.abs(r) if mirror else r, z), axis=-1)
+    for tool, shift in placed:
+        depth = tool.signed_distance(points.reshape(-1, 2) - shift).reshape(points.shape[:2])
+        if depth.max() <= 0 or depth.min() >= 0:
+            continue
+        if filled:
+            axes.contourf(r, z, depth, levels=[0, np.inf], colors=["0.88"], zorder=0.5)
+        axes.contour(r, z, depth, levels=[0], colors=[colour], linewidths=1.5, zorder=1.5)
 
 
 def outline(profile: Any, axes: Any, scale: float = 1.0, **style: Any) -> None:

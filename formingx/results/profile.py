@@ -47,13 +47,23 @@ class Profile:
 
     @property
     def thickness(self) -> np.ndarray:
-        """Distance between the two points now, shape (n,), length."""
+        """Distance between the two points now, shape (n,), length: where the sheet is sheared, more than its wall."""
         return np.hypot(*(self.top - self.bottom).T)
 
     @property
     def thickness_ratio(self) -> np.ndarray:
         """Thickness over original thickness, shape (n,)."""
         return self.thickness / self.original_thickness
+
+    @property
+    def wall_ratio(self) -> np.ndarray:
+        """Wall thickness over original thickness, shape (n,)."""
+        return self.wall_thickness / self.original_thickness
+
+    @property
+    def wall_thickness(self) -> np.ndarray:
+        """Shortest distance from the points of the bottom face to the top face now, shape (n,), length."""
+        return distance_to_line(self.bottom, _fine(self.top))
 
     @property
     def middle(self) -> np.ndarray:
@@ -68,6 +78,14 @@ class Profile:
     def thickness_ratio_at(self, radius: float) -> float:
         """Thickness ratio at a reference radius, linear between the nodes."""
         return float(np.interp(radius, self.reference_radius, self.thickness_ratio))
+
+
+def distance_to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
+    """Shortest distance, shape (m,), of points, (m, 2), to the straight pieces between points of a line, (n, 2)."""
+    a, b = line[:-1], line[1:]
+    along = np.einsum("mij,ij->mi", points[:, None] - a, b - a) / np.einsum("ij,ij->i", b - a, b - a)
+    away = points[:, None] - a - np.clip(along, 0, 1)[..., None] * (b - a)
+    return np.hypot(away[..., 0], away[..., 1]).min(1)
 
 
 class Profiles:
@@ -94,6 +112,14 @@ class Profiles:
                              f" the mesh has {list(mesh.boundaries)}")
         bottom, top = (mesh.line_of(name) for name in faces)
         return probe(self._problem, np.vstack([bottom, _opposite(bottom, top)]))
+
+
+def _fine(line: np.ndarray, parts: int = 6) -> np.ndarray:
+    """Points along the parabolas through the nodes of a line's edges (end, middle, end, ...)."""
+    a, m, b = line[:-1:2, None], line[1::2, None], line[2::2, None]
+    xi = np.linspace(0, 1, parts, endpoint=False)[:, None]
+    inner = (1 - xi) * (1 - 2 * xi) * a + 4 * xi * (1 - xi) * m + xi * (2 * xi - 1) * b
+    return np.vstack([inner.reshape(-1, 2), line[-1]])
 
 
 def _opposite(line: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -18,6 +18,7 @@ from ..errors import InputError
 from . import files, plots
 from .compare import Smooth
 from .profile import Profile
+from .tooling import Tooling
 
 PENETRATION = 0.05
 """Penetration over the smallest thickness above which a report warns."""
@@ -36,6 +37,7 @@ class Record:
         histories: of the n states, rows (residual, correction, work) of Newton's iterations.
         profiles: of the n states, each a `Profile`, or None.
         counts: what the run cost; until: (measure, value) that it aimed at, or None.
+        tooling: the `Tooling` of the scene; travels: of the n states, `Tooling.travels`.
     """
 
     summary: dict[str, str]
@@ -47,6 +49,8 @@ class Record:
     profiles: list[Any]
     counts: dict[str, Any]
     until: tuple[str, float] | None
+    tooling: Tooling
+    travels: list[list[float | None]]
 
     @property
     def control(self) -> str:
@@ -87,19 +91,23 @@ def of_path(path: Any) -> Record:
         profiles = [None] * len(path)
     problem = path.problem
     stepping: dict = next((s.stepping for s in reversed(path.states) if s.stepping), {})
+    tooling = Tooling.of_problem(problem)
     return Record(summary(problem.scene), files.versions(), problem.scene.kinematics.dimension_of_volume == 3,
                   [s.kind for s in path.states], {c: path[c] for c in path.columns},
-                  [list(s.history) for s in path.states], profiles, vars(path.counts), stepping.get("until"))
+                  [list(s.history) for s in path.states], profiles, vars(path.counts), stepping.get("until"), tooling,
+                  [tooling.travels(s.setting, s.control) for s in path.states])
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:
     """The record of what `formingx.checkpoint.contents` gives."""
     stepping: dict = next((s["stepping"] for s in reversed(states) if s["stepping"]), {})
+    tooling = Tooling.of_description(about["scene"])
     profiles = [s["profile"] and Profile(**{k: np.array(v) for k, v in s["profile"].items()}) for s in states]
     return Record(about["summary"], about["versions"], about["scene"]["kinematics"]["kind"] == "Axisymmetric",
                   [s["kind"] for s in states], {c: np.array([s["measures"][c] for s in states])
                                                 for c in states[0]["measures"]},
-                  [s["history"] for s in states], profiles, stepping.get("counts", {}), stepping.get("until"))
+                  [s["history"] for s in states], profiles, stepping.get("counts", {}), stepping.get("until"), tooling,
+                  [tooling.travels(s.get("setting", {}), s["control"]) for s in states])
 
 
 def write(record: Record, file: Any, title: str, failure: Any, comm: Any) -> None:
@@ -111,7 +119,7 @@ def write(record: Record, file: Any, title: str, failure: Any, comm: Any) -> Non
 
 
 def _page(record: Record, title: str, failure: Any) -> str:
-    warnings = record.warnings()
+    warnings, contacts = record.warnings(), record.tooling.contacts
     parts = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{_lead(record)}</p>"]
     if failure is not None:
         parts.append(f"<div class='note bad'><h2>The run could not go on</h2><p>{_lines(str(failure))}</p></div>")
@@ -128,11 +136,14 @@ def _page(record: Record, title: str, failure: Any) -> str:
         parts.append(_figure(_curves(record), "The states (dots), limit points (rings), and the path through them."))
     if record.profiles[-1] is not None:
         parts += ["<h2>Shape and thickness</h2>",
-                  _figure(_shapes(record), "Sections of the sheet along the path, and thickness over original thickness"
-                                           " against the length of its deformed middle line from the axis.")]
+                  _figure(_shapes(record), f"Sections of the sheet{' and the tools' * bool(contacts)} along the path,"
+                                           " and thickness over original thickness against the length of its deformed"
+                                           " middle line from the axis.")]
         view = _view(record)
         if view:
             parts.append(_picture(view, "The last state, cut open.", "small"))
+    if contacts:
+        parts += ["<h2>Tools</h2>", _tools(record)]
     parts += ["<h2>Inputs</h2>", _table(["", ""], [[k, v] for k, v in record.summary.items()])]
     parts += ["<h2>Convergence</h2>"]
     if any(len(h) > 1 for h in record.histories):
@@ -180,7 +191,7 @@ def _key_numbers(record: Record) -> str:
     chosen.append(len(record.kinds) - 1)
     rows = [[_words(name), *(_number(values[k]) for k in chosen)] for name, values in record.measures.items()]
     if record.profiles[-1] is not None:
-        ratios = [record.profiles[k].thickness_ratio for k in chosen]
+        ratios = [record.profiles[k].wall_ratio for k in chosen]
         rows.append(["smallest thickness / original", *(_number(r.min()) for r in ratios)])
         rows.append(["largest thickness / original", *(_number(r.max()) for r in ratios)])
     return _table(head, rows)
@@ -191,15 +202,17 @@ def _curves(record: Record) -> Any:
     others = [c for c in ("pole_stretch", "pole_height", "enclosed_volume")
               if c in record.measures and c != pairs[0][0]]
     pairs += [(c, pairs[0][1]) for c in others[:1]]
+    starts, rings = ([k for k, kind in enumerate(record.kinds) if kind == which and k] for which in
+                     ("start", "limit point"))             # a stage may set out in another direction
     figure, axes = plots.figure(len(pairs))
     for ax, (x, y) in zip(np.atleast_1d(axes), pairs):
         a, b = record.measures[x], record.measures[y]
         scale = [np.ptp(v) or 1.0 for v in (a, b)]
-        line = Smooth(np.column_stack([a, b]) / scale).line * scale
-        drawn, = ax.plot(*line.T)
-        ax.plot(a, b, ".", color=drawn.get_color())
-        rings = [k for k, kind in enumerate(record.kinds) if kind == "limit point"]
-        ax.plot(a[rings], b[rings], "o", color=drawn.get_color(), fillstyle="none", markersize=9)
+        for points in np.split(np.column_stack([a, b]) / scale, starts):
+            if np.ptp(points, axis=0).any():
+                ax.plot(*(Smooth(points).line * scale).T, color="C0")
+        ax.plot(a, b, ".", color="C0")
+        ax.plot(a[rings], b[rings], "o", color="C0", fillstyle="none", markersize=9)
         ax.set(xlabel=_words(x), ylabel=_words(y))
     return figure
 
@@ -209,16 +222,44 @@ def _shapes(record: Record) -> Any:
     n = len(record.kinds)
     chosen = sorted({int(round(k)) for k in np.linspace(0, n - 1, min(n, 6))})
     figure, (left, right) = plots.figure(2)
-    for i, k in enumerate(chosen):
+    driven = [c for c in record.measures if c.endswith(("pressure", "travel"))]
+    colours = [colormaps["viridis"](0.9 * i / max(len(chosen) - 1, 1)) for i in range(len(chosen))]
+    for k, colour in zip(chosen, colours):
         profile = record.profiles[k]
-        colour = colormaps["viridis"](0.9 * i / max(len(chosen) - 1, 1))
-        label = f"{_words(record.control)} {record.measures[record.control][k]:.4g}"
+        label = ", ".join(f"{_words(c)} {record.measures[c][k]:.4g}" for c in driven)
         plots.outline(profile, left, color=colour, label=label)
-        right.plot(profile.arc_length, profile.thickness_ratio, color=colour, label=label)
+        right.plot(profile.arc_length, profile.wall_ratio, color=colour, label=label)
     left.set(xlabel="r", ylabel="z")
+    if record.tooling.contacts:
+        _draw_tools(record, left, chosen, colours)
     right.set(xlabel="arc length", ylabel="thickness / original", ylim=(0, None))
     right.legend(frameon=False, fontsize=8, loc="best")
     return figure
+
+
+def _draw_tools(record: Record, axes: Any, chosen: list[int], colours: list[Any]) -> None:
+    """Tools that stay, in grey; those that move, in the colours of the states, grey in the last."""
+    low, high = plots.span([record.profiles[k] for k in chosen])
+    mirror = all(record.profiles[k].bottom[:, 0].min() > -1e-9 * high[0] for k in chosen)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    end = record.travels[chosen[-1]]
+    for k, colour in zip(chosen[:-1], colours):
+        elsewhere = [travel if travel != there else None for travel, there in zip(record.travels[k], end)]
+        plots.tools(axes, record.tooling.placed(elsewhere), low, high, mirror, colour, filled=False)
+    plots.tools(axes, record.tooling.placed(end), low, high, mirror)
+
+
+def _tools(record: Record) -> str:
+    """Every contact, and where its tool is in the last state."""
+    contacts, rows = record.tooling.contacts, []
+    for contact, travel in zip(contacts, record.travels[-1]):
+        force = record.measures.get("tool_force" if len(contacts) == 1 else f"{contact.name}_force")
+        moves = "stays" if contact.moves is None else "moves along ({:g}, {:g})".format(*contact.moves)
+        where = "takes no part" if travel is None else _number(travel) if contact.moves else ""
+        rows.append([contact.name or "", contact.on, repr(contact.tool)[5:-1], str(contact.friction),
+                     _number(contact.penalty), moves, where, "" if force is None else _number(force[-1])])
+    return _table(["tool", "face", "profile", "friction", "penalty", "motion", "travel at the end",
+                   "force along z at the end"], rows)
 
 
 def _view(record: Record) -> bytes | None:

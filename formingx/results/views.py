@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from .profile import distance_to_line
 
 
 def revolved(profile: Any, file: Any, comm: Any, title: str = "thickness / original") -> None:
@@ -76,10 +77,11 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
         surface["ratio"] = np.tile(values, (len(stations), 1)).ravel(order="F")
         return surface
 
-    ratio = profile.thickness_ratio
+    ratio = profile.wall_ratio
+    beyond = distance_to_line(profile.top, profile.bottom) / profile.original_thickness
     rim = np.linspace(profile.bottom[-1], profile.top[-1], 3)[1:-1]
     line = np.vstack([profile.bottom, rim, profile.top[::-1]])
-    values = np.concatenate([ratio, np.full(len(rim), ratio[-1]), ratio[::-1]])
+    values = np.concatenate([ratio, np.full(len(rim), ratio[-1]), beyond[::-1]])
     plotter = pyvista.Plotter(off_screen=True, window_size=(1000, 800))
     plotter.set_background("white")
     bar = {"title": title + "\n", "color": "black", "vertical": True, "position_x": 0.85, "position_y": 0.2,

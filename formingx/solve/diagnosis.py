@@ -8,6 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..results.diagnosis import Body, Diagnosis, Place, body, place
+from ..results.tooling import Tooling
 from .direct import DirectSolver, condition
 
 
@@ -69,7 +70,9 @@ def diagnose(branch: Any, states: list, reason: str, attempt: Attempt | None = N
         problem.memory = keep
     causes, advice = _verdict(facts, fixed_control, pace, target)
     x.destroy()
-    data = (problem.comm.rank, shape, marks) if shape else None
+    tooling = Tooling.of_problem(problem)
+    tools = tooling.placed(tooling.travels(last.setting, last.control)) if last else []
+    data = (problem.comm.rank, shape, marks, tools) if shape else None
     return Diagnosis(**facts, causes=tuple(causes), advice=tuple(advice), picture_data=data)
 
 

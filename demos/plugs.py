@@ -1,0 +1,117 @@
+"""What the demos of plug-assist share: a sheet with a plug above it, how the plug holds it, force and shape."""
+
+import numpy as np
+from common import COMM
+from moulding import cost
+
+import formingx as fx
+from formingx.results import files, plots
+
+NEWTON = 100.0                                               # N in one MPa cm2
+LAWS = {
+    "held": ("stick", False),                                # no slip, as the thesis: never lets go
+    "stick": ("stick", True),                                # a rough plug that the sheet may lift off
+    "frictionless": ("none", True),
+}
+"""{name: (friction, separates)}; a number is Coulomb's coefficient."""
+
+
+def plug(radius, thickness, fillet, height=60.0):
+    """A round flat-ended plug with a rounded edge, that stands on a sheet."""
+    return fx.tools.male(radius=radius, height=height, base=-height, fillet=fillet).mirrored().moved(z=thickness)
+
+
+def sheet(radius, thickness, plug_radius, law, elements):
+    """Small elements where the law asks for them: around the edge, or wherever the sheet slides over it."""
+    near = {1.1 * plug_radius: 0.2} if law in ("held", "stick") else {0.65 * plug_radius: 0.2}
+    return fx.mesh.disc(radius=radius, thickness=thickness, elements=elements, concentrate=near)
+
+
+def name_of(law) -> str:
+    """A law as a key of the summary."""
+    return law if isinstance(law, str) else f"coulomb_{law:g}"
+
+
+def scene(radius, thickness, plug_radius, fillet, material, law, elements, support=None, **options):
+    """A sheet held at its rim under a plug that moves down. law: of LAWS, or a coefficient of friction."""
+    friction, separates = LAWS.get(law, (law, True))
+    mesh = sheet(radius, thickness, plug_radius, law, elements)
+    return fx.Scene(mesh=mesh, materials=material, supports=[fx.Symmetry("axis"), support or fx.Clamped("rim")],
+                    contacts=[fx.Contact("top", plug(plug_radius, thickness, fillet), friction, separates=separates,
+                                         moves=(0, -1), **options)])
+
+
+def push(made, travels, pole_stretch=None, **options):
+    """(path, how it ended): to the last travel, or to a pole stretch, through the (other) travels."""
+    targets = [fx.travel(t) for t in travels]
+    until = targets.pop() if pole_stretch is None else fx.pole_stretch(pole_stretch)
+    try:
+        return fx.trace(made, until=until, through=targets, step=fx.StepControl(target=6), max_steps=400,
+                        **options), "done"
+    except fx.ConvergenceError as error:
+        return error.path, str(error)
+
+
+def force(state) -> float:
+    """Force on the plug, N."""
+    return NEWTON * state.measures["tool_force"]
+
+
+def force_limit(plug_radius, thickness, c10) -> float:
+    """The force that a frictionless plug on a neo-Hookean membrane cannot pass, N: 2 pi rp T, T = 2 c10 h0.
+
+    T = 2 c10 h0 (1 - l^-6) is the tension, per current length, of a membrane stretched l both ways, as it is under the
+    plug; around an edge without friction it stays the same, and the wall can do no more than hang straight down.
+    """
+    return NEWTON * 4 * np.pi * plug_radius * c10 * thickness
+
+
+def key_numbers(path, end, travels, places, plug_radius, thickness) -> dict:
+    """What the summary holds of one path. places: {name: reference radius}; travels not met have no entry."""
+    met = {f"{t:g}": path.met(fx.travel(t)) for t in travels}
+    met = {key: state for key, state in met.items() if state is not None}
+    shapes = {key: path.profile(state) for key, state in met.items()}
+    last = path.profile()
+    flat = last.wall_ratio[last.reference_radius <= plug_radius]
+    outside = last.rest_top[:, 0] > plug_radius
+    return {
+        "force_N_at_travel_cm": {key: force(state) for key, state in met.items()},
+        "thickness_ratio_at_travel_cm": {
+            key: {name: shape.thickness_ratio_at(R) for name, R in places.items()} for key, shape in shapes.items()},
+        "wall_ratio_at_travel_cm": {
+            key: {name: float(np.interp(R, shape.reference_radius, shape.wall_ratio))
+                  for name, R in places.items()} for key, shape in shapes.items()},
+        "stretches_at_pole": pole_stretches(path, path.last, thickness),
+        "flat_top_thickness_ratio": [float(flat.min()), float(flat.max())],
+        "mean_hoop_deviation_outside_plug": float(np.abs(last.top[outside, 0] / last.rest_top[outside, 0] - 1).mean()),
+        "reached_travel_cm": float(path["travel"].max()),
+        "largest_force_N": NEWTON * float(path["tool_force"].max()),
+        "largest_penetration_over_h0": float(path["penetration"].max()) / thickness,
+        "ended": end,
+        **cost(path),
+    }
+
+
+def pole_stretches(path, state, thickness) -> dict:
+    """Principal stretches of the top face at the pole: in the plane and through the thickness."""
+    F = path.stress(state).at([[0.0, thickness]]).deformation_gradient[0]
+    return {"meridional": float(F[0, 0]), "hoop": float(F[2, 2]), "thickness": float(F[1, 1])}
+
+
+def write(path, out, name) -> None:
+    """A path and its last profile as files."""
+    path.to_csv(out / f"{name}.csv")
+    files.write_profile(path.profile(), out / f"{name}_profile.csv", COMM)
+
+
+def draw_shapes(axes, path, states, tool, **style) -> None:
+    """Profiles of some states and the plug in the last of them."""
+    for k, state in enumerate(states):
+        plots.outline(path.profile(state), axes, color=style.get("color", f"C{k}"))
+    low = states[-1].measures["travel"]
+    axes.plot(*(tool.outline() - [0, low]).T, "k", linewidth=1.2)
+    x = np.vstack([path.profile(s).top for s in states])
+    size = x[:, 0].max()
+    axes.set(xlabel="r, cm", ylabel="z, cm", xlim=(0, 1.05 * size), ylim=(x[:, 1].min() - 0.15 * size,
+                                                                          x[:, 1].max() + 0.1 * size))
+    axes.set_aspect("equal")

@@ -1,0 +1,108 @@
+"""A plug pushed into a clamped PMMA sheet at 160 C (Song 1993, section 6.3, figs. 6.1 to 6.5; test of Williams 1970).
+
+Neo-Hookean, c10 = 0.448 MPa (chapter 6 reads C10 as the I1 constant); r0 = 8.89 cm, h0 = 0.6985 cm, plug radius
+1.905 cm. The thesis' plug has a sharp edge; here it is rounded (--fillet). Four ways in which the plug holds the sheet:
+"held", what touches never lets go (the thesis' no slip); "stick", rough, but the sheet may lift off; Coulomb friction;
+"frictionless" (the thesis' slip). Lengths in cm, forces in N.
+"""
+
+import plugs
+from common import parser, save, say, summarise
+
+import formingx as fx
+from formingx.results import files, plots
+
+RADIUS, THICKNESS, PLUG, C10 = 8.89, 0.6985, 1.905, 0.448
+TRAVELS = tuple(float(t) for t in range(2, 21, 2))
+PLACES = {"0": 0.0, "rp+h0/2": PLUG + THICKNESS / 2, "rp+h0": PLUG + THICKNESS, "rp+2h0": PLUG + 2 * THICKNESS}
+THESIS = {"flat_top_ratio_measured_by_Williams": 0.51, "flat_top_ratio_with_slip": [0.3, 0.7],
+          "pole_stretch_with_slip": 1.25, "mean_hoop_deviation_outside_plug_with_slip": 0.062,
+          "reached_cm_without_slip": 20.0}
+# law: (elements, the pole stretch at which the run ends, or None: 20 cm)
+RUNS = {"held": ((60, 2), None), "stick": ((60, 2), None), 0.3: ((120, 2), 3.0), "frictionless": ((80, 3), 3.0)}
+QUICK = {"held": ((40, 2), None), "frictionless": ((50, 2), 2.0)}
+
+
+def main():
+    options = parser("williams_plug", __doc__.splitlines()[0])
+    options.add_argument("--fillet", type=float, default=0.35, help="radius of the plug's edge, cm")
+    options.add_argument("--refine", type=int, default=1, help="all elements divided by this")
+    args = options.parse_args()
+    limit = plugs.force_limit(PLUG, THICKNESS, C10)
+    summary, paths = {"thesis": THESIS, "force_limit_without_friction_N": limit}, {}
+    for law, (elements, stretch) in (QUICK if args.quick else RUNS).items():
+        name, elements = plugs.name_of(law), tuple(n * args.refine for n in elements)
+        made = plugs.scene(RADIUS, THICKNESS, PLUG, args.fillet, fx.NeoHookean(c10=C10), law, elements)
+        path, end = plugs.push(made, TRAVELS, stretch)
+        n = plugs.key_numbers(path, end, TRAVELS, PLACES, PLUG, THICKNESS)
+        summary[name], paths[name] = n | {"elements": list(elements)}, path
+        tell(name, n)
+        plugs.write(path, args.out, name)
+    made = plugs.scene(RADIUS, THICKNESS, PLUG, args.fillet, fx.NeoHookean(c10=C10), "held", RUNS["held"][0],
+                       fx.SimplySupported("rim"))
+    path, end = plugs.push(made, TRAVELS)                        # figure 6.10
+    summary["held_hinged"] = n = plugs.key_numbers(path, end, TRAVELS, PLACES, PLUG, THICKNESS)
+    tell("held, hinged rim", n)
+    tool = plugs.plug(PLUG, THICKNESS, args.fillet)
+    save(draw(paths, tool, limit), args.out / "williams_plug.png")
+    save(draw_rims(paths["held"], path), args.out / "rims.png")
+    if not args.quick:
+        paths["held"].view3d(args.out / "plug_3d.png")
+    summarise(args.out, {**summary, "fillet_cm": args.fillet, "versions": files.versions()})
+
+
+def tell(name, n) -> None:
+    """The numbers of one run."""
+    say(f"{name}: to {n['reached_travel_cm']:.4g} cm, {n['steps']} states, {n['newton_iterations']} Newton iterations,"
+        f" {n['cutbacks']} cut back, {n['solve_seconds']:.1f} s; hoop stretch outside the plug off 1 by"
+        f" {n['mean_hoop_deviation_outside_plug']:.3f} in the mean; wall under the plug over h0"
+        f" {n['flat_top_thickness_ratio'][0]:.3f} to {n['flat_top_thickness_ratio'][1]:.3f}",
+        *([] if n["ended"] == "done" else [f"  ended before its target: {n['ended'][:200]} ..."]))
+    for t, f in n["force_N_at_travel_cm"].items():
+        ratios = "  ".join(f"{v:.4f}" for v in n["wall_ratio_at_travel_cm"][t].values())
+        say(f"  {t:>4} cm {f:9.1f} N   wall over h0 at R = 0, rp + h0/2, rp + h0, rp + 2 h0: {ratios}")
+
+
+def draw(paths, tool, limit):
+    """Force curves, thickness and stretches: figs. 6.1 to 6.4."""
+    figure, (shapes, slips, forces, thickness) = plots.figure(4, width=3.9, height=4.6)
+    plugs.draw_shapes(shapes, paths["held"], states(paths["held"], (4, 8, 12, 16, 20)), tool)
+    shapes.set(title="held")
+    plugs.draw_shapes(slips, paths["frictionless"], states(paths["frictionless"], (2, 4, 6)), tool)
+    slips.set(title="frictionless")
+    for k, (name, path) in enumerate(paths.items()):
+        forces.plot(path["travel"], plugs.NEWTON * path["tool_force"], color=f"C{k}", label=name.replace("_", " "))
+        profile = path.profile()
+        thickness.plot(profile.reference_radius, profile.wall_ratio, color=f"C{k}",
+                       label=f"{name.replace('_', ' ')}, {path.last.measures['travel']:.3g} cm")
+    forces.axhline(limit, color="k", linestyle=":", linewidth=1)
+    forces.text(20, limit, r"$4\pi r_p c_{10} h_0$", ha="right", va="bottom")
+    forces.set(xlabel="travel, cm", ylabel="force on the plug, N", title="force", ylim=(0, None))
+    thickness.set(xlabel="reference radius R, cm", ylabel="wall / original", title="thickness", ylim=(0, 1.02))
+    thickness.axvline(PLUG, color="0.7", linewidth=1)
+    for axes in (forces, thickness):
+        axes.legend(frameon=False, fontsize="small")
+    return figure
+
+
+def draw_rims(clamped, hinged):
+    """Shapes and forces with both rims: fig. 6.10."""
+    figure, (shapes, forces) = plots.figure(2, width=4.6, height=4.6)
+    for color, path, label in (("C0", clamped, "clamped"), ("C3", hinged, "hinged")):
+        for state in states(path, (1, 2, 4, 8)):
+            shapes.plot(*path.profile(state).middle.T, color=color, linewidth=1.2)
+        forces.plot(path["travel"], plugs.NEWTON * path["tool_force"], color=color, label=label)
+    shapes.set(xlabel="r, cm", ylabel="z of the middle line, cm")
+    forces.set(xlabel="travel, cm", ylabel="force on the plug, N")
+    forces.legend(frameon=False)
+    return figure
+
+
+def states(path, travels) -> list:
+    """Those that were met, and the last one."""
+    found = [path.met(fx.travel(float(t))) for t in travels]
+    return [*(s for s in found if s is not None and s is not path.last), path.last]
+
+
+if __name__ == "__main__":
+    main()
