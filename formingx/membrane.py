@@ -102,12 +102,12 @@ class MidSurface(Formulation):
             tags.append(np.full(len(found), tag, dtype=np.int32))
         numbers, order = np.unique(np.concatenate(ends).astype(np.int32), return_index=True)
         facets = dolfinx_mesh.meshtags(domain, 0, numbers, np.concatenate(tags)[order])
-        boundaries = {}
+        boundaries: dict[str, tuple[int, ...]] = {}
         for name in mesh.boundaries:
             at = mesh.nodes_of(name)[:, 0]
             for tag, end in enumerate((R[0], R[-1]), 1):
                 if len(at) and np.all(np.abs(at - end) < near):
-                    boundaries[name] = tag
+                    boundaries[name] = (tag,)
         return Mesh(domain, None, facets, mesh.layers, boundaries)
 
     def _elements(self, cell: Any) -> tuple[Any, list[Any]]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from . import _compat, grid
-from .errors import InputError, count, finite, known, non_negative, positive
+from .errors import InputError, count, finite, known, non_negative, pair, positive
 
 
 @dataclass(frozen=True)
@@ -22,18 +22,71 @@ class Mesh:
     Attributes:
         domain: the `dolfinx.mesh.Mesh`; coordinates (R, Z) in the user's unit of length.
         cells, facets: its `MeshTags`.
-        layers, boundaries: name to tag.
+        layers: name to tag.
+        boundaries: name to the tags of its facets: one, or several where a part has a name of its own (`with_part`).
     """
 
     domain: Any
     cells: Any
     facets: Any
     layers: dict[str, int]
-    boundaries: dict[str, int]
+    boundaries: dict[str, tuple[int, ...]]
 
     def facets_of(self, boundary: str) -> np.ndarray:
-        """Local facet indices of a boundary, shape (n,), ghosts included."""
-        return self.facets.find(self.boundaries[boundary])
+        """Local facet indices of a boundary, sorted, shape (n,), ghosts included."""
+        return np.sort(np.concatenate([self.facets.find(tag) for tag in self.boundaries[boundary]]))
+
+    def with_part(self, name: str, of: str, within: tuple[float, float], along: str = "r") -> Mesh:
+        """The mesh with one more boundary: the facets of a boundary between two coordinates.
+
+        They belong to both boundaries from then on: a load or contact on the whole acts on the part too.
+
+        Args:
+            name: of the part, a new one.
+            of: the boundary that it is a part of.
+            within: (lowest, highest) reference coordinate, length; nodes must lie there (`disc`: `concentrate`), unless
+                the boundary ends before.
+            along: the coordinate, "r" or "z".
+
+        Raises:
+            InputError: a name that is not known or not new, no facet within, or one that is within in part only.
+        """
+        from dolfinx.mesh import entities_to_geometry, meshtags
+        who = f"with_part({name!r}, {of!r})"
+        if not isinstance(name, str) or not name or name in self.boundaries:
+            raise InputError(f"{who}: name = {name!r}: must be a word that no boundary has yet; there are"
+                             f" {', '.join(map(repr, self.boundaries))}")
+        known(f"{who}: boundary", of, self.boundaries)
+        known(f"{who}: along", along, ("r", "z"))
+        low, high = pair(f"{who}: within", within)
+        if not low < high:
+            raise InputError(f"{who}: within = {within!r}: the first must be below the second")
+        domain, axis = self.domain, "rz".index(along)
+        comm, facets = domain.comm, self.facets_of(of)
+        domain.topology.create_connectivity(1, 2)
+        nodes = entities_to_geometry(domain, 1, facets) if len(facets) else np.zeros((0, 2), dtype=np.int32)
+        ends = domain.geometry.x[nodes[:, :2], axis]
+        near = 1e-8 * comm.allreduce(np.abs(domain.geometry.x).max(initial=0.0), MPI.MAX)
+        lowest, highest = ends.min(1), ends.max(1)
+        inside = (lowest > low - near) & (highest < high + near)
+        cut = ~inside & (lowest < high - near) & (highest > low + near)
+        cuts = np.concatenate(comm.allgather(np.column_stack([lowest, highest])[cut]))
+        if len(cuts):
+            raise InputError(f"{who}: within = {within!r} cuts the element edge from {along} = {cuts[0, 0]:.6g} to"
+                             f" {cuts[0, 1]:.6g}: both must be {along} of nodes; a disc has nodes where it is told to"
+                             f" concentrate")
+        if not comm.allreduce(int(inside.sum()), MPI.SUM):
+            raise InputError(f"{who}: within = {within!r}: {of!r} has nothing there; its {along} is from"
+                             f" {comm.allreduce(lowest.min(initial=np.inf), MPI.MIN):.6g} to"
+                             f" {comm.allreduce(highest.max(initial=-np.inf), MPI.MAX):.6g}")
+        # a facet has one tag: those of the part get new ones, which belong to all that the old ones belonged to
+        first, old = 1 + max(tag for tags in self.boundaries.values() for tag in tags), self.boundaries[of]
+        values, places = self.facets.values.copy(), np.searchsorted(self.facets.indices, facets[inside])
+        values[places] = first + np.searchsorted(old, values[places])
+        new = {tag: first + k for k, tag in enumerate(old)}
+        boundaries = {key: (*tags, *(new[tag] for tag in tags if tag in new)) for key, tags in self.boundaries.items()}
+        return replace(self, facets=meshtags(domain, 1, self.facets.indices, values),
+                       boundaries=boundaries | {name: tuple(new.values())})
 
     def nodes_of(self, boundary: str) -> np.ndarray:
         """Coordinates of all geometry nodes of a boundary, sorted by R, then Z, shape (n, 2); same on all ranks."""
@@ -315,7 +368,14 @@ def write(mesh: Mesh, file: str | os.PathLike, shift: tuple[float, float] = (0.0
 
     A name that ends in .txt: the text format of `formingx.grid`, with its `numbering` ("corners" or "around"). Else a
     gmsh file (MSH 2.2, text). Serial only. Nodes are numbered as in the mesh; `shift` is added to their coordinates.
+
+    Raises:
+        InputError: an unknown numbering, more than one rank, or a boundary that is a part of another (`with_part`).
     """
+    for name, tags in mesh.boundaries.items():
+        if len(tags) > 1:
+            raise InputError(f"mesh.write: boundary {name!r} has a part with a name of its own, which files cannot"
+                             f" hold: write the mesh without it, and call with_part on what is read")
     plain = to_grid(mesh)
     plain = plain._replace(points=plain.points + np.array(shift))
     if _is_text(file):
@@ -326,7 +386,7 @@ def write(mesh: Mesh, file: str | os.PathLike, shift: tuple[float, float] = (0.0
                          f" (.txt) has a choice")
     import gmsh
     with _gmsh_model(mesh.domain.comm) as model:
-        _fill(model, plain, mesh.layers | mesh.boundaries)
+        _fill(model, plain, mesh.layers | {name: tags[0] for name, tags in mesh.boundaries.items()})
         gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
         gmsh.write(os.fspath(file))
 
@@ -395,7 +455,8 @@ def _from_gmsh(build: Any, comm: MPI.Comm) -> Mesh:
         domain, cells, facets = _compat.gmsh_to_mesh(model, comm)
     if domain.topology.cell_name() != "triangle":
         raise InputError(f"the mesh is made of {domain.topology.cell_name()}s: formingx needs triangles")
-    return Mesh(domain, cells, facets, *names)
+    layers, boundaries = names
+    return Mesh(domain, cells, facets, layers, {name: (tag,) for name, tag in boundaries.items()})
 
 
 @contextlib.contextmanager

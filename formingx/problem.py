@@ -116,10 +116,8 @@ class Problem:
 
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         """out = F(x, control); sets `force_scale`."""
-        multipliers = self.set_state(x, control)
-        values, fields = self.assemble(self._residual), x.array_r[: self._n]
-        for contact in self.touching:
-            contact.add_residual(values, fields, control)
+        multipliers, fields = self.set_state(x, control), x.array_r[: self._n]
+        values = self._forces(fields, control)
         self.force_scale = np.sqrt(self._dot(values, values))
         for multiplier, row in zip(multipliers, self._rows, strict=True):
             values += multiplier * row
@@ -128,6 +126,24 @@ class Problem:
                                 in zip(self._rows, self._at, self._there, multipliers, strict=True)])
         if self._left is not None:
             out.axpy(control - 1, self._left)
+
+    def reaction(self, number: int, x: PETSc.Vec, control: float) -> float:
+        """Force of the body on what a support (its number in the scene) drives, along its motion, all ranks.
+
+        Stress length^2 (per depth: length): of the forces that are left over at the unknowns that it holds.
+        """
+        self.set_state(x, control)
+        dofs = np.unique(np.concatenate([dofs for i, _, dofs, driven in self._holds if i == number and driven]))
+        left = self._forces(x.array_r[: self._n], control)[dofs[dofs < self._n]].sum()
+        forms = self.forms
+        return -float(self.comm.allreduce(left, MPI.SUM)) * forms.stress * forms.volume / forms.length
+
+    def _forces(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Internal less external forces at the state last set, which supports carry; owned part, shape (n,)."""
+        values = self.assemble(self._residual)
+        for contact in self.touching:
+            contact.add_residual(values, fields, control)
+        return values
 
     def folded(self, x: PETSc.Vec, control: float) -> bool:
         """True if an element is turned inside out: J is not positive at some quadrature point."""

@@ -1,10 +1,16 @@
-"""Exact solutions to compare with: membrane theory of free inflation; the thick tube and the thick sphere.
+"""Exact solutions to compare with: membranes, inflated or under a flat plug; the thick tube and the thick sphere.
 
 Membrane: Adkins & Rivlin, Phil. Trans. R. Soc. A 244 (1952) 505-531. A flat circular membrane, rim held, under a
 pressure. With stretches l1 (meridional), l2 = r/R, l3 = 1/(l1 l2) and the Mooney energy, tensions per deformed length
 are T1 = 2 h0 l3 (l1^2 - l3^2)(c10 + c01 l2^2), T2 likewise. Equilibrium: d(T1 r)/dr = T2 and
 T1 dtheta/ds + T2 sin(theta)/r = p, theta the slope of the meridian. Integrated from the pole until l2 = 1: only the
 product p R counts, so no shooting is needed.
+
+Plug: the same membrane pushed by a sharp-edged flat plug of radius rp; no pressure acts. Outside the plug, with tensions
+per original length N1 = 2 h0 (l1 - l1^-3 l2^-2)(c10 + c01 l2^2), N2 likewise, and H, V the radial and axial parts of
+R N1: dH/dR = N2, V = force/(2 pi), dr/dR = l1 H/(R N1), dz/dR = l1 V/(R N1). A stuck membrane keeps r = rp at R = rp;
+one that slides without friction is equally stretched over the face, by l0, and N1 goes on across the edge at
+R = rp/l0.
 
 Thick wall (Green & Adkins, Large Elastic Deformations, 1970; Mooney energy): l = r/R, r^n = R^n + a^n - A^n with n = 2
 (tube in plane strain) or 3 (sphere). Equilibrium, integrated from the free outer face: s_rr = g(l_outer) - g(l), with
@@ -98,6 +104,98 @@ def membrane_limit_point(*, radius: float, thickness: float, c10: float,
     found = minimize_scalar(lambda s: -state(s).pressure, bounds=(stretches[i - 1], stretches[i + 1]),
                             method="bounded", options={"xatol": 1e-8})
     return float(found.x), state(found.x)
+
+
+@dataclass(frozen=True)
+class PlugState:
+    """A membrane under a plug, in the units of what was given.
+
+    Attributes:
+        force: on the plug, stress length^2. face_stretch: in both directions under the plug.
+        R, r, z: reference radius and deformed meridian from the plug's edge to the rim, shape (n,), length; rim z = 0.
+        thickness_ratio: l3 at those R, shape (n,).
+    """
+
+    force: float
+    face_stretch: float
+    R: np.ndarray
+    r: np.ndarray
+    z: np.ndarray
+    thickness_ratio: np.ndarray
+
+
+def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thickness: float, c10: float,
+                        c01: float = 0.0, friction: str = "stick") -> PlugState:
+    """The membrane, rim held, that a sharp-edged flat plug has pushed by `travel` (length, above 0).
+
+    Args:
+        friction: on the plug, "stick" or "none".
+
+    Raises:
+        InputError: a size or constant that is not allowed; a travel at which the membrane would touch the plug's side,
+            or that a frictionless plug does not come to.
+    """
+    from scipy.integrate import solve_bvp
+    from scipy.optimize import brentq
+    travel, radius, thickness = positive("travel", travel), positive("radius", radius), positive("thickness", thickness)
+    c10, c01, edge = positive("c10", c10), non_negative("c01", c01), positive("plug_radius", plug_radius) / radius
+    known("membrane_under_plug: friction", friction, ("stick", "none"))
+    if edge >= 1:
+        raise InputError(f"plug_radius = {plug_radius!r}: must be below radius = {radius!r}")
+    k, depth, slides = c01 / c10, travel / radius, friction == "none"
+
+    def tension(l1, l2):                      # lengths over the radius, tensions over 2 c10 h0
+        return (l1 - l1**-3 * l2**-2) * (1 + k * l2**2)
+
+    def stretch(n, l2):                       # l1 of that tension: Newton's method from above
+        n = n / (1 + k * l2**2)
+        l1 = n + l2**-0.5
+        for _ in range(60):
+            l1 = l1 - (l1 - l1**-3 * l2**-2 - n) / (1 + 3 * l1**-4 * l2**-2)
+        return l1
+
+    def start(p):
+        return edge / p[1] if slides else edge
+
+    def slopes(s, y, p):
+        r, _, H = y
+        V, width = p[0], 1 - start(p)
+        R = 1 - width * (1 - s)
+        RN, l2 = np.hypot(H, V), r / R
+        l1 = stretch(RN / R, l2)
+        return width * np.array([l1 * H / RN, l1 * V / RN, tension(l2, l1)])
+
+    def ends(a, b, p):
+        found = [a[0] - edge, a[1] + depth, b[0] - 1, b[1]]
+        if slides:
+            found.append(np.hypot(a[2], p[0]) - start(p) * tension(p[1], p[1]))
+        return np.array(found)
+
+    s = np.linspace(0, 1, 60) ** 2
+    share = min(depth, 0.1)                   # a cone, pushed on to the travel
+    l1 = np.hypot(1, share / (1 - edge))
+    RN = (edge + (1 - edge) * s) * tension(l1, 1.0)
+    y, p = np.array([edge + (1 - edge) * s, share * (s - 1), RN / l1]), [edge * tension(l1, 1.0) * share / (1 - edge)]
+    if slides:
+        p.append(brentq(lambda l: tension(l, l) - tension(l1, 1.0), 1, l1))
+    goal, depth = depth, share
+    while True:
+        found = solve_bvp(slopes, ends, s, y, p, tol=1e-6, max_nodes=5000)
+        if not found.success:
+            raise InputError(f"travel = {travel!r}: the membrane comes to {depth * radius:.6g} and not further:"
+                             f" {found.message}")
+        if depth == goal:
+            break
+        depth, before = min(1.25 * depth, goal), depth
+        y, p = found.sol(s) * np.array([[1], [depth / before], [1]]), found.p
+    r = found.y[0]
+    if r.min() < edge * (1 - 1e-6):
+        raise InputError(f"travel = {travel!r}: the membrane would touch the side of the plug")
+    R = 1 - (1 - start(found.p)) * (1 - found.x)
+    l1 = stretch(np.hypot(found.y[2], found.p[0]) / R, r / R)
+    force = 4 * np.pi * c10 * thickness * radius * found.p[0]
+    return PlugState(float(force), float(found.p[1]) if slides else 1.0, R * radius, r * radius, found.y[1] * radius,
+                     R / (l1 * r))
 
 
 @dataclass(frozen=True)

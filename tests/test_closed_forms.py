@@ -23,11 +23,13 @@ def cylinder(material, model=None):
      lambda s: (s**3 + 2 * s**-1.5 - 3) / 3 + 0.2 / 1.5 * (s**-1.5 + 2 * s**0.75 - 3)),
 ])
 def test_uniaxial_tension_and_compression(material, energy, stretch):
-    """The energy of the homogeneous state, and a radius that keeps the volume."""
+    """The energy of the homogeneous state, the force on the support that is driven, and a volume that stays."""
     path = fx.trace(cylinder(material), until=fx.travel(2.0 * (stretch - 1)))
     volume = np.pi * 2.0
     assert path.last.measures["strain_energy"] == pytest.approx(energy(stretch) * volume, rel=1e-9)
     assert path.last.measures["volume_error"] < 1e-9
+    pulls_back = -np.pi * material.stress("uniaxial", stretch)
+    assert path.last.measures["support_force"] == pytest.approx(pulls_back, rel=1e-8)
     assert path.problem.symmetric
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import ROOT, treloar
+from conftest import ROOT, run_json, treloar
 
 import formingx as fx
 from formingx import _compat
@@ -153,6 +153,54 @@ def test_line_of_a_boundary():
     mesh = fx.mesh.disc(radius=2.0, thickness=0.1, elements=(5, 1))
     np.testing.assert_allclose(mesh.line_of("top"), mesh.nodes_of("top"))
     np.testing.assert_allclose(mesh.line_of("rim"), mesh.nodes_of("rim"))
+
+
+def test_parts_of_a_boundary():
+    """A part has the facets between its ends, the whole keeps them, and parts may overlap."""
+    mesh = fx.mesh.disc(radius=2.0, thickness=0.1, elements=(10, 2), concentrate={0.5: 0.2, 1.2: 0.5})
+    whole = mesh.facets_of("top")
+    mesh = mesh.with_part("plug", "top", (0, 0.5)).with_part("ring", "top", (0.5, 1.2)).with_part("in", "top", (0, 1.2))
+    mesh = mesh.with_part("grip", "rim", (0.05, 1.0), along="z")
+    assert np.array_equal(mesh.facets_of("top"), whole)
+    assert np.array_equal(np.union1d(mesh.facets_of("plug"), mesh.facets_of("ring")), mesh.facets_of("in"))
+    for name, ends in (("plug", (0, 0.5)), ("ring", (0.5, 1.2)), ("in", (0, 1.2)), ("top", (0, 2))):
+        assert mesh.nodes_of(name)[[0, -1], 0] == pytest.approx(ends, abs=1e-12)
+        assert np.ptp(mesh.line_of(name)[:, 0]) == pytest.approx(ends[1] - ends[0])
+    assert mesh.nodes_of("grip")[:, 1] == pytest.approx([0.05, 0.075, 0.1])
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("grip")],
+                     loads=[fx.Pressure("in")])
+    solid = Solid(scene)
+    areas = {name: solid.integral(solid.weight * solid.face(name, 2)[1]) for name in ("plug", "ring", "in", "top")}
+    assert list(areas.values()) == pytest.approx([np.pi * (b**2 - a**2) for a, b in ((0, .5), (.5, 1.2), (0, 1.2),
+                                                                                     (0, 2))], rel=1e-10)
+
+
+def test_parts_on_two_ranks():
+    script = ("import formingx as fx; m = fx.mesh.disc(radius=2.0, thickness=0.1, elements=(20, 1),"
+              " concentrate={0.5: 0.2}).with_part('plug', 'top', (0, 0.5)); n = [len(m.nodes_of(k)) for k in"
+              " ('plug', 'top')]; s = m.domain.comm.allgather(n); import json; s[0] == s[-1] and m.domain.comm.rank or"
+              " print(json.dumps(n))")
+    assert run_json(script, 2) == run_json(script, None)
+
+
+@pytest.mark.parametrize("wrong, words", [
+    ({"name": "rim"}, "name = 'rim': must be a word that no boundary has yet; there are 'axis', 'rim'"),
+    ({"of": "lid"}, "boundary 'lid' is not known"),
+    ({"within": (0.5, 0)}, "the first must be below the second"),
+    ({"within": (0, 0.45)}, "cuts the element edge from r = 0.4 to 0.5: both must be r of nodes"),
+    ({"within": (2, 3)}, r"'top' has nothing there; its r is from 0 to 1"),
+    ({"within": 1}, "within = 1"),
+    ({"along": "x"}, "along 'x' is not known")])
+def test_parts_refuse(wrong, words):
+    mesh = fx.mesh.disc(radius=1.0, thickness=0.1, elements=(10, 1))
+    with pytest.raises(fx.InputError, match=words):
+        mesh.with_part(**{"name": "plug", "of": "top", "within": (0, 0.5), **wrong})
+
+
+def test_a_part_is_not_written(tmp_path):
+    mesh = fx.mesh.disc(radius=1.0, thickness=0.1, elements=(10, 1)).with_part("plug", "top", (0, 0.5))
+    with pytest.raises(fx.InputError, match="boundary 'top' has a part with a name of its own"):
+        fx.mesh.write(mesh, tmp_path / "part.msh")
 
 
 @pytest.mark.parametrize("wrong, words", [

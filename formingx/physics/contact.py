@@ -34,6 +34,10 @@ Were it as stiff as the ramp, that range would be narrower than a step of Newton
 """
 
 
+_AT_FOOT = 1e-7
+"""Distances from the foot of the ramp, over theta, that are as good as none."""
+
+
 class Contact:
     """A face of the body that a rigid tool stops.
 
@@ -90,8 +94,9 @@ class Contact:
 
     def law(self, k: float, theta: float, points: np.ndarray) -> Law:
         """Tractions for a penalty k (stress/length) and a ramp theta (length), at points, shape (n, 2)."""
-        depth = self.tool.signed_distance(points)
-        return Law(self.tool, self.mu, k, theta, np.maximum(depth + (1 - 1e-7) * theta, 0.0), self.separates)
+        foot = (1 - _AT_FOOT * self.separates) * theta
+        shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)
+        return Law(self.tool, self.mu, k, theta, shift, self.separates)
 
     def __repr__(self) -> str:
         return f"Contact({self.on!r}, {self.tool!r}, {self.friction!r})"
@@ -194,7 +199,10 @@ class Law:
 
     def start(self, x: np.ndarray) -> Touch:
         """What points at x remember before anything has happened."""
-        return _touch(x.copy(), self.distance(x), np.zeros(len(x)))
+        d = self.distance(x)
+        if not self.separates:                              # at the foot of the ramp it is held, free of stress
+            d = np.where(np.abs(d / self.theta + 1) < _AT_FOOT, -(1 - _AT_FOOT) * self.theta, d)
+        return _touch(x.copy(), d, np.zeros(len(x)))
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:

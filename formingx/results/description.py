@@ -98,10 +98,9 @@ def _mesh(problem: Any) -> dict[str, Any]:
     sums = comm.allreduce(np.einsum("cn,cnk->k", weights, x), MPI.SUM)
     topology = mesh.domain.topology
 
-    def count(tags, tag, dim):
-        found = tags.find(tag)
+    def count(found, dim):
         return int(comm.allreduce(int(np.sum(found < topology.index_map(dim).size_local)), MPI.SUM))
     return {"cells": total, "extent": [float(v) for v in problem.scene.extent], "length": problem.forms.length,
-            "layers": {name: count(mesh.cells, tag, 2) for name, tag in mesh.layers.items()},
-            "boundaries": {name: count(mesh.facets, tag, 1) for name, tag in mesh.boundaries.items()},
+            "layers": {name: count(mesh.cells.find(tag), 2) for name, tag in mesh.layers.items()},
+            "boundaries": {name: count(mesh.facets_of(name), 1) for name in mesh.boundaries},
             "sums": [float(v) for v in sums]}

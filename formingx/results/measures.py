@@ -251,6 +251,16 @@ class _Nodal(Bound):
         return float(self._over([0.0, *(self._of(contact, x.array_r, control) for contact in there)]))
 
 
+class _Reaction(Bound):
+    """Force of the body on a driven support (by its number in the scene); recorded only."""
+
+    def __init__(self, problem, number):
+        self._problem, self._number = problem, number
+
+    def value(self, x, control):
+        return self._problem.reaction(self._number, x, control)
+
+
 def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     """The measures that every run records, by column name.
 
@@ -258,14 +268,17 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     (stress length^3), mass_error (volume over its original value, minus 1), volume_error (root mean square of
     J - 1). Pole and volume are there where the scene has an axis and a driven pressure. With contacts: contact_length
     (reference length in touch), penetration (of the deepest node, length), tool_force (along Z, of the body on all
-    tools). Where several things can be driven each has its column, plug_travel for one named "plug" (`Scene.column`),
-    and where there are several contacts those with a name have a force, plug_force. `timed`: process_time too.
+    tools). With a driven support: support_force (of the body on it, along its component). Where several things can be
+    driven each has its column, plug_travel for one named "plug" (`Scene.column`), a support plug_force; and where there
+    are several contacts those with a name have a force, plug_force. `timed`: process_time too.
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
     found: dict[str, Bound] = {"process_time": Amplitude(problem, -1)} if timed else {}
     for i, thing in enumerate(scene.things):
         if any(thing is t for t in scene.drivable):
-            found[scene.column(thing)] = Amplitude(problem, i)
+            found[column := scene.column(thing)] = Amplitude(problem, i)
+            if hasattr(thing, "constraints"):
+                found["support_force" if column == thing.quantity else f"{thing.name}_force"] = _Reaction(problem, i)
     if "axis" in scene.mesh.boundaries:
         found["pole_height"] = bind_pole_height(problem)
         found["pole_stretch"] = bind_pole_stretch(problem)
