@@ -6,11 +6,11 @@ are T1 = 2 h0 l3 (l1^2 - l3^2)(c10 + c01 l2^2), T2 likewise. Equilibrium: d(T1 r
 T1 dtheta/ds + T2 sin(theta)/r = p, theta the slope of the meridian. Integrated from the pole until l2 = 1: only the
 product p R counts, so no shooting is needed.
 
-Plug: the same membrane pushed by a sharp-edged flat plug of radius rp; no pressure acts. Outside the plug, with tensions
-per original length N1 = 2 h0 (l1 - l1^-3 l2^-2)(c10 + c01 l2^2), N2 likewise, and H, V the radial and axial parts of
-R N1: dH/dR = N2, V = force/(2 pi), dr/dR = l1 H/(R N1), dz/dR = l1 V/(R N1). A stuck membrane keeps r = rp at R = rp;
-one that slides without friction is equally stretched over the face, by l0, and N1 goes on across the edge at
-R = rp/l0.
+Plug: the same membrane pushed by a sharp-edged flat plug of radius rp; no pressure acts. Outside the plug, with
+tensions per original length N1 = 2 h0 (l1 - l1^-3 l2^-2)(c10 + c01 l2^2), N2 likewise, and H, V the radial and axial
+parts of R N1: dH/dR = N2, V = force/(2 pi), dr/dR = l1 H/(R N1), dz/dR = l1 V/(R N1). A stuck membrane keeps r = rp
+at R = rp; one that slides without friction is equally stretched over the face, by l0, and N1 goes on across the edge
+at R = rp/l0.
 
 Thick wall (Green & Adkins, Large Elastic Deformations, 1970; Mooney energy): l = r/R, r^n = R^n + a^n - A^n with n = 2
 (tube in plane strain) or 3 (sphere). Equilibrium, integrated from the free outer face: s_rr = g(l_outer) - g(l), with
