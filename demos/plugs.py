@@ -71,9 +71,6 @@ def key_numbers(path, end, travels, places, plug_radius, thickness) -> dict:
     met = {f"{t:g}": path.met(fx.travel(t)) for t in travels}
     met = {key: state for key, state in met.items() if state is not None}
     shapes = {key: path.profile(state) for key, state in met.items()}
-    last = path.profile()
-    flat = last.wall_ratio[last.reference_radius <= plug_radius]
-    outside = last.rest_top[:, 0] > plug_radius
     return {
         "force_N_at_travel_cm": {key: force(state) for key, state in met.items()},
         "thickness_ratio_at_travel_cm": {
@@ -81,14 +78,25 @@ def key_numbers(path, end, travels, places, plug_radius, thickness) -> dict:
         "wall_ratio_at_travel_cm": {
             key: {name: float(np.interp(R, shape.reference_radius, shape.wall_ratio))
                   for name, R in places.items()} for key, shape in shapes.items()},
-        "stretches_at_pole": pole_stretches(path, path.last, thickness),
-        "flat_top_thickness_ratio": [float(flat.min()), float(flat.max())],
-        "mean_hoop_deviation_outside_plug": float(np.abs(last.top[outside, 0] / last.rest_top[outside, 0] - 1).mean()),
+        **shape_numbers(path, path.last, plug_radius, thickness),
         "reached_travel_cm": float(path["travel"].max()),
         "largest_force_N": NEWTON * float(path["tool_force"].max()),
         "largest_penetration_over_h0": float(path["penetration"].max()) / thickness,
         "ended": end,
         **cost(path),
+    }
+
+
+def shape_numbers(path, state, plug_radius, thickness) -> dict:
+    """Stretches at the pole, least and largest wall of what lay under the plug at rest, hoop stretch outside it."""
+    shape = path.profile(state)
+    flat = shape.wall_ratio[shape.reference_radius <= plug_radius]
+    outside = shape.rest_top[:, 0] > plug_radius
+    hoop = shape.top[outside, 0] / shape.rest_top[outside, 0]
+    return {
+        "stretches_at_pole": pole_stretches(path, state, thickness),
+        "flat_top_thickness_ratio": [float(flat.min()), float(flat.max())],
+        "mean_hoop_deviation_outside_plug": float(np.abs(hoop - 1).mean()),
     }
 
 
