@@ -133,6 +133,17 @@ def test_williams_plug_quick(tmp_path):
         assert (tmp_path / f"{picture}.png").stat().st_size > 10_000
 
 
+def test_plug_stress_quick(tmp_path):
+    found = summary("plug_stress", tmp_path, "--quick")
+    held, slips = (found[law]["coarse"]["6"] for law in ("held", "frictionless"))
+    for name in ("largest_sigma_1", "largest_eps_1"):                # at the edge of the plug, as the thesis
+        assert held[name]["side"] == "top" and held[name]["R_cm"] == pytest.approx(1.95, abs=0.15)
+    assert held["distance_of_largest_sigma_1_and_eps_1_over_rp"] < 0.1 and not held["peak_of_sigma_1"]["converged"]
+    assert slips["largest_eps_1"]["R_cm"] < 1.905 and slips["peak_of_sigma_1"]["value"] == pytest.approx(3.2, rel=0.1)
+    for picture in ("contours_held", "contours_frictionless", "faces"):
+        assert (tmp_path / f"{picture}.png").stat().st_size > 10_000
+
+
 def test_plug_and_vacuum_quick(tmp_path):
     found = summary("plug_and_vacuum", tmp_path, "--quick")
     straight, lifts, holds, carries = (found[name] for name in ("straight", "lifts", "holds", "carries"))
