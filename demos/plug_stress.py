@@ -123,7 +123,8 @@ def draw(found, tool, travel, law):
             v = found.values[name].ravel()
             levels = np.linspace(v[near].min(), v[near].max(), 11)
             shades = ax.tricontourf(*x.T, triangles, v, levels=levels, cmap="viridis", extend="both")
-            bar = figure.colorbar(shades, ax=ax, shrink=0.8, ticks=levels[::2], format="%.3g", extendrect=True, extendfrac=0)
+            bar = figure.colorbar(shades, ax=ax, shrink=0.8, ticks=levels[::2], format="%.3g",
+                                  extendrect=True, extendfrac=0)
             ends = levels[[0, -1]]
             left = bar.ax.secondary_yaxis("left", functions=(lambda y, a=ends: (y - a[0]) / (a[1] - a[0]),
                                                              lambda y, a=ends: a[0] + y * (a[1] - a[0])))
