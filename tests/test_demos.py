@@ -143,3 +143,18 @@ def test_plug_and_vacuum_quick(tmp_path):
     assert len(found["map"]) == 4 and not any("ended" in point for point in found["map"])
     for picture in ("plug_and_vacuum", "map"):
         assert (tmp_path / f"{picture}.png").stat().st_size > 10_000
+
+
+def test_throne_plug_quick(tmp_path):
+    found = summary("throne_plug", tmp_path, "--quick")
+    for name in ("thin_treloar", "thick"):
+        held, slips = found[name]["held"], found[name]["frictionless"]
+        assert held["reached_plug_radii"] > 3
+        forces = list(held["force_N_at_travel_cm"].values())
+        assert forces == sorted(forces)
+        for law in (held, slips):
+            for ratio in law["force_over_membrane_at_travel_cm"].values():
+                assert ratio == pytest.approx(1.0, abs=0.05)
+    assert found["comparison"]["largest_difference_of_rims"] < 0.02         # thesis: small differences
+    for picture in ("forces", "profiles"):
+        assert (tmp_path / f"{picture}.png").stat().st_size > 10_000
