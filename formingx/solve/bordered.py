@@ -16,7 +16,10 @@ UNLOADED = 1e-5
 """Support forces (over stress times volume over length) below which a body counts as unloaded."""
 
 SETTLING = 40
-"""At most so many iterations, points touching and letting go on the way."""
+"""At most so many iterations, points touching and letting go on the way, that come to no new branch.
+
+A slack sheet lies on a flat plug with a hundred points, which let go one or two at a time: that is no going round.
+"""
 
 SMALL = 1e-3
 """Corrections (dimensionless displacement) below which growth is no sign of divergence: points touch and let go."""
@@ -49,13 +52,14 @@ class _Kinks:
     Attributes:
         changed: the iteration that came to the branch it is on; share: of a correction to take: less when an iteration
             comes back to a branch that it had left, for then it would go round for ever.
+        found: how often it came to a branch that was new.
     """
 
     def __init__(self, problem: Any):
         self._problem, self._iteration = problem, -1
         self._seen: dict[Any, int] = {}
         self._last: Any = None
-        self.changed, self.share = 0, 1.0
+        self.changed, self.share, self.found = 0, 1.0, 0
 
     def look(self) -> None:
         """To be called once an iteration, after the residual was computed."""
@@ -65,6 +69,8 @@ class _Kinks:
             self.changed = self._iteration
             if now in self._seen:
                 self.share = max(self.share / 2, 0.25)
+            else:
+                self.found += 1
         elif self._iteration > self.changed + 1:
             self.share = 1.0
         self._seen[now] = self._iteration
@@ -168,8 +174,9 @@ class BorderedNewton:
             grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
             if grown and not (problem.has_kinks and moved < SMALL):
                 raise Failure("the iteration diverges", history)
-            if len(quiet) >= self.tolerances.iterations or len(history) >= SETTLING:
-                unsettled = len(history) >= SETTLING and len(history) - kinks.changed < 3
+            settling = len(history) - min(kinks.found, 4 * SETTLING) >= SETTLING
+            if len(quiet) >= self.tolerances.iterations or settling:
+                unsettled = settling and len(history) - kinks.changed < 3
                 raise Failure("contact does not settle: " * unsettled + f"no convergence in {len(history)} iterations",
                               history)
             if not self.tangent(x, control):
