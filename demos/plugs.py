@@ -98,14 +98,23 @@ def course(path, end, travels, places) -> dict:
 
 def key_numbers(path, end, travels, places, plug_radius, thickness) -> dict:
     """What the summary holds of the path of a plug: `course`, and what its last state is like."""
-    last = path.profile()
-    flat = last.wall_ratio[last.reference_radius <= plug_radius]
-    outside = last.rest_top[:, 0] > plug_radius
-    return course(path, end, travels, places) | {
-        "stretches_at_pole": pole_stretches(path, path.last, thickness),
-        "flat_top_thickness_ratio": [float(flat.min()), float(flat.max())],
-        "mean_hoop_deviation_outside_plug": float(np.abs(last.top[outside, 0] / last.rest_top[outside, 0] - 1).mean()),
+    return {
+        **course(path, end, travels, places),
+        **shape_numbers(path, path.last, plug_radius, thickness),
         "largest_penetration_over_h0": float(path["penetration"].max()) / thickness,
+    }
+
+
+def shape_numbers(path, state, plug_radius, thickness) -> dict:
+    """Stretches at the pole, least and largest wall of what lay under the plug at rest, hoop stretch outside it."""
+    shape = path.profile(state)
+    flat = shape.wall_ratio[shape.reference_radius <= plug_radius]
+    outside = shape.rest_top[:, 0] > plug_radius
+    hoop = shape.top[outside, 0] / shape.rest_top[outside, 0]
+    return {
+        "stretches_at_pole": pole_stretches(path, state, thickness),
+        "flat_top_thickness_ratio": [float(flat.min()), float(flat.max())],
+        "mean_hoop_deviation_outside_plug": float(np.abs(hoop - 1).mean()),
     }
 
 

@@ -37,6 +37,14 @@ def main():
         n = plugs.key_numbers(path, end, TRAVELS, PLACES, PLUG, THICKNESS)
         summary[name], paths[name] = n | {"elements": list(elements)}, path
         tell(name, n)
+        if law == "frictionless":                                # figures 6.3 and 6.4
+            state = path.at(fx.pole_stretch(THESIS["pole_stretch_with_slip"]))
+            n = plugs.shape_numbers(path, state, PLUG, THICKNESS)
+            n |= {"travel_cm": state.measures["travel"], "force_N": plugs.force(state)}
+            summary["frictionless_at_pole_stretch_of_thesis"] = n
+            flat, off = n["flat_top_thickness_ratio"], n["mean_hoop_deviation_outside_plug"]
+            say(f"  at the pole stretch of figure 6.4, 1.25: travel {n['travel_cm']:.3f} cm, {n['force_N']:.1f} N, wall"
+                f" under the plug over h0 {flat[0]:.3f} to {flat[1]:.3f}, hoop stretch off 1 by {off:.3f}")
         plugs.write(path, args.out, name)
     made = plugs.scene(RADIUS, THICKNESS, PLUG, args.fillet, fx.NeoHookean(c10=C10), "held", RUNS["held"][0],
                        fx.SimplySupported("rim"))

@@ -116,11 +116,12 @@ class NodalContact:
             values = self.law.stiffness_ahead(self.positions(fields, control), self._memory, self._arrived)
         return (self._scale * self._length)[:, None, None] * values
 
-    def add_control_derivative(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
-        """Add the derivative of the nodal forces by the control: the tool moves."""
+    def add_control_derivative(self, values: np.ndarray, fields: np.ndarray, control: float,
+                               ahead: bool = False) -> None:
+        """Add the derivative of the nodal forces by the control: the tool moves; `ahead`: as in `stiffness`."""
         if self.rate:
-            by_position = self._scale[:, None, None] * self.tractions(fields, control).stiffness
-            values[self.dofs] -= by_position @ (self.rate * self._motion)
+            by_motion = self.stiffness(fields, control, ahead) @ (self.rate * self._motion / self._length)
+            values[self.dofs] -= by_motion
 
     def advance(self, fields: np.ndarray, control: float) -> None:
         """A state is accepted: remember it."""

@@ -173,14 +173,14 @@ class Problem:
         fields = x.array_r[: self._n]
         return self._matrix.fill([(c.dofs, c.stiffness(fields, control, ahead)) for c in self.touching])
 
-    def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
-        """out = dF/dcontrol at (x, control)."""
+    def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, ahead: bool = False) -> None:
+        """out = dF/dcontrol at (x, control); `ahead`: as in `tangent`."""
         self.set_state(x, control)
         values = self.assemble(self._by_control) if self._by_control else np.zeros(self._n)
         if self._moving:
             values += self.assemble(self._by_motion)
         for contact in self.touching:
-            contact.add_control_derivative(values, x.array_r[: self._n], control)
+            contact.add_control_derivative(values, x.array_r[: self._n], control, ahead)
         values[self._held] = -self._motion
         self.fill(out, values)
         if self._left is not None:

@@ -12,6 +12,11 @@ import formingx as fx
 ROOT = Path(__file__).parents[1]
 
 
+def pytest_collection_finish():
+    """What was imported stays: leave it out of every collection of garbage."""
+    gc.freeze()
+
+
 @pytest.fixture(autouse=True)
 def collect_garbage():
     """PETSc objects are freed collectively: free them between tests, not whenever Python likes."""

@@ -240,7 +240,7 @@ def test_report_of_tools(plugged, formed, tmp_path):
     text = page(tmp_path / "run.html")
     force = f"{plugged.last.measures['plug_force']:.6g}"
     for words in ("plug", "1 arc, closed", "moves along (0, -1)", force, "floor", "1 line from", "stays",
-                  "the tools along the path"):
+                  "the tools along the path", " Stages ", "plug travel at its end"):
         assert words in text
     plugged.save(tmp_path / "run")
     assert main(["report", str(tmp_path / "run"), "--out", str(tmp_path / "again.html")]) == 0

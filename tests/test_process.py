@@ -71,6 +71,22 @@ def test_the_order_of_stages_does_not_matter_without_friction(there_and_back):
     assert same(other.last, end(there_and_back, "high"))
 
 
+@pytest.mark.parametrize("friction", ["none", 0.3, 1.0, "stick"])
+def test_a_plug_in_strokes_lets_the_sheet_come_back_to_rest(friction):
+    """Back at rest the plug touches the pole without force: there its force grows as the square of the depth."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(20, 1)), materials=fx.NeoHookean(c10=0.2),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", tools.sphere(radius=3.0, z=0.3), friction, moves=(0, -1))])
+    strokes = [Stage(f"{way} {k}", drive=scene.driven, until=fx.travel(depth * (way == "down")))
+               for k, depth in enumerate((1.0, 2.0, 2.0)) for way in ("down", "up")]
+    path = run(scene, *strokes)
+    for k in range(3):
+        rest = end(path, f"up {k}").measures
+        assert abs(rest["pole_height"]) < 1e-9 and rest["tool_force"] < 1e-10 * path["tool_force"].max()
+    second, third = (end(path, f"down {k}").measures["tool_force"] for k in (1, 2))
+    assert third == pytest.approx(second, rel=1e-3)            # where it sticks depends on the steps, a little
+
+
 def test_one_stage_is_a_trace():
     scene = fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")])

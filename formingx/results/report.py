@@ -33,7 +33,7 @@ class Record:
 
     Attributes:
         summary: {part of the scene: one line}; versions: {program: version}; axisymmetric: else plane strain.
-        kinds: of the states; measures: {column: shape (n,)}.
+        kinds: of the states; stages: their names, "" in a run without; measures: {column: shape (n,)}.
         histories: of the n states, rows (residual, correction, work) of Newton's iterations.
         profiles: of the n states, each a `Profile`, or None.
         counts: what the run cost; until: (measure, value) that it aimed at, or None.
@@ -44,6 +44,7 @@ class Record:
     versions: dict[str, str]
     axisymmetric: bool
     kinds: list[str]
+    stages: list[str]
     measures: dict[str, np.ndarray]
     histories: list[list]
     profiles: list[Any]
@@ -93,7 +94,7 @@ def of_path(path: Any) -> Record:
     stepping: dict = next((s.stepping for s in reversed(path.states) if s.stepping), {})
     tooling = Tooling.of_problem(problem)
     return Record(summary(problem.scene), files.versions(), problem.scene.kinematics.dimension_of_volume == 3,
-                  [s.kind for s in path.states], {c: path[c] for c in path.columns},
+                  [s.kind for s in path.states], [s.stage for s in path.states], {c: path[c] for c in path.columns},
                   [list(s.history) for s in path.states], profiles, vars(path.counts), stepping.get("until"), tooling,
                   [tooling.travels(s.setting, s.control) for s in path.states])
 
@@ -104,8 +105,8 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
     tooling = Tooling.of_description(about["scene"])
     profiles = [s["profile"] and Profile(**{k: np.array(v) for k, v in s["profile"].items()}) for s in states]
     return Record(about["summary"], about["versions"], about["scene"]["kinematics"]["kind"] == "Axisymmetric",
-                  [s["kind"] for s in states], {c: np.array([s["measures"][c] for s in states])
-                                                for c in states[0]["measures"]},
+                  [s["kind"] for s in states], [s["stage"] for s in states],
+                  {c: np.array([s["measures"][c] for s in states]) for c in states[0]["measures"]},
                   [s["history"] for s in states], profiles, stepping.get("counts", {}), stepping.get("until"), tooling,
                   [tooling.travels(s.get("setting", {}), s["control"]) for s in states])
 
@@ -132,6 +133,9 @@ def _page(record: Record, title: str, failure: Any) -> str:
     else:
         parts.append("<p class=good>No warnings: the target was met, mass and penetration are within bounds.</p>")
     parts += ["<h2>Results</h2>", _key_numbers(record)]
+    if any(record.stages):
+        parts += ["<h2>Stages</h2>", _stages(record),
+                  _figure(_course(record), "What is driven, and the forces on the tools, from state to state.")]
     if len(record.kinds) > 1:
         parts.append(_figure(_curves(record), "The states (dots), limit points (rings), and the path through them."))
     if record.profiles[-1] is not None:
@@ -197,6 +201,42 @@ def _key_numbers(record: Record) -> str:
     return _table(head, rows)
 
 
+def _course_columns(record: Record) -> list[list[str]]:
+    """Columns of what is driven, and of forces, of one kind each."""
+    kinds = [[c for c in record.measures if c.endswith(end)] for end in ("pressure", "travel", "displacement", "force")]
+    return [columns for columns in kinds if columns]
+
+
+def _stages(record: Record) -> str:
+    """Every stage: its states and iterations, and where it ended."""
+    columns = [c for kind in _course_columns(record) for c in kind]
+    rows = []
+    for stage in dict.fromkeys(record.stages):
+        mine = [k for k, s in enumerate(record.stages) if s == stage]
+        iterations = sum(max(len(record.histories[k]) - 1, 0) for k in mine)
+        profile = record.profiles[mine[-1]]
+        ends = [_number(record.measures[c][mine[-1]]) for c in columns]
+        rows.append([stage, str(len(mine) - 1), str(iterations), *ends,
+                     "" if profile is None else _number(profile.wall_ratio.min())])
+    return _table(["stage", "states", "iterations", *(f"{_words(c)} at its end" for c in columns),
+                   "smallest thickness / original"], rows)
+
+
+def _course(record: Record) -> Any:
+    """What is driven, and forces, against the number of the state; stages in turn white and grey."""
+    kinds = _course_columns(record)
+    ends = [k for k in range(1, len(record.stages)) if record.stages[k] != record.stages[k - 1]]
+    figure, axes = plots.figure(len(kinds), width=11 / len(kinds), height=3.4)
+    for ax, columns in zip(np.atleast_1d(axes), kinds):
+        for column in columns:
+            ax.plot(record.measures[column], ".-", linewidth=1, label=_words(column))
+        for a, b in zip(ends[::2], [*ends[1::2], len(record.stages)]):
+            ax.axvspan(a - 0.5, b - 0.5, color="0.94", zorder=0)
+        ax.set(xlabel="state")
+        ax.legend(frameon=False, fontsize=8)
+    return figure
+
+
 def _curves(record: Record) -> Any:
     pairs = [plots.main_columns(list(record.measures))]
     others = [c for c in ("pole_stretch", "pole_height", "enclosed_volume")
@@ -256,7 +296,8 @@ def _tools(record: Record) -> str:
         force = record.measures.get("tool_force" if len(contacts) == 1 else f"{contact.name}_force")
         moves = "stays" if contact.moves is None else "moves along ({:g}, {:g})".format(*contact.moves)
         where = "takes no part" if travel is None else _number(travel) if contact.moves else ""
-        rows.append([contact.name or "", contact.on, repr(contact.tool)[5:-1], str(contact.friction),
+        rows.append([contact.name or "", contact.on, repr(contact.tool)[5:-1],
+                     f"{contact.friction}{'' if contact.separates else ', holds what has touched'}",
                      _number(contact.penalty), moves, where, "" if force is None else _number(force[-1])])
     return _table(["tool", "face", "profile", "friction", "penalty", "motion", "travel at the end",
                    "force along z at the end"], rows)

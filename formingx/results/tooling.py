@@ -51,5 +51,5 @@ def _contact(data: dict[str, Any]) -> Contact:
     pieces = [(Line if len(piece) == 2 else Arc)(*(np.array(v) if isinstance(v, list) else v for v in piece))
               for piece in shape["pieces"]]
     moves = data["moves"] and tuple(data["moves"])
-    more = {name: data[name] for name in ("penalty", "ramp", "nodes_per_step", "name")}
+    more = {name: data[name] for name in ("penalty", "ramp", "separates", "nodes_per_step", "name")}
     return Contact(data["on"], Tool.of_pieces(pieces, shape["closed"]), data["friction"], moves=moves, **more)

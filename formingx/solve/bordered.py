@@ -15,6 +15,10 @@ from .direct import DirectSolver
 UNLOADED = 1e-5
 """Support forces (over stress times volume over length) below which a body counts as unloaded."""
 
+AT_REST = 1e-2
+"""Displacements (dimensionless) below which corrections are measured against this: where a body comes back to rest on
+a tool, the tool's force vanishes as the square of the depth, and no correction is as small as the displacements."""
+
 SETTLING = 40
 """At most so many iterations, points touching and letting go on the way, that come to no new branch.
 
@@ -28,7 +32,7 @@ SMALL = 1e-3
 class Iteration(NamedTuple):
     """One Newton iteration: what it found and what it did. The last entry of a history is the converged state.
 
-    residual: |F| before it, over the norm of the support forces; correction: |dx|/|x|, criterion (3.5.1);
+    residual: |F| before it, over the norm of the support forces; correction: |dx|/(|x| + AT_REST), criterion (3.5.1);
     work: |F . dx| over its first value, criterion (3.5.2).
     """
 
@@ -81,7 +85,7 @@ class _Kinks:
 class Tolerances:
     """When a state counts as converged: all of these.
 
-    correction: the next correction that quadratic convergence predicts, over the norm of x.
+    correction: the next correction that quadratic convergence predicts, over the norm of x (and `AT_REST`).
     residual: norm of F over the norm of the support forces.
     iterations: at most so many.
 
@@ -140,7 +144,7 @@ class BorderedNewton:
         self.problem.tangent(x, control, ahead)
         if not self.solver.factorise():
             return False
-        self.problem.control_derivative(x, control, self.F_control)
+        self.problem.control_derivative(x, control, self.F_control, ahead)
         self.solver.solve(self.F_control, self.b)
         self.b.scale(-1)
         return bool(np.isfinite(self.b.norm()))
@@ -194,7 +198,7 @@ class BorderedNewton:
             x.axpy(kinks.share, self.a)
             control += kinks.share * step
             moved = self._norm(self.a, step)
-            correction = moved / (self._norm(x, control) + 1e-8)
+            correction = moved / (self._norm(x, control) + AT_REST)
             if not np.isfinite(correction):
                 raise Failure("the tangent matrix is singular", history)
             history.append(Iteration(residual, correction, work / work0))

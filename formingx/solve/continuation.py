@@ -130,9 +130,11 @@ class Run:
                 self._settle()
                 self._check_direction()
                 _show(bar, self.states, self.until)
+        except BaseException:
+            path.counts.seconds += self._elapsed()
+            raise
         finally:
             bar.close()
-            path.counts.seconds += self._elapsed()
 
     @property
     def states(self) -> list[State]:

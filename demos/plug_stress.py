@@ -1,0 +1,144 @@
+"""Where a plugged sheet is strained and stressed most, with and without slip (Song 1993, section 6.4, figs. 6.11-6.15).
+
+Sheet and plug as in demos/williams_plug.py, at one travel (the thesis prints none; at 4.8 cm the stretch at the
+pole is its 1.25, with slip). Principal values in the manner of the thesis: 1 the larger and 2 the smaller in the (r, z)
+plane, 3 around the axis. Euler strain eps = (1 - 1/l^2) / 2. A mesh is refined once, to see what has converged. Lengths
+in cm, stresses in MPa.
+"""
+
+import numpy as np
+import plugs
+from common import COMM, parser, save, say, summarise
+from williams_plug import C10, PLUG, RADIUS, THICKNESS
+
+import formingx as fx
+from formingx.results import files, plots
+from formingx.results.fields import Fields
+
+LAWS = {"held": (60, 3), "frictionless": (80, 3)}            # elements
+NEAR = 2 * PLUG                                              # a clamped rim has a peak of its own
+CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+THESIS = {"held": "largest sigma_1, sigma_2, sigma_3 on top at R = 1.905 cm; largest eps_1 on top near R = 2.1 cm;"
+                  " the two less than 10 % of rp apart",
+          "frictionless": "largest stresses at R = 1.905 cm; largest eps_1 in the middle of the sheet"}
+LABELS = {"sigma_1": r"$\sigma_1$, MPa", "sigma_3": r"$\sigma_3$, MPa", "eps_1": r"$\epsilon_1$",
+          "eps_2": r"$\epsilon_2$", "eps_3": r"$\epsilon_3$"}
+
+
+class Corners:
+    """Values at the corners of all cells that lie near the plug, each cell with its own: shape (cells, 3)."""
+
+    def __init__(self, path):
+        fields, stress = Fields(path), path.stress().in_cells(CORNERS)
+        u = fields.of(path.last)["displacement"]
+        sigma, F = stress.cauchy, stress.deformation_gradient
+        plane = np.linalg.eigvalsh(sigma[:, :2, :2])
+        value, vector = np.linalg.eigh((F @ F.transpose(0, 2, 1))[:, :2, :2])
+        strain = (1 - 1 / np.column_stack([value[:, ::-1], F[:, 2, 2] ** 2])) / 2
+        columns = np.column_stack([plane[:, ::-1], sigma[:, 2, 2], strain, vector[:, :, 1]]).reshape(len(u), 3, -1)
+        rows = np.concatenate([fields.points[:, :3], (fields.points + u)[:, :3], columns], axis=2)
+        rows = np.concatenate(COMM.allgather(rows))
+        rows = rows[rows[:, :, 0].mean(1) < NEAR]
+        self.rest, self.now, self.direction = rows[..., :2], rows[..., 2:4], rows[..., 10:]
+        names = ("sigma_1", "sigma_2", "sigma_3", "eps_1", "eps_2", "eps_3")
+        self.values = {name: rows[..., 4 + k] for k, name in enumerate(names)}
+
+    def largest(self, name) -> dict:
+        """The largest value, and where: R, height in the sheet at rest, side."""
+        k = np.unravel_index(self.values[name].argmax(), self.values[name].shape)
+        R, Z = self.rest[k]
+        side = "top" if Z > 0.95 * THICKNESS else "bottom" if Z < 0.05 * THICKNESS else "inside"
+        return {"value": float(self.values[name][k]), "R_cm": float(R), "Z_over_h0": float(Z / THICKNESS), "side": side,
+                "r_cm": float(self.now[k][0]), "z_cm": float(self.now[k][1])}
+
+
+def press(law, elements, fillet, travel):
+    """The path to the travel."""
+    made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), law, elements)
+    return fx.trace(made, until=fx.travel(travel), step=fx.StepControl(target=6), max_steps=400)
+
+
+def key_numbers(path, corners) -> dict:
+    """What the summary holds of one state."""
+    found = {f"largest_{name}": corners.largest(name) for name in corners.values}
+    sigma, eps = found["largest_sigma_1"], found["largest_eps_1"]
+    apart = np.hypot(sigma["r_cm"] - eps["r_cm"], sigma["z_cm"] - eps["z_cm"])
+    peak = path.stress().peak(radii=(0.0, NEAR))
+    return {**found, "distance_of_largest_sigma_1_and_eps_1_over_rp": float(apart / PLUG),
+            "peak_of_sigma_1": {"value": peak.value, "error": peak.error, "converged": bool(peak.converged),
+                                "in_words": str(peak)}}
+
+
+def main():
+    options = parser("plug_stress", __doc__.splitlines()[0])
+    options.add_argument("--fillet", type=float, default=0.35, help="radius of the plug's edge, cm")
+    options.add_argument("--travel", type=float, default=4.8, help="of the plug, cm")
+    args = options.parse_args()
+    summary: dict = {"thesis": THESIS}
+    paths, corners = {}, {}
+    for law, elements in LAWS.items():
+        meshes = {"coarse": (40, 2)} if args.quick else {"standard": elements, "refined": (elements[0] * 3 // 2, 4)}
+        summary[law] = {}
+        for mesh, elements in meshes.items():
+            paths[law] = path = press(law, elements, args.fillet, args.travel)
+            corners[law] = Corners(path)
+            summary[law][mesh] = n = key_numbers(path, corners[law]) | {"elements": list(elements)}
+            say(f"{law}, {elements[0]} x {elements[1]} elements:", *(
+                f"  largest {name:8} {m['value']:8.4f} at R = {m['R_cm']:.3f} cm, Z = {m['Z_over_h0']:.2f} h0,"
+                f" {m['side']}"
+                for name, m in ((name, n[f"largest_{name}"]) for name in corners[law].values)),
+                f"  largest sigma_1 and eps_1 are {n['distance_of_largest_sigma_1_and_eps_1_over_rp']:.3f} rp apart",
+                f"  {n['peak_of_sigma_1']['in_words']}")
+    tool = plugs.plug(PLUG, THICKNESS, args.fillet)
+    for law, found in corners.items():
+        save(draw(found, tool, args.travel, law), args.out / f"contours_{law}.png")
+    save(draw_faces(paths), args.out / "faces.png")
+    summarise(args.out, {**summary, "travel_cm": args.travel, "fillet_cm": args.fillet, "versions": files.versions()})
+
+
+def draw(found, tool, travel, law):
+    """Contours near the plug, in units (right of the bar) and normalised to 0 ... 1 as in the thesis (left), and where
+    the first principal direction of strain points: figs. 6.11 to 6.13, 6.15."""
+    figure, axes = plots.figure(5, width=3.4, height=4.4)
+    x, triangles = found.now.reshape(-1, 2), np.arange(found.now[..., 0].size).reshape(-1, 3)
+    for ax, name in zip(axes, ("sigma_1", "sigma_3", "eps_1", "eps_2", "eps_3")):
+        v = found.values[name].ravel()
+        low, high = v.min(), v.max()
+        shades = ax.tricontourf(*x.T, triangles, v, levels=np.linspace(low, high, 11), cmap="viridis")
+        bar = ax.figure.colorbar(shades, ax=ax, shrink=0.7, label=LABELS[name])
+        left = bar.ax.secondary_yaxis("left", functions=(lambda y, a=low, b=high: (y - a) / (b - a),
+                                                         lambda y, a=low, b=high: a + y * (b - a)))
+        left.tick_params(labelsize="x-small")
+        k = np.unravel_index(found.values[name].argmax(), found.values[name].shape)
+        ax.plot(*found.now[k], "o", color="red", fillstyle="none", markersize=9)
+        ax.plot(*(tool.outline() - [0, travel]).T, "k", linewidth=1.2)
+        low = x[:, 1].min()
+        ax.set(xlim=(0, 1.6 * PLUG), ylim=(low - 0.1, low + 2.4), xlabel="r, cm", title=LABELS[name])
+        ax.set_aspect("equal")
+        ax.grid(False)
+    middle, way = found.now.mean(1), found.direction.mean(1)
+    ends = np.stack([middle - 0.05 * way, middle + 0.05 * way], 1)
+    for line in ends:
+        axes[2].plot(*line.T, color="white", linewidth=0.6)
+    axes[0].set(ylabel="z, cm")
+    figure.suptitle(f"{law}, {travel:g} cm")
+    return figure
+
+
+def draw_faces(paths):
+    """The first principal stress along both faces: fig. 6.14."""
+    figure, axes = plots.figure(len(paths), width=4.8)
+    R = np.linspace(0, 0.97 * RADIUS, 400)
+    for ax, (law, path) in zip(axes, paths.items()):
+        field = path.stress()
+        for face, Z in (("top", THICKNESS), ("bottom", 0.0)):
+            sigma = field.at(np.column_stack([R, np.full_like(R, Z)])).cauchy
+            ax.plot(R, np.linalg.eigvalsh(sigma[:, :2, :2])[:, 1], label=face)
+        ax.axvline(PLUG, color="0.7", linewidth=1)
+        ax.set(xlabel="reference radius R, cm", ylabel=r"$\sigma_1$, MPa", title=law)
+        ax.legend(frameon=False)
+    return figure
+
+
+if __name__ == "__main__":
+    main()
