@@ -2,10 +2,10 @@
 
 Mooney rubber, C10 the I1 constant; r0 = 7.62 cm. Thin: h0 = 0.0254 cm (r0/h0 = 300), plug radius 1.05 cm, with Throne's
 constants (0.1213, 0.03327 MPa) and with Treloar's (0.143, 0.03327 MPa); thick: h0 = 0.076 cm (100), plug radius 2.30 cm
-(0.1731, 0.004006 MPa). "held": what touches the plug never lets go (no slip), to 10 cm; "frictionless", to a pole stretch
-of 3; each with a clamped and with a hinged rim, beside the membrane under a plug with a sharp edge
-(`formingx.reference`). The plug's edge is rounded here (--fillet); with smaller fillets the force comes to that of the
-membrane. Lengths in cm, forces in N.
+(0.1731, 0.004006 MPa). "held": what touches the plug never lets go (no slip), to 10 cm; "frictionless", to a pole
+stretch of 3; each with a clamped and with a hinged rim, beside the membrane under a plug with a sharp edge
+(`formingx.reference`; it ends where it would touch the plug's side). The plug's edge is rounded here (--fillet); with
+smaller fillets the force comes to that of the membrane. Lengths in cm, forces in N.
 
 The thesis' text has no forces, only this: for the thick sheet its curve seems better than Throne's own; for the thin
 one Throne's constants give much softer curves than measured, Treloar's compare well; outside the plug the strain is
@@ -24,6 +24,7 @@ from formingx.results import files, plots
 
 RADIUS = 7.62
 TRAVELS = tuple(float(t) for t in range(1, 11))
+QUICK_TRAVELS = (3.0, 7.0)
 
 
 class Sheet(NamedTuple):
@@ -44,12 +45,12 @@ THESIS = {"thin_throne": "much softer than measured", "thin_treloar": "compares 
           "plane_strain_outside_plug": "only approximately"}
 # law: (elements, the pole stretch at which the run ends, or None: 10 cm, friction)
 RUNS = {"held": ((120, 1), None, "stick"), "frictionless": ((100, 1), 3.0, "none")}
-QUICK = {"held": ((60, 1), None, "stick"), "frictionless": ((60, 1), 1.5, "none")}
+QUICK = {"held": ((60, 1), None, "stick"), "frictionless": ((60, 1), 1.3, "none")}
 FILLETS = (0.18, 0.06, 0.02)                                 # over the plug's radius, against the membrane
 
 
-def press(sheet, law, elements, stretch=None, fillet=FILLETS[0], rim="clamped", travels=TRAVELS):
-    """(path, how it ended), to a pole stretch or to the last travel."""
+def press(sheet, law, elements, travels, stretch=None, fillet=FILLETS[0], rim="clamped"):
+    """(path, how it ended), to a pole stretch or to the last travel; fillet over the plug's radius."""
     support = fx.Clamped("rim") if rim == "clamped" else fx.SimplySupported("rim")
     made = plugs.scene(RADIUS, sheet.thickness, sheet.plug, fillet * sheet.plug,
                        fx.MooneyRivlin(c10=sheet.c10, c01=sheet.c01), law, elements, support)
@@ -66,11 +67,11 @@ def membrane(sheet, law, travel):
         return None
 
 
-def key_numbers(sheet, law, path, end) -> dict:
+def key_numbers(sheet, law, path, end, travels) -> dict:
     """Those of all plugs, and the membrane's force beside them."""
     rp, h0 = sheet.plug, sheet.thickness
     places = {"0": 0.0, "rp/2": rp / 2, "1.5rp": 1.5 * rp, "2rp": 2 * rp, "3rp": 3 * rp}
-    n = plugs.key_numbers(path, end, TRAVELS, places, rp, h0)
+    n = plugs.key_numbers(path, end, travels, places, rp, h0)
     exact: dict = {}
     for t in n["force_N_at_travel_cm"]:
         found = membrane(sheet, law, float(t))
@@ -87,6 +88,7 @@ def main():
     options.add_argument("--refine", type=int, default=1, help="elements along the radius multiplied by this")
     args = options.parse_args()
     sheets = {k: s for k, s in SHEETS.items() if not args.quick or k != "thin_throne"}
+    travels = QUICK_TRAVELS if args.quick else TRAVELS
     summary: dict = {"thesis": THESIS}
     paths = {}
     for name, sheet in sheets.items():
@@ -94,9 +96,10 @@ def main():
         for law, ((along, through), stretch, _) in (QUICK if args.quick else RUNS).items():
             elements = (along * args.refine, through)
             for rim in ("clamped", "hinged"):
-                path, end = press(sheet, law, elements, stretch, args.fillet, rim)
+                path, end = press(sheet, law, elements, travels, stretch, args.fillet, rim)
                 key = law if rim == "clamped" else f"{law}_hinged"
-                summary[name][key] = n = key_numbers(sheet, law, path, end) | {"elements": list(elements)}
+                summary[name][key] = n = key_numbers(sheet, law, path, end, travels) | {
+                    "elements": list(elements)}
                 paths[name, key] = path
                 tell(f"{sheet.label}, {law}, {rim} rim", n)
                 plugs.write(path, args.out, f"{name}_{key}")
@@ -114,7 +117,7 @@ def sharpen(refine) -> dict:
     sheet, travel = SHEETS["thin_treloar"], 3.0
     found = {}
     for fillet in FILLETS:
-        path, _ = press(sheet, "held", (120 * refine, 1), fillet=fillet, travels=(travel,))
+        path, _ = press(sheet, "held", (120 * refine, 1), (travel,), fillet=fillet)
         found[f"{fillet:g}"] = plugs.force(path.last) / (plugs.NEWTON * membrane(sheet, "held", travel).force)
     say(f"{sheet.label}, held, {travel:g} cm: force over that of the membrane under a sharp edge, fillet/rp = "
         + ", ".join(f"{k}: {v:.4f}" for k, v in found.items()))
