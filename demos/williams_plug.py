@@ -3,7 +3,9 @@
 Neo-Hookean, c10 = 0.448 MPa (chapter 6 reads C10 as the I1 constant); r0 = 8.89 cm, h0 = 0.6985 cm, plug radius
 1.905 cm. The thesis' plug has a sharp edge; here it is rounded (--fillet). Four ways in which the plug holds the sheet:
 "held", what touches never lets go (the thesis' no slip); "stick", rough, but the sheet may lift off; Coulomb friction;
-"frictionless" (the thesis' slip). Lengths in cm, forces in N.
+"frictionless" (the thesis' slip). And "driven_nodes", the thesis' own scheme for no slip: nodes within the plug's radius
+go with it, as under a sharp edge; 20 cm are reached on a coarse mesh only (--refine 2: 8 cm), for the corner is
+singular. Lengths in cm, forces in N.
 """
 
 import plugs
@@ -51,9 +53,9 @@ def main():
     path, end = plugs.push(made, TRAVELS)                        # figure 6.10
     summary["held_hinged"] = n = plugs.key_numbers(path, end, TRAVELS, PLACES, PLUG, THICKNESS)
     tell("held, hinged rim", n)
-    path_of_nodes, end = plugs.push(plugs.driven_nodes(RADIUS, THICKNESS, PLUG, fx.NeoHookean(c10=C10),
-                                                       RUNS["held"][0]), TRAVELS)
-    summary["driven_nodes"] = n = plugs.course(path_of_nodes, end, TRAVELS, PLACES)
+    elements = tuple(n * args.refine for n in RUNS["held"][0])
+    summary["driven_nodes"] = n = plugs.course(*plugs.push(plugs.driven_nodes(
+        RADIUS, THICKNESS, PLUG, fx.NeoHookean(c10=C10), elements), TRAVELS), TRAVELS, PLACES)
     tell_driven(n, summary["held"])
     tool = plugs.plug(PLUG, THICKNESS, args.fillet)
     save(draw(paths, tool, limit), args.out / "williams_plug.png")
@@ -74,10 +76,11 @@ def tell(name, n) -> None:
 def tell_driven(n, held) -> None:
     """The thesis' own scheme beside the rounded plug that holds the sheet."""
     forces, others = n["force_N_at_travel_cm"], held["force_N_at_travel_cm"]
+    walls, other = n["wall_ratio_at_travel_cm"], held["wall_ratio_at_travel_cm"]
     say(f"driven nodes (the thesis' scheme, a sharp edge): to {n['reached_travel_cm']:.4g} cm, {n['steps']} states,"
-        f" {n['newton_iterations']} Newton iterations; force over that of the rounded plug, held: "
-        + ", ".join(f"{forces[t] / others[t]:.3f}" for t in forces if t in others) + " at "
-        + ", ".join(t for t in forces if t in others) + " cm",
+        f" {n['newton_iterations']} Newton iterations; over the rounded plug, held (force; wall at rp + h0): "
+        + ", ".join(f"{t} cm {forces[t] / others[t]:.3f}; {walls[t]['rp+h0'] / other[t]['rp+h0']:.3f}"
+                    for t in forces if t in others),
         *([] if n["ended"] == "done" else [f"  ended before its target: {n['ended'][:200]} ..."]))
 
 

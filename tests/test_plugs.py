@@ -37,15 +37,15 @@ def test_work_on_a_membrane_is_its_energy(friction):
 
 
 def test_membrane_limits():
-    """Moduli scale the force; a small travel needs little of it; a sliding face is as tense as the wall allows."""
+    """Moduli scale the force; at the edge a sliding wall pulls as the face does: 2 pi rp T sin(slope)."""
     twice = membrane_under_plug(3.0, **{**SHEET, "c10": 0.2426, "c01": 0.06654})
     assert twice.force == pytest.approx(2 * membrane_under_plug(3.0, **SHEET).force, rel=1e-8)
-    neo = {**SHEET, "c01": 0.0}
-    slides = membrane_under_plug(4.0, **neo, friction="none")
-    limit = 4 * np.pi * SHEET["plug_radius"] * SHEET["c10"] * SHEET["thickness"]
-    assert 0.9 * limit < slides.force < limit * (1 - slides.face_stretch**-6) * (1 + 1e-6)
-    with pytest.raises(InputError, match="the membrane"):
-        membrane_under_plug(40.0, **neo, friction="none")
+    slides = membrane_under_plug(4.0, **{**SHEET, "c01": 0.0}, friction="none")
+    tension = 2 * SHEET["c10"] * SHEET["thickness"] * (1 - slides.face_stretch**-6)
+    r, z = (np.diff(v[:2])[0] for v in (slides.r, slides.z))
+    assert slides.force == pytest.approx(2 * np.pi * SHEET["plug_radius"] * tension * z / np.hypot(r, z), rel=5e-3)
+    with pytest.raises(InputError, match="the membrane would touch the side of the plug"):
+        membrane_under_plug(8.0, **SHEET, friction="none")
 
 
 @pytest.mark.parametrize("plug", [case for cases in plug_extremes.CASES.values() for case in cases])
@@ -65,6 +65,6 @@ def test_extreme_plugs(plug):
     path, end, _ = plug_extremes.run(plug)
     assert end == "arrived"
     assert path["penetration"].max() < 0.01 * plug.lengths[2]
-    assert 0.5 < plug_extremes.smallest_J(path, path.last) <= 1 + 1e-9
+    assert 0 < plug_extremes.smallest_J(path, path.last) <= 1 + 1e-9
     if plug.back:
         assert np.abs(path.last.x).max() < 1e-6
