@@ -3,8 +3,8 @@
 Neo-Hookean, c10 = 0.448 MPa (chapter 6 reads C10 as the I1 constant); r0 = 8.89 cm, h0 = 0.6985 cm, plug radius
 1.905 cm. The thesis' plug has a sharp edge; here it is rounded (--fillet). Four ways in which the plug holds the sheet:
 "held", what touches never lets go (the thesis' no slip); "stick", rough, but the sheet may lift off; Coulomb friction;
-"frictionless" (the thesis' slip). And "driven_nodes", the thesis' own scheme for no slip: nodes within the plug's radius
-go with it, as under a sharp edge; 20 cm are reached on a coarse mesh only (--refine 2: 8 cm), for the corner is
+"frictionless" (the thesis' slip). And "driven_nodes", the thesis' own scheme for no slip: nodes within the plug's
+radius go with it, as under a sharp edge; 20 cm are reached on a coarse mesh only (--refine 2: 8 cm), for the corner is
 singular. Lengths in cm, forces in N.
 """
 
