@@ -20,10 +20,8 @@ AT_REST = 1e-2
 a tool, the tool's force vanishes as the square of the depth, and no correction is as small as the displacements."""
 
 SETTLING = 40
-"""At most so many iterations, points touching and letting go on the way, that come to no new branch.
-
-A slack sheet lies on a flat plug with a hundred points, which let go one or two at a time: that is no going round.
-"""
+"""At most so many iterations, points touching and letting go on the way; those that come to a new branch by a `SMALL`
+correction do not count: a slack sheet lies on a flat plug with a hundred points, which let go one or two at a time."""
 
 SMALL = 1e-3
 """Corrections (dimensionless displacement) below which growth is no sign of divergence: points touch and let go."""
@@ -56,7 +54,7 @@ class _Kinks:
     Attributes:
         changed: the iteration that came to the branch it is on; share: of a correction to take: less when an iteration
             comes back to a branch that it had left, for then it would go round for ever.
-        found: how often it came to a branch that was new.
+        found: how often a small correction came to a branch that was new.
     """
 
     def __init__(self, problem: Any):
@@ -65,8 +63,8 @@ class _Kinks:
         self._last: Any = None
         self.changed, self.share, self.found = 0, 1.0, 0
 
-    def look(self) -> None:
-        """To be called once an iteration, after the residual was computed."""
+    def look(self, moved: float) -> None:
+        """To be called once an iteration, after the residual was computed; moved: by the correction before."""
         self._iteration += 1
         now = self._problem.branch
         if now != self._last and self._last is not None:
@@ -74,7 +72,7 @@ class _Kinks:
             if now in self._seen:
                 self.share = max(self.share / 2, 0.25)
             else:
-                self.found += 1
+                self.found += moved < SMALL
         elif self._iteration > self.changed + 1:
             self.share = 1.0
         self._seen[now] = self._iteration
@@ -173,7 +171,7 @@ class BorderedNewton:
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
             problem.linearise(x, control, self.F)
-            kinks.look()
+            kinks.look(moved)
             quiet = history[kinks.changed:]
             grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
             if grown and not (problem.has_kinks and moved < SMALL):
