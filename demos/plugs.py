@@ -1,7 +1,7 @@
 """What the demos of plug-assist share: a sheet with a plug above it, how the plug holds it, force and shape."""
 
 import numpy as np
-from common import COMM
+from common import COMM, say
 from moulding import cost
 
 import formingx as fx
@@ -52,9 +52,20 @@ def push(made, travels, pole_stretch=None, **options):
         return error.path, str(error)
 
 
+def driven_nodes(radius, thickness, plug_radius, material, elements):
+    """The scheme of the thesis (6.1 to 6.4): nodes within the plug's radius go with it, not sideways; the face is free.
+
+    They are of the lower face and go up: the same upside down.
+    """
+    mesh = fx.mesh.disc(radius=radius, thickness=thickness, elements=elements, concentrate={plug_radius: 0.2})
+    return fx.Scene(mesh=mesh.with_part("plug", "bottom", (0, plug_radius)), materials=material, supports=[
+        fx.Symmetry("axis"), fx.Clamped("rim"), fx.Symmetry("plug", normal="r"), fx.Displaced("plug", "z")])
+
+
 def force(state) -> float:
-    """Force on the plug, N."""
-    return NEWTON * state.measures["tool_force"]
+    """Force on the plug, N, whether it is a tool or driven nodes."""
+    found = state.measures
+    return NEWTON * (found["tool_force"] if "tool_force" in found else -found["support_force"])
 
 
 def force_limit(plug_radius, thickness, c10) -> float:
@@ -66,8 +77,8 @@ def force_limit(plug_radius, thickness, c10) -> float:
     return NEWTON * 4 * np.pi * plug_radius * c10 * thickness
 
 
-def key_numbers(path, end, travels, places, plug_radius, thickness) -> dict:
-    """What the summary holds of one path. places: {name: reference radius}; travels not met have no entry."""
+def course(path, end, travels, places) -> dict:
+    """Forces and thickness of one path. places: {name: reference radius}; travels not met have no entry."""
     met = {f"{t:g}": path.met(fx.travel(t)) for t in travels}
     met = {key: state for key, state in met.items() if state is not None}
     shapes = {key: path.profile(state) for key, state in met.items()}
@@ -78,12 +89,19 @@ def key_numbers(path, end, travels, places, plug_radius, thickness) -> dict:
         "wall_ratio_at_travel_cm": {
             key: {name: float(np.interp(R, shape.reference_radius, shape.wall_ratio))
                   for name, R in places.items()} for key, shape in shapes.items()},
-        **shape_numbers(path, path.last, plug_radius, thickness),
         "reached_travel_cm": float(path["travel"].max()),
-        "largest_force_N": NEWTON * float(path["tool_force"].max()),
-        "largest_penetration_over_h0": float(path["penetration"].max()) / thickness,
+        "largest_force_N": max(map(force, path.states)),
         "ended": end,
         **cost(path),
+    }
+
+
+def key_numbers(path, end, travels, places, plug_radius, thickness) -> dict:
+    """What the summary holds of the path of a plug: `course`, and what its last state is like."""
+    return {
+        **course(path, end, travels, places),
+        **shape_numbers(path, path.last, plug_radius, thickness),
+        "largest_penetration_over_h0": float(path["penetration"].max()) / thickness,
     }
 
 
@@ -104,6 +122,21 @@ def pole_stretches(path, state, thickness) -> dict:
     """Principal stretches of the top face at the pole: in the plane and through the thickness."""
     F = path.stress(state).at([[0.0, thickness]]).deformation_gradient[0]
     return {"meridional": float(F[0, 0]), "hoop": float(F[2, 2]), "thickness": float(F[1, 1])}
+
+
+def tell(name, n) -> None:
+    """How far a run went, and what it cost."""
+    say(f"{name}: to {n['reached_travel_cm']:.4g} cm, {n['steps']} states, {n['newton_iterations']} Newton iterations,"
+        f" {n['cutbacks']} cut back, {n['solve_seconds']:.1f} s; hoop stretch outside the plug off 1 by"
+        f" {n['mean_hoop_deviation_outside_plug']:.3f} in the mean; wall under the plug over h0"
+        f" {n['flat_top_thickness_ratio'][0]:.3f} to {n['flat_top_thickness_ratio'][1]:.3f}",
+        *([] if n["ended"] == "done" else [f"  ended before its target: {n['ended'][:200]} ..."]))
+
+
+def states(path, travels) -> list:
+    """Those that were met, and the last one."""
+    found = [path.met(fx.travel(float(t))) for t in travels]
+    return [*(s for s in found if s is not None and s is not path.last), path.last]
 
 
 def write(path, out, name) -> None:

@@ -3,7 +3,9 @@
 Neo-Hookean, c10 = 0.448 MPa (chapter 6 reads C10 as the I1 constant); r0 = 8.89 cm, h0 = 0.6985 cm, plug radius
 1.905 cm. The thesis' plug has a sharp edge; here it is rounded (--fillet). Four ways in which the plug holds the sheet:
 "held", what touches never lets go (the thesis' no slip); "stick", rough, but the sheet may lift off; Coulomb friction;
-"frictionless" (the thesis' slip). Lengths in cm, forces in N.
+"frictionless" (the thesis' slip). And "driven_nodes", the thesis' own scheme for no slip: nodes within the plug's
+radius go with it, as under a sharp edge; 20 cm are reached on a coarse mesh only (--refine 2: 8 cm), for the corner is
+singular. Lengths in cm, forces in N.
 """
 
 import plugs
@@ -51,6 +53,10 @@ def main():
     path, end = plugs.push(made, TRAVELS)                        # figure 6.10
     summary["held_hinged"] = n = plugs.key_numbers(path, end, TRAVELS, PLACES, PLUG, THICKNESS)
     tell("held, hinged rim", n)
+    elements = tuple(n * args.refine for n in RUNS["held"][0])
+    summary["driven_nodes"] = n = plugs.course(*plugs.push(plugs.driven_nodes(
+        RADIUS, THICKNESS, PLUG, fx.NeoHookean(c10=C10), elements), TRAVELS), TRAVELS, PLACES)
+    tell_driven(n, summary["held"])
     tool = plugs.plug(PLUG, THICKNESS, args.fillet)
     save(draw(paths, tool, limit), args.out / "williams_plug.png")
     save(draw_rims(paths["held"], path), args.out / "rims.png")
@@ -61,22 +67,29 @@ def main():
 
 def tell(name, n) -> None:
     """The numbers of one run."""
-    say(f"{name}: to {n['reached_travel_cm']:.4g} cm, {n['steps']} states, {n['newton_iterations']} Newton iterations,"
-        f" {n['cutbacks']} cut back, {n['solve_seconds']:.1f} s; hoop stretch outside the plug off 1 by"
-        f" {n['mean_hoop_deviation_outside_plug']:.3f} in the mean; wall under the plug over h0"
-        f" {n['flat_top_thickness_ratio'][0]:.3f} to {n['flat_top_thickness_ratio'][1]:.3f}",
-        *([] if n["ended"] == "done" else [f"  ended before its target: {n['ended'][:200]} ..."]))
+    plugs.tell(name, n)
     for t, f in n["force_N_at_travel_cm"].items():
         ratios = "  ".join(f"{v:.4f}" for v in n["wall_ratio_at_travel_cm"][t].values())
         say(f"  {t:>4} cm {f:9.1f} N   wall over h0 at R = 0, rp + h0/2, rp + h0, rp + 2 h0: {ratios}")
 
 
+def tell_driven(n, held) -> None:
+    """The thesis' own scheme beside the rounded plug that holds the sheet."""
+    forces, others = n["force_N_at_travel_cm"], held["force_N_at_travel_cm"]
+    walls, other = n["wall_ratio_at_travel_cm"], held["wall_ratio_at_travel_cm"]
+    say(f"driven nodes (the thesis' scheme, a sharp edge): to {n['reached_travel_cm']:.4g} cm, {n['steps']} states,"
+        f" {n['newton_iterations']} Newton iterations; over the rounded plug, held (force; wall at rp + h0): "
+        + ", ".join(f"{t} cm {forces[t] / others[t]:.3f}; {walls[t]['rp+h0'] / other[t]['rp+h0']:.3f}"
+                    for t in forces if t in others),
+        *([] if n["ended"] == "done" else [f"  ended before its target: {n['ended'][:200]} ..."]))
+
+
 def draw(paths, tool, limit):
     """Force curves, thickness and stretches: figs. 6.1 to 6.4."""
     figure, (shapes, slips, forces, thickness) = plots.figure(4, width=3.9, height=4.6)
-    plugs.draw_shapes(shapes, paths["held"], states(paths["held"], (4, 8, 12, 16, 20)), tool)
+    plugs.draw_shapes(shapes, paths["held"], plugs.states(paths["held"], (4, 8, 12, 16, 20)), tool)
     shapes.set(title="held")
-    plugs.draw_shapes(slips, paths["frictionless"], states(paths["frictionless"], (2, 4, 6)), tool)
+    plugs.draw_shapes(slips, paths["frictionless"], plugs.states(paths["frictionless"], (2, 4, 6)), tool)
     slips.set(title="frictionless")
     for k, (name, path) in enumerate(paths.items()):
         forces.plot(path["travel"], plugs.NEWTON * path["tool_force"], color=f"C{k}", label=name.replace("_", " "))
@@ -97,19 +110,13 @@ def draw_rims(clamped, hinged):
     """Shapes and forces with both rims: fig. 6.10."""
     figure, (shapes, forces) = plots.figure(2, width=4.6, height=4.6)
     for color, path, label in (("C0", clamped, "clamped"), ("C3", hinged, "hinged")):
-        for state in states(path, (1, 2, 4, 8)):
+        for state in plugs.states(path, (1, 2, 4, 8)):
             shapes.plot(*path.profile(state).middle.T, color=color, linewidth=1.2)
         forces.plot(path["travel"], plugs.NEWTON * path["tool_force"], color=color, label=label)
     shapes.set(xlabel="r, cm", ylabel="z of the middle line, cm")
     forces.set(xlabel="travel, cm", ylabel="force on the plug, N")
     forces.legend(frameon=False)
     return figure
-
-
-def states(path, travels) -> list:
-    """Those that were met, and the last one."""
-    found = [path.met(fx.travel(float(t))) for t in travels]
-    return [*(s for s in found if s is not None and s is not path.last), path.last]
 
 
 if __name__ == "__main__":

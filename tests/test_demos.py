@@ -129,6 +129,8 @@ def test_williams_plug_quick(tmp_path):
     stretch = slips["stretches_at_pole"]
     assert stretch["meridional"] == pytest.approx(stretch["hoop"], rel=5e-3) and stretch["hoop"] > 1.9
     assert held["mean_hoop_deviation_outside_plug"] < 0.06                  # thesis: 6 %
+    driven = found["driven_nodes"]                           # the thesis' scheme: a sharp edge
+    assert driven["ended"] == "done" and 1 < driven["force_N_at_travel_cm"]["20"] / forces[-1] < 1.05
     for picture in ("williams_plug", "rims"):
         assert (tmp_path / f"{picture}.png").stat().st_size > 10_000
 
@@ -155,4 +157,21 @@ def test_plug_and_vacuum_quick(tmp_path):
     assert carries["base"] > 2 * straight["base"] and carries["least"] < straight["least"]
     assert len(found["map"]) == 4 and not any("ended" in point for point in found["map"])
     for picture in ("plug_and_vacuum", "map"):
+        assert (tmp_path / f"{picture}.png").stat().st_size > 10_000
+
+
+def test_throne_plug_quick(tmp_path):
+    found = summary("throne_plug", tmp_path, "--quick")
+    for name in ("thin_treloar", "thick"):
+        held, slips = found[name]["held"], found[name]["frictionless"]
+        assert held["ended"] == slips["ended"] == "done" and held["reached_plug_radii"] > 3
+        for law in (held, slips):                            # a rounded edge takes some of the plug's radius
+            for ratio in law["force_over_membrane_at_travel_cm"].values():
+                assert 0.84 < ratio < 1
+        stretch = slips["stretches_at_pole"]
+        assert stretch["meridional"] == pytest.approx(stretch["hoop"], rel=1e-3) and stretch["hoop"] > 1.29
+    sharper = list(found["force_over_membrane_at_fillet_over_rp"].values())
+    assert sharper == sorted(sharper) and sharper[-1] == pytest.approx(1.0, abs=0.01)      # 0.928, 0.977, 0.991
+    assert found["comparison"]["largest_difference_of_rims"] < 0.03                        # thesis: small
+    for picture in ("forces", "profiles"):
         assert (tmp_path / f"{picture}.png").stat().st_size > 10_000

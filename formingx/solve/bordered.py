@@ -20,7 +20,8 @@ AT_REST = 1e-2
 a tool, the tool's force vanishes as the square of the depth, and no correction is as small as the displacements."""
 
 SETTLING = 40
-"""At most so many iterations, points touching and letting go on the way."""
+"""At most so many iterations, points touching and letting go on the way; those that come to a new branch by a `SMALL`
+correction do not count: a slack sheet lies on a flat plug with a hundred points, which let go one or two at a time."""
 
 SMALL = 1e-3
 """Corrections (dimensionless displacement) below which growth is no sign of divergence: points touch and let go."""
@@ -53,22 +54,25 @@ class _Kinks:
     Attributes:
         changed: the iteration that came to the branch it is on; share: of a correction to take: less when an iteration
             comes back to a branch that it had left, for then it would go round for ever.
+        found: how often a small correction came to a branch that was new.
     """
 
     def __init__(self, problem: Any):
         self._problem, self._iteration = problem, -1
         self._seen: dict[Any, int] = {}
         self._last: Any = None
-        self.changed, self.share = 0, 1.0
+        self.changed, self.share, self.found = 0, 1.0, 0
 
-    def look(self) -> None:
-        """To be called once an iteration, after the residual was computed."""
+    def look(self, moved: float) -> None:
+        """To be called once an iteration, after the residual was computed; moved: by the correction before."""
         self._iteration += 1
         now = self._problem.branch
         if now != self._last and self._last is not None:
             self.changed = self._iteration
             if now in self._seen:
                 self.share = max(self.share / 2, 0.25)
+            else:
+                self.found += moved < SMALL
         elif self._iteration > self.changed + 1:
             self.share = 1.0
         self._seen[now] = self._iteration
@@ -167,13 +171,14 @@ class BorderedNewton:
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
             problem.linearise(x, control, self.F)
-            kinks.look()
+            kinks.look(moved)
             quiet = history[kinks.changed:]
             grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
             if grown and not (problem.has_kinks and moved < SMALL):
                 raise Failure("the iteration diverges", history)
-            if len(quiet) >= self.tolerances.iterations or len(history) >= SETTLING:
-                unsettled = len(history) >= SETTLING and len(history) - kinks.changed < 3
+            settling = len(history) - min(kinks.found, 4 * SETTLING) >= SETTLING
+            if len(quiet) >= self.tolerances.iterations or settling:
+                unsettled = settling and len(history) - kinks.changed < 3
                 raise Failure("contact does not settle: " * unsettled + f"no convergence in {len(history)} iterations",
                               history)
             if not self.tangent(x, control):

@@ -1,0 +1,148 @@
+"""Plugs far from the ordinary: slender and wide, sharp and round, sheets thick and thin, any friction, out and back.
+
+r0 = 10 cm, clamped; Mooney, I1 constant 0.4 MPa, I2 constant 0.04 MPa; r0/h0 = 20, plug radius 2.5 cm, edge fillet
+h0/2 unless said; travel to three plug radii. Withdrawn: pushed, held at its travel, brought back to 0. Every row ends
+in a converged state or in an error that keeps the last good one; anything else is printed as a DEFECT.
+"""
+
+import argparse
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
+import plugs  # noqa: E402
+
+import formingx as fx  # noqa: E402
+from formingx.results.diagnosis import body  # noqa: E402
+
+RADIUS, TRAVEL = 10.0, 3.0                                   # cm; over the plug's radius
+LAWS = ("frictionless", 0.1, 0.3, 1.0, 3.0, 10.0, "stick", "held")
+
+
+@dataclass(frozen=True)
+class Plug:
+    """A plug and its sheet: radius over r0, fillet over h0 ("round": the plug's radius), r0/h0.
+
+    law: of `plugs.LAWS`, or a coefficient of friction; back: held at its travel and withdrawn.
+    """
+
+    radius: float = 0.25
+    fillet: float | str = 0.5
+    slenderness: float = 20.0
+    law: float | str = "held"
+    back: bool = False
+
+    @property
+    def lengths(self) -> tuple[float, float, float]:
+        """Plug radius, fillet, thickness, cm."""
+        radius, thickness = self.radius * RADIUS, RADIUS / self.slenderness
+        return radius, radius if self.fillet == "round" else self.fillet * thickness, thickness
+
+
+CASES = {
+    "plug radius/r0": [Plug(radius=q, law=law) for law in ("held", 0.3) for q in (0.05, 0.1, 0.25, 0.5, 0.75, 0.95)],
+    "fillet/h0": [Plug(fillet=f, law=law) for law in ("held", 0.3) for f in (0.0, 0.5, "round")],
+    "r0/h0": [Plug(slenderness=q, law=law) for law in ("held", 0.3) for q in (5.0, 10.0, 20.0, 50.0, 100.0, 300.0,
+                                                                              500.0)],
+    "friction": [Plug(law=law) for law in LAWS],
+    "withdrawn": [Plug(law=law, back=True) for law in LAWS],
+}
+
+
+def mesh_for(plug):
+    """The one rule: at the edge three elements to the fillet, or two to h0, and not smaller than h0/10; r0/20 far away.
+
+    Where the sheet may slide over the edge they are as small from 0.6 plug radii on.
+    """
+    radius, fillet, thickness = plug.lengths
+    smallest, largest = max(min(thickness / 2, (fillet or thickness) / 3), thickness / 10), RADIUS / 20
+    small = min(smallest / largest, 1.0)
+    places = (radius,) if plug.law in ("held", "stick") else (0.6 * radius, radius)
+    R = np.linspace(0, RADIUS, 4001)
+    away = np.abs(np.subtract.outer(places, R))
+    sizes = (small + (1 - small) * away / away.max(1, keepdims=True)).min(0)
+    along = int(np.ceil(np.trapezoid(1 / sizes, R) / largest))
+    return fx.mesh.disc(radius=RADIUS, thickness=thickness, elements=(along, 2),
+                        concentrate=dict.fromkeys(places, small))
+
+
+def run(plug, max_steps=400, **options):
+    """(path or None, how it ended, elements): "arrived", or why not."""
+    radius, fillet, thickness = plug.lengths
+    friction, separates = plugs.LAWS.get(plug.law, (plug.law, True))
+    mesh = mesh_for(plug)
+    elements = mesh.domain.topology.index_map(2).size_global
+    scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=0.4, c01=0.04),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", plugs.plug(radius, thickness, fillet), friction, separates=separates,
+                                          moves=(0, -1), name="plug", **options)])
+    travel = TRAVEL * radius
+    stages = [fx.Stage("push", drive="plug", until=fx.travel(travel))]
+    if plug.back:
+        stages += [fx.Stage("hold", follow={"plug": [(0, travel), (1, travel)]}),
+                   fx.Stage("withdraw", drive="plug", until=fx.travel(0.0))]
+    try:
+        return fx.Process(scene).run(stages, step=fx.StepControl(target=6), max_steps=max_steps,
+                                     progress=False), "arrived", elements
+    except fx.ConvergenceError as error:
+        return error.path, ended(error), elements
+    except fx.InputError as error:
+        return None, f"refused: {error}", elements
+
+
+def ended(error) -> str:
+    """Reason, cause and advice of an error, in one line."""
+    found = error.diagnosis
+    if found is None:
+        return str(error)
+    return f"{found.reason}. Causes: {'; '.join(found.causes) or 'none singled out'}. Try {'; '.join(found.advice)}"
+
+
+def smallest_J(path, state) -> float:
+    """det F where it is smallest."""
+    path.go_to(state)
+    path.problem.x.array_w[:] = state.x
+    return float(body(path.problem, path.problem.x, state.control).J.min())
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--groups", nargs="+", choices=CASES, default=list(CASES), help="rows to run")
+    options.add_argument("--laws", nargs="+", help="only these: held, stick, frictionless or coefficients")
+    options.add_argument("--max-steps", type=int, default=400, help="states of a stage before it gives up")
+    args = options.parse_args()
+    print(f"{'case':36}{'elements':>9}{'travel/rp':>10}{'pole, cm':>10}{'force, N':>10}{'depth/h0':>10}{'least J':>9}"
+          f"{'states':>8}{'Newton':>8}{'cuts':>6}{'s':>7}  end", flush=True)
+    for group in args.groups:
+        for plug in CASES[group]:
+            if args.laws and plugs.name_of(plug.law).removeprefix("coulomb_") not in args.laws:
+                continue
+            value = {"plug radius/r0": plug.radius, "fillet/h0": plug.fillet, "r0/h0": plug.slenderness}.get(group)
+            label = f"{group}{'' if value is None else f' {value}'}, {plugs.name_of(plug.law)}"
+            began = time.perf_counter()
+            try:
+                path, end, elements = run(plug, args.max_steps)
+                seconds = time.perf_counter() - began
+                print(f"{label:36}{row(path, plug, elements)}{seconds:7.1f}  {end}", flush=True)
+            except Exception as error:                       # what a row must not end in
+                print(f"{label:36}  DEFECT: {type(error).__name__}: {error}", flush=True)
+
+
+def row(path, plug, elements) -> str:
+    """The numbers of one row."""
+    if path is None or not path.states:
+        return f"{elements:9d}" + 70 * " "
+    radius, _, thickness = plug.lengths
+    m, c = path.last.measures, path.counts
+    assert np.isfinite(list(m.values())).all()
+    return (f"{elements:9d}{path['travel'].max() / radius:10.3f}{m['pole_height']:10.2g}{plugs.force(path.last):10.4g}"
+            f"{path['penetration'].max() / thickness:10.1e}{smallest_J(path, path.last):9.4f}{c.steps:8d}"
+            f"{c.iterations:8d}{c.failures:6d}")
+
+
+if __name__ == "__main__":
+    main()

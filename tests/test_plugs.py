@@ -1,0 +1,70 @@
+"""Sheets under plugs: the membrane solution, the rule for meshes, and the fast rows of the extremes."""
+
+import sys
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+from formingx.errors import InputError
+from formingx.reference import membrane_under_plug
+
+sys.path.insert(0, str(ROOT / "benchmarks"))
+import plug_extremes  # noqa: E402
+from plug_extremes import Plug  # noqa: E402
+
+SHEET = {"radius": 7.62, "plug_radius": 1.05, "thickness": 0.0254, "c10": 0.1213, "c01": 0.03327}
+
+
+def energy(state, plug_radius, thickness, c10, c01, **_):
+    """Of the membrane under a plug: the Mooney energy, integrated."""
+    def density(l1, l2):
+        l3 = 1 / (l1 * l2)
+        return c10 * (l1**2 + l2**2 + l3**2 - 3) + c01 * (l1**-2 + l2**-2 + l3**-2 - 3)
+    l2 = state.r / state.R
+    outside = np.trapezoid(2 * np.pi * state.R * density(1 / (l2 * state.thickness_ratio), l2), state.R)
+    face = np.pi * (plug_radius / state.face_stretch) ** 2 * density(state.face_stretch, state.face_stretch)
+    return thickness * (outside + face)
+
+
+@pytest.mark.parametrize("friction", ["stick", "none"])
+def test_work_on_a_membrane_is_its_energy(friction):
+    """dE/dtravel = force, with and without friction."""
+    below, at, above = (membrane_under_plug(t, **SHEET, friction=friction) for t in (2.9, 3.0, 3.1))
+    slope = (energy(above, **SHEET) - energy(below, **SHEET)) / 0.2
+    assert slope == pytest.approx(at.force, rel=2e-3)
+    assert (at.face_stretch == 1) == (friction == "stick")
+
+
+def test_membrane_limits():
+    """Moduli scale the force; at the edge a sliding wall pulls as the face does: 2 pi rp T sin(slope)."""
+    twice = membrane_under_plug(3.0, **{**SHEET, "c10": 0.2426, "c01": 0.06654})
+    assert twice.force == pytest.approx(2 * membrane_under_plug(3.0, **SHEET).force, rel=1e-8)
+    slides = membrane_under_plug(4.0, **{**SHEET, "c01": 0.0}, friction="none")
+    tension = 2 * SHEET["c10"] * SHEET["thickness"] * (1 - slides.face_stretch**-6)
+    r, z = (np.diff(v[:2])[0] for v in (slides.r, slides.z))
+    assert slides.force == pytest.approx(2 * np.pi * SHEET["plug_radius"] * tension * z / np.hypot(r, z), rel=5e-3)
+    with pytest.raises(InputError, match="the membrane would touch the side of the plug"):
+        membrane_under_plug(8.0, **SHEET, friction="none")
+
+
+@pytest.mark.parametrize("plug", [case for cases in plug_extremes.CASES.values() for case in cases])
+def test_one_rule_for_all_meshes(plug):
+    nodes = plug_extremes.mesh_for(plug).nodes_of("top")[::2, 0]         # ends of edges
+    radius, fillet, thickness = plug.lengths
+    edge = np.diff(nodes)[np.searchsorted(nodes, radius * (1 - 1e-9)) - 1]
+    assert np.isclose(nodes, radius).any() and len(nodes) < 250
+    assert edge < 1.3 * max(min(thickness / 2, (fillet or thickness) / 3), thickness / 10)
+
+
+ROWS = [Plug(slenderness=5.0), Plug(radius=0.5), Plug(law="frictionless", back=True)]
+
+
+@pytest.mark.parametrize("plug", ROWS, ids=str)
+def test_extreme_plugs(plug):
+    path, end, _ = plug_extremes.run(plug)
+    assert end == "arrived"
+    assert path["penetration"].max() < 0.01 * plug.lengths[2]
+    assert 0 < plug_extremes.smallest_J(path, path.last) <= 1 + 1e-9
+    if plug.back:
+        assert np.abs(path.last.x).max() < 1e-6
