@@ -81,7 +81,7 @@ class _Sheet:
     """
 
     def __init__(self, scene: Scene):
-        mesh, comm = scene.mesh, scene.mesh.domain.comm
+        mesh, comm = scene.mesh, scene.mesh.comm
         n = mesh.domain.topology.index_map(2).size_local
         names = np.full(n, "", dtype=object)
         for name, tag in mesh.layers.items():
@@ -163,7 +163,7 @@ def _fillets(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
     for contact in scene.contacts:
         nodes = scene.mesh.nodes_of(contact.on)
         facets = scene.mesh.facets_of(contact.on)
-        total = scene.mesh.domain.comm.allreduce(_own(scene, facets), MPI.SUM)
+        total = scene.mesh.comm.allreduce(_own(scene, facets), MPI.SUM)
         edge = np.hypot(*np.ptp(nodes, axis=0)) / max(total, 1)
         arcs = [p for p in contact.tool.pieces if isinstance(p, Arc) and p.radius > 0]
         if not arcs:

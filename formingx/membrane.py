@@ -75,7 +75,7 @@ class MidSurface(Formulation):
     def _make_mesh(self) -> Mesh:
         """The line halfway between the two faces, with a node wherever the lower face has one."""
         mesh = self.scene.mesh
-        comm = mesh.domain.comm
+        comm = mesh.comm
         if "bottom" not in mesh.boundaries:
             raise InputError(f"Membrane: the mesh needs a boundary named 'bottom'; it has {list(mesh.boundaries)}")
         R = self._R = mesh.nodes_of("bottom")[:, 0]
@@ -108,7 +108,7 @@ class MidSurface(Formulation):
             for tag, end in enumerate((R[0], R[-1]), 1):
                 if len(at) and np.all(np.abs(at - end) < near):
                     boundaries[name] = (tag,)
-        return Mesh(domain, None, facets, mesh.layers, boundaries)
+        return Mesh(domain, None, facets, mesh.layers, boundaries, comm)
 
     def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
         element = basix.ufl.element("Lagrange", cell, 2)
@@ -154,7 +154,7 @@ def _faces(mesh: Mesh, layer: str, R: np.ndarray, near: float) -> tuple[np.ndarr
     if nodes.shape[1] == 6:
         halves = [pair for a, b, m in edges for pair in ((a, m), (m, b))]
     pieces = geometry.x[np.concatenate([nodes[:, pair] for pair in (*halves, *((b, a) for a, b in halves))]), :2]
-    pieces = np.concatenate(mesh.domain.comm.allgather(pieces.reshape(-1, 2, 2)))
+    pieces = np.concatenate(mesh.comm.allgather(pieces.reshape(-1, 2, 2)))
     first = np.searchsorted(R, pieces[:, :, 0].min(axis=1) - near)
     last = np.searchsorted(R, pieces[:, :, 0].max(axis=1) + near)
     which = np.repeat(np.arange(len(pieces)), last - first)                    # every piece meets some of the R

@@ -24,6 +24,8 @@ class Mesh:
         cells, facets: its `MeshTags`.
         layers: name to tag.
         boundaries: name to the tags of its facets: one, or several where a part has a name of its own (`with_part`).
+        comm: the communicator that it was made on. (What mpi4py hangs on `domain.comm`, a copy, when objects are
+            passed there is freed with it; inside an exception that would lock up Python's end.)
     """
 
     domain: Any
@@ -31,6 +33,7 @@ class Mesh:
     facets: Any
     layers: dict[str, int]
     boundaries: dict[str, tuple[int, ...]]
+    comm: MPI.Comm
 
     def facets_of(self, boundary: str) -> np.ndarray:
         """Local facet indices of a boundary, sorted, shape (n,), ghosts included."""
@@ -62,7 +65,7 @@ class Mesh:
         if not low < high:
             raise InputError(f"{who}: within = {within!r}: the first must be below the second")
         domain, axis = self.domain, "rz".index(along)
-        comm, facets = domain.comm, self.facets_of(of)
+        comm, facets = self.comm, self.facets_of(of)
         domain.topology.create_connectivity(1, 2)
         nodes = entities_to_geometry(domain, 1, facets) if len(facets) else np.zeros((0, 2), dtype=np.int32)
         ends = domain.geometry.x[nodes[:, :2], axis]
@@ -96,7 +99,7 @@ class Mesh:
         domain.topology.create_connectivity(1, 2)
         nodes = np.unique(entities_to_geometry(domain, 1, facets)) if len(facets) else []
         local = domain.geometry.x[nodes, :2].reshape(-1, 2)
-        points = np.concatenate(domain.comm.allgather(local))
+        points = np.concatenate(self.comm.allgather(local))
         scale = np.ptp(points, axis=0).max() if len(points) else 1.0
         keys = np.round(points / (scale or 1.0), 12)
         _, first = np.unique(keys, axis=0, return_index=True)
@@ -118,7 +121,7 @@ class Mesh:
         mid_edge = _compat.coordinate_map(domain).degree == 2
         # of an edge: its two ends and, on second-order geometry, its middle
         nodes = entities_to_geometry(domain, 1, self.facets_of(boundary)).reshape(-1, 3 if mid_edge else 2)
-        edges = np.concatenate(domain.comm.allgather(domain.geometry.x[nodes][..., :2]))
+        edges = np.concatenate(self.comm.allgather(domain.geometry.x[nodes][..., :2]))
         corners, ends = np.unique(np.round(edges[:, :2].reshape(-1, 2) / max(np.ptp(edges, axis=(0, 1)).max(), 1e-300),
                                            12), axis=0, return_inverse=True)
         ends = ends.reshape(-1, 2)
@@ -385,7 +388,7 @@ def write(mesh: Mesh, file: str | os.PathLike, shift: tuple[float, float] = (0.0
         raise InputError(f"mesh.write: numbering = {numbering!r}: gmsh files have their own, 'corners'; the text format"
                          f" (.txt) has a choice")
     import gmsh
-    with _gmsh_model(mesh.domain.comm) as model:
+    with _gmsh_model(mesh.comm) as model:
         _fill(model, plain, mesh.layers | {name: tags[0] for name, tags in mesh.boundaries.items()})
         gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
         gmsh.write(os.fspath(file))
@@ -395,7 +398,7 @@ def to_grid(mesh: Mesh) -> grid.Grid:
     """The mesh as plain arrays (serial only); node i of the mesh has the number i + 1."""
     from dolfinx.mesh import entities_to_geometry
     domain = mesh.domain
-    if domain.comm.size > 1:
+    if mesh.comm.size > 1:
         raise InputError("the nodes of a mesh are numbered and written on one rank only: run this on one")
     domain.topology.create_connectivity(1, 2)
     points = domain.geometry.x[:, :2].copy()
@@ -456,7 +459,7 @@ def _from_gmsh(build: Any, comm: MPI.Comm) -> Mesh:
     if domain.topology.cell_name() != "triangle":
         raise InputError(f"the mesh is made of {domain.topology.cell_name()}s: formingx needs triangles")
     layers, boundaries = names
-    return Mesh(domain, cells, facets, layers, {name: (tag,) for name, tag in boundaries.items()})
+    return Mesh(domain, cells, facets, layers, {name: (tag,) for name, tag in boundaries.items()}, comm)
 
 
 @contextlib.contextmanager

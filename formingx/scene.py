@@ -160,14 +160,14 @@ class Scene:
                 continue
             on = thing.on
             known(f"{thing!r}: boundary", on, self.mesh.boundaries)
-            if self.mesh.domain.comm.allreduce(len(self.mesh.facets_of(on)), MPI.SUM) == 0:
+            if self.mesh.comm.allreduce(len(self.mesh.facets_of(on)), MPI.SUM) == 0:
                 raise InputError(f"{thing!r}: boundary {on!r} is empty: no facet of the mesh carries it")
 
     def _check_contact(self, contact: Contact) -> None:
         """The body starts outside the tool, the face looks at it, and the pressure does not push away from it."""
         mesh, near = self.mesh, 1e-6 * max(self.extent)
         face = mesh.nodes_of(contact.on)
-        comm = mesh.domain.comm
+        comm = mesh.comm
         points = np.concatenate(comm.allgather(mesh.domain.geometry.x[:, :2]))
         depth = contact.tool.signed_distance(points)
         worst = int(np.argmax(depth))
@@ -198,7 +198,7 @@ class Scene:
         if not isinstance(self.kinematics, Axisymmetric):
             return
         geometry = self.mesh.domain.geometry
-        comm = self.mesh.domain.comm
+        comm = self.mesh.comm
         low = comm.allreduce(geometry.x[:, 0].min(initial=np.inf), MPI.MIN)
         size = comm.allreduce(np.abs(geometry.x).max(initial=0.0), MPI.MAX)
         if low < -1e-12 * size:
@@ -269,13 +269,13 @@ class Scene:
         topology.create_connectivity(1, 2)
         touching = {topology.connectivity(1, 2).links(f)[0] for f in self.mesh.facets_of(boundary)}
         mine = set(cells.values[np.isin(cells.indices, sorted(touching))].tolist())
-        tags = set().union(*self.mesh.domain.comm.allgather(mine))
+        tags = set().union(*self.mesh.comm.allgather(mine))
         return {name for name, tag in self.mesh.layers.items() if tag in tags}
 
     @property
     def extent(self) -> np.ndarray:
         """Size of the mesh along R and Z, shape (2,), all ranks."""
-        X, comm = self.mesh.domain.geometry.x[:, :2], self.mesh.domain.comm
+        X, comm = self.mesh.domain.geometry.x[:, :2], self.mesh.comm
         high = np.array([comm.allreduce(X[:, i].max(initial=-np.inf), MPI.MAX) for i in (0, 1)])
         low = np.array([comm.allreduce(X[:, i].min(initial=np.inf), MPI.MIN) for i in (0, 1)])
         return high - low

@@ -51,7 +51,7 @@ class Formulation(ABC):
         self.length, self.stress = float(max(scene.extent)), max(self._moduli.values())
         self.mesh = self._make_mesh()
         self.domain = self.mesh.domain
-        self.comm = self.domain.comm
+        self.comm = scene.mesh.comm
         self.displacement_element, elements = self._elements(self.domain.basix_cell())
         self.space = fem.functionspace(self.domain, basix.ufl.mixed_element(elements))
         self.w = fem.Function(self.space, name="w")
@@ -299,7 +299,7 @@ def _colour(scene: Any) -> dict[str, int]:
         mine = {v for c in cells for v in topology.connectivity(2, 0).links(c)}
         local = np.array(sorted(mine), dtype=np.int32)
         touches.append(set(topology.index_map(0).local_to_global(local).tolist()))
-    touches = [set().union(*parts) for parts in zip(*mesh.domain.comm.allgather(touches), strict=True)]
+    touches = [set().union(*parts) for parts in zip(*mesh.comm.allgather(touches), strict=True)]
     colours: list[int] = []
     for i, mine in enumerate(touches):
         taken = {colours[j] for j in range(i) if touches[j] & mine}

@@ -1,10 +1,12 @@
 """A run made to fail for each reason gives the right words, numbers and place."""
 
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
-from conftest import run_json, treloar
+from conftest import ROOT, run_json, treloar
 
 import formingx as fx
 
@@ -145,3 +147,12 @@ except fx.ConvergenceError as error:
 def test_ranks_tell_the_same():
     one, two = run_json(SCRIPT, 1), run_json(SCRIPT, 2)
     assert two == pytest.approx(one, rel=1e-4)
+
+
+def test_a_script_that_stops_in_an_error_ends():
+    """Objects that Python frees while an error is on its way must not lock up the end of the program."""
+    script = ("import sys; sys.path.insert(0, 'tests')\nfrom conftest import treloar\nimport formingx as fx\n"
+              "for scene in [treloar(), treloar()]:\n    fx.trace(scene, until=fx.pressure(1.0), max_steps=1)\n")
+    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1 and "ConvergenceError: pressure = 1 was not reached" in done.stderr
+    assert "Exception ignored" not in done.stderr

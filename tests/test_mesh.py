@@ -178,7 +178,7 @@ def test_parts_of_a_boundary():
 def test_parts_on_two_ranks():
     script = ("import formingx as fx; m = fx.mesh.disc(radius=2.0, thickness=0.1, elements=(20, 1),"
               " concentrate={0.5: 0.2}).with_part('plug', 'top', (0, 0.5)); n = [len(m.nodes_of(k)) for k in"
-              " ('plug', 'top')]; s = m.domain.comm.allgather(n); import json; s[0] == s[-1] and m.domain.comm.rank or"
+              " ('plug', 'top')]; s = m.comm.allgather(n); import json; s[0] == s[-1] and m.comm.rank or"
               " print(json.dumps(n))")
     assert run_json(script, 2) == run_json(script, None)
 

@@ -30,7 +30,7 @@ def describe(problem: Any) -> dict[str, Any]:
 
 def summary(scene: Any) -> dict[str, str]:
     """{part: one line for people} of a scene."""
-    mesh, comm = scene.mesh, scene.mesh.domain.comm
+    mesh, comm = scene.mesh, scene.mesh.comm
     topology, extent = mesh.domain.topology, scene.extent
     cells = comm.allreduce(topology.index_map(2).size_local, MPI.SUM)
     layers = ", ".join(mesh.layers)
