@@ -20,6 +20,7 @@ export OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}"       # default BLAS threads make
 export PETSC_OPTIONS="-no_signal_handler${PETSC_OPTIONS:+ $PETSC_OPTIONS}"   # signals are the command's own
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 export OMPI_MCA_btl="${OMPI_MCA_btl:-self,sm}"
+export OMPI_MCA_topo="${OMPI_MCA_topo:-basic}"       # open-mpi/ompi#13918: the other one hangs now and then
 export PRTE_MCA_rmaps_default_mapping_policy="${PRTE_MCA_rmaps_default_mapping_policy:-:oversubscribe}"
 
 way=${FX:-}
@@ -220,7 +221,7 @@ case $way in
         [ "$also" = "$here" ] || set -- -v "$also:$also" "$@"
         exec "$way" run --rm -i $tty $keep --init --shm-size=1g --user "$user" --security-opt label=disable \
             -v "$here:$here" -w "$PWD" -e HOME=/tmp -e PYTHONPATH -e XDG_CACHE_HOME -e MPLCONFIGDIR \
-            -e OMP_NUM_THREADS -e PETSC_OPTIONS -e OMPI_MCA_btl -e OMPI_ALLOW_RUN_AS_ROOT -e OMPI_ALLOW_RUN_AS_ROOT_CONFIRM \
+            -e OMP_NUM_THREADS -e PETSC_OPTIONS -e OMPI_MCA_btl -e OMPI_MCA_topo -e OMPI_ALLOW_RUN_AS_ROOT -e OMPI_ALLOW_RUN_AS_ROOT_CONFIRM \
             -e PRTE_MCA_rmaps_default_mapping_policy "$@" ;;
 esac
 [ "$way" != root ] || namespaces || way=copy

@@ -1,9 +1,9 @@
 """Where a plugged sheet is strained and stressed most, with and without slip (Song 1993, section 6.4, figs. 6.11-6.15).
 
-Sheet and plug as in demos/williams_plug.py, at one travel (the thesis prints none; at 4.8 cm the stretch at the
-pole is its 1.25, with slip). Principal values in the manner of the thesis: 1 the larger and 2 the smaller in the (r, z)
-plane, 3 around the axis. Euler strain eps = (1 - 1/l^2) / 2. A mesh is refined once, to see what has converged. Lengths
-in cm, stresses in MPa.
+Sheet and plug as in demos/williams_plug.py, at two travels (the thesis prints none; with slip, the stretch at the pole
+is its 1.25 near 4.8 cm). Principal values in the manner of the thesis: 1 the larger and 2 the smaller in the (r, z)
+plane, 3 around the axis. Euler strain eps = (1 - 1/l^2) / 2. Each mesh is refined once, to see what has converged.
+Lengths in cm, stresses in MPa.
 """
 
 import numpy as np
@@ -28,9 +28,9 @@ LABELS = {"sigma_1": r"$\sigma_1$, MPa", "sigma_3": r"$\sigma_3$, MPa", "eps_1":
 class Corners:
     """Values at the corners of all cells that lie near the plug, each cell with its own: shape (cells, 3)."""
 
-    def __init__(self, path):
-        fields, stress = Fields(path), path.stress().in_cells(CORNERS)
-        u = fields.of(path.last)["displacement"]
+    def __init__(self, path, state):
+        fields, stress = Fields(path), path.stress(state).in_cells(CORNERS)
+        u = fields.of(state)["displacement"]
         sigma, F = stress.cauchy, stress.deformation_gradient
         plane = np.linalg.eigvalsh(sigma[:, :2, :2])
         value, vector = np.linalg.eigh((F @ F.transpose(0, 2, 1))[:, :2, :2])
@@ -52,18 +52,19 @@ class Corners:
                 "r_cm": float(self.now[k][0]), "z_cm": float(self.now[k][1])}
 
 
-def press(law, elements, fillet, travel):
-    """The path to the travel."""
+def press(law, elements, fillet, travels):
+    """The path through the travels."""
     made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), law, elements)
-    return fx.trace(made, until=fx.travel(travel), step=fx.StepControl(target=6), max_steps=400)
+    *through, until = [fx.travel(t) for t in sorted(travels)]
+    return fx.trace(made, until=until, through=through, step=fx.StepControl(target=6), max_steps=400)
 
 
-def key_numbers(path, corners) -> dict:
+def key_numbers(path, state, corners) -> dict:
     """What the summary holds of one state."""
     found = {f"largest_{name}": corners.largest(name) for name in corners.values}
     sigma, eps = found["largest_sigma_1"], found["largest_eps_1"]
     apart = np.hypot(sigma["r_cm"] - eps["r_cm"], sigma["z_cm"] - eps["z_cm"])
-    peak = path.stress().peak(radii=(0.0, NEAR))
+    peak = path.stress(state).peak(radii=(0.0, NEAR))
     return {**found, "distance_of_largest_sigma_1_and_eps_1_over_rp": float(apart / PLUG),
             "peak_of_sigma_1": {"value": peak.value, "error": peak.error, "converged": bool(peak.converged),
                                 "in_words": str(peak)}}
@@ -72,7 +73,8 @@ def key_numbers(path, corners) -> dict:
 def main():
     options = parser("plug_stress", __doc__.splitlines()[0])
     options.add_argument("--fillet", type=float, default=0.35, help="radius of the plug's edge, cm")
-    options.add_argument("--travel", type=float, default=4.8, help="of the plug, cm")
+    options.add_argument("--travels", type=float, nargs="+", default=[4.8, 6.0], help="of the plug, cm; pictures of"
+                         " the last")
     args = options.parse_args()
     summary: dict = {"thesis": THESIS}
     paths, corners = {}, {}
@@ -80,47 +82,64 @@ def main():
         meshes = {"coarse": (40, 2)} if args.quick else {"standard": elements, "refined": (elements[0] * 3 // 2, 4)}
         summary[law] = {}
         for mesh, elements in meshes.items():
-            paths[law] = path = press(law, elements, args.fillet, args.travel)
-            corners[law] = Corners(path)
-            summary[law][mesh] = n = key_numbers(path, corners[law]) | {"elements": list(elements)}
-            say(f"{law}, {elements[0]} x {elements[1]} elements:", *(
-                f"  largest {name:8} {m['value']:8.4f} at R = {m['R_cm']:.3f} cm, Z = {m['Z_over_h0']:.2f} h0,"
-                f" {m['side']}"
-                for name, m in ((name, n[f"largest_{name}"]) for name in corners[law].values)),
-                f"  largest sigma_1 and eps_1 are {n['distance_of_largest_sigma_1_and_eps_1_over_rp']:.3f} rp apart",
-                f"  {n['peak_of_sigma_1']['in_words']}")
-    tool = plugs.plug(PLUG, THICKNESS, args.fillet)
+            paths[law] = path = press(law, elements, args.fillet, args.travels)
+            summary[law][mesh] = {"elements": list(elements)}
+            for travel in sorted(args.travels):
+                state = path.met(fx.travel(travel))
+                corners[law] = Corners(path, state)
+                summary[law][mesh][f"{travel:g}"] = n = key_numbers(path, state, corners[law])
+                tell(f"{law}, {elements[0]} x {elements[1]} elements, {travel:g} cm", n)
+    tool, travel = plugs.plug(PLUG, THICKNESS, args.fillet), max(args.travels)
     for law, found in corners.items():
-        save(draw(found, tool, args.travel, law), args.out / f"contours_{law}.png")
+        save(draw(found, tool, travel, law), args.out / f"contours_{law}.png")
     save(draw_faces(paths), args.out / "faces.png")
-    summarise(args.out, {**summary, "travel_cm": args.travel, "fillet_cm": args.fillet, "versions": files.versions()})
+    summarise(args.out, {**summary, "fillet_cm": args.fillet, "versions": files.versions()})
+
+
+def tell(name, n) -> None:
+    """The numbers of one state."""
+    say(f"{name}:", *(f"  largest {key[8:]:8} {m['value']:8.4f} at R = {m['R_cm']:.3f} cm, Z = {m['Z_over_h0']:.2f} h0,"
+                      f" {m['side']}" for key, m in n.items() if key.startswith("largest")),
+        f"  largest sigma_1 and eps_1 are {n['distance_of_largest_sigma_1_and_eps_1_over_rp']:.3f} rp apart",
+        f"  {n['peak_of_sigma_1']['in_words']}")
 
 
 def draw(found, tool, travel, law):
-    """Contours near the plug, in units (right of the bar) and normalised to 0 ... 1 as in the thesis (left), and where
-    the first principal direction of strain points: figs. 6.11 to 6.13, 6.15."""
-    figure, axes = plots.figure(5, width=3.4, height=4.4)
+    """Contours near the plug, in units (right of the bar) and normalised to 0 ... 1 as in the thesis (left), the
+    largest value ringed, and the first principal direction of strain: figs. 6.11 to 6.13, 6.15."""
+    figure, axes = plots.figure(3, width=4.6, height=3.5, rows=2)
     x, triangles = found.now.reshape(-1, 2), np.arange(found.now[..., 0].size).reshape(-1, 3)
-    for ax, name in zip(axes, ("sigma_1", "sigma_3", "eps_1", "eps_2", "eps_3")):
-        v = found.values[name].ravel()
-        low, high = v.min(), v.max()
-        shades = ax.tricontourf(*x.T, triangles, v, levels=np.linspace(low, high, 11), cmap="viridis")
-        bar = ax.figure.colorbar(shades, ax=ax, shrink=0.7, label=LABELS[name])
-        left = bar.ax.secondary_yaxis("left", functions=(lambda y, a=low, b=high: (y - a) / (b - a),
-                                                         lambda y, a=low, b=high: a + y * (b - a)))
-        left.tick_params(labelsize="x-small")
-        k = np.unravel_index(found.values[name].argmax(), found.values[name].shape)
-        ax.plot(*found.now[k], "o", color="red", fillstyle="none", markersize=9)
+    near = x[:, 0] < 1.6 * PLUG
+    low = x[near, 1].min()
+    for ax, name in zip(axes, ("sigma_1", "sigma_3", None, "eps_1", "eps_2", "eps_3")):
+        if name is None:
+            rest, middle, way = found.rest.mean(1), found.now.mean(1), found.direction.mean(1)
+            fewer = np.unique((rest // [0.14, 0.14]).astype(int), axis=0, return_index=True)[1]
+            ends = np.stack([middle - 0.07 * way, middle + 0.07 * way], 1)[fewer]
+            ax.tripcolor(*x.T, triangles, np.full(len(x), 0.12), cmap="Greys", vmin=0, vmax=1)
+            ax.plot(*ends.transpose(2, 1, 0), color="C0", linewidth=1.2)
+            ax.set(title=r"direction of $\epsilon_1$")
+        else:
+            v = found.values[name].ravel()
+            levels = np.linspace(v[near].min(), v[near].max(), 11)
+            shades = ax.tricontourf(*x.T, triangles, v, levels=levels, cmap="viridis", extend="both")
+            bar = figure.colorbar(shades, ax=ax, shrink=0.8, ticks=levels[::2], format="%.3g",
+                                  extendrect=True, extendfrac=0)
+            ends = levels[[0, -1]]
+            left = bar.ax.secondary_yaxis("left", functions=(lambda y, a=ends: (y - a[0]) / (a[1] - a[0]),
+                                                             lambda y, a=ends: a[0] + y * (a[1] - a[0])))
+            left.tick_params(labelsize="x-small")
+            k = np.unravel_index(found.values[name].argmax(), found.values[name].shape)
+            ax.plot(*found.now[k], "o", color="red", fillstyle="none", markersize=9)
+            ax.set(title=LABELS[name])
         ax.plot(*(tool.outline() - [0, travel]).T, "k", linewidth=1.2)
-        low = x[:, 1].min()
-        ax.set(xlim=(0, 1.6 * PLUG), ylim=(low - 0.1, low + 2.4), xlabel="r, cm", title=LABELS[name])
+        ax.set(xlim=(0, 1.6 * PLUG), ylim=(low - 0.1, low + 2.2))
         ax.set_aspect("equal")
         ax.grid(False)
-    middle, way = found.now.mean(1), found.direction.mean(1)
-    ends = np.stack([middle - 0.05 * way, middle + 0.05 * way], 1)
-    for line in ends:
-        axes[2].plot(*line.T, color="white", linewidth=0.6)
     axes[0].set(ylabel="z, cm")
+    axes[3].set(ylabel="z, cm")
+    for ax in axes[3:]:
+        ax.set(xlabel="r, cm")
     figure.suptitle(f"{law}, {travel:g} cm")
     return figure
 

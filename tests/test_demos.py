@@ -135,6 +135,19 @@ def test_williams_plug_quick(tmp_path):
         assert (tmp_path / f"{picture}.png").stat().st_size > 10_000
 
 
+def test_plug_stress_quick(tmp_path):
+    found = summary("plug_stress", tmp_path, "--quick")
+    held, slips = (found[law]["coarse"]["6"] for law in ("held", "frictionless"))
+    for name in ("largest_sigma_1", "largest_eps_1"):                # at the edge of the plug, as the thesis
+        assert held[name]["side"] == "top" and held[name]["R_cm"] == pytest.approx(1.95, abs=0.15)
+    assert held["distance_of_largest_sigma_1_and_eps_1_over_rp"] < 0.1 and not held["peak_of_sigma_1"]["converged"]
+    sigma = slips["largest_sigma_1"]                         # 80 x 3 and 120 x 4 elements: 3.204 and 3.215 MPa
+    assert sigma["side"] == "bottom" and sigma["value"] == pytest.approx(3.21, rel=5e-2)
+    assert slips["largest_eps_1"]["R_cm"] == pytest.approx(sigma["R_cm"], abs=0.1)
+    for picture in ("contours_held", "contours_frictionless", "faces"):
+        assert (tmp_path / f"{picture}.png").stat().st_size > 10_000
+
+
 def test_plug_and_vacuum_quick(tmp_path):
     found = summary("plug_and_vacuum", tmp_path, "--quick")
     straight, lifts, holds, carries = (found[name] for name in ("straight", "lifts", "holds", "carries"))

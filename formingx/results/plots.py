@@ -5,18 +5,19 @@ from __future__ import annotations
 from typing import Any
 
 
-def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: Any = None) -> tuple[Any, Any]:
-    """(figure, axes) with `columns` plots side by side, widths in `ratios`; saving needs no screen."""
+def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: Any = None,
+           rows: int = 1) -> tuple[Any, Any]:
+    """(figure, axes, row by row) with `columns` plots side by side, widths in `ratios`; saving needs no screen."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
-    drawing = Figure(figsize=(width * columns, height), layout="constrained")
+    drawing = Figure(figsize=(width * columns, height * rows), layout="constrained")
     FigureCanvasAgg(drawing)
-    axes = drawing.subplots(1, columns, squeeze=False, width_ratios=ratios)[0]
+    axes = drawing.subplots(rows, columns, squeeze=False, width_ratios=ratios).ravel()
     for a in axes:
         a.grid(True, color="0.9", linewidth=0.7)
         a.set_axisbelow(True)
         a.spines[["top", "right"]].set_visible(False)
-    return drawing, axes[0] if columns == 1 else axes
+    return drawing, axes[0] if len(axes) == 1 else axes
 
 
 def of_contact(column: str) -> bool:
