@@ -237,8 +237,9 @@ def _verdict(facts: dict, fixed_control: bool, pace: str, target: float | None) 
         now = f"J = {J:.3g}" if J < 0.3 else f"its shape is {facts['shape']:.2g} of what it was at rest"
         causes.append(f"an element is about to turn inside out: {now} in the last good state, at {facts['at_J']}"
                       + (f" (in the failed attempt J = {failed_J:.3g})" if inverted else ""))
-        advice.append(f"smaller elements around (R, Z) = ({facts['at_J'].R:.4g}, {facts['at_J'].Z:.4g}), or elements"
-                      f" that start long in the direction in which they are squeezed there")
+        R, Z = facts["at_J"].R, facts["at_J"].Z
+        advice.append(f"smaller elements around (R, Z) = ({R:.4g}, {Z:.4g}), in a disc with concentrate={{{R:.4g}:"
+                      f" 0.2}}, or elements that start long in the direction in which they are squeezed there")
     limits = facts.get("limit_points", ())
     if target is not None and limits and abs(target) > max(map(abs, limits)):
         causes.append(f"the {what} has its maximum, {max(limits, key=abs):.6g}, at a limit point that was passed, and"
