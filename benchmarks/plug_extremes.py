@@ -56,12 +56,14 @@ CASES = {
 def mesh_for(plug):
     """The one rule: at the edge three elements to the fillet, or two to h0, and not smaller than h0/10; r0/20 far away.
 
-    Where the sheet may slide over the edge they are as small from 0.6 plug radii on.
+    Where the sheet may slide over the edge there are eight to the fillet, not smaller than h0/20, from 0.6 plug radii
+    on: they come to the edge stretched, and nodes slide off it one by one.
     """
     radius, fillet, thickness = plug.lengths
-    smallest, largest = max(min(thickness / 2, (fillet or thickness) / 3), thickness / 10), RADIUS / 20
+    slides = plug.law not in ("held", "stick")
+    places, parts, least = ((0.6 * radius, radius), 8, 0.05) if slides else ((radius,), 3, 0.1)
+    smallest, largest = np.clip((fillet or thickness) / parts, least * thickness, thickness / 2), RADIUS / 20
     small = min(smallest / largest, 1.0)
-    places = (radius,) if plug.law in ("held", "stick") else (0.6 * radius, radius)
     R = np.linspace(0, RADIUS, 4001)
     away = np.abs(np.subtract.outer(places, R))
     sizes = (small + (1 - small) * away / away.max(1, keepdims=True)).min(0)
@@ -99,7 +101,8 @@ def ended(error) -> str:
     found = error.diagnosis
     if found is None:
         return str(error)
-    return f"{found.reason}. Causes: {'; '.join(found.causes) or 'none singled out'}. Try {'; '.join(found.advice)}"
+    causes, advice = "; ".join(found.causes), "; ".join(found.advice)
+    return f"{found.reason}. " + f"Cause: {causes}. " * bool(causes) + f"Try {advice}." * bool(advice)
 
 
 def smallest_J(path, state) -> float:

@@ -21,7 +21,8 @@ a tool, the tool's force vanishes as the square of the depth, and no correction 
 
 SETTLING = 40
 """At most so many iterations, points touching and letting go on the way; those that come to a new branch by a `SMALL`
-correction do not count: a slack sheet lies on a flat plug with a hundred points, which let go one or two at a time."""
+correction do not count: a slack sheet lies on a flat plug with a hundred points, which let go one or two at a time.
+(With a history, which depends on the step, a shorter step is better.)"""
 
 SMALL = 1e-3
 """Corrections (dimensionless displacement) below which growth is no sign of divergence: points touch and let go."""
@@ -72,7 +73,7 @@ class _Kinks:
             if now in self._seen:
                 self.share = max(self.share / 2, 0.25)
             else:
-                self.found += moved < SMALL
+                self.found += moved < SMALL and not self._problem.memory
         elif self._iteration > self.changed + 1:
             self.share = 1.0
         self._seen[now] = self._iteration

@@ -134,7 +134,7 @@ class Branch:
 
     def interpolate(self, a: State, b: State, fraction: float) -> tuple[np.ndarray, float]:
         """(x, control) on the cubic through two states and their tangents."""
-        s, h = fraction, self._chord(a, b)
+        s, h = fraction, self.distance(a, b)
         weights = (1 - 3 * s**2 + 2 * s**3, 3 * s**2 - 2 * s**3, h * (s - 2 * s**2 + s**3), h * (s**3 - s**2))
         x = weights[0] * a.x + weights[1] * b.x + weights[2] * a.direction + weights[3] * b.direction
         control = weights[0] * a.control + weights[1] * b.control + weights[2] * a.slope + weights[3] * b.slope
@@ -159,7 +159,7 @@ class Branch:
         the control differs from its extremum by less than 1e-12 of itself, as slope and curvature tell.
         """
         for _ in range(8):
-            chord = self._chord(a, b)
+            chord = self.distance(a, b)
             x, control = self.interpolate(a, b, _stationary(a, b, chord))
             found = self.solve(x, control, self._plane(a, x, control), "limit point", a)
             curvature = abs(a.slope - b.slope) / chord
@@ -193,7 +193,8 @@ class Branch:
         self._b.array_w[:] = y
         return self.problem.inner(self._a, self._b) + CONTROL_WEIGHT * control * other
 
-    def _chord(self, a: State, b: State) -> float:
+    def distance(self, a: State, b: State) -> float:
+        """Length of the straight line between two states."""
         return float(np.sqrt(self._inner(b.x - a.x, b.control - a.control, b.x - a.x, b.control - a.control)))
 
     def _plane(self, old: State, x0: np.ndarray, control0: float) -> Callable:

@@ -192,6 +192,8 @@ class Run:
                     new.met = target
                 if problem.too_far(old.x, old.control, new.x, new.control):
                     raise Failure("too much came into contact in one step", [])
+                if self._been_at(new, old):
+                    raise Failure("the iteration fell back to a part of the path that was passed", [])
                 states = self._sorted_into(old, new)
                 if target is None and not limited:
                     self.step.accepted(len(new.history) - 1)
@@ -203,6 +205,16 @@ class Run:
                 if not self.step.failed():
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
                                   failure.attempt)
+
+    def _been_at(self, new: State, old: State) -> bool:
+        """True if a state found from `old` lies on an earlier piece of the path, which never comes back to itself."""
+        near, passed = 0.1 * self.branch.distance(old, new), self.states[:-1]
+        for a, b in zip(passed, passed[1:]):
+            if (a.control - new.control) * (b.control - new.control) < 0:
+                x, control = self.branch.interpolate(a, b, (new.control - a.control) / (b.control - a.control))
+                if self.branch.distance(new, replace(new, x=x, control=control)) < near:
+                    return True
+        return False
 
     def _check_direction(self) -> None:
         """Stop if the path has turned back: its target further away than half of what had been gained.
