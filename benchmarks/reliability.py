@@ -89,9 +89,23 @@ def _run(scene: Any, until: Any = None) -> None:
     fx.trace(scene, until=until or fx.pole_height(0.1), progress=False)
 
 
+def _named() -> fx.Scene:
+    """A scene for a process: a pressure and a plug, with names."""
+    plug = fx.Contact("top", fx.tools.sphere(radius=0.5, z=0.1), "none", moves=(0, -1), name="plug")
+    return _scene(loads=[fx.Pressure("bottom", name="air")], contacts=[plug])
+
+
+def _processed(stages: Any) -> None:
+    fx.Process(_named()).run(stages, progress=False)
+
+
+def _staged(**stage: Any) -> None:
+    _processed([fx.Stage("on", **({"drive": "plug"} if "follow" not in stage else {}), **stage)])
+
+
 def calls(made: fx.Scene, saved: str) -> list[Call]:
     """Every public callable that takes what a user types; `saved`: a checkpoint of the scene `made`."""
-    positive, number, word = ("positive", 1.0), ("number", 0.1), ("word", "bottom")
+    positive, number, word, name = ("positive", 1.0), ("number", 0.1), ("word", "bottom"), ("name", None)
     materials = [Call(m.__name__, m, {k: (kind, v) for k, (kind, v) in args.items()}, lambda m: _scene(materials=m))
                  for m, args in ((fx.NeoHookean, {"c10": positive}), (fx.MooneyRivlin,
                                   {"c10": ("not negative", 1.0), "c01": ("not negative", 0.1)}),
@@ -101,9 +115,9 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
     boundary = [Call(s.__name__, s, {"on": ("word", "rim"), **more},
                      lambda s: _run(_scene(supports=[fx.Symmetry("axis"), s]))) for s, more in (
         (fx.Clamped, {}), (fx.SimplySupported, {"weight": ("word", "area")}))]
-    targets = [Call(t.__name__, t, {"value": (kind, 0.1)}, lambda t: _run(_scene(), t)) for t, kind in (
-        (fx.pressure, "number"), (fx.pole_height, "number"), (fx.pole_stretch, "positive"),
-        (fx.enclosed_volume, "number"))]
+    targets = [Call(t.__name__, t, {"value": (kind, 0.1), **more}, lambda t: _run(_scene(), t)) for t, kind, more in (
+        (fx.pressure, "number", {"of": name}), (fx.pole_height, "number", {}), (fx.pole_stretch, "positive", {}),
+        (fx.enclosed_volume, "number", {}))]
     size = {"radius": positive}
     tools = [Call(f"tools.{t.__name__}", t, args) for t, args in (
         (fx.tools.plane, {"z": number}),
@@ -124,22 +138,37 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
     sphere = {"inner_radius": positive, "thickness": positive, "elements": ("pair", (4, 2)), "grading": positive}
     contact = {"on": ("word", "top"), "tool": ("thing", fx.tools.plane(0.3)), "friction": ("friction", "stick"),
                "penalty": positive, "ramp": positive, "nodes_per_step": ("count", 1), "separates": ("flag", True),
-               "moves": ("pair or None", None)}
+               "moves": ("pair or None", None), "name": name}
+    stage = {"name": ("label", "up"), "drive": ("optional thing", "air"), "until": ("optional thing", fx.pressure(0.1)),
+             "through": ("several", ()), "without": ("several", ()), "step": ("optional thing", None)}
+    table = {"follow": {"air": [(0.0, 0.0), (1.0, 0.1)]}}
+    process = {"stages": ("several", [fx.Stage("up", drive="air", until=fx.pressure(0.1))]),
+               "step": ("optional thing", None), "tolerances": ("optional thing", None), "max_steps": ("count", 200),
+               "progress": ("flag", False), "start": ("optional thing", None), "checkpoint": ("folder", None)}
+    part = {"name": ("label", "plug"), "of": ("word", "top"), "within": ("pair", (0.0, 0.5)), "along": ("word", "r")}
     return [
         *materials, *boundary, *targets, *tools,
         Call("Ogden", fx.Ogden, {"mu": ("terms", (1.0,)), "alpha": ("terms", (2.0,))},
              lambda m: _scene(materials=m)),
         Call("Symmetry", fx.Symmetry, {"on": ("word", "axis"), "normal": ("word", "r")},
              lambda s: _run(_scene(supports=[s, fx.Clamped("rim")]))),
-        Call("Displaced", fx.Displaced, {"on": word, "component": ("word", "z")},
+        Call("Displaced", fx.Displaced, {"on": word, "component": ("word", "z"), "name": name},
              lambda s: _run(_scene(loads=[], supports=[fx.Symmetry("axis"), fx.Clamped("rim"), s]))),
         Call("PinnedNode", fx.PinnedNode, {"r": ("number", 1.0), "z": ("number", 0.0)}),
-        Call("Pressure", fx.Pressure, {"on": word, "value": ("optional number", None)},
+        Call("Pressure", fx.Pressure, {"on": word, "value": ("optional number", None), "name": name},
              lambda p: _run(_scene(loads=[p]))),
         Call("displacement", fx.displacement, {"value": number, "at": ("pair", (0.0, 0.0)),
                                                "component": ("word", "z")}, lambda t: _run(_scene(), t)),
-        Call("travel", fx.travel, {"value": number}),
+        Call("travel", fx.travel, {"value": number, "of": name}, lambda t: _staged(until=t)),
+        Call("process_time", fx.process_time, {"value": number}, lambda t: _staged(until=t, **table)),
+        Call("Stage", fx.Stage, stage | {"follow": ("optional thing", None)}, lambda s: _processed([s])),
+        Call("Stage.follow", fx.Stage, stage | {"drive": ("optional thing", None), "until": ("optional thing", None),
+                                                "follow": ("table", table["follow"])}, lambda s: _processed([s])),
+        Call("Process", fx.Process, {"scene": ("thing", _scene())}),
+        Call("Process.run", lambda **given: fx.Process(_named()).run(**given), process),
+        Call("Mesh.with_part", _mesh().with_part, part),
         Call("mesh.disc", fx.mesh.disc, disc), Call("mesh.sphere", fx.mesh.sphere, sphere),
+        Call("mesh.parison", fx.mesh.parison, sphere | {"thickness": ("positive", 0.1), "length": positive}),
         Call("mesh.read", fx.mesh.read, {"file": ("file", None)}),
         Call("Contact", fx.Contact, contact, lambda c: _run(_scene(contacts=[c]))),
         Call("Tool", fx.Tool, {"points": ("several", [(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)]),
@@ -170,6 +199,11 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
     ]
 
 
+BAD["name"] = {k: v for k, v in _WORD.items() if k not in ("unknown",)}
+BAD["label"] = BAD["name"] | _NONE
+BAD["table"] = {"a number": 3, "a word": "x", "a list": [[]], "unknown": {"nobody": [(0.0, 0.0)]}, "empty": {},
+                "back in time": {"air": [(0.0, 0.0), (2.0, 0.1), (1.0, 0.2)]}, "no pair": {"air": [0.0, 1.0]},
+                "nan": {"air": [(0.0, 0.0), (math.nan, 0.1)]}, "leaps": {"air": [(0.0, 0.5)]}}
 BAD["pair or None"] = {k: v for k, v in BAD["pair"].items() if k != "None"}
 BAD["friction"] = {"unknown": "slippery", "nan": math.nan, "negative": -0.1, "a bool": True, "a list": [], "None": None}
 BAD["file"] = {"None": None, "a number": 3.5, "not there": "/nowhere/at all.msh", "a folder": "/", "empty": ""}
@@ -177,7 +211,7 @@ BAD["folder"] = {"a number": 3.5, "nan": math.nan, "a list": [], "empty": "", "a
 BAD["state"] = {"a word": "x", "negative": -1, "a fraction": 0.5, "nan": math.nan, "too large": 1000, "a list": []}
 BAD["terms"] = {k: v for k, v in BAD["several"].items() if k not in ("a number", "a wrong entry")}
 BAD["step"] = {k: v for k, v in BAD["positive"].items() if k != "inf"}
-_LEFT_OUT = {"comm"}
+_LEFT_OUT = {"comm", "self"}
 
 
 def bad_input() -> list[Outcome]:
@@ -190,7 +224,7 @@ def bad_input() -> list[Outcome]:
     found = []
     try:
         for call in calls(made, saved):
-            parameters = inspect.signature(call.make).parameters
+            parameters = inspect.signature(fx.Process.run if call.name == "Process.run" else call.make).parameters
             left = set(parameters) - set(call.arguments) - _LEFT_OUT
             assert not left, f"{call.name}: no bad values are known for {left}"
             good = {k: v for k, (_, v) in call.arguments.items()}

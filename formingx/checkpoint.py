@@ -42,35 +42,33 @@ class Checkpoint:
     """The folder of one run, for writing.
 
     Args:
-        folder: made when the first state is written.
-        problem: the `Problem` of the run.
+        folder: made, or looked at, at once.
+        path: of the run; what is in the folder must be its beginning.
+
+    Raises (collective):
+        InputError: the folder holds another run, or something else.
+        OSError: it cannot be written.
     """
 
-    def __init__(self, folder: Any, problem: Any):
-        self.folder, self._problem = place("checkpoint", folder), problem
-        self._w = fem.Function(problem.forms.space)
-        self._there: int | None = None                      # states in the folder
+    def __init__(self, folder: Any, path: Path):
+        self.folder, self._path, self._problem = place("checkpoint", folder), path, path.problem
+        self._w = fem.Function(path.problem.forms.space)
+        self._there = self._begin()                         # states in the folder
 
-    def begin(self, path: Path) -> None:
-        """Make the folder, or check that what is in it is the beginning of this path; collective; raises as `write`."""
-        if self._there is None:
-            self._there = self._begin(path)
-
-    def write(self, path: Path) -> None:
-        """Write the states of a path that are not in the folder yet; collective.
+    def write(self) -> None:
+        """Write the states of the path that are not in the folder yet; collective.
 
         Raises:
-            InputError: the folder holds another run.
             OSError: it cannot be written, or the disk is full; all states before are kept.
         """
-        self.begin(path)
-        for number in range(self._there or 0, len(path)):
+        path = self._path
+        for number in range(self._there, len(path)):
             self._write_state(number, path.states[number], _profile(path, path.states[number]))
             self._there = number + 1
 
-    def _begin(self, path: Path) -> int:
-        """See `begin`; the number of states there."""
-        problem, folder = self._problem, self.folder
+    def _begin(self) -> int:
+        """Make the folder, or check what is in it; the number of states there."""
+        problem, folder, path = self._problem, self.folder, self._path
         scene = describe(problem)
         about = {"formingx": FORMAT, "versions": files.versions(), "scene": scene, "summary": summary(problem.scene)}
 

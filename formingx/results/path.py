@@ -203,7 +203,7 @@ class Path:
             OSError: it cannot be written.
         """
         from ..checkpoint import Checkpoint
-        Checkpoint(folder, self.problem).write(self)
+        Checkpoint(folder, self).write()
 
     def to_vtx(self, folder: Any, states: Any = None) -> None:
         """Write fields of states (default: the last) for ParaView, one time step each; see `formingx.results.fields`.

@@ -73,7 +73,7 @@ def trace(scene: Scene, *, until: measures.Target, through: Sequence[measures.Ta
     branch = Branch(problem, tolerances or Tolerances())
     path = Path(problem, branch, start)
     targets = [(target, target.bind(problem)) for target in (*through, until)]
-    run = Run(path, branch, targets, step, None if checkpoint is None else Checkpoint(checkpoint, problem))
+    run = Run(path, branch, targets, step, None if checkpoint is None else Checkpoint(checkpoint, path))
     run.trace(max_steps, progress, None if path.states else branch.start())
     return path
 
@@ -102,8 +102,6 @@ class Run:
         kept: dict[str, Any] = {}
         self._first = len(path.states)
         bar = _progress_bar(path.problem.comm, self.until, progress)
-        if self.checkpoint is not None:
-            self.checkpoint.begin(path)
         try:
             if start is None:
                 self._first -= sum(1 for _ in itertools.takewhile(lambda s: s.setting == path.last.setting,
@@ -319,7 +317,7 @@ def settle(path: Path, step: StepControl, until: measures.Target, checkpoint: Ch
     """Note in the last state of a path how the run goes on from it, on disk too."""
     path.last.stepping = {"step": asdict(step), "counts": asdict(path.counts), "until": [until.name, until.value]}
     if checkpoint is not None:
-        checkpoint.write(path)
+        checkpoint.write()
 
 
 def is_met(target: measures.Target, bound: measures.Bound, value: float) -> bool:

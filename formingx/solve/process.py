@@ -196,7 +196,7 @@ class _Execution:
         timed = any(plan.tables for plan in plans)
         self.path = Path(problem, self.branch, start if isinstance(start, Path) else None, timed)
         self.path.states += [start] if isinstance(start, State) else []
-        self.checkpoint = None if checkpoint is None else Checkpoint(checkpoint, problem)
+        self.checkpoint = None if checkpoint is None else Checkpoint(checkpoint, self.path)
         self._rest = np.zeros(problem.x.getLocalSize())
         self._targets = [self._bind(plan) for plan in plans]    # so that nothing is compiled between stages
         problem.enter(Setting.first(scene), self._rest, 0.0)
