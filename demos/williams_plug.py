@@ -8,6 +8,7 @@ radius go with it, as under a sharp edge; 20 cm are reached on a coarse mesh onl
 singular. Lengths in cm, forces in N.
 """
 
+import numpy as np
 import plugs
 from common import parser, save, say, summarise
 
@@ -45,6 +46,7 @@ def main():
             n |= {"travel_cm": state.measures["travel"], "force_N": plugs.force(state)}
             summary["frictionless_at_pole_stretch_of_thesis"] = n
             flat, off = n["flat_top_thickness_ratio"], n["mean_hoop_deviation_outside_plug"]
+            save(draw_stretches(path, state), args.out / "stretches.png")
             say(f"  at the pole stretch of figure 6.4, 1.25: travel {n['travel_cm']:.3f} cm, {n['force_N']:.1f} N, wall"
                 f" under the plug over h0 {flat[0]:.3f} to {flat[1]:.3f}, hoop stretch off 1 by {off:.3f}")
         plugs.write(path, args.out, name)
@@ -85,7 +87,7 @@ def tell_driven(n, held) -> None:
 
 
 def draw(paths, tool, limit):
-    """Force curves, thickness and stretches: figs. 6.1 to 6.4."""
+    """Shapes, force curves and thickness: figs. 6.1 to 6.3."""
     figure, (shapes, slips, forces, thickness) = plots.figure(4, width=3.9, height=4.6)
     plugs.draw_shapes(shapes, paths["held"], plugs.states(paths["held"], (4, 8, 12, 16, 20)), tool)
     shapes.set(title="held")
@@ -103,6 +105,24 @@ def draw(paths, tool, limit):
     thickness.axvline(PLUG, color="0.7", linewidth=1)
     for axes in (forces, thickness):
         axes.legend(frameon=False, fontsize="small")
+    return figure
+
+
+def draw_stretches(path, state):
+    """Principal stretches and Lagrange strains of the top face, with slip: figs. 6.4 and 6.5."""
+    figure, (stretches, strains) = plots.figure(2, width=5.0)
+    R = np.linspace(0, 0.99 * RADIUS, 300)
+    F = path.stress(state).at(np.column_stack([R, np.full_like(R, THICKNESS)])).deformation_gradient
+    plane = np.linalg.svd(F[:, :2, :2], compute_uv=False)
+    for k, (n, l) in enumerate(((1, plane[:, 0]), (2, plane[:, 1]), (3, F[:, 2, 2]))):
+        stretches.plot(R, l, color=f"C{k}", label=rf"$\lambda_{n}$")
+        strains.plot(R, (l**2 - 1) / 2, color=f"C{k}", label=rf"$E_{n} = (\lambda_{n}^2 - 1)/2$")
+    stretches.set(ylabel="stretch of the top face", title=f"frictionless, {state.measures['travel']:.3g} cm")
+    strains.set(ylabel="Lagrange strain of the top face")
+    for axes in (stretches, strains):
+        axes.axvline(PLUG, color="0.7", linewidth=1)
+        axes.set(xlabel="reference radius R, cm")
+        axes.legend(frameon=False)
     return figure
 
 

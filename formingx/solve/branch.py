@@ -43,9 +43,11 @@ class Branch:
                 _, history = self.newton.correct(self._x, 0.0, _no_control)
             except Failure as failure:
                 found = diagnose(self, [], failure.reason, self._attempt())
-                raise ConvergenceError("no equilibrium was found before anything is driven, under the loads that have"
-                                       f" a fixed value: {failure.reason}; drive the largest of them instead",
-                                       diagnosis=found) from None
+                fixed = [repr(load) for load in self.problem.scene.loads if not load.driven]
+                words, advice = (f", under {', '.join(fixed)}", "drive the largest of them instead") if fixed else (
+                    "", "a tool touches the body at rest: give its Contact a smaller ramp")
+                raise ConvergenceError(f"no equilibrium was found before anything is driven{words}: {failure.reason};"
+                                       f" {advice}", diagnosis=found) from None
             self.iterations += len(history) - 1
         else:
             self.problem.stiff_state(self._x)
