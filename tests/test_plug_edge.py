@@ -30,10 +30,13 @@ def test_a_coarse_mesh_knows_what_it_resolves():
 
 @pytest.mark.slow
 def test_peaks_under_refinement():
-    """MPa: 0.5203, 0.5149, 0.5135 with a fillet of h0/2 and mu = 0.3; 0.523, 0.612, 0.915 sharp, stuck."""
+    """MPa: 0.5203, 0.5150, 0.5135 with a fillet of h0/2 and mu = 0.3; 0.523, 0.614, 0.933 sharp, stuck.
+
+    On meshes of sizes 1, 1/2, 1/3 the differences of an error of order 1 are as 3 to 1.
+    """
     fillet, sharp = peaks("fillet", (1, 2, 3)), peaks("sharp, stick", (1, 2, 3))
     a, b, c = (p.value for p in fillet)
-    assert all(p.converged for p in fillet) and abs(b - c) < abs(a - b) / 2 < 5e-3 * c
+    assert all(p.converged for p in fillet) and abs(b - c) < abs(a - b) / 3 < 5e-3 * c
     assert fillet[2].error < fillet[1].error < fillet[0].error
     assert not any(p.converged for p in sharp)
     assert sharp[1].value > 1.1 * sharp[0].value and sharp[2].value > 1.3 * sharp[1].value
