@@ -9,6 +9,7 @@ from test_closed_forms import tube
 from test_stress import sphere
 
 import formingx as fx
+from formingx import _compat
 from formingx.reference import thick_wall
 from formingx.results.patches import Patches
 
@@ -119,7 +120,7 @@ def test_wrong_requests():
 def test_patches_reproduce_cubics():
     """On any patch that determines a cubic; a patch that does not gives a field that fits the values."""
     mesh = treloar((6, 2)).mesh
-    corners = mesh.domain.geometry.dofmap[:, :3]
+    corners = _compat.cell_nodes(mesh.domain)[:, :3]
     places = np.array([[1, 1], [4, 1], [1, 4]]) / 6
     weights = np.column_stack([1 - places.sum(1), places])
     points = np.einsum("qk,nkx->nqx", weights, mesh.domain.geometry.x[corners, :2])

@@ -27,6 +27,7 @@ from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from .. import _compat
 from ..errors import InputError, known, pair
 from .locate import locate
 from .patches import Patches
@@ -260,10 +261,10 @@ class Stresses:
         comm, parts = self.problem.comm, [self._at_quadrature(state, layer) for layer in self.cells]
         order = np.argsort(np.concatenate([self._owned(layer) for layer in self.cells]))
         points, values, volume = (np.concatenate([part[k] for part in parts])[order] for k in range(3))
-        geometry, own = self.problem.forms.domain.geometry, order.size
-        corners = geometry.dofmap[:own, :3]
+        domain, own = self.problem.forms.domain, order.size
+        corners = _compat.cell_nodes(domain)[:own, :3]
         if self._patches is None:
-            numbers = geometry.index_map().local_to_global(corners.ravel()).reshape(-1, 3)
+            numbers = domain.geometry.index_map().local_to_global(corners.ravel()).reshape(-1, 3)
             layer = np.concatenate([np.full(len(self._owned(name)), k) for k, name in enumerate(self.cells)])[order]
             first = comm.exscan(own) or 0
             points_of_all, numbers, layer = (np.concatenate(comm.allgather(v)) for v in (points, numbers, layer))
@@ -273,7 +274,7 @@ class Stresses:
         def cauchy(values):
             flat = values.reshape(-1, _COUNT)
             return _unpack(np.zeros((len(flat), 2)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
-        X = geometry.x[corners, :2]
+        X = domain.geometry.x[corners, :2]
         largest = np.linalg.eigvalsh(cauchy(self._patches.at(cubics, X)))[..., -1]
         top = (np.arange(own), largest.argmax(1))
         return Fitted(points, volume, cauchy(values), cauchy(self._patches.at(cubics, points)), largest[top], X[top])
