@@ -14,14 +14,15 @@ from .scene import Scene
 _LOOKS = 50            # how often the tools are looked at on the way of a stage
 
 
-def check(scene: Scene, plans: list[Any]) -> None:
+def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None) -> None:
     """An InputError if tools of a stage overlap, or one goes through a boundary that is held.
 
     plans: of the stages, with `stage`, `numbers` of what it drives, `tables` [(number, table)], numbers that are `off`.
+    stands: travels at the beginning {number: length}, default 0.
     Where a travel cannot be known before the run (a stage that ends at a pole height) its tool is left out from there.
     """
     tools = {i: thing for i, thing in enumerate(scene.things) if isinstance(thing, Contact)}
-    stands = {i: 0.0 for i in tools}
+    stands = stands or dict.fromkeys(tools, 0.0)
     for plan in plans:
         present = {i: tool for i, tool in tools.items() if i not in plan.off}
         for where in _legs(plan, stands):

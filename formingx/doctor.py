@@ -118,7 +118,7 @@ def _folded(nodes: np.ndarray) -> np.ndarray:
 
 
 def _driven(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
-    if scene.driven is None:
+    if not scene.drivable:
         yield Finding("error", "loads", "nothing is driven, so there is no run: give one load no value, as"
                                         " Pressure('bottom'), or add a Displaced support")
 
@@ -133,7 +133,7 @@ def _elements(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
     slender = sheet.edges.max(1) ** 2 / (2 * np.maximum(sheet.area, 1e-300))
     worst = int(np.argmax(slender))
     if slender[worst] > _FLATTEST:
-        at = place(scene.mesh, sheet.corners[worst].mean(0), sheet.layer[worst])
+        at = place(scene.mesh, sheet.corners[worst].mean(0), str(sheet.layer[worst]))
         yield Finding("warning", "mesh", f"an element at {at} is {slender[worst]:.3g} times longer than high (up to"
                                          f" 100 was tried): use more elements along the sheet, or Membrane()"
                                          f" for one so thin")

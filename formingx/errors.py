@@ -10,7 +10,13 @@ from typing import Any
 
 
 class InputError(ValueError):
-    """Something that the user gave is not allowed: the message names it, its value and what is allowed."""
+    """Something that the user gave is not allowed: the message names it, its value and what is allowed.
+
+    Attributes:
+        path: of a process that refuses a stage when it comes to it, what was computed before; else None.
+    """
+
+    path: Any = None
 
 
 class ConvergenceError(RuntimeError):
@@ -72,7 +78,8 @@ def instance(name: str, value: Any, kind: Any, what: str) -> Any:
 
 def several(name: str, values: Any, what: str) -> list[Any]:
     """`values` as a list, or an InputError unless it is a list, a tuple or the like."""
-    if not isinstance(values, Iterable) or isinstance(values, str | bytes | dict):
+    alone = isinstance(values, str | bytes | dict) or hasattr(values, "_fields")         # a NamedTuple is one thing
+    if not isinstance(values, Iterable) or alone:
         raise InputError(f"{name} = {values!r}: must be a list of {what}")
     return list(values)
 

@@ -105,6 +105,7 @@ class Scene:
         if len(self.drivable) > 1:
             raise InputError(f"{who}: {', '.join(map(repr, self.drivable))} are all driven: one control drives a run;"
                              f" give the others a value, or drive them in stages with formingx.Process")
+        self.check_driven(self.supports)
         return self.driven
 
     def number(self, who: str, thing: Any) -> int:
@@ -126,6 +127,17 @@ class Scene:
         self._check_axis(supports)
         if not touched:
             self._check_rigid_body(supports)
+
+    def check_driven(self, supports: Sequence[Any]) -> None:
+        """An InputError if what one of these supports drives is held by another."""
+        for mine in supports:
+            for held in mine.constraints():
+                if not getattr(held, "driven", False):
+                    continue
+                for other in supports:
+                    if other is not mine and any((h.on, h.component) == (held.on, held.component)
+                                                 for h in other.constraints()):
+                        raise InputError(f"{mine!r}: {other!r} holds the same component of the same boundary")
 
     def _check_names(self) -> None:
         names = [thing.name for thing in self.things if getattr(thing, "name", None) is not None]

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+import test_process
 from conftest import treloar
 
 import formingx as fx
@@ -63,6 +64,10 @@ def test_layers_and_nothing_driven():
     for words in ("nothing is driven", "layer 'a': it is 0.5 of the body's length thick", "1e+06 times stiffer",
                   "units of stress"):
         assert words in str(report)
+
+
+def test_a_scene_for_a_process_is_driven():
+    assert fx.doctor(test_process.plugged()).healthy
 
 
 def test_bad_input():

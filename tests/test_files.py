@@ -288,6 +288,11 @@ def test_vtx_bad_input(inflated, tmp_path, name, states, message):
         inflated.to_vtx(tmp_path / name, states)
 
 
+def test_a_view_is_a_png(inflated, tmp_path):
+    with pytest.raises(fx.InputError, match="must end in .png"):
+        inflated.view3d(tmp_path / "view.svg")
+
+
 @pytest.mark.parametrize("write", ["to_vtx", "to_xdmf", "to_csv", "animate", "report"])
 def test_unwritable(inflated, write):
     suffix = {"to_vtx": "bp", "to_xdmf": "xdmf", "to_csv": "csv", "animate": "gif", "report": "html"}[write]

@@ -121,5 +121,7 @@ def test_column_and_value_that_a_path_does_not_have():
     path = fx.trace(treloar(), until=fx.pressure(0.1))
     with pytest.raises(fx.InputError, match="column 'height' is not known; known: pressure"):
         path["height"]
+    with pytest.raises(fx.InputError, match="through = Target.*must be a list of targets"):
+        fx.trace(treloar(), until=fx.pressure(0.1), through=fx.pressure(0.05))
     with pytest.raises(fx.InputError, match="does not pass pressure = 0.3"):
         path.at(fx.pressure(0.3))

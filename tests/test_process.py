@@ -366,3 +366,46 @@ def test_ranks_agree():
 
 def test_a_scene_pays_for_what_is_in_it():
     assert Problem(plugged()).memory == [] and Problem(gripped()).contacts == []
+
+
+def test_the_stages_of_a_restart_are_those_that_were_run():
+    path = run(plugged(), plug("down", 1.0))
+    with pytest.raises(fx.InputError, match="last state is of stage 'down', number 1, but stage 1 is 'blow' now"):
+        fx.Process(path.problem.scene).run([air("blow", 0.01)], start=path, progress=False)
+
+
+def test_tables_follow_one_another():
+    """A table ends at 0 up to round-off; the next one begins with 0."""
+    path = run(plugged(), Stage("one", follow={"plug": [(0, 0), (1, 1.0), (1.7, 0)]}, step=STEP),
+               Stage("two", follow={"plug": [(1.7, 0), (2.7, 1.0)]}, step=STEP))
+    assert path["plug_travel"][-1] == pytest.approx(1.0)
+
+
+def test_tools_are_kept_apart_from_where_a_stage_ended():
+    """How far a plug has come at a pole height is known when the next stage begins; what was computed is kept."""
+    floor = fx.Contact("bottom", tools.plane(2.0).mirrored(), "none", name="floor")
+    by_height = Stage("by height", drive="plug", until=fx.pole_height(-1.0), step=STEP)
+    with pytest.raises(fx.InputError, match="Stage 'too far'.*tools overlap") as caught:
+        run(plugged(more=[floor]), by_height, plug("too far", 3.5))
+    assert caught.value.path.last.measures["pole_height"] == pytest.approx(-1.0)
+
+
+def test_what_is_driven_is_not_held_too():
+    scene = fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim"), fx.Displaced("rim", "z", name="lift")])
+    with pytest.raises(fx.InputError, match="Clamped.*holds the same component of the same boundary"):
+        fx.trace(scene, until=fx.travel(1.0), progress=False)
+    with pytest.raises(fx.InputError, match="Stage 'lift'.*holds the same component"):
+        run(scene, Stage("lift", drive="lift", until=fx.travel(1.0)))
+
+
+def test_a_state_of_the_path_that_meets_a_target_is_found(there_and_back):
+    path = there_and_back
+    assert path.at(fx.travel(2.0, of="plug")) is end(path, "down")
+    assert path.at(fx.travel(1.5)).stage == "down"             # whatever was looked at before
+    path.go_to(path.last)
+    assert path.at(fx.travel(1.5)).stage == "down"
+    with pytest.raises(fx.InputError, match="after: must be a state of this path"):
+        path.at(fx.travel(1.5), after=State(np.zeros(1), 0.0, np.zeros(1), 0.0))
+    with pytest.raises(fx.InputError, match="column 'travel' is not known"):
+        path.curve("travel")

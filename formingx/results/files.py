@@ -64,7 +64,7 @@ def on_root(comm: Any, action: Callable[[], Any]) -> Any:
     if comm.rank == 0:
         try:
             result = action()
-        except (OSError, ValueError) as found:
+        except (OSError, ValueError, ImportError) as found:
             error = found
     result, error = comm.bcast((result, error), root=0)
     if error is not None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, known
 from ..setting import Setting
 from . import measures
 from .measures import Target
@@ -129,23 +129,41 @@ class Path:
 
         Raises:
             InputError: the path does not pass through that value there.
+            ConvergenceError: it does, between two states, but no state was found there.
         """
-        bound = target.bind(self.problem)
-        states = self.states[next((i for i, s in enumerate(self.states) if s is after), 0):]
-        values = [self.value(bound, state) - target.value for state in states]
-        for a, b, left, right in zip(values, values[1:], states, states[1:]):
-            if left.setting == right.setting and (b == 0 or a * b < 0):
+        first = next((i for i, s in enumerate(self.states) if s is after), 0 if after is None else None)
+        if first is None:
+            raise InputError("Path.at: after: must be a state of this path")
+        states = self.states[first:]
+        values: list[float] = []
+        refused: list[InputError] = []
+        for left, right in zip(states, states[1:]):
+            if left.setting != right.setting:
+                continue
+            self.go_to(left)                                 # a travel is that of what the stage drives
+            try:
+                bound = target.bind(self.problem)
+            except InputError as error:
+                refused.append(error)
+                continue
+            a, b = (self.value(bound, state) - target.value for state in (left, right))
+            for off, state in ((a, left), (b, right)):
+                if abs(off) <= 1e-12 * max(abs(target.value), bound.size):
+                    return state
+            if a * b < 0:
                 now, self.problem.memory = self.problem.memory, left.memory
                 try:
-                    self.go_to(left)
-                    found = self._branch.between(left, right, bound, target.value)
+                    found = self._branch.find(left, right, bound, target)
                 finally:
                     self.problem.memory = now
                 found.stage, found.setting = left.stage, left.setting
                 found.measures = {name: self.value(m, found) for name, m in self._recorded.items()}
                 return found
-        raise InputError(f"the path does not pass {target}: its values lie between"
-                         f" {min(values) + target.value:.6g} and {max(values) + target.value:.6g}")
+            values += [a + target.value, b + target.value]
+        if refused and not values:
+            raise refused[0]
+        raise InputError(f"the path does not pass {target}: " + (
+            f"its values lie between {min(values):.6g} and {max(values):.6g}" if values else "it has one state there"))
 
     def between(self, a: State, b: State, fraction: float) -> tuple[np.ndarray, float]:
         """(x, control) on the smooth (cubic) path from a state to the next; for drawing."""
@@ -166,6 +184,8 @@ class Path:
 
         Values at the states themselves are theirs; between them they are interpolated, not solved for.
         """
+        for column in columns:
+            known("Path: column", column, self.columns)
         rows = [[self.states[0].measures[c] for c in columns]]
         for a, b in zip(self.states, self.states[1:]):
             self.go_to(b)

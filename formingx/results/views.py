@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from . import files
 from .profile import distance_to_line
 
 
@@ -62,10 +63,14 @@ def _mirrored(profile: Any) -> Any:
 
 def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any, comm: Any, title: str) -> None:
     """Draw the section swept through `stations`; place(points (n, 2), station) gives its x, y, z there, each (n,)."""
-    if comm.rank == 0:
+    if FilePath(file).suffix.lower() != ".png":
+        raise InputError(f"file {str(file)!r}: its name must end in .png")
+
+    def draw():
         FilePath(file).parent.mkdir(parents=True, exist_ok=True)
         with _screen():
             _draw(profile, stations, place, camera, os.fspath(file), title)
+    files.on_root(comm, draw)
 
 
 def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: str, title: str) -> None:
@@ -86,21 +91,25 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
     plotter.set_background("white")
     bar = {"title": title + "\n", "color": "black", "vertical": True, "position_x": 0.85, "position_y": 0.2,
            "height": 0.6, "width": 0.07, "title_font_size": 20, "label_font_size": 18, "fmt": "%.2f", "n_labels": 5}
-    plotter.add_mesh(swept(line, values), scalars="ratio", cmap="viridis_r", smooth_shading=True, scalar_bar_args=bar,
+    middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), 0.01) / 2     # a flat sheet is of one colour
+    shades = {"scalars": "ratio", "cmap": "viridis_r", "clim": (middle - half, middle + half)}
+    plotter.add_mesh(swept(line, values), **shades, smooth_shading=True, scalar_bar_args=bar,
                      ambient=0.45, diffuse=0.65, specular=0.25, specular_power=20, split_sharp_edges=True)
     for s in (stations[0], stations[-1]):              # the cut faces
         faces = [np.column_stack(place(side, s)) for side in (profile.bottom, profile.top)]
         section = pyvista.StructuredGrid(*(np.stack([f[:, k] for f in faces], 1)[..., None] for k in range(3)))
         section["ratio"] = np.tile(ratio, 2)
-        plotter.add_mesh(section, scalars="ratio", cmap="viridis_r", lighting=False, show_scalar_bar=False)
+        plotter.add_mesh(section, **shades, lighting=False, show_scalar_bar=False)
         points = np.vstack([faces[0], faces[1][::-1]])
         plotter.add_mesh(pyvista.lines_from_points(points, close=True), color="black", line_width=2)
     plotter.camera_position = [camera, (0, 0, 0), (0, 0, 1)]
     plotter.reset_camera()
     _fit(plotter, np.vstack([np.column_stack(place(line, s)) for s in stations]))
     plotter.enable_anti_aliasing("ssaa")
-    plotter.screenshot(file)
-    plotter.close()
+    try:
+        plotter.screenshot(file)
+    finally:                                           # before its screen goes
+        plotter.close()
 
 
 def _fit(plotter: Any, points: np.ndarray) -> None:

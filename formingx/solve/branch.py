@@ -154,6 +154,14 @@ class Branch:
                 high = middle
         return self.solve(*self.interpolate(a, b, low), bound.equation(target), "target", a)
 
+    def find(self, a: State, b: State, bound: Any, target: Any) -> State:
+        """`between` for a target that lies between two states; raises `ConvergenceError`."""
+        try:
+            return self.between(a, b, bound, target.value)
+        except Failure as failure:
+            raise ConvergenceError(f"the path passes {target} between two of its states, but no state was found there:"
+                                   f" {failure.reason}; run with through=[...] to have one") from None
+
     def limit_point(self, a: State, b: State) -> State:
         """The state between two where the control is stationary; raises `Failure`.
 

@@ -146,10 +146,19 @@ class Process:
                              " gave back")
         problem = start.problem if isinstance(start, Path) else Problem(self.scene)
         for state in [start] if isinstance(start, State) else start.states[-1:] if start else []:
-            if len(state.x) != problem.x.getLocalSize() or not 0 <= state.setting.get("stage", -1) < len(stages):
+            number = state.setting.get("stage", -1)
+            if len(state.x) != problem.x.getLocalSize() or not 0 <= number < len(stages):
                 raise InputError("Process: start: must be of this process: its last state is of another scene or stage")
+            if stages[number].name != state.stage:
+                raise InputError(f"Process: start: its last state is of stage {state.stage!r}, number {number + 1}, but"
+                                 f" stage {number + 1} is {stages[number].name!r} now: give the stages of the whole"
+                                 f" process, those that are done too")
         execution = _Execution(self.scene, plans, problem, tolerances or Tolerances(), step, checkpoint, start)
-        return execution.run(count("Process: max_steps", max_steps), progress)
+        try:
+            return execution.run(count("Process: max_steps", max_steps), progress)
+        except InputError as error:
+            error.path = execution.path
+            raise
 
     def _plan(self, stage: Stage) -> _Plan:
         scene, who = self.scene, stage.who
@@ -167,7 +176,9 @@ class Process:
             raise InputError(f"{who}: one thing has two tables")
         there = [thing for i, thing in enumerate(scene.things) if i not in off]
         try:
-            scene.check_held([t for t in there if hasattr(t, "constraints")], any(t in there for t in scene.contacts))
+            supports = [t for t in there if hasattr(t, "constraints")]
+            scene.check_held(supports, any(t in there for t in scene.contacts))
+            scene.check_driven(supports)
         except InputError as error:
             raise InputError(f"{who}: {error}") from None
         tables = [(i, table) for number, (_, table) in zip(numbers, stage.tables) for i in scene.together(number)]
@@ -212,6 +223,8 @@ class _Execution:
             piece = last["piece"] if k == last["stage"] else -1     # of this stage, that has begun already
             if piece < 1:
                 self._change(piece == 0)
+            if piece < 1:                                    # now the travels are known
+                clearance.check(self.scene, [plan], self._travels())
             if plan.tables:
                 self._follow(plan.tables, max(piece, 0))
             elif plan.numbers:
@@ -241,6 +254,12 @@ class _Execution:
         """The setting, the unknowns and the control where the process stands now."""
         last = self.path.last if self.path.states else None
         return self.problem.setting, last.x if last else self._rest, last.control if last else 0.0
+
+    def _travels(self) -> dict[int, float]:
+        """How far each tool of the scene has come, {number: length}."""
+        setting, _, control = self._standing()
+        return {i: setting.amplitude(i, control) * self.problem.forms.scales[i]
+                for i, thing in enumerate(self.scene.things) if hasattr(thing, "moves")}
 
     def _enter(self, base: list[float], rate: list[float], piece: int, control: float, fading: bool = False) -> None:
         setting = Setting(base, rate, self._off, fading, self._k, piece)
@@ -361,6 +380,7 @@ class _Execution:
                 raise InputError(f"{who}: the table of {name} begins at time {first[0]:g}, but the process time is"
                                  f" {now:g} already: it goes back in time")
             stands = before.amplitude(i, control) * self.problem.forms.scales[i]
-            if first[0] <= now + _SAME * abs(now) and abs(stands - first[1]) > 1e-9 * max(abs(stands), abs(first[1])):
+            size = max(np.abs(table[:, 1]).max(), self.problem.forms.scales[i])
+            if first[0] <= now + _SAME * abs(now) and abs(stands - first[1]) > 1e-9 * size:
                 raise InputError(f"{who}: the table of {name} begins with {first[1]:g} at time {first[0]:g}, but it"
                                  f" stands at {stands:g} then")
