@@ -129,8 +129,8 @@ def draw(found, tool, travel, law):
             left = bar.ax.secondary_yaxis("left", functions=(lambda y, a=ends: (y - a[0]) / (a[1] - a[0]),
                                                              lambda y, a=ends: a[0] + y * (a[1] - a[0])))
             left.tick_params(labelsize="x-small")
-            k = np.unravel_index(found.values[name].argmax(), found.values[name].shape)
-            ax.plot(*found.now[k], "o", color="red", fillstyle="none", markersize=9)
+            most = found.largest(name)
+            ax.plot(most["r_cm"], most["z_cm"], "o", color="red", fillstyle="none", markersize=9)
             ax.set(title=LABELS[name])
         ax.plot(*(tool.outline() - [0, travel]).T, "k", linewidth=1.2)
         ax.set(xlim=(0, 1.6 * PLUG), ylim=(low - 0.1, low + 2.2))

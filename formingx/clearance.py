@@ -14,16 +14,21 @@ from .scene import Scene
 _LOOKS = 50            # how often the tools are looked at on the way of a stage
 
 
-def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None) -> None:
+def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None) -> list[Any]:
     """An InputError if tools of a stage overlap, or one goes through a boundary that is held.
+
+    Returns the plans to check once more when their turn comes: a travel at their beginning is not known yet.
 
     plans: of the stages, with `stage`, `numbers` of what it drives, `tables` [(number, table)], numbers that are `off`.
     stands: travels at the beginning {number: length}, default 0.
     Where a travel cannot be known before the run (a stage that ends at a pole height) its tool is left out from there.
     """
     tools = {i: thing for i, thing in enumerate(scene.things) if isinstance(thing, Contact)}
-    stands = stands or dict.fromkeys(tools, 0.0)
+    outlines = {i: _outline(tool) for i, tool in tools.items()}
+    stands, unsure = stands or dict.fromkeys(tools, 0.0), []
     for plan in plans:
+        if not all(map(np.isfinite, stands.values())):
+            unsure.append(plan)
         present = {i: tool for i, tool in tools.items() if i not in plan.off}
         for where in _legs(plan, stands):
             for i in (i for i in present if where[i] != stands[i] and np.isfinite(where[i])):
@@ -33,8 +38,9 @@ def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None
                     raise InputError(f"{plan.stage.who}: {error}") from None
             for part in np.linspace(0, 1, _LOOKS):
                 now = {i: stands[i] + part * (where[i] - stands[i]) for i in tools}
-                _check_overlap(scene, plan.stage.who, present, now)
+                _check_overlap(scene, plan.stage.who, present, outlines, now)
             stands = where
+    return unsure
 
 
 def _legs(plan: Any, stands: dict[int, float]) -> Iterator[dict[int, float]]:
@@ -49,16 +55,16 @@ def _legs(plan: Any, stands: dict[int, float]) -> Iterator[dict[int, float]]:
         yield stands | {i: end for i in plan.numbers if i in stands}
 
 
-def _check_overlap(scene: Scene, who: str, present: dict[int, Contact], where: dict[int, float]) -> None:
+def _check_overlap(scene: Scene, who: str, present: dict[int, Contact], outlines: dict[int, np.ndarray],
+                   where: dict[int, float]) -> None:
     near = 1e-6 * max(scene.extent)
     for i, a in present.items():
         for j, b in present.items():
             if j <= i or j in scene.together(i) or not np.isfinite(where[i] + where[j]):
                 continue
             shift = where[i] * np.array(a.moves or (0, 0)) - where[j] * np.array(b.moves or (0, 0))
-            depths = [(b.tool.signed_distance(p), p) for p in [_outline(a) + shift]]
-            depths += [(a.tool.signed_distance(p - shift), p) for p in [_outline(b)]]
-            for depth, points in depths:
+            for points, other, back in ((outlines[i] + shift, b, 0.0), (outlines[j], a, shift)):
+                depth = other.tool.signed_distance(points - back)
                 worst = int(np.argmax(depth))
                 if depth[worst] > near:
                     r, z = points[worst] + where[j] * np.array(b.moves or (0, 0))

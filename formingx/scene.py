@@ -130,14 +130,11 @@ class Scene:
 
     def check_driven(self, supports: Sequence[Any]) -> None:
         """An InputError if what one of these supports drives is held by another."""
-        for mine in supports:
-            for held in mine.constraints():
-                if not getattr(held, "driven", False):
-                    continue
-                for other in supports:
-                    if other is not mine and any((h.on, h.component) == (held.on, held.component)
-                                                 for h in other.constraints()):
-                        raise InputError(f"{mine!r}: {other!r} holds the same component of the same boundary")
+        held = [(support, h) for support in supports for h in support.constraints()]
+        for mine, driven in held:
+            for other, h in held if getattr(driven, "driven", False) else ():
+                if other is not mine and (h.on, h.component) == (driven.on, driven.component):
+                    raise InputError(f"{mine!r}: {other!r} holds the same component of the same boundary")
 
     def _check_names(self) -> None:
         names = [thing.name for thing in self.things if getattr(thing, "name", None) is not None]

@@ -79,7 +79,7 @@ def test_parison_quick(tmp_path):
 def test_male_mould_quick(tmp_path):
     found = summary("male_mould", tmp_path, "--quick")
     drape, stick = found["drape_frictionless"], found["vacuum_stick"]
-    assert 0.05 < drape["first_contact_at_cm"] < 0.1             # the first state that touches: the gap is 0.05
+    assert drape["first_contact_at_cm"] == pytest.approx(0.05, rel=2e-2)
     assert drape["pole_thickness_ratio_at_cm"]["3"] == pytest.approx(0.8918, rel=1e-2)
     assert drape["tool_force_lb_at_cm"]["3"] == pytest.approx(23.1, rel=2e-2)
     # the top sticks before it has stretched; where it slides it thins

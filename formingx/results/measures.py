@@ -261,6 +261,11 @@ class _Reaction(Bound):
         return self._problem.reaction(self._number, x, control)
 
 
+def is_met(target: Target, bound: Bound, value: float) -> bool:
+    """True if a value of the target's measure is the target's, to round-off."""
+    return abs(value - target.value) <= 1e-12 * max(abs(value), abs(target.value), bound.size)
+
+
 def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     """The measures that every run records, by column name.
 

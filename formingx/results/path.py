@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, known
+from ..errors import InputError
 from ..setting import Setting
 from . import measures
 from .measures import Target
@@ -79,9 +79,13 @@ class Path:
 
     def __getitem__(self, name: str) -> np.ndarray:
         """One measure over all states, shape (len(path),), in the user's units."""
-        if name not in self.columns:
-            raise InputError(f"Path: column {name!r} is not known; known: {', '.join(self.columns)}")
+        self._check(name)
         return np.array([state.measures[name] for state in self.states])
+
+    def _check(self, *names: str) -> None:
+        for name in names:
+            if name not in self.columns:
+                raise InputError(f"Path: column {name!r} is not known; known: {', '.join(self.columns)}")
 
     @property
     def columns(self) -> list[str]:
@@ -146,11 +150,11 @@ class Path:
             except InputError as error:
                 refused.append(error)
                 continue
-            a, b = (self.value(bound, state) - target.value for state in (left, right))
-            for off, state in ((a, left), (b, right)):
-                if abs(off) <= 1e-12 * max(abs(target.value), bound.size):
+            a, b = ends = [self.value(bound, state) for state in (left, right)]
+            for value, state in zip(ends, (left, right)):
+                if measures.is_met(target, bound, value):
                     return state
-            if a * b < 0:
+            if (a - target.value) * (b - target.value) < 0:
                 now, self.problem.memory = self.problem.memory, left.memory
                 try:
                     found = self._branch.find(left, right, bound, target)
@@ -159,7 +163,7 @@ class Path:
                 found.stage, found.setting = left.stage, left.setting
                 found.measures = {name: self.value(m, found) for name, m in self._recorded.items()}
                 return found
-            values += [a + target.value, b + target.value]
+            values += ends
         if refused and not values:
             raise refused[0]
         raise InputError(f"the path does not pass {target}: " + (
@@ -184,8 +188,7 @@ class Path:
 
         Values at the states themselves are theirs; between them they are interpolated, not solved for.
         """
-        for column in columns:
-            known("Path: column", column, self.columns)
+        self._check(*columns)
         rows = [[self.states[0].measures[c] for c in columns]]
         for a, b in zip(self.states, self.states[1:]):
             self.go_to(b)

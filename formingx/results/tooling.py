@@ -8,6 +8,7 @@ import numpy as np
 
 from ..physics.contact import Contact
 from ..physics.tools import Arc, Line, Tool
+from ..setting import Setting
 
 
 class Tooling(NamedTuple):
@@ -37,7 +38,8 @@ class Tooling(NamedTuple):
         """How far each has come (length) in a state of this setting and control; None: it takes no part."""
         if not setting:
             return [0.0] * len(self.contacts)
-        return [None if i in setting["off"] else self.length * (setting["base"][i] + setting["rate"][i] * control)
+        there = Setting(**setting)
+        return [None if i in there.off else self.length * there.amplitude(i, control)
                 for i in range(self.before, self.before + len(self.contacts))]
 
     def placed(self, travels: list[float | None]) -> list[tuple[Tool, np.ndarray]]:

@@ -165,7 +165,7 @@ class Run:
     def _close_met(self, start: State) -> None:
         """Close the targets that hold at the start already, to round-off."""
         for target, bound in list(self.open):
-            if is_met(target, bound, self.branch.value(bound, start.x, start.control)):
+            if measures.is_met(target, bound, self.branch.value(bound, start.x, start.control)):
                 start.met = start.met or target
                 self.open = [(t, b) for t, b in self.open if t is not target]
 
@@ -318,11 +318,6 @@ def settle(path: Path, step: StepControl, until: measures.Target, checkpoint: Ch
     path.last.stepping = {"step": asdict(step), "counts": asdict(path.counts), "until": [until.name, until.value]}
     if checkpoint is not None:
         checkpoint.write()
-
-
-def is_met(target: measures.Target, bound: measures.Bound, value: float) -> bool:
-    """True if a value of the target's measure is the target's, to round-off."""
-    return abs(value - target.value) <= 1e-12 * max(abs(value), abs(target.value), bound.size)
 
 
 def _progress_bar(comm: Any, until: measures.Target, progress: bool) -> Any:

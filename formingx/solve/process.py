@@ -140,7 +140,7 @@ class Process:
         instance("Process: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
         instance("Process: start", start, Path | State | None, "a path, a state or None")
         plans = [self._plan(stage) for stage in stages]
-        clearance.check(self.scene, plans)
+        unsure = clearance.check(self.scene, plans)
         if isinstance(start, Path) and start.problem.scene is not self.scene:
             raise InputError("Process: start: must be a path of this very scene: fx.load(folder, scene), or what run"
                              " gave back")
@@ -153,7 +153,8 @@ class Process:
                 raise InputError(f"Process: start: its last state is of stage {state.stage!r}, number {number + 1}, but"
                                  f" stage {number + 1} is {stages[number].name!r} now: give the stages of the whole"
                                  f" process, those that are done too")
-        execution = _Execution(self.scene, plans, problem, tolerances or Tolerances(), step, checkpoint, start)
+        execution = _Execution(self.scene, plans, problem, tolerances or Tolerances(), step, checkpoint, start,
+                               unsure)
         try:
             return execution.run(count("Process: max_steps", max_steps), progress)
         except InputError as error:
@@ -201,8 +202,8 @@ class _Execution:
     """
 
     def __init__(self, scene: Scene, plans: list[_Plan], problem: Problem, tolerances: Tolerances,
-                 step: StepControl | None, checkpoint: Any, start: Path | State | None):
-        self.scene, self.plans, self.problem, self._step = scene, plans, problem, step
+                 step: StepControl | None, checkpoint: Any, start: Path | State | None, unsure: list[_Plan]):
+        self.scene, self.plans, self.problem, self._step, self._unsure = scene, plans, problem, step, unsure
         self.branch, self._balanced = Branch(problem, tolerances), tolerances.residual
         timed = any(plan.tables for plan in plans)
         self.path = Path(problem, self.branch, start if isinstance(start, Path) else None, timed)
@@ -223,8 +224,8 @@ class _Execution:
             piece = last["piece"] if k == last["stage"] else -1     # of this stage, that has begun already
             if piece < 1:
                 self._change(piece == 0)
-            if piece < 1:                                    # now the travels are known
-                clearance.check(self.scene, [plan], self._travels())
+                if any(plan is p for p in self._unsure):     # now its travels are known
+                    clearance.check(self.scene, [plan], self._travels())
             if plan.tables:
                 self._follow(plan.tables, max(piece, 0))
             elif plan.numbers:
@@ -257,9 +258,12 @@ class _Execution:
 
     def _travels(self) -> dict[int, float]:
         """How far each tool of the scene has come, {number: length}."""
+        return {i: self._stands(i) for i, thing in enumerate(self.scene.things) if hasattr(thing, "moves")}
+
+    def _stands(self, number: int) -> float:
+        """Value of a thing now, in the user's units."""
         setting, _, control = self._standing()
-        return {i: setting.amplitude(i, control) * self.problem.forms.scales[i]
-                for i, thing in enumerate(self.scene.things) if hasattr(thing, "moves")}
+        return setting.amplitude(number, control) * self.problem.forms.scales[number]
 
     def _enter(self, base: list[float], rate: list[float], piece: int, control: float, fading: bool = False) -> None:
         setting = Setting(base, rate, self._off, fading, self._k, piece)
@@ -370,7 +374,7 @@ class _Execution:
         return self._trace([*through, (target, target.bind(self.problem))], None if begun else 0.0, turns=False)
 
     def _check_beginning(self, tables: list[tuple[int, np.ndarray]], now: float, end: float) -> None:
-        who, (before, _, control) = self._stage.who, self._standing()
+        who = self._stage.who
         if end <= now:
             raise InputError(f"{who}: ends at time {end:g}, but the process time is {now:g} already: time cannot go"
                              f" back")
@@ -379,7 +383,7 @@ class _Execution:
             if first[0] < now - _SAME * abs(now):
                 raise InputError(f"{who}: the table of {name} begins at time {first[0]:g}, but the process time is"
                                  f" {now:g} already: it goes back in time")
-            stands = before.amplitude(i, control) * self.problem.forms.scales[i]
+            stands = self._stands(i)
             size = max(np.abs(table[:, 1]).max(), self.problem.forms.scales[i])
             if first[0] <= now + _SAME * abs(now) and abs(stands - first[1]) > 1e-9 * size:
                 raise InputError(f"{who}: the table of {name} begins with {first[1]:g} at time {first[0]:g}, but it"
