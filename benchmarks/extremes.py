@@ -16,11 +16,11 @@ from common import COMM, say  # noqa: E402
 from scipy.sparse import csr_matrix  # noqa: E402
 
 import formingx as fx  # noqa: E402
-from formingx.problem import Problem  # noqa: E402
+from formingx.discrete.problem import Problem  # noqa: E402
 from formingx.reference import membrane_inflation, membrane_limit_point  # noqa: E402
 from formingx.results import files  # noqa: E402
-from formingx.solve.bordered import Failure  # noqa: E402
-from formingx.solve.branch import Branch  # noqa: E402
+from formingx.solve.curve import Branch  # noqa: E402
+from formingx.solve.newton import Failure  # noqa: E402
 
 RATIO = 15.24
 

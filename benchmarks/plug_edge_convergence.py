@@ -16,8 +16,9 @@ from pathlib import Path
 from mpi4py import MPI
 
 import formingx as fx
-from formingx.results import files, plots
-from formingx.results.fields import Fields
+from formingx.results import files
+from formingx.results.files.fields import Fields
+from formingx.results.show import plots
 
 RADIUS, THICKNESS, C10, PLUG = 8.89, 0.6985, 0.448, 1.905            # cm, cm, MPa, cm
 CASES = {"fillet": (THICKNESS / 2, 0.3), "sharp": (0.0, 0.3), "fillet, stick": (THICKNESS / 2, "stick"),

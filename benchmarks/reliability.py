@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import formingx as fx
-from formingx.solve import branch
+from formingx.solve import curve as branch
 
 _NUMBER = {"a word": "x", "nan": math.nan, "inf": math.inf, "a bool": True, "a list": [], "an array": [1.0, 2.0],
            "huge": 10**400, "a dict": {}}

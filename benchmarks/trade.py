@@ -17,7 +17,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
 from common import COMM, save, say  # noqa: E402
 
 import formingx as fx  # noqa: E402
-from formingx.results import files, plots  # noqa: E402
+from formingx.results import files
+from formingx.results.show import plots  # noqa: E402
 
 # scene: size, materials (c10, c01), target pole height, in the thesis' units; Treloar's target lies beyond its limit
 SCENES = {

@@ -8,7 +8,8 @@ from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, RADIUS, block, force, press
 
 import formingx as fx
-from formingx.results import files, plots
+from formingx.results import files
+from formingx.results.show import plots
 
 I1_CONSTANT, PRESSED = 0.10, 0.3288                          # MPa, cm
 

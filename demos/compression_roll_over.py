@@ -8,7 +8,8 @@ from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, block, draw_grids, force, press, where
 
 import formingx as fx
-from formingx.results import files, plots
+from formingx.results import files
+from formingx.results.show import plots
 
 RATIOS = (1.19, 1.47, 1.87, 2.5, 3.4, 5.23)
 GRIDS = ((8, 4), (16, 8), (24, 16))

@@ -8,7 +8,8 @@ from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, block, draw_grids, forces, press, where
 
 import formingx as fx
-from formingx.results import files, plots
+from formingx.results import files
+from formingx.results.show import plots
 
 STRIP = 0.3125                                               # half of its height, cm
 RATIOS = (1.1, 1.2, 1.3, 1.47)

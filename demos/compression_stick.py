@@ -9,7 +9,8 @@ from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, RADIUS, block, draw_grids, forces, press
 
 import formingx as fx
-from formingx.results import files, plots
+from formingx.results import files
+from formingx.results.show import plots
 
 DEFLECTIONS = (0.1, 0.2, 0.3, 0.4)                           # total, cm
 LAWS = ("stick", 0.05, 0.1, 0.2, 0.3, "none")

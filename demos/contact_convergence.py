@@ -4,7 +4,7 @@ import cup
 from common import parser, save, say, summarise
 from moulding import first_touch, name_of
 
-from formingx.results import plots
+from formingx.results.show import plots
 
 MEASURES = {"correction": r"$\|\Delta x\|/\|x\|$  (3.5.1)", "work": "work, over its first  (3.5.2)",
             "residual": "residual, over support forces"}

@@ -13,7 +13,8 @@ from common import COMM, parser, save, say, summarise
 
 import formingx as fx
 from formingx.reference import membrane_limit_point
-from formingx.results import files, plots
+from formingx.results import files
+from formingx.results.show import plots
 
 # radius, thickness (in), c10, c01 (psi)
 CASES = {"case1": (3.5, 0.25, 56.0, 20.0), "case2": (3.5, 0.25, 40.0, 0.0), "case3": (3.5, 0.25, 40.0, 36.0),

@@ -4,8 +4,9 @@ import numpy as np
 from common import COMM, save, say
 
 import formingx as fx
-from formingx.results import files, plots
-from formingx.results.profile import distance_to_line
+from formingx.results import files
+from formingx.results.evaluate.profile import distance_to_line
+from formingx.results.show import plots
 
 
 def name_of(friction) -> str:

@@ -8,8 +8,8 @@ import numpy as np
 from common import save
 
 import formingx as fx
-from formingx.results import plots
-from formingx.results.probes import probe
+from formingx.discrete.probes import probe
+from formingx.results.show import plots
 
 RADIUS, HALF_HEIGHT = 1.32, 1.25                             # cm
 NEWTON = 100.0                                               # N in one MPa cm2

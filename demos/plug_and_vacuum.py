@@ -20,7 +20,8 @@ from moulding import cost
 from mpi4py import MPI
 
 import formingx as fx
-from formingx.results import files, plots
+from formingx.results import files
+from formingx.results.show import plots
 
 DEPTH, DRAFT, FILLET, EDGE = 10.0, 5.0, 2.0, 1.5
 SHARE, SEAL, LOW = 0.6, 20.0, 6.0                            # of the depth; psi, to lay the wall; psi, to let go

@@ -12,8 +12,9 @@ from common import COMM, parser, save, say, summarise
 from williams_plug import C10, PLUG, RADIUS, THICKNESS
 
 import formingx as fx
-from formingx.results import files, plots
-from formingx.results.fields import Fields
+from formingx.results import files
+from formingx.results.files.fields import Fields
+from formingx.results.show import plots
 
 LAWS = {"held": (60, 3), "frictionless": (80, 3)}            # elements
 NEAR = 2 * PLUG                                              # a clamped rim has a peak of its own

@@ -5,7 +5,8 @@ from common import COMM, say
 from moulding import cost
 
 import formingx as fx
-from formingx.results import files, plots
+from formingx.results import files
+from formingx.results.show import plots
 
 NEWTON = 100.0                                               # N in one MPa cm2
 LAWS = {

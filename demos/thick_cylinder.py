@@ -12,7 +12,8 @@ from common import COMM, parser, save, say, summarise
 
 import formingx as fx
 from formingx.reference import thick_sphere_limit_point, thick_wall
-from formingx.results import files, plots
+from formingx.results import files
+from formingx.results.show import plots
 
 INCH, PSI = 2.54, 6894.757e-6                                  # cm, MPa
 INNER, OUTER, C10, C01 = 7.0, 18.625, 60.0, 10.0               # in, psi

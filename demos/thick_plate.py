@@ -8,7 +8,8 @@ import numpy as np
 from common import COMM, parser, save, say, summarise
 
 import formingx as fx
-from formingx.results import files, plots
+from formingx.results import files
+from formingx.results.show import plots
 
 RADIUS, THICKNESS, C10, C01 = 7.5, 0.5, 80.0, 20.0
 PRESSURES = ("1", "5", "10", "20", "30", "40.1")

@@ -20,7 +20,8 @@ from common import parser, save, say, summarise
 
 import formingx as fx
 from formingx.reference import membrane_under_plug
-from formingx.results import files, plots
+from formingx.results import files
+from formingx.results.show import plots
 
 RADIUS = 7.62
 TRAVELS = tuple(float(t) for t in range(1, 11))

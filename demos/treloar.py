@@ -8,7 +8,8 @@ from common import COMM, parser, save, say, summarise
 
 import formingx as fx
 from formingx.reference import membrane_inflation, membrane_limit_point
-from formingx.results import files, plots
+from formingx.results import files
+from formingx.results.show import plots
 
 RADIUS, THICKNESS, C10 = 1.25, 0.082, 2.0
 STRETCHES = ("1.2", "1.5", "2", "3", "4", "6", "8.5")

@@ -11,7 +11,8 @@ import numpy as np
 from common import COMM, parser, save, say, summarise
 
 import formingx as fx
-from formingx.results import files, plots
+from formingx.results import files
+from formingx.results.show import plots
 
 RADIUS, LAYER = 19.1, 0.635
 CONSTANTS = {1: (0.552, 0.138), 2: (0.414, 0.0), 3: (0.759, 0.276)}         # c10, c01

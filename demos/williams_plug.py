@@ -13,7 +13,8 @@ import plugs
 from common import parser, save, say, summarise
 
 import formingx as fx
-from formingx.results import files, plots
+from formingx.results import files
+from formingx.results.show import plots
 
 RADIUS, THICKNESS, PLUG, C10 = 8.89, 0.6985, 1.905, 0.448
 TRAVELS = tuple(float(t) for t in range(2, 21, 2))

@@ -1,28 +1,28 @@
 """formingx: how polymers are formed, simulated with finite elements on FEniCSx."""
 
 from . import mesh
-from .checkpoint import load
-from .data import treloar1944
 from .doctor import doctor
 from .errors import ConvergenceError, InputError
-from .fit import Fit, fit
+from .materials.data import treloar1944
+from .materials.fit import Fit, fit
+from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from .physics import tools
 from .physics.contact import Contact
-from .physics.incompressibility import DisplacementPenalty, Membrane, MixedPressure
 from .physics.kinematics import Axisymmetric, PlaneStrain
 from .physics.loads import Pressure
-from .physics.materials import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
+from .physics.models import DisplacementPenalty, Membrane, MixedPressure
 from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Symmetry
 from .physics.tools import Tool
 from .results.compare import Comparison, compare
-from .results.measures import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel
-from .results.nodal import NodalComparison, compare_nodes, write_nodes
+from .results.compare_nodes import NodalComparison, compare_nodes, write_nodes
+from .results.evaluate.profile import Profile
+from .results.evaluate.stress import Stress, StressField
+from .results.files.checkpoint import load
 from .results.path import Path, State
-from .results.profile import Profile
-from .results.stress import Stress, StressField
-from .scene import Scene
-from .solve.bordered import Tolerances
-from .solve.continuation import trace
-from .solve.newton import solve
+from .scene.scene import Scene
+from .solve.fixed import solve
+from .solve.follow import trace
+from .solve.newton import Tolerances
 from .solve.process import Process, Stage
 from .solve.stepping import StepControl
+from .solve.targets import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel

@@ -11,8 +11,9 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from . import InputError, checkpoint, compare
-from .results import report
+from . import InputError, compare
+from .results.files import checkpoint
+from .results.show import report
 
 _COMPARE = """Compare a run's CSV file with another program's curve: differences, limit points, a picture.
 The header of THEIRS names its columns and may state units: pressure [psi]."""

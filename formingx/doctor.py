@@ -9,12 +9,12 @@ import numpy as np
 from mpi4py import MPI
 
 from . import _compat
+from .discrete.elements import place, shape_quality
 from .errors import instance, several
-from .physics.incompressibility import DisplacementPenalty, Membrane
+from .physics.models import DisplacementPenalty, Membrane
 from .physics.tools import Arc
-from .results.diagnosis import place, shape_quality
-from .results.measures import Target
-from .scene import Scene
+from .scene.scene import Scene
+from .solve.targets import Target
 
 _FLATTEST = 110.0          # longest edge over height: discs of aspect 100 end right in benchmarks/extremes.py
 _PER_FILLET = 2.0          # elements along a fillet

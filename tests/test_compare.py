@@ -7,7 +7,7 @@ from reference import element
 from test_reference_element import follow, pair
 
 import formingx as fx
-from formingx.results import tables
+from formingx.results.files import tables
 
 
 def spiral(t, shift=0.0):

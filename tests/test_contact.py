@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import formingx as fx
+from formingx.discrete.problem import Problem
 from formingx.physics.contact import Law, Touch
-from formingx.problem import Problem
 
 tools = fx.tools
 THETA, K = 0.02, 300.0

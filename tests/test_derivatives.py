@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import formingx as fx
-from formingx.problem import Problem
+from formingx.discrete.problem import Problem
 
 pytestmark = pytest.mark.quick
 

@@ -117,7 +117,7 @@ def test_condition_number():
     """The estimate against NumPy's 1-norm condition number of the same matrix, and the sign of its determinant."""
     from scipy.sparse import csr_matrix
 
-    from formingx.problem import Problem
+    from formingx.discrete.problem import Problem
     from formingx.solve.direct import DirectSolver, condition
     problem = Problem(treloar(elements=(4, 1)))
     x = problem.x.duplicate()

@@ -16,10 +16,10 @@ from test_contact import cup
 import formingx as fx
 from formingx import _compat
 from formingx.__main__ import main
-from formingx.results import plots, report
-from formingx.results.description import describe
-from formingx.results.fields import Fields
-from formingx.results.tooling import Tooling
+from formingx.discrete.tooling import Tooling
+from formingx.results.files.description import describe
+from formingx.results.files.fields import Fields
+from formingx.results.show import plots, report
 
 
 @pytest.fixture(scope="module")

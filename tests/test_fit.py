@@ -8,7 +8,7 @@ import pytest
 from conftest import run
 
 import formingx as fx
-from formingx.physics.homogeneous import MODES
+from formingx.materials.homogeneous import MODES
 
 
 def measured(material, reach=4.0, modes=tuple(MODES), noise=0.0):

@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 from test_derivatives import assert_derivatives, difference, random_state
 
 import formingx as fx
-from formingx.problem import Problem
+from formingx.discrete.problem import Problem
 from formingx.reference import membrane_inflation, membrane_limit_point
 
 MATERIALS = [

@@ -6,7 +6,7 @@ from conftest import ROOT, run_json, treloar
 
 import formingx as fx
 from formingx import _compat
-from formingx.solid import Solid
+from formingx.discrete.solid import Solid
 
 pytestmark = pytest.mark.quick
 

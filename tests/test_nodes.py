@@ -5,7 +5,7 @@ import pytest
 from conftest import ROOT, run, treloar
 
 import formingx as fx
-from formingx import grid
+from formingx.mesh import text as grid
 
 ONE = """six-node triangles 1
 numbering corners   # one element, as a textbook numbers it

@@ -9,7 +9,7 @@ from conftest import ROOT, treloar
 import formingx as fx
 from formingx.errors import InputError
 from formingx.reference import membrane_under_plug
-from formingx.solve.continuation import Run
+from formingx.solve.follow import Run
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import plug_extremes  # noqa: E402

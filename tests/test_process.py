@@ -8,10 +8,10 @@ from conftest import run_json
 from test_contact import support_force
 
 import formingx as fx
-from formingx.problem import Problem
+from formingx.discrete.problem import Problem
+from formingx.discrete.schedule import Setting
+from formingx.discrete.solid import Formulation
 from formingx.results.path import State
-from formingx.setting import Setting
-from formingx.solid import Formulation
 
 Stage, tools = fx.Stage, fx.tools
 STEP = fx.StepControl(target=8)

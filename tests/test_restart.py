@@ -15,7 +15,7 @@ from conftest import ROOT, run, treloar
 from test_contact import cup
 
 import formingx as fx
-from formingx import checkpoint
+from formingx.results.files import checkpoint
 
 SCENES = {"hinged": (treloar, fx.pole_stretch(3.0)), "stick": (lambda: cup("stick"), fx.pressure(8.0)),
           "coulomb": (lambda: cup(0.3), fx.pressure(8.0)),

@@ -8,7 +8,7 @@ from conftest import run_json, treloar
 from test_closed_forms import cylinder, tube
 
 import formingx as fx
-from formingx.problem import Problem
+from formingx.discrete.problem import Problem
 from formingx.reference import thick_sphere_limit_point, thick_wall
 
 STRETCH = 1.7

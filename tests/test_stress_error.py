@@ -11,7 +11,7 @@ from test_stress import sphere
 import formingx as fx
 from formingx import _compat
 from formingx.reference import thick_wall
-from formingx.results.patches import Patches
+from formingx.results.evaluate.patches import Patches
 
 MODELS = [fx.MixedPressure(), fx.MixedPressure(eps=1e-4, space="P1"), fx.MixedPressure(space="P0"),
           fx.DisplacementPenalty(eps=1e-4)]

@@ -5,8 +5,8 @@ import pytest
 from conftest import treloar
 
 import formingx as fx
+from formingx.discrete.probes import Probe
 from formingx.reference import membrane_limit_point
-from formingx.results.probes import Probe
 
 STRETCHES = (1.2, 1.5, 2.0, 3.0, 4.0, 6.0)
 

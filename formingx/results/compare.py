@@ -11,7 +11,9 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError, known
-from . import files, plots, tables
+from . import files
+from .files import tables
+from .show import plots
 
 _SAMPLES, _FINE = 2000, 33         # of a curve; and of the two pieces that meet at a sample
 _MOST = 10_000                     # points of theirs: each is measured against every sample

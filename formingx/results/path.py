@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from ..discrete.schedule import Setting
 from ..errors import InputError
-from ..setting import Setting
-from . import measures
-from .measures import Target
-from .profile import Profile, Profiles
-from .stress import Stresses, StressField
+from ..solve import targets
+from ..solve.targets import Target
+from . import columns
+from .evaluate.profile import Profile, Profiles
+from .evaluate.stress import Stresses, StressField
 
 
 @dataclass
@@ -68,7 +69,7 @@ class Path:
 
     def __init__(self, problem: Any, branch: Any, start: Path | None = None, timed: bool = False):
         self.problem, self._branch, self.stage = problem, branch, ""
-        self._recorded = measures.standard(problem, timed)
+        self._recorded = columns.standard(problem, timed)
         self._profiles, self._stresses = Profiles(problem), Stresses(problem)
         self.states: list[State] = list(start.states) if start else []
         self.counts: Counts = replace(start.counts) if start else Counts()
@@ -152,7 +153,7 @@ class Path:
                 continue
             a, b = ends = [self.value(bound, state) for state in (left, right)]
             for value, state in zip(ends, (left, right)):
-                if measures.is_met(target, bound, value):
+                if targets.is_met(target, bound, value):
                     return state
             if (a - target.value) * (b - target.value) < 0:
                 now, self.problem.memory = self.problem.memory, left.memory
@@ -225,7 +226,7 @@ class Path:
             InputError: the folder holds another run.
             OSError: it cannot be written.
         """
-        from ..checkpoint import Checkpoint
+        from .files.checkpoint import Checkpoint
         Checkpoint(folder, self).write()
 
     def to_vtx(self, folder: Any, states: Any = None) -> None:
@@ -235,12 +236,12 @@ class Path:
             folder: its name ends in .bp.
             states: a state, several in order, or "all".
         """
-        from . import fields
+        from .files import fields
         fields.to_vtx(self, folder, states)
 
     def to_xdmf(self, file: Any, states: Any = None) -> None:
         """The same fields as `to_vtx`, for programs that do not read VTX; the name ends in .xdmf."""
-        from . import fields
+        from .files import fields
         fields.to_xdmf(self, file, states)
 
     def animate(self, file: Any, frames: int = 60, seconds: float = 5.0) -> None:
@@ -251,7 +252,7 @@ class Path:
         Raises:
             InputError: the name does not end in .gif, a number is not allowed, or the mesh is no sheet.
         """
-        from . import animation
+        from .show import animation
         animation.animate(self, file, frames, seconds)
 
     def report(self, file: Any, title: str = "", failure: Any = None) -> None:
@@ -264,17 +265,17 @@ class Path:
         Raises:
             OSError: the file cannot be written.
         """
-        from . import report
+        from .show import report
         report.write(report.of_path(self), file, title, failure, self.problem.comm)
 
     def plot(self, y: str, x: str, axes: Any = None, **style: Any) -> Any:
         """Draw column `y` over column `x`; returns the matplotlib axes."""
-        from . import plots
+        from .show import plots
         return plots.curve(self, y, x, axes, **style)
 
     def plot_convergence(self, axes: Any = None) -> Any:
         """Draw the correction (3.5.1) of every Newton iteration of every state; returns the matplotlib axes."""
-        from . import plots
+        from .show import plots
         return plots.convergence(self, axes)
 
     def view3d(self, file: Any, state: State | None = None) -> None:
@@ -282,6 +283,6 @@ class Path:
 
         It is revolved about the axis, or, in plane strain, extruded.
         """
-        from . import views
+        from .show import views
         axisymmetric = self.problem.scene.kinematics.dimension_of_volume == 3
         (views.revolved if axisymmetric else views.extruded)(self.profile(state), file, self.problem.comm)

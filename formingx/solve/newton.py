@@ -1,133 +1,211 @@
-"""Newton's method at fixed control, by PETSc SNES, in load increments (Song 1993, section 3.2)."""
+"""Newton's method for F(x, control) = 0 with one more equation, c(x, control) = 0: one factorisation, two solves."""
 
 from __future__ import annotations
 
-import itertools
-import time
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
 
-from ..errors import ConvergenceError, count, finite, instance
-from ..problem import Problem
-from ..results.path import Path
-from ..scene import Scene
-from .bordered import UNLOADED, Iteration, Tolerances
-from .branch import Branch
-from .diagnosis import Attempt, diagnose
-from .direct import configure
-from .stepping import StepControl
+from ..errors import count, positive
+from .direct import DirectSolver
 
-_prefixes = itertools.count()
+UNLOADED = 1e-5
+"""Support forces (over stress times volume over length) below which a body counts as unloaded."""
+
+AT_REST = 1e-2
+"""Displacements (dimensionless) below which corrections are measured against this: where a body comes back to rest on
+a tool, the tool's force vanishes as the square of the depth, and no correction is as small as the displacements."""
+
+SETTLING = 40
+"""At most so many iterations, points touching and letting go on the way; those that come to a new branch by a `SMALL`
+correction do not count: a slack sheet lies on a flat plug with a hundred points, which let go one or two at a time.
+(With a history, which depends on the step, a shorter step is better.)"""
+
+SMALL = 1e-3
+"""Corrections (dimensionless displacement) below which growth is no sign of divergence: points touch and let go."""
 
 
-class FixedControl:
-    """F(x, control) = 0 at a given control.
+class Iteration(NamedTuple):
+    """One Newton iteration: what it found and what it did. The last entry of a history is the converged state.
 
-    Full Newton steps: on a thin sheet a backtracking line search stalls.
+    residual: |F| before it, over the norm of the support forces; correction: |dx|/(|x| + AT_REST), criterion (3.5.1);
+    work: |F . dx| over its first value, criterion (3.5.2).
     """
 
-    def __init__(self, problem: Any, tolerances: Tolerances):
-        self._problem, self._tolerances = problem, tolerances
-        self._control, self._work = 0.0, 0.0
-        self.history: list[Iteration] = []
-        self._snes = PETSc.SNES().create(problem.comm)
-        self._snes.setType("newtonls")
-        self._snes.setFunction(self._function, problem.x.duplicate())
-        self._snes.setJacobian(self._jacobian, problem.matrix)
-        self._snes.setConvergenceTest(self._test)
-        self._snes.setTolerances(max_it=tolerances.iterations)
-        configure(self._snes.getKSP(), problem.matrix, problem.symmetric)
-        prefix, options = f"formingx_{next(_prefixes)}_", PETSc.Options()
-        self._snes.setOptionsPrefix(prefix)
-        options[prefix + "snes_linesearch_type"] = "basic"
-        self._snes.setFromOptions()
-        del options[prefix + "snes_linesearch_type"]
+    residual: float
+    correction: float
+    work: float
 
-    def solve(self, x: PETSc.Vec, control: float) -> bool:
-        """Iterate x, in place, to the solution; False if there was no convergence (x is then worthless)."""
-        self._control, self._work, self.history = control, 0.0, []
-        self._snes.solve(None, x)
-        return self._snes.getConvergedReason() > 0
 
-    def correction(self) -> np.ndarray:
-        """The last correction of x, own part, shape (n,)."""
-        return -self._snes.getSolutionUpdate().array_r
+class Failure(Exception):
+    """Newton's method did not converge; `reason` says how, `history` holds the iterations."""
+
+    def __init__(self, reason: str, history: list[Iteration]):
+        super().__init__(reason)
+        self.reason, self.history = reason, history
+        self.attempt: Any = None                            # where it ended (`diagnosis.Attempt`), if that is known
+
+
+class _Kinks:
+    """Which branch of its kinks a problem is on, iteration by iteration.
+
+    Attributes:
+        changed: the iteration that came to the branch it is on; share: of a correction to take: less when an iteration
+            comes back to a branch that it had left, for then it would go round for ever.
+        found: how often a small correction came to a branch that was new.
+    """
+
+    def __init__(self, problem: Any):
+        self._problem, self._iteration = problem, -1
+        self._seen: dict[Any, int] = {}
+        self._last: Any = None
+        self.changed, self.share, self.found = 0, 1.0, 0
+
+    def look(self, moved: float) -> None:
+        """To be called once an iteration, after the residual was computed; moved: by the correction before."""
+        self._iteration += 1
+        now = self._problem.branch
+        if now != self._last and self._last is not None:
+            self.changed = self._iteration
+            if now in self._seen:
+                self.share = max(self.share / 2, 0.25)
+            else:
+                self.found += moved < SMALL and not self._problem.memory
+        elif self._iteration > self.changed + 1:
+            self.share = 1.0
+        self._seen[now] = self._iteration
+        self._last = now
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """When a state counts as converged: all of these.
+
+    correction: the next correction that quadratic convergence predicts, over the norm of x (and `AT_REST`).
+    residual: norm of F over the norm of the support forces.
+    iterations: at most so many.
+
+    Raises:
+        InputError: a value that is not greater than 0.
+    """
+
+    correction: float = 1e-10
+    residual: float = 1e-8
+    iterations: int = 12
+
+    def __post_init__(self) -> None:
+        positive("Tolerances: correction", self.correction)
+        positive("Tolerances: residual", self.residual)
+        count("Tolerances: iterations", self.iterations)
+
+    def met(self, corrections: list[float], residuals: list[float]) -> bool:
+        """True if a state with these corrections behind it, and these residuals (its own last), has converged.
+
+        Corrections that no longer shrink, below 1e-7, or that are below 1e-11, have met round-off (a flat thin sheet:
+        near 1e-8): then nothing better is to be had, and the residual may be what round-off leaves. A
+        residual that no longer shrinks with corrections below the tolerance is at round-off, however large: a stiff
+        penalty (8 mu/eps) times the round-off of the displacements can well exceed the support forces of a thin sheet.
+        """
+        if not corrections:
+            return False
+        residual, last, before = residuals[-1], corrections[-1], corrections[-2] if len(corrections) > 1 else 1.0
+        ahead = last * min(1.0, last / before) ** 2
+        if ahead < self.correction and residual < self.residual:
+            return True
+        if last < self.correction and residual > 0.3 * residuals[-2]:
+            return True
+        stalled = 0.3 * before < last < 1e-7 and residual > 0.3 * residuals[-2]
+        return (last < 1e-11 or stalled) and residual < 1e3 * self.residual
+
+
+class BorderedNewton:
+    """Solves F(x, control) = 0 together with c(x, control) = 0.
+
+    `norm(x, control)` measures corrections. The constraint is called as c(x, control, gradient) and returns
+    (c, dc/dcontrol), having put dc/dx into `gradient`.
+    """
+
+    def __init__(self, problem: Any, tolerances: Tolerances, norm: Callable[[PETSc.Vec, float], float]):
+        self.problem, self.tolerances, self._norm = problem, tolerances, norm
+        self.solver = DirectSolver(problem.matrix, problem.symmetric)
+        new = problem.x.duplicate
+        self.F, self.F_control, self.gradient, self.a, self.b = new(), new(), new(), new(), new()
+        self.reached = 0.0, 0.0                             # control and its last correction in `correct`
+
+    def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> bool:
+        """`self.b` = dx/dcontrol along the path at a solution; False if the tangent matrix is singular.
+
+        `ahead`: see `Problem.tangent`.
+        """
+        self.problem.tangent(x, control, ahead)
+        if not self.solver.factorise():
+            return False
+        self.problem.control_derivative(x, control, self.F_control, ahead)
+        self.solver.solve(self.F_control, self.b)
+        self.b.scale(-1)
+        return bool(np.isfinite(self.b.norm()))
+
+    def correct(self, x: PETSc.Vec, control: float, constraint: Any) -> tuple[float, list[Iteration]]:
+        """Iterate x (in place) and control to convergence; returns the control and the history.
+
+        Afterwards `self.b` is dx/dcontrol at the solution (to the accuracy of the last correction).
+
+        Raises:
+            Failure: no convergence; x is then worthless.
+        """
+        problem = self.problem
+        history: list[Iteration] = []
+        problem.begin()
+        problem.residual(x, control, self.F)
+        self.a.set(0)
+        self.reached = control, 0.0
+        work0 = moved = 0.0
+        kinks = _Kinks(problem)
+        while True:
+            residual = self.F.norm() / (problem.force_scale + UNLOADED)
+            if not np.isfinite(residual):
+                raise Failure(f"the forces are not finite: {problem.why_not_finite}", history)
+            if self.tolerances.met([i.correction for i in history], [*(i.residual for i in history), residual]):
+                history.append(Iteration(residual, 0.0, 0.0))
+                return control, history
+            problem.linearise(x, control, self.F)
+            kinks.look(moved)
+            quiet = history[kinks.changed:]
+            grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
+            if grown and not (problem.has_kinks and moved < SMALL):
+                raise Failure("the iteration diverges", history)
+            settling = len(history) - min(kinks.found, 4 * SETTLING) >= SETTLING
+            if len(quiet) >= self.tolerances.iterations or settling:
+                unsettled = settling and len(history) - kinks.changed < 3
+                raise Failure("contact does not settle: " * unsettled + f"no convergence in {len(history)} iterations",
+                              history)
+            if not self.tangent(x, control):
+                raise Failure("the tangent matrix is singular", history)
+            c, c_control = constraint(x, control, self.gradient)
+            self.solver.solve(self.F, self.a)
+            self.a.scale(-1)
+            slope = self.gradient.dot(self.b) + c_control
+            if slope == 0 or not np.isfinite(slope):
+                raise Failure("the quantity that is aimed at does not change along the path here", history)
+            step = (-c - self.gradient.dot(self.a)) / slope
+            self.a.axpy(step, self.b)
+            work = abs(self.F.dot(self.a))
+            work0 = work0 or work or 1.0
+            x.axpy(kinks.share, self.a)
+            control += kinks.share * step
+            moved = self._norm(self.a, step)
+            correction = moved / (self._norm(x, control) + AT_REST)
+            if not np.isfinite(correction):
+                raise Failure("the tangent matrix is singular", history)
+            history.append(Iteration(residual, correction, work / work0))
+            self.reached = control, step
+            problem.residual(x, control, self.F)
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
-        self._snes.destroy()
-
-    def _function(self, snes: Any, x: PETSc.Vec, out: PETSc.Vec) -> None:
-        self._problem.residual(x, self._control, out)
-
-    def _jacobian(self, snes: Any, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
-        self._problem.tangent(x, self._control)
-
-    def _test(self, snes: Any, iteration: int, norms: tuple) -> int:
-        size, step, residual = norms
-        relative = residual / (self._problem.force_scale + UNLOADED)
-        correction = step / (size + 1e-8) if iteration else 1.0
-        work = abs(snes.getFunction()[0].dot(snes.getSolutionUpdate())) if iteration else 0.0
-        self._work = self._work or work
-        self.history.append(Iteration(relative, correction, work / self._work if self._work else 1.0))
-        if not np.isfinite(relative):
-            return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
-        if self._tolerances.met([i.correction for i in self.history[1:]], [i.residual for i in self.history]):
-            return PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE
-        return PETSc.SNES.ConvergedReason.ITERATING
-
-
-def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerances | None = None) -> Path:
-    """Load the body to a value of the control in increments, each by Newton's method at fixed control.
-
-    For scenes without limit point before `to`; `trace` passes limit points and picks its own steps.
-
-    Args:
-        to: pressure (stress) or travel (length) of what is driven.
-        increments: number of equal increments; one that fails is halved.
-        tolerances: when a state counts as converged; default `Tolerances()`.
-
-    Raises:
-        InputError: nothing is driven, or an argument is not allowed.
-        ConvergenceError: an increment did not converge; it carries the path so far.
-    """
-    instance("solve: scene", scene, Scene, "a formingx.Scene")
-    instance("solve: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
-    scene.only_driven("solve")
-    to, increments = finite("solve: to", to), count("solve: increments", increments)
-    problem, began = Problem(scene), time.perf_counter()
-    tolerances = tolerances or Tolerances()
-    branch, newton = Branch(problem, tolerances), FixedControl(problem, tolerances)
-    path, x = Path(problem, branch), problem.x.duplicate()
-    path.record(branch.start())
-    step = StepControl(length=1 / increments, largest=1 / increments, smallest=1e-5 / increments)
-    done = 0.0                                               # fraction of `to`
-    while done < 1:
-        old, fraction = path.last, min(done + step.length, 1.0)
-        if 1 - fraction < 1e-9:
-            fraction = 1.0
-        control = fraction * to / problem.forms.control_scale
-        lead = (control - old.control) / old.slope           # along the tangent, as far as the control asks
-        problem.prepare(old.x, old.control, old.direction, old.slope, lead)
-        x.array_w[:] = branch.guess_from_rest(old, control) if old.kind == "start" else old.x + lead * old.direction
-        converged = newton.solve(x, control) and not problem.folded(x, control)
-        path.counts.iterations += len(newton.history) - 1
-        if converged:
-            path.record(branch.adopt(x, control, newton.history, old))
-            step.accepted(len(newton.history) - 1)
-            done = fraction
-            continue
-        path.counts.failures += 1
-        if not step.failed():
-            attempt = Attempt(x.array_r.copy(), control, newton.correction(), 0.0)
-            found = diagnose(branch, path.states, "Newton's method at fixed control did not converge", attempt,
-                             fixed_control=True)
-            raise ConvergenceError(
-                f"no equilibrium was found beyond {path.describe(old)} by Newton's method at fixed control, however"
-                f" small the increment: the path may turn back there. That state is the last good one; it is kept in"
-                f" the error's `path`. Try `trace`, which passes limit points.", path, found)
-    path.counts.seconds = time.perf_counter() - began
-    newton.destroy()
-    return path
+        self.solver.destroy()
+        for vector in (self.F, self.F_control, self.gradient, self.a, self.b):
+            vector.destroy()

@@ -14,17 +14,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import clearance
-from ..checkpoint import Checkpoint
+from ..discrete.problem import Problem
+from ..discrete.schedule import Setting
 from ..errors import ConvergenceError, InputError, count, finite, instance, several
-from ..problem import Problem
-from ..results import measures
+from ..results.files.checkpoint import Checkpoint
 from ..results.path import Path, State
-from ..scene import Scene
-from ..setting import Setting
-from .bordered import UNLOADED, Failure, Tolerances
-from .branch import Branch
-from .continuation import Run, settle
+from ..scene import clearance
+from ..scene.scene import Scene
+from . import targets as goals
+from .curve import Branch
+from .follow import Run, settle
+from .newton import UNLOADED, Failure, Tolerances
 from .stepping import StepControl
 
 _SAME = 1e-12          # relative: times that are the same
@@ -50,8 +50,8 @@ class Stage:
         InputError: no target, both `drive` and `follow`, a table that goes back in time, an argument not allowed.
     """
 
-    def __init__(self, name: str, drive: Any = None, until: measures.Target | None = None,
-                 through: Sequence[measures.Target] = (), without: Sequence[Any] = (), *,
+    def __init__(self, name: str, drive: Any = None, until: goals.Target | None = None,
+                 through: Sequence[goals.Target] = (), without: Sequence[Any] = (), *,
                  follow: Mapping[Any, Sequence] | None = None, step: StepControl | None = None):
         if not isinstance(name, str) or not name:
             raise InputError(f"Stage: name = {name!r}: must be a word")
@@ -61,7 +61,7 @@ class Stage:
         self.without = several(f"{who}: without", without, "things of the scene")
         self.step = instance(f"{who}: step", step, StepControl | None, "a StepControl or None")
         for target in (*([] if until is None else [until]), *self.through):
-            instance(f"{who}: target", target, measures.Target, "a target, such as pole_stretch(3)")
+            instance(f"{who}: target", target, goals.Target, "a target, such as pole_stretch(3)")
         if drive is not None and follow is not None:
             raise InputError(f"{who}: both drive and follow are given: a stage has one control")
         if drive is not None and until is None:
@@ -234,7 +234,7 @@ class _Execution:
                 self._record(self._resumed(self._standing()[2]))
         return self.path
 
-    def _bind(self, plan: _Plan) -> list[tuple[measures.Target, measures.Bound]]:
+    def _bind(self, plan: _Plan) -> list[tuple[goals.Target, goals.Bound]]:
         """The targets of a stage and their measures; where it drives one thing the last is `until`."""
         stage, n = plan.stage, len(self.scene.things)
         moving = {*plan.numbers, *(i for i, _ in plan.tables)}
@@ -246,7 +246,7 @@ class _Execution:
                 bound = target.bind(self.problem)
             except InputError as error:
                 raise InputError(f"{stage.who}: {error}") from None
-            if isinstance(bound, measures.Amplitude) and not bound.moves:
+            if isinstance(bound, goals.Amplitude) and not bound.moves:
                 raise InputError(f"{stage.who}: target {target}: this stage does not drive that")
             found.append((target, bound))
         return found
@@ -281,7 +281,7 @@ class _Execution:
     def _record(self, state: State) -> None:
         """Take up a state that needs no solving."""
         self.path.record(state)
-        settle(self.path, StepControl(), measures.changed(), self.checkpoint)
+        settle(self.path, StepControl(), goals.changed(), self.checkpoint)
 
     def _trace(self, targets: list, control: float | None, turns: bool = True) -> list:
         """Follow the path from a control (None: on from the last state); returns the targets that are still open."""
@@ -301,7 +301,7 @@ class _Execution:
             start = 0.0 if fading else control
             self._enter(before.standing(control), still, 0, start, fading)
         if self.problem.setting.fading and (begun or self._out_of_balance(x)):
-            target = measures.changed()
+            target = goals.changed()
             self._trace([(target, target.bind(self.problem))], start)
 
     def _bring_in(self, thing: Any, x: np.ndarray, control: float) -> None:
@@ -370,7 +370,7 @@ class _Execution:
             if self.path.last.control < 1.0:
                 self._record(replace(self.path.last, control=1.0, kind="target", measures={}, history=[]))
             return through
-        target = measures.process_time(then)
+        target = goals.process_time(then)
         return self._trace([*through, (target, target.bind(self.problem))], None if begun else 0.0, turns=False)
 
     def _check_beginning(self, tables: list[tuple[int, np.ndarray]], now: float, end: float) -> None:

@@ -1,0 +1,1 @@
+"""The discrete equations of a scene: what `solve` sees."""

@@ -1,0 +1,214 @@
+"""Contact of one face as forces at its nodes: where `problem` meets `physics.contact`. No form is compiled per tool."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from ..physics.contact import Contact, Touch, Tractions
+
+HOVERING = 1e-3
+"""Distances (over thickness) at which a node is as good as in touch."""
+
+
+class NodalContact:
+    """Residual, tangent and history of one contact, at the nodes of its face that this rank owns.
+
+    Args:
+        solid: the scene's `Solid`; contact: the `Contact`; assemble: makes the owned part of a linear form.
+
+    Attributes:
+        dofs: local numbers of (u_r, u_z), shape (n, 2); points: reference positions, shape (n, 2), length.
+        lengths, area: reference length and area that belong to each node, shape (n,) (area: 0 on the axis).
+    """
+
+    def __init__(self, solid: Any, contact: Contact, assemble: Any):
+        self.solid, self.contact = solid, contact
+        space, comm = solid.space, solid.comm
+        vectors, numbers = space.sub(0).collapse()
+        facets = solid.scene.mesh.facets_of(contact.on)
+        nodes = np.sort(fem.locate_dofs_topological(vectors, 1, facets))
+        dofs = np.asarray(numbers, dtype=np.int32).reshape(-1, 2)[nodes]
+        own = dofs[:, 0] < space.dofmap.index_map.size_local
+        self.dofs, self.points = dofs[own], vectors.tabulate_dof_coordinates()[nodes[own], :2].copy()
+        self.lengths = assemble(solid.compile(solid.length_row(contact.on)))[self.dofs[:, 0]]
+        self.area = self.lengths * solid.scene.kinematics.weight(self.points.T)
+        self._comm, self._length = comm, solid.length
+        self._spread_to_axis(solid.scene.kinematics)
+        self.thickness = solid.thickness(contact.on)
+        self.law = contact.law(contact.penalty * solid.stress / self.thickness, contact.ramp * self.thickness,
+                               self.points)
+        self._scale = solid.length / (solid.stress * solid.volume) * self.area
+        self._motion = solid.length * np.array(contact.moves or (0.0, 0.0))
+        self.base, self.rate = 0.0, float(contact.driven)   # of the travel by the control (`Setting`)
+        self._last: Any = None                              # positions and tractions last computed
+        self._accepted: Any = None                          # positions at the last accepted state
+        self._iterate: Any = None                           # `Motion` at the iteration before
+        self.memory = self.law.start(self.points) if self.law.remembers else None
+        self._sense: Any = None                             # of sliding, of the iteration before
+        self._arrived = np.zeros(len(self.points), dtype=bool)     # in the step before the last accepted state
+        # without history only the step's own convergence limits how much may touch in it
+        self._allowed = contact.nodes_per_step * (1 if self.law.remembers else 10)
+        self._foreseen = 0
+
+    def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Nodes seen from the tool, shape (n, 2), length; `fields`: owned unknowns."""
+        return self.points + self._length * fields[self.dofs] - (self.base + self.rate * control) * self._motion
+
+    def tractions(self, fields: np.ndarray, control: float) -> Tractions:
+        """What the law gives at a state, computed once for it."""
+        x = self.positions(fields, control)
+        if self._last is None or not np.array_equal(x, self._last[0]):
+            self._last = x, self.law.tractions(x, self.memory)
+        return self._last[1]
+
+    def _spread_to_axis(self, kinematics: Any) -> None:
+        """Give the node on the axis some area of its facet's, so that something holds it.
+
+        (1/24, -2/24, 1/24) of L times the weight at L: integrals of what is linear along the facet stay exact.
+        """
+        nodes = np.concatenate(self._comm.allgather(np.column_stack([self.points, self.lengths, self.area])))
+        for axis in nodes[(nodes[:, 3] < 1e-9 * nodes[:, 3].max()) & (nodes[:, 2] > 0)]:
+            length = 6 * axis[2]                                        # of its facet, on which Gauss-Lobatto gives 1/6
+            away = np.hypot(*(self.points - axis[:2]).T) / length
+            at = kinematics.weight(np.array([axis[0] + length, axis[1]])) * length / 24
+            for place, share in ((0.0, 1), (0.5, -2), (1.0, 1)):
+                self.area[np.abs(away - place) < 0.1] += share * at
+
+    @property
+    def branch(self) -> bytes:
+        """Which nodes touch and slide, of the tractions last computed."""
+        last = self._last[1]
+        return (last.sense + 4 * (last.normal != 0)).astype(np.int8).tobytes()
+
+    def forget(self, fields: np.ndarray, control: float) -> None:
+        """The tool comes in: nothing has touched it yet."""
+        self._accepted, self._arrived[:] = None, False
+        if self._memory is not None:
+            self.memory = self.law.start(self.positions(fields, control))
+
+    def begin(self) -> None:
+        """Newton's method begins at a guess ahead of the last accepted state."""
+        self._iterate = self._accepted if self._accepted is None else self.law.motion(self._accepted, self._memory)
+
+    def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
+        """Make the tangent at a state the one that an iteration wants, and the residual (`values`) fit to it."""
+        x = self.positions(fields, control)
+        plain = self.tractions(fields, control)
+        if self._iterate is not None:
+            found = self.law.tractions(x, self._memory, self._sense, self._iterate.to(x))
+            values[self.dofs] += self._scale[:, None] * (found.force - plain.force)
+            self._last = x, found
+        self._sense = self._last[1].sense
+        self._iterate = self.law.motion(x, self._memory)
+
+    def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
+        """Add the nodal forces to the owned residual."""
+        values[self.dofs] += self._scale[:, None] * self.tractions(fields, control).force
+
+    def stiffness(self, fields: np.ndarray, control: float, ahead: bool = False) -> np.ndarray:
+        """Derivative of the nodal forces by the nodes' own unknowns, shape (n, 2, 2); `ahead`: see the law."""
+        values = self.tractions(fields, control).stiffness
+        if ahead:
+            values = self.law.stiffness_ahead(self.positions(fields, control), self._memory, self._arrived)
+        return (self._scale * self._length)[:, None, None] * values
+
+    def add_control_derivative(self, values: np.ndarray, fields: np.ndarray, control: float,
+                               ahead: bool = False) -> None:
+        """Add the derivative of the nodal forces by the control: the tool moves; `ahead`: as in `stiffness`."""
+        if self.rate:
+            by_motion = self.stiffness(fields, control, ahead) @ (self.rate * self._motion / self._length)
+            values[self.dofs] -= by_motion
+
+    def advance(self, fields: np.ndarray, control: float) -> None:
+        """A state is accepted: remember it."""
+        x = self.positions(fields, control)
+        self._accepted, self._sense, self._last = x, None, None
+        if self._memory is not None:
+            before, theta = self._memory.distance, self.law.theta
+            self.memory = self.law.tractions(x, self._memory).touch
+            self._arrived = (before <= -theta) & (self._memory.distance > -theta)
+
+    @property
+    def memory(self) -> Touch | None:
+        """What the nodes remember of the last accepted state; None without friction."""
+        return self._memory
+
+    @memory.setter
+    def memory(self, memory: Touch | None) -> None:
+        self._memory, self._last = memory, None
+
+    def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
+        """How long a step along a tangent may be: to the first touch, or until enough new nodes touch.
+
+        A step that would bring a whole region into contact at once would decide by its own length where it sticks.
+        """
+        start = self.positions(fields, control)
+        velocity = self._length * direction[self.dofs] - slope * self.rate * self._motion
+        free = ~self.law.touching(start, self._memory)
+        times = self._arrivals(start, velocity, length)
+        ahead = (times > 0.02 * length) & (times < length)         # nearer ones are as good as in touch
+        times = np.sort(np.concatenate(self._comm.allgather(times[ahead])))
+        touching = self._comm.allreduce(int(np.sum(~free & (self.area > 0))), MPI.SUM)
+        allowed = self._allowed if touching > 1 else 1
+        return min(1.001 * times[allowed - 1], length) if len(times) >= allowed else length
+
+    def prepare(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> None:
+        """A step of this length along a tangent is about to be taken: foretell where nodes arrive."""
+        start = self.positions(fields, control)
+        velocity = self._length * direction[self.dofs] - slope * self.rate * self._motion
+        times = self._arrivals(start, velocity, length)
+        self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
+        if self._memory is not None:
+            self.memory = self._memory._replace(arrival=start + times[:, None] * velocity)
+
+    def _arrivals(self, start: np.ndarray, velocity: np.ndarray, length: float) -> np.ndarray:
+        """Arc length at which free nodes meet the ramp, `length` if they do not before, shape (n,)."""
+        before = -self.law.theta - self.law.distance(start)
+        free, at, times = ~self.law.touching(start, self._memory) & (self.area > 0), 0.0, np.full(len(start), length)
+        for s in length * np.linspace(0, 1, 17)[1:]:
+            now = -self.law.theta - self.law.distance(start + s * velocity)
+            hit = free & (now <= 0)
+            times[hit] = at + (s - at) * before[hit] / (before[hit] - now[hit])
+            free, before, at = free & ~hit, now, s
+        return times
+
+    def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+        """More than twice the new nodes that a step is meant, or foreseen, to bring into contact."""
+        if self._memory is None:
+            return False
+        a, b = (self.law.distance(self.positions(f, c)) for f, c in ((old, old_control), (new, control)))
+        found = int(np.sum((a <= -self.law.theta - HOVERING * self.thickness) & (b > -self.law.theta)))
+        return self._comm.allreduce(found, MPI.SUM) > 2 * max(self._allowed, self._foreseen) + 2
+
+    def touching(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Which nodes touch, or are held, shape (n,)."""
+        return self.law.touching(self.positions(fields, control), self._memory)
+
+    def largest_penetration(self, fields: np.ndarray, control: float) -> float:
+        """Depth of the deepest node inside the tool, 0 if none is, length, all ranks."""
+        d = self.contact.tool.signed_distance(self.positions(fields, control))
+        return self._comm.allreduce(max(float(d.max(initial=0.0)), 0.0), MPI.MAX)
+
+    def contact_length(self, fields: np.ndarray, control: float) -> float:
+        """Reference length of the face that is in touch, all ranks."""
+        return self._comm.allreduce(float(self.lengths[self.touching(fields, control)].sum()), MPI.SUM)
+
+    def traction(self, fields: np.ndarray, control: float) -> tuple[np.ndarray, np.ndarray]:
+        """(reference points (m, 2), normal and tangential traction per reference area (m, 2)) of all ranks, by R."""
+        found = self.tractions(fields, control)
+        rows = np.column_stack([self.points, found.normal, found.tangential])
+        rows = np.concatenate(self._comm.allgather(rows))
+        rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+        return rows[:, :2], rows[:, 2:]
+
+    def force(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Total force of the body on the tool (r, z), shape (2,), stress length^2 (per depth: length), all ranks.
+
+        Axisymmetric: the r entry is the radial traction summed around, not a resultant (which is 0).
+        """
+        total = (self.area[:, None] * self.tractions(fields, control).force).sum(0)
+        return self._comm.allreduce(total, MPI.SUM)

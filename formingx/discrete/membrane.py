@@ -1,0 +1,168 @@
+"""A scene as a membrane: its mid-surface as a line, its thickness as data (Adkins and Rivlin 1952).
+
+With the meridional stretch l1 = |dx/dS| and the hoop stretch l2 (r/R, or 1 in plane strain), the energy per reference
+area of the mid-surface is the sum over the layers of h W(l1, l2, 1/(l1 l2)): the volume is kept exactly, and no
+pressure is needed. The follower pressure acts on the mid-surface. A flat membrane without stretch has no stiffness
+normal to itself: its pressure grows with the cube of the pole height. So a path leaves rest along the deflection that
+the membrane has under a vanishing tension, at no pressure; every state on it is a solution of the unchanged equations.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dolfinx_mesh
+
+from .. import _compat
+from ..errors import InputError
+from ..mesh.mesh import Mesh
+from ..physics.supports import Held
+from .solid import Formulation
+
+_FIRST_STRETCH = 1e-6
+"""Stretch at which the first direction of a path is taken (a direction only: no state is solved for there)."""
+
+
+class MidSurface(Formulation):
+    """The forms of a scene as a membrane; the only field is the displacement of the mid-surface.
+
+    Raises:
+        InputError: the sheet is not a graph over R, or a load or support is where a membrane has neither face nor end.
+    """
+
+    slack_at_rest = True
+
+    @property
+    def bodies(self):
+        """Not there: raises an InputError."""
+        raise InputError("a membrane knows no stress through its thickness, nor between its layers: use a solid model,"
+                         " MixedPressure() for one")
+
+    def face(self, name, quadrature_degree):
+        """(normal of the mid-surface away from the loaded face, the whole mid-surface)."""
+        nodes = self.scene.mesh.nodes_of(name)
+        near = 1e-8 * self.length
+        whole = len(nodes) and np.allclose([nodes[0, 0], nodes[-1, 0]], [self._R[0], self._R[-1]], rtol=0, atol=near)
+        for side, Z in ((-1.0, self._low), (1.0, self._high)):
+            if whole and np.abs(nodes[:, 1] - np.interp(nodes[:, 0], self._R, Z)).max() < near:
+                t = self._tangent
+                return side * ufl.as_vector([-t[1], t[0]]), self.dx(metadata={"quadrature_degree": quadrature_degree})
+        raise InputError(f"boundary {name!r}: a membrane takes loads on the whole of its lower or of its upper face"
+                         f" only")
+
+    def constraints(self, support):
+        """A mean over an end is the value at its point; a membrane is held at its ends only."""
+        held = [Held(c.component, on=c.on) if not isinstance(c, Held) else c for c in support.constraints()]
+        for item in held:
+            if item.on is not None and item.on not in self.mesh.boundaries:
+                raise InputError(f"{support!r}: a membrane can be held at its ends only, which are"
+                                 f" {list(self.mesh.boundaries)}")
+        return held
+
+    def nearest(self, points):
+        """Points of the mid-surface at the same R, shape (n, 2)."""
+        R = np.asarray(points, dtype=float)[:, 0]
+        return np.column_stack([R, np.interp(R, self._R, (self._low + self._high) / 2)])
+
+    def set_stiff(self):
+        """A small stretch in all directions."""
+        self.w.sub(0).interpolate(lambda X: _FIRST_STRETCH / self.length * X[:2])
+
+    def _make_mesh(self) -> Mesh:
+        """The line halfway between the two faces, with a node wherever the lower face has one."""
+        mesh = self.scene.mesh
+        comm = mesh.comm
+        if "bottom" not in mesh.boundaries:
+            raise InputError(f"Membrane: the mesh needs a boundary named 'bottom'; it has {list(mesh.boundaries)}")
+        R = self._R = mesh.nodes_of("bottom")[:, 0]
+        near = 1e-9 * self.length
+        faces = {name: _faces(mesh, name, R, near) for name in mesh.layers}
+        self._low = np.min([low for low, _ in faces.values()], axis=0)
+        self._high = np.max([high for _, high in faces.values()], axis=0)
+        self._layers = {name: np.maximum(high - low, 0.0) for name, (low, high) in faces.items()}
+        if np.any(np.diff(R) < near) or not np.all(self._high - self._low > near):
+            raise InputError("Membrane: the sheet must have a single lower and upper point at each R")
+        degree = _compat.coordinate_map(mesh.domain).degree
+        first = np.arange(0, len(R) - degree, degree)
+        cells = np.column_stack([first, first + degree, *([first + 1] if degree == 2 else [])])
+        points = np.column_stack([R, (self._low + self._high) / 2])
+        if comm.rank:
+            cells, points = cells[:0], points[:0]
+        element = basix.ufl.element("Lagrange", "interval", degree, shape=(2,))
+        domain = dolfinx_mesh.create_mesh(comm, cells=cells.astype(np.int64), x=points, e=element)
+        domain.topology.create_connectivity(0, 1)
+        ends, tags = [], []
+        for tag, end in enumerate((R[0], R[-1]), 1):
+            found = dolfinx_mesh.locate_entities(domain, 0, lambda X, end=end: np.abs(X[0] - end) < near)
+            ends.append(found)
+            tags.append(np.full(len(found), tag, dtype=np.int32))
+        numbers, order = np.unique(np.concatenate(ends).astype(np.int32), return_index=True)
+        facets = dolfinx_mesh.meshtags(domain, 0, numbers, np.concatenate(tags)[order])
+        boundaries: dict[str, tuple[int, ...]] = {}
+        for name in mesh.boundaries:
+            at = mesh.nodes_of(name)[:, 0]
+            for tag, end in enumerate((R[0], R[-1]), 1):
+                if len(at) and np.all(np.abs(at - end) < near):
+                    boundaries[name] = (tag,)
+        return Mesh(domain, None, facets, mesh.layers, boundaries, comm)
+
+    def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
+        element = basix.ufl.element("Lagrange", cell, 2)
+        return element, [basix.ufl.blocked_element(element, shape=(2,))]
+
+    def _weight(self) -> Any:
+        """The kinematic weight times the thickness normal to the mid-surface; the faces are measured along Z."""
+        direction = ufl.Jacobian(self.domain)[:, 0]
+        direction = direction / ufl.sqrt(ufl.inner(direction, direction))
+        self._tangent = ufl.sign(direction[0]) * direction                     # towards growing R
+        space = fem.functionspace(self.domain, ("Lagrange", 2))
+        self._thicknesses = {}
+        for name, values in self._layers.items():
+            h = self._thicknesses[name] = fem.Function(space, name=f"thickness of {name}")
+            h.interpolate(lambda X, values=values: np.interp(X[0], self._R, values))
+        return self._area() * sum(self._thicknesses.values())
+
+    def _area(self) -> Any:
+        return self.scene.kinematics.weight(self.X) * self._tangent[0]
+
+    def _deformation_gradient(self) -> Any:
+        """In principal axes (meridian, normal, hoop)."""
+        F = self.scene.kinematics.deformation_gradient(self.u, self.X)         # of the surface: its normal is kept
+        t = F * ufl.as_vector([self._tangent[0], self._tangent[1], 0])
+        l1, l2 = ufl.sqrt(ufl.inner(t, t)), F[2, 2]
+        return ufl.diag(ufl.as_vector([l1, 1 / (l1 * l2), l2]))
+
+    def _energy(self) -> Any:
+        energy, dx = 0, self.dx
+        for name, material in self.scene.materials.items():
+            W = material.strain_energy(self.F, **{k: self.constant(c) for k, c in material.parameters.items()})
+            energy += self._scale * W * self._thicknesses[name] * self._area() * dx
+        return energy
+
+
+def _faces(mesh: Mesh, layer: str, R: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest Z of a layer at each of the ascending R, shape (n,); (inf, -inf) where it is absent."""
+    geometry, owned = mesh.domain.geometry, mesh.domain.topology.index_map(2).size_local
+    cells = mesh.cells.find(mesh.layers[layer])
+    nodes = _compat.cell_nodes(mesh.domain)[cells[cells < owned]]
+    edges = [(1, 2, 3), (0, 2, 4), (0, 1, 5)]                                  # ends, and the node between them
+    halves = [(a, b) for a, b, _ in edges]
+    if nodes.shape[1] == 6:
+        halves = [pair for a, b, m in edges for pair in ((a, m), (m, b))]
+    pieces = geometry.x[np.concatenate([nodes[:, pair] for pair in (*halves, *((b, a) for a, b in halves))]), :2]
+    pieces = np.concatenate(mesh.comm.allgather(pieces.reshape(-1, 2, 2)))
+    first = np.searchsorted(R, pieces[:, :, 0].min(axis=1) - near)
+    last = np.searchsorted(R, pieces[:, :, 0].max(axis=1) + near)
+    which = np.repeat(np.arange(len(pieces)), last - first)                    # every piece meets some of the R
+    at = np.arange(len(which)) - np.repeat(np.cumsum(last - first) - (last - first), last - first) + first[which]
+    (Ra, Za), (Rb, Zb) = pieces[which, 0].T, pieces[which, 1].T
+    steep = np.abs(Rb - Ra) < near
+    Z = Za + (Zb - Za) * np.clip(np.where(steep, 0.0, (R[at] - Ra) / np.where(steep, 1.0, Rb - Ra)), 0, 1)
+    low, high = np.full(len(R), np.inf), np.full(len(R), -np.inf)
+    np.minimum.at(low, at, Z)
+    np.maximum.at(high, at, Z)
+    return low, high

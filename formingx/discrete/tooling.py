@@ -1,0 +1,57 @@
+"""The tools of a scene and where they stand in its states: for pictures and tables."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..physics.contact import Contact
+from ..physics.tools import Arc, Line, Tool
+from .schedule import Setting
+
+
+class Tooling(NamedTuple):
+    """All contacts of a scene.
+
+    contacts: in the order of the scene; before: how many of its things come before them (`Scene.things`); length: that
+    of a problem's forms, which makes amplitudes of travels.
+    """
+
+    contacts: list[Contact]
+    before: int
+    length: float
+
+    @classmethod
+    def of_problem(cls, problem: Any) -> Tooling:
+        """Those of a `Problem`."""
+        scene = problem.scene
+        return cls(scene.contacts, len(scene.loads) + len(scene.supports), problem.forms.length)
+
+    @classmethod
+    def of_description(cls, scene: dict[str, Any]) -> Tooling:
+        """Those of a scene as plain data (`description.describe`)."""
+        return cls([_contact(dict(data)) for data in scene["contacts"]], len(scene["loads"]) + len(scene["supports"]),
+                   scene["mesh"]["length"])
+
+    def travels(self, setting: dict[str, Any], control: float) -> list[float | None]:
+        """How far each has come (length) in a state of this setting and control; None: it takes no part."""
+        if not setting:
+            return [0.0] * len(self.contacts)
+        there = Setting(**setting)
+        return [None if i in there.off else self.length * there.amplitude(i, control)
+                for i in range(self.before, self.before + len(self.contacts))]
+
+    def placed(self, travels: list[float | None]) -> list[tuple[Tool, np.ndarray]]:
+        """(tool, its shift (r, z)) of those that take part."""
+        return [(contact.tool, travel * np.array(contact.moves or (0.0, 0.0)))
+                for contact, travel in zip(self.contacts, travels, strict=True) if travel is not None]
+
+
+def _contact(data: dict[str, Any]) -> Contact:
+    shape = data["tool"]
+    pieces = [(Line if len(piece) == 2 else Arc)(*(np.array(v) if isinstance(v, list) else v for v in piece))
+              for piece in shape["pieces"]]
+    moves = data["moves"] and tuple(data["moves"])
+    more = {name: data[name] for name in ("penalty", "ramp", "separates", "nodes_per_step", "name")}
+    return Contact(data["on"], Tool.of_pieces(pieces, shape["closed"]), data["friction"], moves=moves, **more)

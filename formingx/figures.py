@@ -1,0 +1,41 @@
+"""Empty figures, drawn without a screen, and the tools of a scene in them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: Any = None,
+           rows: int = 1) -> tuple[Any, Any]:
+    """(figure, axes, row by row) with `columns` plots side by side, widths in `ratios`; saving needs no screen."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    drawing = Figure(figsize=(width * columns, height * rows), layout="constrained")
+    FigureCanvasAgg(drawing)
+    axes = drawing.subplots(rows, columns, squeeze=False, width_ratios=ratios).ravel()
+    for a in axes:
+        a.grid(True, color="0.9", linewidth=0.7)
+        a.set_axisbelow(True)
+        a.spines[["top", "right"]].set_visible(False)
+    return drawing, axes[0] if len(axes) == 1 else axes
+
+
+def tools(axes: Any, placed: Any, low: Any, high: Any, mirror: bool = False, colour: str = "0.35",
+          filled: bool = True) -> None:
+    """Rigid tools, as far as they reach into the box from `low` to `high`, (r, z); their solid grey if `filled`.
+
+    placed: [(tool, its shift (r, z))]; mirror: with their mirror images at r = 0.
+    """
+    box = np.array([low, high], dtype=float)
+    n = np.maximum(300 * (box[1] - box[0]) / np.max(box[1] - box[0]), 40).astype(int)
+    r, z = (np.linspace(*box[:, k], n[k]) for k in (0, 1))
+    points = np.stack(np.meshgrid(np.abs(r) if mirror else r, z), axis=-1)
+    for tool, shift in placed:
+        depth = tool.signed_distance(points.reshape(-1, 2) - shift).reshape(points.shape[:2])
+        if depth.max() <= 0 or depth.min() >= 0:
+            continue
+        if filled:
+            axes.contourf(r, z, depth, levels=[0, np.inf], colors=["0.88"], zorder=0.5)
+        axes.contour(r, z, depth, levels=[0], colors=[colour], linewidths=1.5, zorder=1.5)

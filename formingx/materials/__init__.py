@@ -1,0 +1,1 @@
+"""Strain energies, homogeneous tests and fits."""

@@ -1,0 +1,135 @@
+"""Constants of a material from tests."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import InputError, known
+from . import homogeneous
+from .material import Material
+
+_FIRST, _LAST = 20, 400
+"""Evaluations for every first guess, and then for the best three."""
+
+
+class Fit(NamedTuple):
+    """What a fit found.
+
+    material: the material with the fitted constants, in the data's unit of stress.
+    rms: {test: root mean square of the nominal stress' residual}, same unit.
+    rms_total: the same over all points of all tests: what was made small.
+    """
+
+    material: Material
+    rms: dict[str, float]
+    rms_total: float
+
+    def __str__(self) -> str:
+        parts = ", ".join(f"{mode} {value:.4g}" for mode, value in self.rms.items())
+        return f"{self.material}: rms {self.rms_total:.4g} ({parts})"
+
+
+def fit(material: type[Material] | Material, data: dict[str, Any], terms: int | None = None) -> Fit:
+    """Fit the constants of a material to tests, all points of all tests with the same weight.
+
+    Least squares of the nominal stress, from several first guesses, of which the best result counts. The constants
+    stay admissible, and no step leaves a material's limit (Gent, Arruda-Boyce).
+
+    Args:
+        material: a class (`MooneyRivlin`, `Ogden`, ...), or a material whose constants are the first guess: a
+            `Hyperelastic` must be given so.
+        data: {test: (stretch, nominal stress)}, each of shape (n,), for any of "uniaxial", "pure_shear" (planar)
+            and "equibiaxial". Force over reference area, in any unit: the constants get the same.
+        terms: number of terms if `material` is the class `Ogden`, default 3.
+
+    Raises:
+        InputError: data that are not finite, not positive stretches, of different length, fewer than the constants,
+            all at stretch 1, or beyond every admissible limit.
+    """
+    from scipy.optimize import least_squares
+
+    stretches, measured, parts = _checked(data)
+    guesses = _guesses(material, stretches, measured, terms)
+    response, n = guesses[0].response, len(guesses[0].parameters)
+    if len(measured) < n:
+        raise InputError(f"fit: {len(measured)} points cannot fix the {n} constants of {type(guesses[0]).__name__}")
+    scale = np.abs(measured).max()
+
+    def refined(guess: Material, start: Any, evaluations: int) -> tuple[float, Material, np.ndarray]:
+        """(cost, guess, coordinates) after so many evaluations; the cost is infinite where the stress is."""
+        low, high = np.array([bounds for _, *bounds in guess.coordinates()]).T
+
+        def residual(x):
+            return (response.stress(stretches, guess.constants_at(x))[0] - measured) / scale
+
+        start = np.clip(start, low + 1e-9 * np.abs(start), high - 1e-9 * np.abs(start))
+        if not np.all(np.isfinite(residual(start))):
+            return np.inf, guess, start
+        # a step to where the stress is not finite is shortened by least_squares itself
+        found = least_squares(residual, start, bounds=(low, high), x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12,
+                              max_nfev=evaluations)
+        return found.cost, guess, found.x
+
+    def cost(trial: tuple) -> float:
+        return trial[0]
+
+    trials = sorted((refined(g, [x for x, *_ in g.coordinates()], _FIRST) for g in guesses), key=cost)
+    least, guess, x = min((refined(g, x, _LAST) for _, g, x in trials[:3]), key=cost)
+    if not np.isfinite(least):
+        raise InputError(f"fit: {guess} has no finite stress at some stretch of the data: start with constants whose"
+                         f" limit lies beyond them")
+    best = guess.with_constants(guess.constants_at(x))
+    misfit = response.stress(stretches, best.parameters.values())[0] - measured
+    rms = {mode: _rms(misfit[part]) for mode, part in parts.items()}
+    return Fit(best, rms, _rms(misfit))
+
+
+def _guesses(material: Any, stretches: np.ndarray, measured: np.ndarray, terms: int | None) -> list[Material]:
+    l1, l2 = stretches
+    if isinstance(material, Material):
+        if terms is not None:
+            raise InputError(f"fit: terms = {terms!r} is for the class Ogden; {material} has its terms already")
+        return [material]
+    if not (isinstance(material, type) and issubclass(material, Material)):
+        raise InputError(f"fit: {material!r}: must be a formingx material or its class")
+    if terms is not None and material.__name__ != "Ogden":
+        raise InputError(f"fit: terms = {terms!r}: {material.__name__} has no terms to count, only Ogden has")
+    I1 = l1**2 + l2**2 + (l1 * l2) ** -2
+    shape = l1 - 1 / (l1**3 * l2**2)                        # neo-Hookean stress over its modulus
+    modulus = float(np.median(measured[shape != 0] / shape[shape != 0]))
+    if not modulus > 0:
+        raise InputError("fit: the stresses do not have the sign of the strains in most points: tension is positive,"
+                         " stretch is length over first length")
+    return material.guesses(modulus, float(I1.max()), terms)
+
+
+def _checked(data: Any) -> tuple[np.ndarray, np.ndarray, dict[str, slice]]:
+    """Stretches (2, n) and stresses (n,) of all tests, and where each test is."""
+    if not isinstance(data, dict) or not data:
+        raise InputError(f"fit: data = {data!r}: must be {{test: (stretch, nominal stress)}}")
+    stretches, stresses, parts, n = [], [], {}, 0
+    for mode, columns in data.items():
+        known("fit: data: test", mode, homogeneous.MODES)
+        try:
+            l, P = (np.asarray(x, float) for x in columns)
+        except (TypeError, ValueError):
+            raise InputError(f"fit: data[{mode!r}]: must be (stretch, nominal stress), numbers") from None
+        if l.ndim != 1 or l.shape != P.shape or not len(l):
+            raise InputError(f"fit: data[{mode!r}]: stretch has the shape {l.shape}, stress {P.shape}: must be (n,),"
+                             f" the same for both")
+        for i in np.flatnonzero(~(np.isfinite(l) & np.isfinite(P) & (l > 0)))[:1]:
+            raise InputError(f"fit: data[{mode!r}], point {i}: stretch = {l[i]}, stress = {P[i]}: must be finite,"
+                             f" and the stretch greater than 0")
+        stretches.append(homogeneous.along(mode, l))
+        stresses.append(P)
+        parts[mode] = slice(n, n := n + len(l))
+    l = np.concatenate(stretches, axis=1)
+    if np.all(l[0] == 1):
+        raise InputError("fit: data: every stretch is 1: nothing is strained")
+    return l, np.concatenate(stresses), parts
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,273 @@
+"""The strain energies that formingx knows, and the user's own."""
+
+from __future__ import annotations
+
+import inspect
+import itertools
+import math
+from collections.abc import Callable
+from typing import Any
+
+import ufl
+
+from ..errors import InputError, count, finite, positive
+from ..physics import kinematics
+from .material import Material
+
+
+class NeoHookean(Material):
+    """W = c10 (I1 - 3). The shear modulus is 2 c10.
+
+    Args:
+        c10: the I1 constant, stress, greater than 0.
+    """
+
+    def __init__(self, *, c10: float):
+        self.parameters = {"c10": c10}
+        self.check()
+
+    def strain_energy(self, F, c10):
+        return c10 * (ufl.inner(F, F) - 3)
+
+    @classmethod
+    def guesses(cls, modulus, I1, terms):
+        return [cls(c10=modulus / 2)]
+
+    def coordinates(self):
+        return [(self.parameters["c10"], 0, math.inf)]
+
+
+class MooneyRivlin(Material):
+    """W = c10 (I1 - 3) + c01 (I2 - 3), eq. (4.1) of Song (1993): c10 belongs to I1, c01 to I2.
+
+    Args:
+        c10: the I1 constant, stress, at least 0.
+        c01: the I2 constant, stress, at least 0 (both at least 0: else W falls without bound).
+    """
+
+    def __init__(self, *, c10: float, c01: float):
+        self.parameters = {"c10": c10, "c01": c01}
+        self.check()
+
+    def check(self):
+        for name, value in self.parameters.items():
+            if finite(f"{self}: {name}", value) < 0:
+                raise InputError(f"{self} is not stable: with {name} < 0 the energy falls without bound at large"
+                                 f" stretch; {name} must be at least 0")
+        super().check()
+
+    def strain_energy(self, F, c10, c01):
+        I1, I2 = kinematics.invariants(F)
+        return c10 * (I1 - 3) + c01 * (I2 - 3)
+
+    @classmethod
+    def guesses(cls, modulus, I1, terms):
+        return [cls(c10=0.4 * modulus, c01=0.1 * modulus)]
+
+    def coordinates(self):
+        return [(value, 0, math.inf) for value in self.parameters.values()]
+
+
+class Yeoh(Material):
+    """W = c10 (I1 - 3) + c20 (I1 - 3)^2 + c30 (I1 - 3)^3, Yeoh (1993). The shear modulus is 2 c10.
+
+    Args:
+        c10: stress, greater than 0.
+        c20: stress, greater than -sqrt(3 c10 c30) (at least 0 if c30 is 0), so that W grows with I1 everywhere.
+        c30: stress, at least 0.
+    """
+
+    def __init__(self, *, c10: float, c20: float, c30: float):
+        self.parameters = {"c10": c10, "c20": c20, "c30": c30}
+        self.check()
+
+    def check(self):
+        for name, value in self.parameters.items():
+            finite(f"{self}: {name}", value)
+        c10, c20, c30 = self.parameters.values()
+        positive(f"{self}: c10", c10)
+        if c30 < 0 or c20 < 0 and c20**2 >= 3 * c10 * c30:
+            raise InputError(f"{self} is not stable: its energy does not grow with I1 everywhere; c30 must be at least"
+                             f" 0 and c20 greater than -sqrt(3 c10 c30) = {-math.sqrt(max(3 * c10 * c30, 0)):.6g}")
+        super().check()
+
+    def strain_energy(self, F, c10, c20, c30):
+        x = ufl.inner(F, F) - 3
+        return c10 * x + c20 * x**2 + c30 * x**3
+
+    @classmethod
+    def guesses(cls, modulus, I1, terms):
+        return [cls(c10=modulus / 2, c20=0, c30=0.1 * modulus / I1**2)]
+
+    def coordinates(self):
+        """c10, c20 + 0.99 sqrt(3 c10 c30) and sqrt(c30): admissible, with 1 % to spare, where none is negative."""
+        c10, c20, c30 = self.parameters.values()
+        return [(x, 0, math.inf) for x in (c10, c20 + 0.99 * math.sqrt(3 * c10 * c30), math.sqrt(c30))]
+
+    def constants_at(self, coordinates):
+        c10, above, root = coordinates
+        return [c10, above - 0.99 * root * math.sqrt(3 * c10), root**2]
+
+
+class Gent(Material):
+    """W = -(mu Jm / 2) ln(1 - (I1 - 3)/Jm), Gent (1996): stress grows without bound as I1 - 3 comes to Jm.
+
+    Args:
+        mu: shear modulus, stress, greater than 0.
+        Jm: the limit of I1 - 3, greater than 0. In uniaxial tension the largest stretch is about sqrt(Jm + 3).
+    """
+
+    def __init__(self, *, mu: float, Jm: float):
+        self.parameters = {"mu": mu, "Jm": Jm}
+        self.check()
+
+    def check(self):
+        for name, value in self.parameters.items():
+            positive(f"{self}: {name}", value)
+        super().check()
+
+    @property
+    def largest_I1(self):
+        return self.parameters["Jm"] + 3
+
+    def strain_energy(self, F, mu, Jm):
+        return -mu * Jm / 2 * _ln(1 - (ufl.inner(F, F) - 3) / Jm)
+
+    @classmethod
+    def guesses(cls, modulus, I1, terms):
+        return [cls(mu=modulus, Jm=factor * (I1 - 3)) for factor in (1.1, 2, 10)]
+
+    def coordinates(self):
+        return [(value, 0, math.inf) for value in self.parameters.values()]
+
+
+class ArrudaBoyce(Material):
+    """The eight-chain model of Arruda and Boyce (1993): dW/dy = mu N b(y), b the inverse of L(b) = coth b - 1/b.
+
+    y = sqrt(I1 / (3 N)) is the chains' stretch over the largest one. For b stands the approximation of Kroeger (2015)
+    b = (3 y - (6 y^3 + y^5 - 2 y^7)/5) / (1 - y^2), whose relative error is at most 0.28 % for every y and 0 at y = 0
+    and 1. It integrates, with s = y^2, to W = mu N (s/2 - s^2/20 - s^3/15 - ln(1 - s)), zero at s = 1/N.
+
+    Args:
+        mu: n k T, stress, greater than 0. The shear modulus at rest is larger: mu (1 + 3/(5 N) + ...).
+        N: segments in a chain, greater than 1: I1 stays below 3 N. In uniaxial tension the largest stretch is about
+            sqrt(3 N).
+    """
+
+    def __init__(self, *, mu: float, N: float):
+        self.parameters = {"mu": mu, "N": N}
+        self.check()
+
+    def check(self):
+        mu, N = self.parameters.values()
+        positive(f"{self}: mu", mu)
+        if finite(f"{self}: N", N) <= 1:
+            raise InputError(f"{self}: N = {N!r}: must be greater than 1, or the chains are fully stretched at rest")
+        super().check()
+
+    @property
+    def largest_I1(self):
+        return 3 * self.parameters["N"]
+
+    def strain_energy(self, F, mu, N):
+        def w(s):
+            return s / 2 - s**2 / 20 - s**3 / 15 - _ln(1 - s)
+        return mu * N * (w(ufl.inner(F, F) / (3 * N)) - w(1 / N))
+
+    @classmethod
+    def guesses(cls, modulus, I1, terms):
+        return [cls(mu=modulus, N=factor * I1 / 3) for factor in (1.1, 2, 10)]
+
+    def coordinates(self):
+        mu, N = self.parameters.values()
+        return [(mu, 0, math.inf), (N, 1, math.inf)]
+
+
+class Ogden(Material):
+    """W = sum mu_k / alpha_k (l1^alpha_k + l2^alpha_k + l3^alpha_k - 3), eq. (4.3) of Song (1993).
+
+    Where alpha_k < 0, l1^alpha_k is written (l2 l3)^-alpha_k, and so on: the same at constant volume (alpha_k = -2 is
+    I2), but finite in an element that is squeezed flat on the way to a solution. Without it Newton's method fails at
+    the stretches of a blown sheet.
+
+    Args:
+        mu: the mu_k, stress; the shear modulus is half the sum of mu_k alpha_k.
+        alpha: as many exponents alpha_k, none zero, each with mu_k alpha_k > 0.
+    """
+
+    def __init__(self, *, mu: Any, alpha: Any):
+        mu, alpha = _as_tuple(mu), _as_tuple(alpha)
+        if len(mu) != len(alpha) or not mu:
+            raise InputError(f"Ogden: mu = {mu!r} and alpha = {alpha!r} must be as many, and at least one each")
+        self.parameters = {f"mu{k}": m for k, m in enumerate(mu, 1)} | {f"alpha{k}": a for k, a in enumerate(alpha, 1)}
+        self.check()
+
+    def check(self):
+        for m, a in self._pairs(self.parameters):
+            if not finite(f"{self}: mu", m) * finite(f"{self}: alpha", a) > 0:
+                raise InputError(f"{self} is not stable: the pair mu = {m!r}, alpha = {a!r} has mu alpha <= 0;"
+                                 f" every pair must have mu alpha > 0")
+        super().check()
+
+    def strain_energy(self, F, **constants):
+        energy, J = 0, kinematics.volume_ratio(F)
+        for (m, a), (_, exponent) in zip(self._pairs(constants), self._pairs(self.parameters), strict=True):
+            powers = kinematics.sum_of_powers(F, a)
+            energy += m / a * ((powers if exponent > 0 else J**-a * powers) - 3)
+        return energy
+
+    @staticmethod
+    def _pairs(constants):
+        return [(constants[f"mu{k}"], constants[f"alpha{k}"]) for k in range(1, len(constants) // 2 + 1)]
+
+    @classmethod
+    def guesses(cls, modulus, I1, terms):
+        """Every choice of so many exponents out of six."""
+        exponents = (1.3, 2, 5, 10, -2, -5)
+        n = count("fit: terms", 3 if terms is None else terms)
+        if n > len(exponents):
+            raise InputError(f"fit: terms = {terms!r}: Ogden can be fitted with at most {len(exponents)}")
+        first = cls(mu=[modulus] * n, alpha=[2.0] * n)
+        return [first.with_constants([2 * modulus / n / a / 4 ** max(abs(a) - 2, 0) for a in some] + list(some))
+                for some in itertools.combinations(exponents, n)]
+
+    def coordinates(self):
+        """mu_k and alpha_k keep their signs; alpha_k lies between -30 and 30."""
+        values = list(self.parameters.values())
+        largest = [math.inf] * (len(values) // 2) + [30.0] * (len(values) // 2)
+        return [(x, 0, top) if x > 0 else (x, -top, 0) for x, top in zip(values, largest, strict=True)]
+
+
+class Hyperelastic(Material):
+    """Any energy, written as a function of the invariants or of F.
+
+    Args:
+        energy: called as `energy(I1, I2, **constants)` or `energy(F, **constants)`; returns a UFL scalar. Where it must
+            not be used it should be infinite or not a number, with its derivatives: a step that gets there is halved.
+        of: "invariants" or "F" (shape (3, 3)).
+        constants: the energy's named constants. Exponents and the like may be among them.
+
+    Example: ``Hyperelastic(lambda I1, I2, c1, c2: c1 * (I1 - 3) + c2 * (I1 - 3)**2, c1=0.2, c2=0.01)``
+    """
+
+    def __init__(self, energy: Callable, of: str = "invariants", **constants: float):
+        if of not in ("invariants", "F"):
+            raise InputError(f"Hyperelastic: of = {of!r}: must be 'invariants' or 'F'")
+        names = list(inspect.signature(energy).parameters)[2 if of == "invariants" else 1:]
+        if set(names) != set(constants):
+            raise InputError(f"Hyperelastic: the energy takes the constants {names}, given are {sorted(constants)}")
+        self.parameters, self._energy, self._of = constants, energy, of
+        self.check()
+
+    def strain_energy(self, F, **constants):
+        arguments = kinematics.invariants(F) if self._of == "invariants" else (F,)
+        return self._energy(*arguments, **constants)
+
+
+def _ln(x: Any) -> Any:
+    """ln x, not a number where x < 0, and so are its derivatives (those of ln x itself are finite there)."""
+    return 2 * ufl.ln(ufl.sqrt(x))
+
+
+def _as_tuple(values: Any) -> tuple:
+    return tuple(values) if hasattr(values, "__iter__") else (values,)

@@ -1,0 +1,142 @@
+"""Meshes of six-node triangles with named layers (cells) and named boundaries (facets)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from .. import _compat
+from ..errors import InputError, known, pair
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A distributed mesh and the names of its parts.
+
+    Attributes:
+        domain: the `dolfinx.mesh.Mesh`; coordinates (R, Z) in the user's unit of length.
+        cells, facets: its `MeshTags`.
+        layers: name to tag.
+        boundaries: name to the tags of its facets: one, or several where a part has a name of its own (`with_part`).
+        comm: the communicator that it was made on. (What mpi4py hangs on `domain.comm`, a copy, when objects are
+            passed there is freed with it; inside an exception that would lock up Python's end.)
+    """
+
+    domain: Any
+    cells: Any
+    facets: Any
+    layers: dict[str, int]
+    boundaries: dict[str, tuple[int, ...]]
+    comm: MPI.Comm
+
+    def facets_of(self, boundary: str) -> np.ndarray:
+        """Local facet indices of a boundary, sorted, shape (n,), ghosts included."""
+        return np.sort(np.concatenate([self.facets.find(tag) for tag in self.boundaries[boundary]]))
+
+    def with_part(self, name: str, of: str, within: tuple[float, float], along: str = "r") -> Mesh:
+        """The mesh with one more boundary: the facets of a boundary between two coordinates.
+
+        They belong to both boundaries from then on: a load or contact on the whole acts on the part too.
+
+        Args:
+            name: of the part, a new one.
+            of: the boundary that it is a part of.
+            within: (lowest, highest) reference coordinate, length; nodes must lie there (`disc`: `concentrate`), unless
+                the boundary ends before.
+            along: the coordinate, "r" or "z".
+
+        Raises:
+            InputError: a name that is not known or not new, no facet within, or one that is within in part only.
+        """
+        from dolfinx.mesh import entities_to_geometry, meshtags
+        who = f"with_part({name!r}, {of!r})"
+        if not isinstance(name, str) or not name or name in self.boundaries:
+            raise InputError(f"{who}: name = {name!r}: must be a word that no boundary has yet; there are"
+                             f" {', '.join(map(repr, self.boundaries))}")
+        known(f"{who}: boundary", of, self.boundaries)
+        known(f"{who}: along", along, ("r", "z"))
+        low, high = pair(f"{who}: within", within)
+        if not low < high:
+            raise InputError(f"{who}: within = {within!r}: the first must be below the second")
+        domain, axis = self.domain, "rz".index(along)
+        comm, facets = self.comm, self.facets_of(of)
+        domain.topology.create_connectivity(1, 2)
+        nodes = entities_to_geometry(domain, 1, facets) if len(facets) else np.zeros((0, 2), dtype=np.int32)
+        ends = domain.geometry.x[nodes[:, :2], axis]
+        near = 1e-8 * comm.allreduce(np.abs(domain.geometry.x).max(initial=0.0), MPI.MAX)
+        lowest, highest = ends.min(1), ends.max(1)
+        inside = (lowest > low - near) & (highest < high + near)
+        cut = ~inside & (lowest < high - near) & (highest > low + near)
+        cuts = np.concatenate(comm.allgather(np.column_stack([lowest, highest])[cut]))
+        if len(cuts):
+            raise InputError(f"{who}: within = {within!r} cuts the element edge from {along} = {cuts[0, 0]:.6g} to"
+                             f" {cuts[0, 1]:.6g}: both must be {along} of nodes; a disc has nodes where it is told to"
+                             f" concentrate")
+        if not comm.allreduce(int(inside.sum()), MPI.SUM):
+            raise InputError(f"{who}: within = {within!r}: {of!r} has nothing there; its {along} is from"
+                             f" {comm.allreduce(lowest.min(initial=np.inf), MPI.MIN):.6g} to"
+                             f" {comm.allreduce(highest.max(initial=-np.inf), MPI.MAX):.6g}")
+        # a facet has one tag: those of the part get new ones, which belong to all that the old ones belonged to
+        first, old = 1 + max(tag for tags in self.boundaries.values() for tag in tags), self.boundaries[of]
+        values, places = self.facets.values.copy(), np.searchsorted(self.facets.indices, facets[inside])
+        values[places] = first + np.searchsorted(old, values[places])
+        new = {tag: first + k for k, tag in enumerate(old)}
+        boundaries = {key: (*tags, *(new[tag] for tag in tags if tag in new)) for key, tags in self.boundaries.items()}
+        return replace(self, facets=meshtags(domain, 1, self.facets.indices, values),
+                       boundaries=boundaries | {name: tuple(new.values())})
+
+    def nodes_of(self, boundary: str) -> np.ndarray:
+        """Coordinates of all geometry nodes of a boundary, sorted by R, then Z, shape (n, 2); same on all ranks."""
+        from dolfinx.mesh import entities_to_geometry
+        domain = self.domain
+        facets = self.facets_of(boundary)
+        domain.topology.create_connectivity(1, 2)
+        nodes = np.unique(entities_to_geometry(domain, 1, facets)) if len(facets) else []
+        local = domain.geometry.x[nodes, :2].reshape(-1, 2)
+        points = np.concatenate(self.comm.allgather(local))
+        scale = np.ptp(points, axis=0).max() if len(points) else 1.0
+        keys = np.round(points / (scale or 1.0), 12)
+        _, first = np.unique(keys, axis=0, return_index=True)
+        points = points[first]
+        return points[np.lexsort((points[:, 1], points[:, 0]))]
+
+    def line_of(self, boundary: str) -> np.ndarray:
+        """Ends and middles of the edges of a boundary one after the other, from its end of smaller R (of smaller Z).
+
+        Shape (2 n + 1, 2) for n edges, the ends at even rows; same on all ranks.
+
+        Raises:
+            InputError: the boundary is not one line with two ends.
+        """
+        from dolfinx.mesh import entities_to_geometry
+        domain = self.domain
+        domain.topology.create_connectivity(1, 2)
+        domain.topology.create_connectivity(2, 1)
+        mid_edge = _compat.coordinate_map(domain).degree == 2
+        # of an edge: its two ends and, on second-order geometry, its middle
+        nodes = entities_to_geometry(domain, 1, self.facets_of(boundary)).reshape(-1, 3 if mid_edge else 2)
+        edges = np.concatenate(self.comm.allgather(domain.geometry.x[nodes][..., :2]))
+        corners, ends = np.unique(np.round(edges[:, :2].reshape(-1, 2) / max(np.ptp(edges, axis=(0, 1)).max(), 1e-300),
+                                           12), axis=0, return_inverse=True)
+        ends = ends.reshape(-1, 2)
+        _, first = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)       # a ghost is there twice
+        at: dict[int, list[int]] = {}
+        for edge in first.tolist():
+            for corner in ends[edge].tolist():
+                at.setdefault(corner, []).append(edge)
+        tips = sorted(corner for corner, there in at.items() if len(there) == 1)     # corners are sorted by R, then Z
+        if len(tips) != 2 or max(map(len, at.values())) > 2:
+            raise InputError(f"boundary {boundary!r} must be one line with two ends; {len(tips)} ends were found")
+        corner, line, here = tips[0], [], -1
+        for _ in first:
+            here = next(e for e in at[corner] if e != here)
+            forward = ends[here, 0] == corner
+            a, b = edges[here, [0, 1] if forward else [1, 0]]
+            line += [a, edges[here, 2] if mid_edge else (a + b) / 2]
+            corner = ends[here, 1 if forward else 0]
+        if len(line) != 2 * len(first) or corner != tips[1]:
+            raise InputError(f"boundary {boundary!r} must be one line with two ends, but is in several parts")
+        return np.array([*line, b])

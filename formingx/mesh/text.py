@@ -1,0 +1,194 @@
+"""A mesh as plain arrays, and its text file: nodes and six-node triangles, for other solvers.
+
+The file, line by line (blank lines count for nothing, nor does what follows a #; node numbers are any whole numbers):
+
+    six-node triangles 1                    the format and its version
+    numbering corners                       of the six nodes, see below
+    nodes 63                                then as many lines: number R Z
+    1 0.0 0.082
+    elements 20 sheet                       then as many lines: number and six nodes; a block for each layer
+    1 3 7 1 12 5 4
+    boundary 10 bottom                      then as many lines: first, middle and last node of an edge
+    3 12 7
+
+`numbering corners`: the three corners counter-clockwise, then the middles of the edges 1-2, 2-3, 3-1 (the usual order
+of textbooks and of gmsh). `numbering around`: corner, middle, corner, ... counter-clockwise, so that every edge reads
+first, middle, last as in eq. (3.3.8) of Song (1993). Along an edge of a boundary the body is on the left, as in the
+thesis' eq. (3.3.4).
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+
+_FORMAT = "six-node triangles 1"
+# position of our node (corners first) in a line of the file
+_NUMBERINGS = {"corners": [0, 1, 2, 3, 4, 5], "around": [0, 2, 4, 1, 3, 5]}
+
+
+class Grid(NamedTuple):
+    """A mesh on one rank; rows of `layers` and `boundaries` hold indices of `points`.
+
+    Attributes:
+        points: (R, Z) of the nodes, shape (n, 2), unit of length of the mesh.
+        numbers: their numbers in a file, shape (n,).
+        layers: {name: triangles, shape (m, 6)}: corners counter-clockwise, then middles of edges 01, 12, 20 (of a
+            first-order mesh: shape (m, 3)).
+        boundaries: {name: edges, shape (k, 3)}: first, last, middle, the body on the left (first order: shape (k, 2)).
+    """
+
+    points: np.ndarray
+    numbers: np.ndarray
+    layers: dict[str, np.ndarray]
+    boundaries: dict[str, np.ndarray]
+
+
+def counter_clockwise(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """The triangles, shape (m, 3 or 6), each turned if it runs clockwise."""
+    triangles = np.array(triangles)
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    wrong = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
+    triangles[wrong] = triangles[wrong][:, [0, 2, 1, 5, 4, 3][: triangles.shape[1]]]
+    return triangles
+
+
+def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> None:
+    """Write a grid as text (see the module).
+
+    Raises:
+        InputError: an unknown numbering, or a grid of three-node triangles.
+    """
+    order = np.argsort(_NUMBERINGS[_known(numbering)])
+    if any(t.shape[1] != 6 for t in grid.layers.values()):
+        raise InputError("mesh.write: the text format holds six-node triangles; this mesh has three-node ones")
+    lines = [_FORMAT, f"numbering {numbering}", f"nodes {len(grid.points)}"]
+    lines += [f"{n} {float(r)!r} {float(z)!r}" for n, (r, z) in zip(grid.numbers, grid.points, strict=True)]
+    number = 0
+    for name, triangles in grid.layers.items():
+        lines.append(f"elements {len(triangles)} {name}")
+        for row in grid.numbers[triangles[:, order]]:
+            number += 1
+            lines.append(f"{number} {' '.join(map(str, row))}")
+    for name, edges in grid.boundaries.items():
+        lines.append(f"boundary {len(edges)} {name}")
+        lines += [" ".join(map(str, row)) for row in grid.numbers[edges[:, [0, 2, 1]]]]
+    with open(file, "w") as stream:
+        stream.write("\n".join(lines) + "\n")
+
+
+def read(file: str | os.PathLike) -> Grid:
+    """The grid in a text file (see the module); clockwise elements are turned.
+
+    Raises:
+        InputError: the file is not there or not in this format; the message names the line.
+    """
+    lines = _Lines(os.fspath(file))
+    if " ".join(next(lines)) != _FORMAT:
+        raise lines.error(f"the first line must be {_FORMAT!r}")
+    order, points, numbers = None, np.zeros((0, 2)), np.zeros(0, dtype=np.int64)
+    layers: dict[str, np.ndarray] = {}
+    boundaries: dict[str, np.ndarray] = {}
+    index: dict[int, int] = {}
+    for words in lines:
+        if words[0] == "numbering" and len(words) == 2:
+            order = _NUMBERINGS[_known(words[1], lines)]
+        elif words[0] == "nodes" and len(words) == 2:
+            rows = lines.block(words[1], (int, float, float), "number R Z")
+            points, numbers = np.array([row[1:] for row in rows]), np.array([row[0] for row in rows])
+            index = {n: i for i, n in enumerate(numbers.tolist())}
+            if len(index) < len(rows):
+                raise lines.error("a node number stands twice in the block of nodes")
+            if not np.all(np.isfinite(points)):
+                raise lines.error("a coordinate in the block of nodes is not finite")
+        elif words[0] == "elements" and len(words) > 2:
+            if order is None:
+                raise lines.error("'numbering corners' or 'numbering around' must come before the elements")
+            rows = lines.block(words[1], (int,) * 7, "number and six nodes", index)
+            triangles = np.array([row[1:] for row in rows])[:, order]
+            layers[_new(lines, words, layers)] = counter_clockwise(points, triangles)
+        elif words[0] == "boundary" and len(words) > 2:
+            rows = lines.block(words[1], (int,) * 3, "first, middle and last node", index, all_nodes=True)
+            boundaries[_new(lines, words, boundaries)] = np.array(rows)[:, [0, 2, 1]]
+        else:
+            raise lines.error("must be 'numbering corners|around', 'nodes COUNT', 'elements COUNT LAYER' or"
+                              " 'boundary COUNT NAME'")
+    if not layers:
+        raise InputError(f"mesh file {lines.file!r} has no block 'elements COUNT LAYER'")
+    _check_edges(lines.file, layers, boundaries, numbers)
+    return Grid(points, numbers, layers, boundaries)
+
+
+def _check_edges(file: str, layers: dict, boundaries: dict, numbers: np.ndarray) -> None:
+    """A boundary edge that is no edge of an element would be lost without a word."""
+    edges = {(frozenset(row[[i, j]].tolist()), int(row[k])) for triangles in layers.values() for row in triangles
+             for i, j, k in ((0, 1, 3), (1, 2, 4), (2, 0, 5))}
+    for name, rows in boundaries.items():
+        for a, b, middle in rows.tolist():
+            if (frozenset((a, b)), middle) not in edges:
+                raise InputError(f"mesh file {file!r}: boundary {name!r}: {numbers[a]} {numbers[middle]} {numbers[b]}"
+                                 f" is not an edge of an element (first, middle and last node)")
+
+
+def _known(numbering: str, lines: _Lines | None = None) -> str:
+    if numbering not in _NUMBERINGS:
+        message = f"numbering = {numbering!r}: must be one of {', '.join(map(repr, _NUMBERINGS))}"
+        raise lines.error(message) if lines else InputError(f"mesh.write: {message}")
+    return numbering
+
+
+def _new(lines: _Lines, words: Sequence[str], taken: Any) -> str:
+    name = " ".join(words[2:])
+    if name in taken:
+        raise lines.error(f"a second block {words[0]!r} is called {name!r}")
+    return name
+
+
+class _Lines(Iterator):
+    """The lines of a file as words, without comments; knows where it is."""
+
+    def __init__(self, file: str):
+        self.file, self.at = file, 0
+        try:
+            with open(file, encoding="utf-8") as stream:
+                self._text = stream.read().splitlines()
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"mesh file {file!r} cannot be read: {error}") from None
+
+    def __next__(self) -> list[str]:
+        while self.at < len(self._text):
+            words = self._text[self.at].split("#")[0].split()
+            self.at += 1
+            if words:
+                return words
+        raise StopIteration
+
+    def error(self, message: str) -> InputError:
+        shown = self._text[self.at - 1].strip() if self._text else ""
+        return InputError(f"mesh file {self.file!r}, line {self.at} ({shown[:60]!r}): {message}")
+
+    def block(self, count: str, kinds: tuple, what: str, nodes: dict | None = None, all_nodes: bool = False) -> list:
+        """`count` lines of numbers; node numbers (all columns, or all but the first) become indices."""
+        if not count.isdigit() or int(count) < 1:
+            raise self.error(f"the count {count!r} must be a whole number of at least 1")
+        rows = []
+        for k in range(int(count)):
+            words = next(self, None)
+            if words is None:
+                raise self.error(f"the file ends after {k} of {count} lines of {what}")
+            try:
+                row = [kind(word) for kind, word in zip(kinds, words, strict=True)]
+            except ValueError:
+                raise self.error(f"must be {what}: {len(kinds)} numbers") from None
+            if nodes is not None:
+                for i in range(0 if all_nodes else 1, len(row)):
+                    if row[i] not in nodes:
+                        raise self.error(f"node {row[i]} is not among the nodes")
+                    row[i] = nodes[row[i]]
+            rows.append(row)
+        return rows

@@ -1,0 +1,79 @@
+"""The measures that every run records: the columns of a path."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..solve.targets import Amplitude, Bound, bind_pole_height, bind_pole_stretch, bind_volume
+
+
+class _Scalar(Bound):
+    """of(value of a scalar form); recorded only."""
+
+    def __init__(self, problem, form, of):
+        self._problem, self._form, self._of = problem, problem.forms.compile(form), of
+
+    def value(self, x, control):
+        self._problem.set_state(x, control)
+        return self._of(self._problem.assemble_scalar(self._form))
+
+
+class _Nodal(Bound):
+    """A number of every contact, put together by `over`; recorded only."""
+
+    def __init__(self, problem, of, over, contacts=None):
+        self._problem, self._of, self._over = problem, of, over
+        self._contacts = problem.contacts if contacts is None else contacts
+
+    def value(self, x, control):
+        there = [c for c in self._contacts if c in self._problem.touching]
+        return float(self._over([0.0, *(self._of(contact, x.array_r, control) for contact in there)]))
+
+
+class _Reaction(Bound):
+    """Force of the body on a driven support (by its number in the scene); recorded only."""
+
+    def __init__(self, problem, number):
+        self._problem, self._number = problem, number
+
+    def value(self, x, control):
+        return self._problem.reaction(self._number, x, control)
+
+
+def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
+    """The measures that every run records, by column name.
+
+    pressure (or travel: a length), pole_height (length), pole_stretch, enclosed_volume (length^3), strain_energy
+    (stress length^3), mass_error (volume over its original value, minus 1), volume_error (root mean square of
+    J - 1). Pole and volume are there where the scene has an axis and a driven pressure. With contacts: contact_length
+    (reference length in touch), penetration (of the deepest node, length), tool_force (along Z, of the body on all
+    tools). With a driven support: support_force (of the body on it, along its component). Where several things can be
+    driven each has its column, plug_travel for one named "plug" (`Scene.column`), a support plug_force; and where there
+    are several contacts those with a name have a force, plug_force. `timed`: process_time too.
+    """
+    scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
+    found: dict[str, Bound] = {"process_time": Amplitude(problem, -1)} if timed else {}
+    for i, thing in enumerate(scene.things):
+        if any(thing is t for t in scene.drivable):
+            found[column := scene.column(thing)] = Amplitude(problem, i)
+            if hasattr(thing, "constraints"):
+                found["support_force" if column == thing.quantity else f"{thing.name}_force"] = _Reaction(problem, i)
+    if "axis" in scene.mesh.boundaries:
+        found["pole_height"] = bind_pole_height(problem)
+        found["pole_stretch"] = bind_pole_stretch(problem)
+    if any(thing.quantity == "pressure" for thing in scene.drivable):
+        found["enclosed_volume"] = bind_volume(problem)
+    change = forms.J - 1
+    found["strain_energy"] = _Scalar(problem, forms.energy, lambda v: v * forms.stress * volume)
+    found["mass_error"] = _Scalar(problem, change * forms.weight * forms.dx, lambda v: v / volume)
+    found["volume_error"] = _Scalar(problem, change**2 * forms.weight * forms.dx,
+                                    lambda v: (v / volume) ** 0.5)
+    if problem.contacts:
+        found["contact_length"] = _Nodal(problem, lambda c, *at: c.contact_length(*at), sum)
+        found["penetration"] = _Nodal(problem, lambda c, *at: c.largest_penetration(*at), max)
+        found["tool_force"] = _Nodal(problem, lambda c, *at: c.force(*at)[1], sum)
+        names = [c.contact.name for c in problem.contacts]
+        for name in dict.fromkeys(filter(None, names)) if len(set(names)) > 1 else ():
+            of_tool = [c for c in problem.contacts if c.contact.name == name]
+            found[f"{name}_force"] = _Nodal(problem, lambda c, *at: c.force(*at)[1], sum, of_tool)
+    return found

@@ -1,0 +1,159 @@
+"""The outline of a sheet and its thickness, against reference radius and against arc length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...discrete.probes import Probe, probe
+from ...errors import InputError
+
+FACES = (("bottom", "top"), ("inner", "outer"))
+"""Names of the two faces of a sheet or of a wall."""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A sheet in one state, at the n nodes of its bottom face, from the axis to the rim.
+
+    The wall of a parison or a sphere has its inner face for a bottom, and its outer face for a top.
+
+    Attributes:
+        rest_bottom, rest_top: points (R, Z) of the two faces, opposite each other at rest, shape (n, 2), length.
+        bottom, top: where they are now, (r, z), shape (n, 2), length.
+    """
+
+    rest_bottom: np.ndarray
+    rest_top: np.ndarray
+    bottom: np.ndarray
+    top: np.ndarray
+
+    @property
+    def reference_radius(self) -> np.ndarray:
+        """R of the points of the bottom face, shape (n,), length."""
+        return self.rest_bottom[:, 0]
+
+    @property
+    def reference_length(self) -> np.ndarray:
+        """Length of the middle line at rest from the axis, shape (n,), length; of a flat sheet: R."""
+        return _length_along((self.rest_bottom + self.rest_top) / 2)
+
+    @property
+    def original_thickness(self) -> np.ndarray:
+        """Distance of the two points at rest, shape (n,), length."""
+        return np.hypot(*(self.rest_top - self.rest_bottom).T)
+
+    @property
+    def thickness(self) -> np.ndarray:
+        """Distance between the two points now, shape (n,), length: where the sheet is sheared, more than its wall."""
+        return np.hypot(*(self.top - self.bottom).T)
+
+    @property
+    def thickness_ratio(self) -> np.ndarray:
+        """Thickness over original thickness, shape (n,)."""
+        return self.thickness / self.original_thickness
+
+    @property
+    def wall_ratio(self) -> np.ndarray:
+        """Wall thickness over original thickness, shape (n,)."""
+        return self.wall_thickness / self.original_thickness
+
+    @property
+    def wall_thickness(self) -> np.ndarray:
+        """Shortest distance from the points of the bottom face to the top face now, shape (n,), length."""
+        return distance_to_line(self.bottom, _fine(self.top))
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Midpoints (r, z) of top and bottom, shape (n, 2), length."""
+        return (self.top + self.bottom) / 2
+
+    @property
+    def arc_length(self) -> np.ndarray:
+        """Length of the deformed middle line from the axis, shape (n,), length."""
+        return _length_along(self.middle)
+
+    def thickness_ratio_at(self, radius: float) -> float:
+        """Thickness ratio at a reference radius, linear between the nodes."""
+        return float(np.interp(radius, self.reference_radius, self.thickness_ratio))
+
+
+def distance_to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
+    """Shortest distance, shape (m,), of points, (m, 2), to the straight pieces between points of a line, (n, 2)."""
+    a, b = line[:-1], line[1:]
+    along = np.einsum("mij,ij->mi", points[:, None] - a, b - a) / np.einsum("ij,ij->i", b - a, b - a)
+    away = points[:, None] - a - np.clip(along, 0, 1)[..., None] * (b - a)
+    return np.hypot(away[..., 0], away[..., 1]).min(1)
+
+
+class Profiles:
+    """Makes the `Profile` of a state; the mesh must have boundaries `bottom` and `top`, or `inner` and `outer`."""
+
+    def __init__(self, problem: Any):
+        self._problem = problem
+        self._probe: Probe | None = None
+
+    def of(self, state: Any) -> Profile:
+        """The profile of a state (collective)."""
+        self._probe = at = self._probe or self._make_probe()
+        self._problem.x.array_w[:] = state.x
+        self._problem.forms.control.value = state.control
+        deformed = at.points + at.displacement(self._problem.x)
+        n = len(at.points) // 2
+        return Profile(at.points[:n].copy(), at.points[n:].copy(), deformed[:n], deformed[n:])
+
+    def _make_probe(self) -> Probe:
+        mesh = self._problem.scene.mesh
+        faces = next((pair for pair in FACES if all(name in mesh.boundaries for name in pair)), None)
+        if faces is None:
+            raise InputError(f"a profile needs boundaries {' or '.join(f'{a!r} and {b!r}' for a, b in FACES)};"
+                             f" the mesh has {list(mesh.boundaries)}")
+        bottom, top = (mesh.line_of(name) for name in faces)
+        return probe(self._problem, np.vstack([bottom, _opposite(bottom, top)]))
+
+
+def _fine(line: np.ndarray, parts: int = 6) -> np.ndarray:
+    """Points along the parabolas through the nodes of a line's edges (end, middle, end, ...)."""
+    a, m, b = line[:-1:2, None], line[1::2, None], line[2::2, None]
+    xi = np.linspace(0, 1, parts, endpoint=False)[:, None]
+    inner = (1 - xi) * (1 - 2 * xi) * a + 4 * xi * (1 - xi) * m + xi * (2 * xi - 1) * b
+    return np.vstack([inner.reshape(-1, 2), line[-1]])
+
+
+def _opposite(line: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """For each node of a line of edges (`Mesh.line_of`) the point of another where its normal meets it.
+
+    The ends belong together; where a normal meets nothing (beside an oblique rim), so does the nearest end.
+    """
+    a, m, b = line[:-1:2], line[1::2], line[2::2]          # tangents of the parabola through an edge's nodes
+    tangent = np.zeros_like(line)
+    tangent[1::2] = b - a
+    tangent[:-1:2] += _unit(4 * m - 3 * a - b)
+    tangent[2::2] += _unit(3 * b - 4 * m + a)
+    found = np.empty_like(line)
+    for k, (x, t) in enumerate(zip(line, tangent)):
+        ahead = (other - x) @ t
+        away = np.hypot(*(other - x).T)
+        met = np.flatnonzero((ahead[:-1] <= 0) & (ahead[1:] > 0))
+        if k in (0, len(line) - 1) or not len(met):
+            found[k] = other[0 if k == 0 or k < len(line) - 1 and away[0] < away[-1] else -1]
+            continue
+        i = met[np.argmin(away[met])]
+        xi = (i % 2 + ahead[i] / (ahead[i] - ahead[i + 1])) / 2
+        a, m, b = other[i - i % 2: i - i % 2 + 3]
+        for _ in range(3):                                 # Newton's method along the curved edge
+            point = (1 - xi) * (1 - 2 * xi) * a + 4 * xi * (1 - xi) * m + xi * (2 * xi - 1) * b
+            slope = (4 * xi - 3) * a + (4 - 8 * xi) * m + (4 * xi - 1) * b
+            xi -= ((point - x) @ t) / (slope @ t)
+        found[k] = (1 - xi) * (1 - 2 * xi) * a + 4 * xi * (1 - xi) * m + xi * (2 * xi - 1) * b
+    return found
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.hypot(*vectors.T)[:, None]
+
+
+def _length_along(points: np.ndarray) -> np.ndarray:
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])

@@ -1,0 +1,390 @@
+"""Stresses and stretches of a state, layer by layer: nothing is smeared over an interface.
+
+P = d(energy density)/dF, the energy being that of `solid`: material and volume term; S = F^-1 P; Cauchy stress
+sigma = F S F^T / J. F and S are projected (L2) on piecewise linear fields, one for each layer; all else follows from
+them point by point. (S does not turn with the sheet: projecting sigma instead would spoil the small stress normal to
+an inflated sheet with the large one along it.)
+
+How far the stresses of the elements are off is estimated as Zienkiewicz and Zhu, Int. J. Numer. Meth. Engng 24 (1987)
+337 (doi:10.1002/nme.1620240206), do: from their distance to a smoother field. That field comes from cubics fitted to F
+and S (`patches`), whose order is higher; projected fields are not nearer to the truth than the elements' own.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import basix
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem, la
+from dolfinx.fem import petsc as fem_petsc
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ... import _compat
+from ...discrete.locate import locate
+from ...errors import InputError, known, pair
+from .patches import Patches
+from .stress_error import Fitted, StressError, StressPeak
+
+# The entries of F and of S that are not zero, in the order (r, z, hoop; out of plane in plane strain).
+_F = ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))
+_S = ((0, 0), (0, 1), (1, 1), (2, 2))
+_COUNT = len(_F) + len(_S)
+log = logging.getLogger("formingx")
+
+
+class FaceStress(NamedTuple):
+    """Cauchy stress on a face, shape (n,) each: normal and shear (continuous across an interface), and along it."""
+
+    normal: np.ndarray
+    shear: np.ndarray
+    meridional: np.ndarray
+    hoop: np.ndarray
+
+
+@dataclass(frozen=True)
+class Stress:
+    """Stresses and stretches at n points. Components in the order r, z, hoop (out of plane, in plane strain).
+
+    Attributes:
+        points: reference points (R, Z), shape (n, 2), length.
+        deformation_gradient: F, shape (n, 3, 3).
+        second_piola: S, shape (n, 3, 3), stress.
+    """
+
+    points: np.ndarray
+    deformation_gradient: np.ndarray
+    second_piola: np.ndarray
+
+    @property
+    def first_piola(self) -> np.ndarray:
+        """P = F S, force per reference area (row: of the force, column: of the face), shape (n, 3, 3)."""
+        return self.deformation_gradient @ self.second_piola
+
+    @property
+    def cauchy(self) -> np.ndarray:
+        """sigma = P F^T / J, tension positive, shape (n, 3, 3), stress."""
+        F = self.deformation_gradient
+        return self.first_piola @ F.transpose(0, 2, 1) / np.linalg.det(F)[:, None, None]
+
+    @property
+    def hydrostatic_pressure(self) -> np.ndarray:
+        """-tr(sigma)/3, shape (n,), stress."""
+        return -np.trace(self.cauchy, axis1=1, axis2=2) / 3
+
+    @property
+    def principal_stretches(self) -> np.ndarray:
+        """The larger and the smaller stretch in the plane, and the hoop stretch, shape (n, 3)."""
+        F = self.deformation_gradient
+        return np.column_stack([np.linalg.svd(F[:, :2, :2], compute_uv=False), F[:, 2, 2]])
+
+    @property
+    def principal_stresses(self) -> np.ndarray:
+        """The principal Cauchy stresses from the largest to the smallest, shape (n, 3), stress."""
+        return np.linalg.eigvalsh(self.cauchy)[:, ::-1]
+
+    def on_face(self, normal: Any) -> FaceStress:
+        """What acts on the deformed faces whose reference normals are `normal`, shape (2,) or (n, 2)."""
+        N = np.broadcast_to(np.asarray(normal, dtype=float), self.points.shape)
+        n = np.linalg.solve(self.deformation_gradient[:, :2, :2].transpose(0, 2, 1), N[..., None])[..., 0]
+        n /= np.linalg.norm(n, axis=1)[:, None]
+        m = np.column_stack([n[:, 1], -n[:, 0]])
+        s = self.cauchy[:, :2, :2]
+
+        def component(a, b):
+            return np.einsum("ni,nij,nj->n", a, s, b)
+        return FaceStress(component(n, n), component(m, n), component(m, m), self.cauchy[:, 2, 2])
+
+
+class StressField:
+    """The stresses of one state: `at` points of a layer, or `at_quadrature_points`, where they are not smoothed."""
+
+    def __init__(self, recovery: Stresses, state: Any):
+        self._recovery, self._state = recovery, state
+        self._nodes = recovery.project(state)
+
+    def at(self, points: Any, layer: str | None = None) -> Stress:
+        """Projected stresses at reference points (R, Z), shape (n, 2), the same on all ranks; collective.
+
+        Args:
+            layer: of which layer; may be left out where there is one only. On an interface it picks the side.
+
+        Raises:
+            InputError: an unknown layer, or a point outside it.
+        """
+        recovery = self._recovery
+        layer = recovery.layer(layer)
+        points = np.atleast_2d(np.asarray(points, dtype=float))
+        domain, comm = recovery.problem.forms.domain, recovery.problem.comm
+        place = locate(domain, points, recovery.problem.forms.length, recovery.cells[layer], f"layer {layer!r}")
+        values = np.zeros((len(points), _COUNT))
+        if len(place.mine):
+            weights = recovery.element.tabulate(0, place.reference)[0]
+            dofs = recovery.space.dofmap.list[place.cells]
+            column = list(recovery.cells).index(layer)
+            values[place.mine] = np.einsum("nk,nkc->nc", weights, self._nodes[dofs, column])
+        return _unpack(points, comm.allreduce(values, MPI.SUM))
+
+    def in_cells(self, reference: np.ndarray) -> Stress:
+        """Projected stresses at places (k, 2) of the reference cell in each of this rank's m cells: of m k points.
+
+        Every cell is of its own layer: at an interface each side has its own values. The points are not filled in.
+        """
+        recovery = self._recovery
+        owned = recovery.problem.forms.domain.topology.index_map(2).size_local
+        column = np.zeros(owned, dtype=np.int64)
+        for k, cells in enumerate(recovery.cells.values()):
+            column[cells[cells < owned]] = k
+        nodes = self._nodes[recovery.space.dofmap.list[:owned], column[:, None]]
+        values = np.einsum("kn,cnx->ckx", recovery.element.tabulate(0, reference)[0], nodes)
+        return _unpack(np.zeros((owned * len(reference), 2)), values.reshape(-1, _COUNT))
+
+    def at_quadrature_points(self, layer: str | None = None) -> Stress:
+        """Stresses as they are at the quadrature points of a layer, all ranks' together; collective."""
+        return self._recovery.raw(self._state, self._recovery.layer(layer))
+
+    def error(self, layer: str | None = None, exact: Callable | None = None) -> StressError:
+        """How far the stresses at the quadrature points are off, by estimate: in each cell and in all; collective.
+
+        sigma_h is the stress there, sigma* that of the fitted F and S (see the module); the integrals are sums over
+        the quadrature points. Where the solution is smooth, the estimate tends to the true error as meshes are refined;
+        at a sharp corner under load it does not fall.
+
+        Args:
+            layer: the cells of one layer only.
+            exact: the true Cauchy stress, shape (n, 3, 3), as a function of reference points, shape (n, 2): it takes
+                the place of sigma*, and the errors are the true ones.
+
+        Raises:
+            InputError: an unknown layer, or an `exact` that is no function or gives another shape.
+        """
+        mine, gather = self._recovery.of_layer(layer), self._recovery.problem.comm.allgather
+        return StressError(*(np.concatenate(gather(v[mine])) for v in self._fitted.error(exact)))
+
+    def error_in_cells(self) -> np.ndarray:
+        """`StressError.mean` of this rank's cells, shape (m,), stress; collective."""
+        return self._fitted.error().mean
+
+    def peak(self, layer: str | None = None, radii: tuple[float, float] | None = None) -> StressPeak:
+        """The largest principal Cauchy stress, and whether the mesh resolves it; collective.
+
+        Logs a warning if it does not (`StressPeak.converged`).
+
+        Args:
+            layer: of one layer only.
+            radii: only of cells whose middle lies between these two reference radii: a clamped rim, for one, has a peak
+                of its own.
+
+        Raises:
+            InputError: an unknown layer, or no cell between the radii.
+        """
+        comm, fitted = self._recovery.problem.comm, self._fitted
+        mine = self._recovery.of_layer(layer)
+        if radii is not None:
+            low, high = pair("stress peak: radii", radii)
+            R = fitted.points[:, :, 0].mean(1)
+            mine &= (low <= R) & (high >= R)
+        errors = np.sqrt(((fitted.smooth - fitted.raw) ** 2).sum((2, 3))).max(1, initial=0.0)
+        cells = [np.concatenate(comm.allgather(v[mine])) for v in (fitted.largest, fitted.at, errors)]
+        if not len(cells[0]):
+            raise InputError(f"stress peak: radii = {radii!r}: no cell has its middle between them")
+        peak = StressPeak.among(*cells)
+        if not peak.converged and comm.rank == 0:
+            log.warning("%s", peak)
+        return peak
+
+    @cached_property
+    def _fitted(self) -> Fitted:
+        return self._recovery.fit(self._state)
+
+
+class Stresses:
+    """Makes the `StressField` of a state; forms and matrix are created once, when first asked for."""
+
+    def __init__(self, problem: Any):
+        self.problem = problem
+        self._ready = False
+        self._raw: dict[int, tuple] = {}
+        self._patches: Patches | None = None
+
+    def of(self, state: Any) -> StressField:
+        """The stresses of a state (collective)."""
+        if not self._ready:
+            self._prepare()
+            self._ready = True
+        return StressField(self, state)
+
+    def layer(self, name: str | None) -> str:
+        """A layer's name, checked."""
+        if name is None:
+            if len(self.cells) > 1:
+                raise InputError(f"stress: which layer? known: {', '.join(map(repr, self.cells))}")
+            return next(iter(self.cells))
+        known("stress: layer", name, self.cells)
+        return name
+
+    def project(self, state: Any) -> np.ndarray:
+        """Nodal values of F and S, shape (nodes, layers, _COUNT), ghosts included."""
+        self._set(state)
+        n = self.space.dofmap.index_map.size_local + self.space.dofmap.index_map.num_ghosts
+        nodes = np.zeros((n, len(self.cells), _COUNT))
+        b, x = self._b, self._x
+        local = b.array_r.size
+        for k in range(_COUNT):
+            self._selector.value[:] = np.eye(_COUNT)[k]
+            array = self._vector.array
+            array[:] = 0
+            fem.assemble_vector(array, self._rhs)
+            self._vector.scatter_reverse(la.InsertMode.add)
+            b.array_w[:] = array[:local]
+            self._solver.solve(b, x)
+            array[:local] = x.array_r
+            self._vector.scatter_forward()
+            nodes[:, :, k] = array.reshape(n, -1)
+        return nodes
+
+    def raw(self, state: Any, layer: str) -> Stress:
+        """F and S at the quadrature points of a layer, all ranks."""
+        points, values, _ = self._at_quadrature(state, layer)
+        gather = self.problem.comm.allgather
+        return _unpack(*(np.concatenate(gather(v)).reshape(-1, v.shape[-1]) for v in (points, values)))
+
+    def fit(self, state: Any) -> Fitted:
+        """F and S fitted to their values at the quadrature points, and what follows; collective."""
+        comm, parts = self.problem.comm, [self._at_quadrature(state, layer) for layer in self.cells]
+        order = np.argsort(np.concatenate([self._owned(layer) for layer in self.cells]))
+        points, values, volume = (np.concatenate([part[k] for part in parts])[order] for k in range(3))
+        domain, own = self.problem.forms.domain, order.size
+        corners = _compat.cell_nodes(domain)[:own, :3]
+        if self._patches is None:
+            numbers = domain.geometry.index_map().local_to_global(corners.ravel()).reshape(-1, 3)
+            layer = np.concatenate([np.full(len(self._owned(name)), k) for k, name in enumerate(self.cells)])[order]
+            first = comm.exscan(own) or 0
+            points_of_all, numbers, layer = (np.concatenate(comm.allgather(v)) for v in (points, numbers, layer))
+            self._patches = Patches(points_of_all, numbers, layer, np.arange(first, first + own))
+        cubics = self._patches.fit(np.concatenate(comm.allgather(values)))
+
+        def cauchy(values):
+            flat = values.reshape(-1, _COUNT)
+            return _unpack(np.zeros((len(flat), 2)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
+        X = domain.geometry.x[corners, :2]
+        largest = np.linalg.eigvalsh(cauchy(self._patches.at(cubics, X)))[..., -1]
+        top = (np.arange(own), largest.argmax(1))
+        return Fitted(points, volume, cauchy(values), cauchy(self._patches.at(cubics, points)), largest[top], X[top])
+
+    def of_layer(self, name: str | None) -> np.ndarray:
+        """Which of this rank's own cells are of a layer (None: of any), shape (m,)."""
+        own = self.problem.forms.domain.topology.index_map(2).size_local
+        return np.isin(np.arange(own), self.cells[self.layer(name)]) if name is not None else np.ones(own, dtype=bool)
+
+    def _owned(self, layer: str) -> np.ndarray:
+        """This rank's own cells of a layer."""
+        return self.cells[layer][self.cells[layer] < self.problem.forms.domain.topology.index_map(2).size_local]
+
+    def _at_quadrature(self, state: Any, layer: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(points, F and S, reference volumes) at the q quadrature points of this rank's m cells of a layer.
+
+        Shapes (m, q, 2), (m, q, _COUNT), (m, q).
+        """
+        forms = self.problem.forms
+        self._set(state)
+        number = next(i for i, (_, names) in enumerate(forms.bodies) if layer in names)
+        if number not in self._raw:
+            parts = self._parts(*forms.bodies[number])
+            metadata = parts[-1][1]                       # where the volume is kept
+            if "quadrature_points" in metadata:
+                points, weights = metadata["quadrature_points"], metadata["quadrature_weights"]
+            else:
+                cell = basix.CellType.triangle
+                points, weights = basix.make_quadrature(cell, self.problem.scene.quadrature_degree)
+            if weights.min() < 0:                         # errors must not cancel
+                weights = np.full(len(points), 0.5 / len(points))
+            values = ufl.as_vector([*self._F, *(sum(part[k] for part, _ in parts) for k in range(len(_S)))])
+            area = abs(ufl.JacobianDeterminant(forms.domain))
+            where = ufl.as_vector([forms.X[0], forms.X[1], forms.weight * area])
+            self._raw[number] = *(fem.Expression(e, points) for e in (values, where)), weights
+        values, where, weights = self._raw[number]
+        cells, q = self._owned(layer), len(weights)
+        values, where = (e.eval(forms.domain, cells).reshape(-1, q, n) if len(cells) else np.zeros((0, q, n))
+                         for e, n in ((values, _COUNT), (where, 3)))
+        return where[..., :2], values, where[..., 2] * weights
+
+    def _set(self, state: Any) -> None:
+        self.problem.x.array_w[:] = state.x
+        self.problem.set_state(self.problem.x, state.control)
+
+    def _parts(self, material: Any, names: list[str]) -> list[tuple[Any, dict]]:
+        """[(entries of S (UFL), quadrature metadata)] of a body: of its material, and of what keeps its volume."""
+        F = ufl.variable(self.problem.forms.F)
+        parts = []
+        for density, metadata in self.problem.forms.energy_densities(material, names, F):
+            S = ufl.inv(F) * ufl.diff(density, F)
+            parts.append(([S[i] for i in _S], metadata))
+        return parts
+
+    def _prepare(self) -> None:
+        problem, forms, mesh = self.problem, self.problem.forms, self.problem.scene.mesh
+        bodies, domain = forms.bodies, forms.domain            # a membrane has none, and says so
+        self.cells = {name: mesh.cells.find(tag) for name, tag in mesh.layers.items()}
+        self.element = basix.ufl.element("Lagrange", domain.basix_cell(), 1)
+        self.space = fem.functionspace(domain, basix.ufl.element("Lagrange", domain.basix_cell(), 1,
+                                                                 shape=(len(self.cells),)))
+        self._F = [forms.F[i] for i in _F]
+        self._selector = fem.Constant(domain, np.zeros(_COUNT, dtype=PETSc.ScalarType))
+        trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+        mass: Any = 0
+        rhs: Any = 0
+        column = {name: k for k, name in enumerate(self.cells)}
+        for body in bodies:
+            parts = self._parts(*body)
+            for name in body[1]:
+                k, dx = column[name], forms.dx(mesh.layers[name])
+                mass += trial[k] * test[k] * dx
+                rhs += sum(self._selector[i] * f for i, f in enumerate(self._F)) * test[k] * dx
+                for S, metadata in parts:
+                    picked = sum(self._selector[len(_F) + i] * s for i, s in enumerate(S))
+                    rhs += picked * test[k] * (dx(metadata=metadata) if metadata else dx)
+        self._rhs = forms.compile(rhs)
+        self._vector = la.vector(self.space.dofmap.index_map, len(self.cells))
+        bcs = self._idle()
+        mass = forms.compile(mass)
+        matrix = fem_petsc.create_matrix(mass)
+        fem_petsc.assemble_matrix(matrix, mass, bcs=bcs)
+        matrix.assemble()
+        self._b, self._x = matrix.createVecLeft(), matrix.createVecRight()
+        self._solver = PETSc.KSP().create(problem.comm)       # a mass matrix: a few dozen iterations to round-off
+        self._solver.setOperators(matrix)
+        self._solver.setType("cg")
+        self._solver.getPC().setType("jacobi")
+        self._solver.setTolerances(rtol=1e-13, atol=0.0, max_it=1000)
+        self._solver.setErrorIfNotConverged(True)
+
+    def _idle(self) -> list:
+        """Boundary conditions that keep at 0 the unknowns of nodes that belong to no cell of their layer."""
+        n = len(self.cells)
+        if n == 1:
+            return []
+        used = la.vector(self.space.dofmap.index_map, n)
+        touched = used.array.reshape(-1, n)
+        for k, cells in enumerate(self.cells.values()):
+            touched[self.space.dofmap.list[cells].ravel(), k] = 1
+        used.scatter_reverse(la.InsertMode.add)               # a cell of another rank may use a node of ours
+        used.scatter_forward()
+        return [fem.dirichletbc(PETSc.ScalarType(0), (np.flatnonzero(touched[:, k] == 0) * n + k).astype(np.int32),
+                                self.space.sub(k)) for k in range(n)]
+
+
+def _unpack(points: np.ndarray, values: np.ndarray) -> Stress:
+    F, S = np.zeros((2, len(points), 3, 3))
+    for k, (i, j) in enumerate(_F):
+        F[:, i, j] = values[:, k]
+    for k, (i, j) in enumerate(_S):
+        S[:, i, j] = S[:, j, i] = values[:, len(_F) + k]
+    return Stress(points, F, S)

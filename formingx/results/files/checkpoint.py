@@ -1,0 +1,302 @@
+"""Checkpoints: a folder that holds every accepted state of a run, from which the run goes on, on any number of ranks.
+
+    run/scene.json               what the scene is, and versions
+    run/0000/state.json          the state's numbers, what contact remembers, and checksums of the two fields:
+    run/0000/x.bp, direction.bp  unknowns and tangent of the path, written by adios4dolfinx
+
+A state is written beside its place and then renamed: what has its name is complete, whenever a run is killed. Fields
+are kept by the order of the cells in the script's mesh, which does not depend on the number of ranks; what contact
+remembers, by the nodes' reference positions.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import zlib
+from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+
+from ... import _compat
+from ...discrete.problem import Problem
+from ...errors import InputError, instance, place
+from ...scene.scene import Scene
+from ...solve.curve import Branch
+from ...solve.newton import Iteration, Tolerances
+from ...solve.targets import Target
+from .. import files
+from ..path import Counts, Path, State
+from .description import describe, differences, summary
+
+FORMAT = 1
+_FIELDS = ("x", "direction")
+
+
+class Checkpoint:
+    """The folder of one run, for writing.
+
+    Args:
+        folder: made, or looked at, at once.
+        path: of the run; what is in the folder must be its beginning.
+
+    Raises (collective):
+        InputError: the folder holds another run, or something else.
+        OSError: it cannot be written.
+    """
+
+    def __init__(self, folder: Any, path: Path):
+        self.folder, self._path, self._problem = place("checkpoint", folder), path, path.problem
+        self._w = fem.Function(path.problem.forms.space)
+        self._there = self._begin()                         # states in the folder
+
+    def write(self) -> None:
+        """Write the states of the path that are not in the folder yet; collective.
+
+        Raises:
+            OSError: it cannot be written, or the disk is full; all states before are kept.
+        """
+        path = self._path
+        for number in range(self._there, len(path)):
+            self._write_state(number, path.states[number], _profile(path, path.states[number]))
+            self._there = number + 1
+
+    def _begin(self) -> int:
+        """Make the folder, or check what is in it; the number of states there."""
+        problem, folder, path = self._problem, self.folder, self._path
+        scene = describe(problem)
+        about = {"formingx": FORMAT, "versions": files.versions(), "scene": scene, "summary": summary(problem.scene)}
+
+        def begin():
+            if not (folder / "scene.json").exists():
+                if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+                    raise InputError(f"checkpoint {str(folder)!r} is there already and is no checkpoint")
+                folder.mkdir(parents=True, exist_ok=True)
+                files.replace(folder / "scene.json", lambda stream: json.dump(about, stream, indent=1))
+                return 0
+            _check_scene(folder, _read_json(folder / "scene.json"), scene)
+            there = _states(folder)
+            held = [_read_json(state / "state.json") for state in there]
+            settled = max((k + 1 for k, data in enumerate(held) if data["stepping"]), default=len(held))
+            whole = held[:max(settled, len(path))]          # what is beyond is of a step that was not finished
+            if len(whole) > len(path) or any((h["control"], h["slope"]) != (s.control, s.slope)
+                                             for h, s in zip(whole, path.states)):
+                raise InputError(f"checkpoint {str(folder)!r} holds {len(held)} states of another run: go on from it"
+                                 f" with start=fx.load({str(folder)!r}, scene), give another folder, or remove it")
+            for left in there[len(whole):]:
+                shutil.rmtree(left)
+            return len(whole)
+        return files.on_root(problem.comm, lambda: _plainly(begin, folder, "cannot be begun"))
+
+    def _write_state(self, number: int, state: State, profile: Any) -> None:
+        problem, comm = self._problem, self._problem.comm
+        final = self.folder / _name(number)
+        part = final.with_name(final.name + ".part")
+        n = problem.forms.space.dofmap.index_map.size_local
+        data = _plain_state(state) | {"memory": _gather_memory(problem, state), "profile": profile}
+        for name in _FIELDS:
+            tails = comm.allgather(getattr(state, name)[n:].tolist())
+            data[f"{name}_tail"] = tails[-1]
+        library, what = _compat.adios4dolfinx(), f"state {number} could not be written; the states before it are kept"
+
+        def prepare():
+            shutil.rmtree(part, ignore_errors=True)
+            part.mkdir()
+            files.reserve(part / "reserved", self._size(len(json.dumps(data))))
+        files.on_root(comm, lambda: _plainly(prepare, self.folder, what))
+        for name in _FIELDS:
+            self._w.x.array[:n] = getattr(state, name)[:n]
+            library.write_function_on_input_mesh(part / f"{name}.bp", self._w, name=name)
+
+        def finish():
+            data["checksums"] = _checksums(part, data)
+            files.replace(part / "state.json", lambda stream: json.dump(data, stream))
+            os.rename(part, final)
+        files.on_root(comm, lambda: _plainly(finish, self.folder, what))
+
+    def _size(self, more: int) -> int:
+        """About as many bytes as a state takes."""
+        dofmap, topology = self._problem.forms.space.dofmap, self._problem.forms.domain.topology
+        cells = topology.index_map(topology.dim).size_global
+        return 16 * (cells * (dofmap.list.shape[1] + 3) + dofmap.index_map.size_global) + more + 2**16
+
+
+def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
+    """The path in a checkpoint, to look at or to go on from: `trace(scene, until=..., start=load("run", scene))`.
+
+    Args:
+        folder: what `trace(..., checkpoint=folder)` or `Path.save(folder)` wrote, on any number of ranks.
+        scene: the same scene, made by the same script.
+        state: go on from this state (0: the start), and leave out what came after; default the last.
+
+    Raises:
+        InputError: there is no checkpoint, it is damaged, or it is of another mesh or scene; the message says what
+            differs.
+    """
+    folder, problem = place("load: folder", folder), Problem(instance("load: scene", scene, Scene, "a formingx.Scene"))
+    about = describe(problem)
+
+    def look():
+        _check_scene(folder, _read_json(folder / "scene.json"), about)
+        there = _states(folder)
+        if not there:
+            raise InputError(f"checkpoint {str(folder)!r} holds no state")
+        if state is not None and not (isinstance(state, int) and 0 <= state < len(there)):
+            raise InputError(f"load: state = {state!r}: the checkpoint holds states 0 to {len(there) - 1}")
+        found = [_read_json(one / "state.json") for one in there[:None if state is None else state + 1]]
+        settled = [k for k, data in enumerate(found) if data.get("stepping")]
+        if state is None and settled:
+            found = found[:settled[-1] + 1]
+        for one, data in zip(there, found):
+            if _checksums(one, data) != data.get("checksums"):
+                raise InputError(f"checkpoint {str(one)!r} is damaged: its files are not those that were written"
+                                 f" (load's state= picks an earlier one)")
+        return found
+    found = files.on_root(problem.comm, look)
+    path = Path(problem, Branch(problem, Tolerances()))
+    path.states = [_read_state(folder / _name(k), data, problem) for k, data in enumerate(found)]
+    kept = next((s.stepping for s in reversed(path.states) if s.stepping), None)
+    path.counts = Counts(**kept["counts"]) if kept else Counts()
+    path.counts.steps = sum(s.kind != "start" for s in path.states)
+    problem.remember(path.last)
+    return path
+
+
+def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """(what scene.json says, what each state.json says) of a checkpoint; no scene is needed.
+
+    Raises:
+        InputError: there is no checkpoint, it holds no state, or it is damaged.
+    """
+    folder = place("checkpoint", folder)
+    about = _read_json(folder / "scene.json")
+    _check_format(folder, about)
+    states = [_read_json(one / "state.json") for one in _states(folder)]
+    if not states:
+        raise InputError(f"checkpoint {str(folder)!r} holds no state")
+    return about, states
+
+
+def _check_format(folder: FilePath, about: dict) -> None:
+    if about.get("formingx") != FORMAT:
+        raise InputError(f"checkpoint {str(folder)!r} has the format {about.get('formingx')!r}; this version of"
+                         f" formingx reads {FORMAT}")
+
+
+def _check_scene(folder: FilePath, about: dict, scene: dict) -> None:
+    _check_format(folder, about)
+    found = list(differences(about["scene"], json.loads(json.dumps(scene))))
+    if found:
+        shown = "; ".join(f"{where}: {a!r} there, {b!r} here" for where, a, b in found[:4])
+        more = f"; and {len(found) - 4} more" if len(found) > 4 else ""
+        raise InputError(f"checkpoint {str(folder)!r} is of another scene: {shown}{more}")
+
+
+def _read_state(folder: FilePath, data: dict, problem: Any) -> State:
+    data = dict(data)
+    n, last = problem.forms.space.dofmap.index_map.size_local, problem.comm.rank == problem.comm.size - 1
+    w = fem.Function(problem.forms.space)
+    arrays = {}
+    for name in _FIELDS:
+        _compat.adios4dolfinx().read_function(folder / f"{name}.bp", w, name=name)
+        arrays[name] = np.concatenate([w.x.array[:n], data.pop(f"{name}_tail") if last else []])
+    met = data.pop("met")
+    return State(**arrays, met=Target(met[0], met[1], None, met[2]) if met else None,
+                 history=[Iteration(*row) for row in data.pop("history")],
+                 memory=_scatter_memory(problem, data.pop("memory")),
+                 **{f.name: data[f.name] for f in fields(State) if f.name in data})
+
+
+def _plain_state(state: State) -> dict[str, Any]:
+    """Everything in a state that JSON can hold as it is."""
+    left = (*_FIELDS, "memory", "met", "history")
+    data = {f.name: getattr(state, f.name) for f in fields(State) if f.name not in left}
+    return data | {"met": state.met and [state.met.name, state.met.value, state.met.signed],
+                   "history": [list(i) for i in state.history]}
+
+
+def _remembering(problem: Any) -> list[Any]:
+    return [contact for contact in problem.contacts if contact.memory is not None]
+
+
+def _gather_memory(problem: Any, state: State) -> list[dict[str, Any]]:
+    """What each contact with friction remembers, node by node with its reference position, all ranks."""
+    found = []
+    for contact, touch in zip(_remembering(problem), state.memory, strict=True):
+        parts = problem.comm.allgather((contact.points, *touch))
+        columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+        found.append(dict(zip(("points", *touch._fields), (c.tolist() for c in columns), strict=True)))
+    return found
+
+
+def _scatter_memory(problem: Any, memory: list[dict[str, Any]]) -> list[Any]:
+    from scipy.spatial import cKDTree
+    found = []
+    for contact, data in zip(_remembering(problem), memory, strict=True):
+        away, rows = cKDTree(np.array(data["points"]).reshape(-1, 2)).query(contact.points)
+        if np.any(away > 1e-9 * problem.forms.length):
+            raise InputError("checkpoint: a contact node of the scene is not in it: it is of another mesh")
+        kind = contact.memory
+        found.append(kind._replace(**{name: np.array(data[name], dtype=float)[rows].reshape(getattr(kind, name).shape)
+                                      for name in kind._fields}))
+    return found
+
+
+def _profile(path: Path, state: State) -> dict[str, list] | None:
+    """The outline and the thickness of a sheet, so that a report needs no scene; None where there is no sheet."""
+    try:
+        profile = path.profile(state)
+    except InputError:
+        return None
+    return {f.name: getattr(profile, f.name).tolist() for f in fields(profile)}
+
+
+def _name(number: int) -> str:
+    return f"{number:04d}"
+
+
+def _states(folder: FilePath) -> list[FilePath]:
+    """The complete states in order."""
+    found = sorted((one for one in folder.iterdir() if one.name.isdigit()), key=lambda one: int(one.name))
+    for k, one in enumerate(found):
+        if int(one.name) != k:
+            raise InputError(f"checkpoint {str(folder)!r} is damaged: state {k} is missing")
+    return found
+
+
+def _read_json(file: FilePath) -> Any:
+    try:
+        with open(file, encoding="utf-8") as stream:
+            found = json.load(stream)
+        if not isinstance(found, dict):
+            raise ValueError("it holds no table")
+        return found
+    except FileNotFoundError:
+        raise InputError(f"checkpoint: {str(file)!r} is not there") from None
+    except NotADirectoryError:
+        raise InputError(f"checkpoint: {str(file.parent)!r} is not a folder") from None
+    except (ValueError, OSError) as error:
+        raise InputError(f"checkpoint: {str(file)!r} is damaged or cannot be read: {error}") from None
+
+
+def _checksums(state: FilePath, data: dict) -> dict[str, int]:
+    """{file: CRC-32} of the fields of a state and of its other data."""
+    rest = {key: value for key, value in data.items() if key != "checksums"}
+    found = {"state.json": zlib.crc32(json.dumps(rest, sort_keys=True).encode())}
+    for name in _FIELDS:
+        found |= {f"{name}.bp/{file.name}": zlib.crc32(file.read_bytes())
+                  for file in sorted((state / f"{name}.bp").glob("*"))}
+    return found
+
+
+def _plainly(action: Callable[[], Any], folder: FilePath, what: str) -> Any:
+    """The action's result; its OSError says which checkpoint and what."""
+    try:
+        return action()
+    except OSError as error:
+        raise OSError(error.errno, f"checkpoint {str(folder)!r}: {what}: {error.strerror}") from None

@@ -1,0 +1,106 @@
+"""A scene as plain data: to tell whether two scenes are the same, and for people to read."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from ... import _compat
+
+_PARTS = ("materials", "supports", "loads", "contacts", "model", "kinematics", "quadrature_degree")
+
+
+def describe(problem: Any) -> dict[str, Any]:
+    """What defines a problem, as JSON can hold it; the same on any number of ranks; collective.
+
+    "mesh": counts, and sums over its cells that change with any coordinate, order of the cells or tag; "unknowns":
+    their number; then every part of the scene by its public attributes.
+    """
+    scene = problem.scene
+    known = set(_PARTS) | {"mesh"}
+    extra = sorted(name for name in vars(scene) if name not in known and not name.startswith("_"))
+    return {"mesh": _mesh(problem), "unknowns": problem.n_unknowns,
+            **{name: plain(getattr(scene, name)) for name in (*_PARTS, *extra)}}
+
+
+def summary(scene: Any) -> dict[str, str]:
+    """{part: one line for people} of a scene."""
+    mesh, comm = scene.mesh, scene.mesh.comm
+    topology, extent = mesh.domain.topology, scene.extent
+    cells = comm.allreduce(topology.index_map(2).size_local, MPI.SUM)
+    layers = ", ".join(mesh.layers)
+    lines = {"mesh": f"{cells} six-node triangles, {extent[0]:.6g} by {extent[1]:.6g} (R, Z); layers: {layers}"
+                     f"; boundaries: {', '.join(mesh.boundaries)}"}
+    for name, material in scene.materials.items():
+        lines[f"material of {name}"] = text(material)
+    for kind in ("supports", "loads", "contacts"):
+        for k, thing in enumerate(getattr(scene, kind), 1):
+            numbers = "".join(f", {name.replace('_', ' ')} {value!r}" for name, value in vars(thing).items()
+                              if isinstance(value, int | float) and repr(value) not in text(thing))
+            lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if getattr(thing, "driven", False) else "")
+    return lines | {"model": text(scene.model), "kinematics": text(scene.kinematics),
+                    "quadrature degree": str(scene.quadrature_degree)}
+
+
+def text(thing: Any) -> str:
+    """repr without memory addresses; of an object that has none of its own, its kind and its public attributes."""
+    if type(thing).__repr__ is object.__repr__:
+        inside = ", ".join(f"{k}={v!r}" for k, v in vars(thing).items() if not k.startswith("_"))
+        return f"{type(thing).__name__}({inside})"
+    return re.sub(r" at 0x[0-9a-f]+", "", repr(thing))
+
+
+def plain(value: Any, depth: int = 8) -> Any:
+    """Numbers, words, lists and dictionaries in place of objects."""
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {str(k): plain(v, depth - 1) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(v, depth - 1) for v in value]
+    if hasattr(value, "strain_energy"):
+        return {"kind": text(value), "shear_modulus": value.shear_modulus}
+    if callable(value) or depth == 0 or not hasattr(value, "__dict__"):
+        return getattr(value, "__qualname__", text(value))
+    return {"kind": type(value).__name__,
+            **{k: plain(v, depth - 1) for k, v in vars(value).items() if not k.startswith("_")}}
+
+
+def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """(place, value in a, value in b) wherever two plain values differ; None where there is none."""
+    if isinstance(a, dict) and isinstance(b, dict):
+        for key in dict.fromkeys([*a, *b]):
+            yield from differences(a.get(key), b.get(key), f"{where}.{key}" if where else key)
+    elif isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
+        for k, (x, y) in enumerate(zip(a, b)):
+            yield from differences(x, y, f"{where}[{k}]")
+    elif isinstance(a, float) and isinstance(b, float):
+        if not (math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-12) or a != a and b != b):
+            yield where, a, b
+    elif a != b:
+        yield where, a, b
+
+
+def _mesh(problem: Any) -> dict[str, Any]:
+    mesh, domain, comm = problem.scene.mesh, problem.forms.domain, problem.comm
+    cells = domain.topology.index_map(domain.topology.dim).size_local
+    x = domain.geometry.x[_compat.cell_nodes(domain)[:cells]][:, :, :2] / problem.forms.length
+    number = domain.topology.original_cell_index[:cells]
+    weights = np.sin(1.0 + number)[:, None] * np.sin(1.0 + np.arange(x.shape[1]))
+    total = comm.allreduce(cells, MPI.SUM)
+    sums = comm.allreduce(np.einsum("cn,cnk->k", weights, x), MPI.SUM)
+    topology = mesh.domain.topology
+
+    def count(found, dim):
+        return int(comm.allreduce(int(np.sum(found < topology.index_map(dim).size_local)), MPI.SUM))
+    return {"cells": total, "extent": [float(v) for v in problem.scene.extent], "length": problem.forms.length,
+            "layers": {name: count(mesh.cells.find(tag), 2) for name, tag in mesh.layers.items()},
+            "boundaries": {name: count(mesh.facets_of(name), 1) for name in mesh.boundaries},
+            "sums": [float(v) for v in sums]}

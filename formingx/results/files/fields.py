@@ -1,0 +1,286 @@
+"""Fields of states on the whole body, for ParaView: VTX (through ADIOS2) or XDMF.
+
+Every triangle gets six nodes of its own, so that nothing is smeared over an interface. The fields:
+
+    displacement            (u_r, u_z), length
+    stretches               the larger and the smaller in the plane, and the hoop stretch (`Stress.principal_stretches`)
+    principal_stresses      of the Cauchy stress, from the largest to the smallest, stress
+    cauchy_rr, _zz, _rz, _hoop  its components; hydrostatic_pressure: minus a third of its trace, stress
+    stress_error            its estimated error, one value in each triangle (`StressError.mean`), stress
+    contact_pressure        normal traction per deformed area at the face, stress, of all tools; where there are any
+                            (the first two nodes from the axis share their areas: there it is less accurate)
+    thickness, thickness_ratio  of the sheet there, where the mesh has two faces that face each other
+
+A membrane is a line and has displacement and thickness only. Rank 0 writes.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path as FilePath
+from typing import Any
+from xml.etree import ElementTree
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem, has_adios2, io
+from dolfinx import mesh as dolfinx_mesh
+from mpi4py import MPI
+
+from ...errors import InputError, place
+from .. import files
+
+_NODES = {1: np.array([[0.0], [1.0], [0.5]]), 2: np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])}
+"""Places of the nodes in the reference cell, in DOLFINx order, by dimension."""
+
+
+class Fields:
+    """Evaluates the fields of a path's states at the nodes of all cells.
+
+    Attributes:
+        points: reference positions of the nodes of this rank's cells, shape (cells, nodes, 2), length.
+    """
+
+    def __init__(self, path: Any):
+        self._path, self._problem = path, path.problem
+        forms, domain = self._problem.forms, self._problem.forms.domain
+        self.dimension = domain.topology.dim
+        self._cells = np.arange(domain.topology.index_map(self.dimension).size_local, dtype=np.int32)
+        self._where, self._u = (fem.Expression(ufl.as_vector([v[0], v[1]]), _NODES[self.dimension])
+                                for v in (forms.X, forms.u))
+        self.points = self._eval(self._where)
+
+    def of(self, state: Any) -> dict[str, np.ndarray]:
+        """{name: values, shape (cells, nodes, components)} of a state; collective."""
+        problem, shape = self._problem, self.points.shape[:2]
+        problem.x.array_w[:] = state.x
+        problem.set_state(problem.x, state.control)
+        found = {"displacement": self._eval(self._u)}
+        moved = self.points + found["displacement"]
+        if self.dimension == 2:
+            field = self._path.stress(state)
+            stress = field.in_cells(_NODES[2])
+            sigma = stress.cauchy
+            found |= {"stretches": stress.principal_stretches, "principal_stresses": stress.principal_stresses,
+                      "cauchy_rr": sigma[:, 0, 0], "cauchy_zz": sigma[:, 1, 1], "cauchy_rz": sigma[:, 0, 1],
+                      "cauchy_hoop": sigma[:, 2, 2], "hydrostatic_pressure": stress.hydrostatic_pressure,
+                      "stress_error": np.repeat(field.error_in_cells(), len(_NODES[2]))}
+            if problem.contacts:
+                found["contact_pressure"] = self._contact_pressure(state, moved)
+        try:
+            profile = self._path.profile(state)
+        except InputError:
+            profile = None                                  # not a sheet
+        if profile is not None:
+            columns = np.column_stack([profile.thickness, profile.thickness_ratio])
+            values = _across(moved.reshape(-1, 2), profile.bottom, profile.top, columns)
+            found |= {"thickness": values[:, 0], "thickness_ratio": values[:, 1]}
+        return {name: np.asarray(values).reshape(*shape, -1) for name, values in found.items()}
+
+    def _eval(self, expression: Any) -> np.ndarray:
+        if not len(self._cells):
+            return np.zeros((0, len(_NODES[self.dimension]), 2))
+        return expression.eval(self._problem.forms.domain, self._cells).reshape(len(self._cells), -1, 2)
+
+    def _contact_pressure(self, state: Any, moved: np.ndarray) -> np.ndarray:
+        """Normal traction over the change of area along the face, zero elsewhere, shape (cells, nodes)."""
+        from scipy.spatial import cKDTree
+        problem, pressure = self._problem, np.zeros(self.points.shape[:2])
+        forms = problem.forms
+        fields, near = state.x[: forms.space.dofmap.index_map.size_local], 1e-9 * forms.length
+        self._path.go_to(state)
+        now, problem.memory = problem.memory, state.memory
+        try:
+            tractions = [contact.traction(fields, state.control) for contact in problem.touching]
+        finally:
+            problem.memory = now
+        for contact, (points, values) in zip(problem.touching, tractions):
+            tree = cKDTree(points)
+            total = np.zeros((len(points), 2))               # sum of area ratios, and of how many facets
+            for cell, facet in self._facets(contact.contact.on):
+                nodes = [*(k for k in range(3) if k != facet), 3 + facet]
+                X, x = self.points[cell, nodes], moved[cell, nodes]
+                ratio = np.hypot(*_tangents(x).T) / np.hypot(*_tangents(X).T)
+                if problem.scene.kinematics.dimension_of_volume == 3:
+                    axis = X[:, 0] < near
+                    ratio = ratio * np.where(axis, ratio, x[:, 0] / np.where(axis, 1.0, X[:, 0]))
+                np.add.at(total, tree.query(X)[1], np.column_stack([ratio, np.ones(3)]))
+            total = problem.comm.allreduce(total)
+            away, at = tree.query(self.points.reshape(-1, 2))
+            found = (values[:, 0] * total[:, 1] / total[:, 0])[at]
+            pressure += np.where(away < near, found, 0.0).reshape(pressure.shape)
+        return pressure
+
+    def _facets(self, boundary: str) -> list[tuple[int, int]]:
+        """(own cell, number of the facet in it) of a boundary."""
+        mesh = self._problem.scene.mesh
+        topology = mesh.domain.topology
+        topology.create_connectivity(1, 2)
+        topology.create_connectivity(2, 1)
+        pairs = []
+        for facet in mesh.facets_of(boundary):
+            cell = int(topology.connectivity(1, 2).links(facet)[0])
+            if cell < len(self._cells):
+                pairs.append((cell, int(np.flatnonzero(topology.connectivity(2, 1).links(cell) == facet)[0])))
+        return pairs
+
+
+def to_vtx(path: Any, folder: Any, states: Any = None) -> None:
+    """Write a VTX folder (name ends in .bp): P2 fields on P2 triangles, time is the number of the state.
+
+    Raises:
+        InputError: this DOLFINx has no ADIOS2, the name does not end in .bp, or a state is not of the path.
+    """
+    if not has_adios2:
+        raise InputError("to_vtx: this DOLFINx was built without ADIOS2: use to_xdmf")
+    _write(path, folder, states, ".bp", _vtx)
+
+
+def to_xdmf(path: Any, file: Any, states: Any = None) -> None:
+    """Write an XDMF file (name ends in .xdmf) and its HDF5 file beside it; else as `to_vtx`."""
+    _write(path, file, states, ".xdmf", _xdmf)
+
+
+def _write(path: Any, file: Any, states: Any, suffix: str, write: Callable) -> None:
+    file, comm = place("file", file), path.problem.comm
+    if file.suffix != suffix:
+        raise InputError(f"file {str(file)!r}: its name must end in {suffix}")
+    chosen = _chosen(path, states)
+    fields = Fields(path)
+    points = _gather(fields.points, comm)
+    steps = []
+    for number, state in chosen:
+        values = fields.of(state)
+        steps.append((float(number), {name: _gather(v, comm) for name, v in values.items()}))
+
+    def write_all():
+        size = 2**17 + sum(8 * (array.size + points.size) for _, values in steps for array in values.values())
+        part = file.with_name(f"part-{file.name}")
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            files.reserve(part, size)
+            write(part, file, _Body(points, fields.dimension), steps)
+        except OSError as error:
+            _remove(part)
+            raise OSError(error.errno, f"{str(file)!r} could not be written: {error.strerror}") from None
+        except RuntimeError as error:                       # what the libraries throw, a full disk for one
+            _remove(part)
+            raise OSError(f"{str(file)!r} could not be written: {error}") from None
+    files.on_root(comm, write_all)
+
+
+def _chosen(path: Any, states: Any) -> list[tuple[int, Any]]:
+    """[(number, state)]; a state that is not on the path (of `Path.at`) gets the next number."""
+    if isinstance(states, str):
+        if states != "all":
+            raise InputError(f"states = {states!r}: must be states of the path, or 'all'")
+        states = path.states
+    states = [path.last] if states is None else [states] if hasattr(states, "control") else list(states)
+    if not states or not all(hasattr(state, "control") for state in states):
+        raise InputError(f"states = {states!r}: must be one or more states of the path, or 'all'")
+    numbers = {id(state): k for k, state in enumerate(path.states)}
+    found = [numbers.get(id(state), k) for k, state in enumerate(states)]
+    if any(b <= a for a, b in zip(found, found[1:])):
+        found = list(range(len(states)))
+    return list(zip(found, states))
+
+
+class _Body:
+    """A mesh on this rank alone in which no two cells share a node, and functions on it."""
+
+    def __init__(self, points: np.ndarray, dimension: int):
+        cells, nodes = points.shape[:2]
+        shape = {1: "interval", 2: "triangle"}[dimension]
+        element = basix.ufl.element("Lagrange", shape, 2, shape=(2,))
+        self.mesh = dolfinx_mesh.create_mesh(
+            MPI.COMM_SELF, cells=np.arange(cells * nodes, dtype=np.int64).reshape(cells, nodes),
+            x=points.reshape(-1, 2), e=element)
+        self._order = self.mesh.topology.original_cell_index
+        self._functions: dict[str, fem.Function] = {}
+
+    def functions(self, values: dict[str, np.ndarray]) -> list[fem.Function]:
+        """P2 functions with these values, shape (cells, nodes, components) each."""
+        for name, array in values.items():
+            n = array.shape[-1]
+            if name not in self._functions:
+                shape = {} if n == 1 else {"shape": (n,)}
+                element = basix.ufl.element("Lagrange", self.mesh.topology.cell_name(), 2, **shape)
+                self._functions[name] = fem.Function(fem.functionspace(self.mesh, element), name=name)
+            f = self._functions[name]
+            f.x.array.reshape(-1, n)[f.function_space.dofmap.list] = array[self._order]
+        return [self._functions[name] for name in values]
+
+
+def _vtx(part: FilePath, file: FilePath, body: _Body, steps: list) -> None:
+    _remove(part)
+    with io.VTXWriter(MPI.COMM_SELF, part, body.functions(steps[0][1]), engine="BP4") as writer:
+        for time, values in steps:
+            body.functions(values)
+            writer.write(time)
+    _remove(file)
+    os.rename(part, file)
+
+
+def _xdmf(part: FilePath, file: FilePath, body: _Body, steps: list) -> None:
+    data = part.with_suffix(".h5")
+    with io.XDMFFile(MPI.COMM_SELF, part, "w") as writer:
+        writer.write_mesh(body.mesh)
+        for time, values in steps:
+            for function in body.functions(values):
+                writer.write_function(function, time)
+    text = _together(part.read_text()).replace(data.name, file.with_suffix(".h5").name)
+    os.replace(data, file.with_suffix(".h5"))
+    part.unlink()
+    files.replace(file, lambda stream: stream.write(text))
+
+
+def _together(text: str) -> str:
+    """XDMF with one grid to a time step that holds all functions; DOLFINx gives each function its own."""
+    root = ElementTree.fromstring(text)
+    domain = root[0]
+    first, *others = [grid for grid in domain if grid.get("GridType") == "Collection"]
+    first.set("Name", "states")
+    for other in others:
+        for step, theirs in zip(first, other, strict=True):
+            step.extend(theirs.findall("Attribute"))
+        domain.remove(other)
+    return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode")
+
+
+def _remove(file: FilePath) -> None:
+    if file.is_dir():
+        shutil.rmtree(file)
+    else:
+        file.unlink(missing_ok=True)
+
+
+def _gather(values: np.ndarray, comm: Any) -> Any:
+    parts = comm.gather(values, root=0)
+    return np.concatenate(parts) if parts else None
+
+
+def _tangents(points: np.ndarray) -> np.ndarray:
+    """dx/ds at the two ends and the middle of a three-node edge, shape (3, 2)."""
+    a, b, m = points
+    return np.array([4 * m - 3 * a - b, a - 4 * m + 3 * b, b - a])
+
+
+def _across(points: np.ndarray, bottom: np.ndarray, top: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (n, k) that belong to the n segments from bottom to top, linear between two of them, at points (m, 2)."""
+    found = np.zeros((len(points), values.shape[1]))
+    along = top - bottom
+    for i, x in enumerate(points):
+        side = along[:, 0] * (x - bottom)[:, 1] - along[:, 1] * (x - bottom)[:, 0]
+        s = np.clip(((x - bottom) * along).sum(1) / (along**2).sum(1), 0, 1)
+        away = np.hypot(*(bottom + s[:, None] * along - x).T)
+        between = np.flatnonzero(side[:-1] * side[1:] <= 0)
+        if not len(between):
+            found[i] = values[np.argmin(away)]
+            continue
+        k = between[np.argmin(away[between] + away[between + 1])]
+        a, b = away[k], away[k + 1]
+        found[i] = (b * values[k] + a * values[k + 1]) / (a + b) if a + b > 0 else values[k]
+    return found

@@ -1,0 +1,142 @@
+"""Tables that other programs write: CSV with named columns, and their units."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...errors import InputError, known, positive
+
+# in m, and in Pa; kg/cm2 is the technical atmosphere of the older literature (kgf/cm2)
+_LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
+_STRESSES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6, "bar": 1e5, "atm": 101325.0,
+             "psi": 6894.757293168, "kg/cm2": 98066.5, "kgf/cm2": 98066.5}
+_VOLUMES = {f"{name}3": size**3 for name, size in _LENGTHS.items()} | {"l": 1e-3, "ml": 1e-6}
+UNITS = {"length": _LENGTHS, "stress": _STRESSES, "volume": _VOLUMES}
+
+
+class Table(NamedTuple):
+    """Columns of numbers.
+
+    Attributes:
+        name: of the file, for messages.
+        columns: {name: values, shape (n,)}.
+        units: {name: unit as the header states it, or None}.
+        kinds: the column `kind` that `Path.to_csv` writes, or None.
+    """
+
+    name: str
+    columns: dict[str, np.ndarray]
+    units: dict[str, str | None]
+    kinds: list[str] | None = None
+
+    def take(self, column: str, wanted: float | str | None = None) -> np.ndarray:
+        """A column times a factor (a number), or in a unit (its name; the header must state its own).
+
+        Raises:
+            InputError: there is no such column, a cell was empty or not a number, a unit is not known or not stated.
+        """
+        known(f"{self.name}: column", column, self.columns)
+        values, unit = self.columns[column], self.units[column]
+        if not np.all(np.isfinite(values)):
+            row = int(np.argmin(np.isfinite(values))) + 1
+            raise InputError(f"{self.name}: column {column!r}: row {row} of the data is empty or not a finite number")
+        if wanted is None:
+            if unit is not None:
+                raise InputError(f"{self.name}: column {column!r} is in {unit!r}: say what to make of it with units,"
+                                 f" a factor or the unit of the other side")
+            return values
+        if not isinstance(wanted, str):
+            return values * positive(f"units of {column!r}", wanted)
+        if unit is None:
+            raise InputError(f"{self.name}: the header does not state the unit of column {column!r} (as in"
+                             f" '{column} [{wanted}]'): give a factor instead of {wanted!r}")
+        return values * conversion(unit, wanted)
+
+
+def conversion(unit: str, wanted: str) -> float:
+    """How many `wanted` one `unit` is.
+
+    Raises:
+        InputError: a unit is not known, or they are of different kinds.
+    """
+    if unit == wanted:
+        return 1.0
+    for sizes in UNITS.values():
+        if unit in sizes and wanted in sizes:
+            return sizes[unit] / sizes[wanted]
+    names = [name for sizes in UNITS.values() for name in sizes]
+    for name in (unit, wanted):
+        if name not in names:
+            raise InputError(f"unit {name!r} is not known; known: {', '.join(names)}; or give a factor")
+    raise InputError(f"{unit!r} cannot be turned into {wanted!r}: they measure different things")
+
+
+def read(file: Any) -> Table:
+    """A CSV file: a header of column names, each with its unit in brackets if it has one ("pressure [psi]"), then rows.
+
+    Cells are parted by commas, semicolons or tabs; lines that begin with # are left out.
+
+    Raises:
+        InputError: the file is not there, has no header, a row of another length, or fewer than two rows.
+    """
+    name = os.fspath(file)
+    try:
+        with open(name, newline="", encoding="utf-8-sig") as stream:
+            lines = [(n, line) for n, line in enumerate(stream, 1) if line.strip() and not line.startswith("#")]
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"table {name!r} cannot be read: {error}") from None
+    if not lines:
+        raise InputError(f"table {name!r} is empty")
+    delimiter = max(",;\t", key=lines[0][1].count)
+    cells = [(n, [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]) for n, line in lines]
+    heads = [_name_and_unit(cell) for cell in cells[0][1]]
+    names = [head for head, _ in heads]
+    if all(_is_number(cell) for cell in cells[0][1]):
+        raise InputError(f"table {name!r}: the first line must name the columns; it reads {lines[0][1].strip()!r}")
+    if len(set(names)) < len(names):
+        raise InputError(f"table {name!r}: a column name stands twice in the header: {', '.join(names)}")
+    for n, row in cells[1:]:
+        if len(row) != len(names):
+            raise InputError(f"table {name!r}, line {n}: {len(row)} cells, but the header names {len(names)} columns")
+    if len(cells) < 3:
+        raise InputError(f"table {name!r}: {len(cells) - 1} rows of data; a curve needs at least 2")
+    text = {head: [row[k] for _, row in cells[1:]] for k, head in enumerate(names)}
+    columns = {head: np.array([float(c) if _is_number(c) else np.nan for c in column]) for head, column in text.items()
+               if any(_is_number(c) for c in column)}
+    return Table(name, columns, {head: unit for head, unit in heads if head in columns}, text.get("kind"))
+
+
+def from_arrays(name: str, columns: Mapping[str, Any]) -> Table:
+    """A table of arrays, all of one length of at least 2."""
+    arrays = {}
+    for key, values in columns.items():
+        try:
+            arrays[str(key)] = np.asarray(values, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"{name}: column {key!r} does not hold numbers") from None
+    shapes = {a.shape for a in arrays.values()}
+    if len(shapes) != 1 or len(next(iter(shapes))) != 1 or next(iter(shapes))[0] < 2:
+        raise InputError(f"{name}: columns must be as long as each other, with at least 2 values; they have the shapes"
+                         f" {', '.join(f'{k}: {a.shape}' for k, a in arrays.items()) or 'none'}")
+    return Table(name, arrays, dict.fromkeys(arrays))
+
+
+def _name_and_unit(cell: str) -> tuple[str, str | None]:
+    found = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]", cell)
+    if not found or not found[1]:
+        return cell, None
+    return found[1], None if found[2] in ("", "-", "1") else found[2]
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True

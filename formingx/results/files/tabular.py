@@ -1,0 +1,103 @@
+"""Files that people open: CSV of a path and of a profile, JSON summaries. Rank 0 writes, whole files or none."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import errno
+import json
+import os
+import platform
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...errors import place
+
+
+def write_path(path: Any, file: Any) -> None:
+    """One row per state: stage (of a process), kind, iterations, then every measure of the path."""
+    staged = any(s.stage for s in path.states)
+    rows = [[*[s.stage] * staged, s.kind, max(len(s.history) - 1, 0), *(s.measures[c] for c in path.columns)]
+            for s in path.states]
+    write_rows(file, [*["stage"] * staged, "kind", "iterations", *path.columns], rows, path.problem.comm)
+
+
+def write_profile(profile: Any, file: Any, comm: Any) -> None:
+    """One row per node of the bottom face: where it was, arc length, both deformed faces, thickness, its ratio."""
+    columns = ["reference_radius", "reference_length", "arc_length", "r_bottom", "z_bottom", "r_top", "z_top",
+               "thickness", "thickness_ratio"]
+    table = np.column_stack([profile.reference_radius, profile.reference_length, profile.arc_length, profile.bottom,
+                             profile.top, profile.thickness, profile.thickness_ratio])
+    write_rows(file, columns, table.tolist(), comm)
+
+
+def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], comm: Any) -> None:
+    """A CSV file with a header; numbers with all their digits."""
+    def write(stream):
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(header)
+        for row in rows:
+            writer.writerow([repr(float(v)) if isinstance(v, (float, np.floating)) else v for v in row])
+    on_root(comm, lambda: replace(file, write))
+
+
+def write_summary(file: Any, summary: dict[str, Any], comm: Any) -> None:
+    """A JSON file of key numbers; NaN is refused."""
+    text = json.dumps(summary, indent=2, allow_nan=False, default=float) + "\n"
+    on_root(comm, lambda: replace(file, lambda stream: stream.write(text)))
+
+
+def versions() -> dict[str, str]:
+    """Versions of what a result depends on."""
+    import dolfinx
+    import petsc4py
+    from petsc4py import PETSc
+    return {"dolfinx": dolfinx.__version__, "petsc": ".".join(map(str, PETSc.Sys.getVersion())),
+            "petsc4py": petsc4py.__version__, "numpy": np.__version__, "python": platform.python_version()}
+
+
+def on_root(comm: Any, action: Callable[[], Any]) -> Any:
+    """The result of an action that rank 0 alone takes, on all ranks; so is what it raises. Collective."""
+    result, error = None, None
+    if comm.rank == 0:
+        try:
+            result = action()
+        except (OSError, ValueError, ImportError) as found:
+            error = found
+    result, error = comm.bcast((result, error), root=0)
+    if error is not None:
+        raise error
+    return result
+
+
+def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:
+    """Write beside the file, then rename: an earlier file survives a failure.
+
+    Raises:
+        OSError: the file cannot be written; it names the file, and no part is left behind.
+    """
+    file = place("file", file)
+    part = file.with_name(file.name + ".part")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with open(part, mode, newline=None if "b" in mode else "", encoding=None if "b" in mode else "utf-8") as stream:
+            write(stream)
+        os.replace(part, file)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            part.unlink()
+        raise OSError(error.errno, f"{os.fspath(file)!r} could not be written: {error.strerror}") from None
+
+
+def reserve(file: Any, size: int) -> None:
+    """Raise an OSError unless there is room for so many bytes beside this name: ADIOS2 aborts on a full disk."""
+    with open(file, "wb") as stream:
+        try:
+            os.posix_fallocate(stream.fileno(), 0, size)
+        except OSError as error:
+            if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
+                raise
+        finally:
+            os.unlink(file)

@@ -1,0 +1,82 @@
+"""Curves with matplotlib, drawn without a screen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...figures import figure
+
+
+def of_contact(column: str) -> bool:
+    """True of what a stiff contact gives: meaningless between states, where the body is but guessed."""
+    return column.endswith(("force", "penetration", "contact_length"))
+
+
+def line(path: Any, *columns: str) -> list[Any]:
+    """Columns along a path: the smooth curve through its states; the states alone if one of them is `of_contact`."""
+    return [path[c] for c in columns] if any(map(of_contact, columns)) else path.curve(*columns)
+
+
+def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
+    """Column y over column x of a path: the states as dots, the path as a line, limit points ringed.
+
+    Returns the axes; `axes.figure.savefig` saves.
+    """
+    axes = axes if axes is not None else figure()[1]
+    drawn, = axes.plot(*line(path, x, y), **style)
+    axes.plot(path[x], path[y], ".", color=drawn.get_color())
+    for state in path.limit_points:
+        axes.plot(state.measures[x], state.measures[y], "o", color=drawn.get_color(), fillstyle="none", markersize=9)
+    axes.set_xlabel(axes.get_xlabel() or x.replace("_", " "))
+    axes.set_ylabel(axes.get_ylabel() or y.replace("_", " "))
+    return axes
+
+
+def convergence(path: Any, axes: Any = None) -> Any:
+    """Correction (3.5.1) against iteration, one line per state (as thesis figures 3.2 and 5.7); returns the axes."""
+    axes = axes if axes is not None else figure()[1]
+    for state in path.states:
+        corrections = [i.correction for i in state.history if i.correction > 0]
+        axes.semilogy(range(1, len(corrections) + 1), corrections, ".-", color="tab:blue", alpha=0.5, linewidth=1)
+    axes.set_xlabel("Newton iteration")
+    axes.set_ylabel("correction $|\\Delta x|/|x|$")
+    axes.xaxis.get_major_locator().set_params(integer=True)
+    return axes
+
+
+def main_columns(columns: list[str]) -> tuple[str, str]:
+    """(x, y) of the loading curve: what is driven over how far the body has gone, or its force over the travel."""
+    travel = next((c for c in columns if c.endswith("travel")), None)
+    if travel:
+        return travel, next(c for c in ("tool_force", "support_force", "pole_height", "strain_energy") if c in columns)
+    return (next(c for c in ("pole_height", "enclosed_volume", "strain_energy") if c in columns),
+            next(c for c in columns if c.endswith("pressure")))
+
+
+def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
+    """The deformed sheet as strips between its two faces; scale: factors of (r, z), colours: of the n nodes, (n, 4)."""
+    import numpy as np
+    from matplotlib.collections import PolyCollection
+    bottom, top = np.asarray(profile.bottom) * scale, np.asarray(profile.top) * scale
+    strips = np.stack([bottom[:-1], bottom[1:], top[1:], top[:-1]], 1)
+    faces = (colours[1:] + colours[:-1]) / 2
+    axes.add_collection(PolyCollection(strips, facecolors=faces, edgecolors=faces, linewidths=1.8, zorder=2))
+
+
+def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:
+    """Corners (r, z), low and high, of a box around sheets (and their mirror images at r = 0), with some room."""
+    import numpy as np
+    points = np.vstack([side for profile in profiles for side in (profile.bottom, profile.top)])
+    low, high = points.min(0), points.max(0)
+    if mirrored:
+        low[0] = -high[0]
+    margin = 0.06 * max(high - low)
+    return low - margin, high + margin
+
+
+def outline(profile: Any, axes: Any, scale: float = 1.0, **style: Any) -> None:
+    """The deformed sheet filled between its faces, r to the right, lengths times `scale`."""
+    import numpy as np
+    points = scale * np.vstack([profile.bottom, profile.top[::-1]])
+    axes.fill(*points.T, **{"linewidth": 0.8, "edgecolor": style.get("color"), **style})
+    axes.set_aspect("equal")

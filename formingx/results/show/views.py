@@ -1,0 +1,153 @@
+"""Three-dimensional pictures with pyvista, drawn without a screen."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from .. import files
+from ..evaluate.profile import distance_to_line
+
+
+def revolved(profile: Any, file: Any, comm: Any, title: str = "thickness / original") -> None:
+    """The sheet revolved about the axis by three quarters, coloured by thickness ratio, as a PNG (rank 0 draws).
+
+    A sheet that is more than twice as high as wide (a parison) is cut along the middle.
+
+    Raises:
+        InputError: there is neither a screen nor Xvfb to draw on.
+    """
+    low, high = _bounds(profile)
+    tall = high[1] - low[1] > 4 * high[0]
+    turn = (0.0, np.pi) if tall else (0.0, 1.5 * np.pi)
+    _view(profile, np.linspace(*turn, 181), lambda p, a: (p[:, 0] * np.cos(a), p[:, 0] * np.sin(a), p[:, 1]),
+          (1.2, -3.4, 1.2) if tall else (2.0, -3.4, 1.9), file, comm, title)
+
+
+def extruded(profile: Any, file: Any, comm: Any, title: str = "thickness / original") -> None:
+    """A sheet in plane strain as a long part, coloured by thickness ratio, as a PNG (rank 0 draws).
+
+    A half sheet, which begins at R = 0, is drawn whole; it is half as long again as it is wide.
+
+    Raises:
+        InputError: there is neither a screen nor Xvfb to draw on.
+    """
+    low, high = _bounds(profile)
+    if abs(low[0]) < 1e-6 * (high[0] - low[0]):
+        profile, width = _mirrored(profile), 2 * high[0]
+    else:
+        width = high[0] - low[0]
+    _view(profile, np.linspace(-0.75 * width, 0.75 * width, 2), lambda p, y: (p[:, 0], np.full(len(p), y), p[:, 1]),
+          (1.9, -3.4, 1.7), file, comm, title)
+
+
+def _bounds(profile: Any) -> tuple[np.ndarray, np.ndarray]:
+    points = np.vstack([profile.bottom, profile.top])
+    return points.min(0), points.max(0)
+
+
+def _mirrored(profile: Any) -> Any:
+    """A half sheet and its mirror image as one."""
+    def whole(points):
+        return np.vstack([points[:0:-1] * (-1, 1), points])
+    return type(profile)(*(whole(p) for p in (profile.rest_bottom, profile.rest_top, profile.bottom, profile.top)))
+
+
+def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any, comm: Any, title: str) -> None:
+    """Draw the section swept through `stations`; place(points (n, 2), station) gives its x, y, z there, each (n,)."""
+    if FilePath(file).suffix.lower() != ".png":
+        raise InputError(f"file {str(file)!r}: its name must end in .png")
+
+    def draw():
+        FilePath(file).parent.mkdir(parents=True, exist_ok=True)
+        with _screen():
+            _draw(profile, stations, place, camera, os.fspath(file), title)
+    files.on_root(comm, draw)
+
+
+def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: str, title: str) -> None:
+    import pyvista
+
+    def swept(line, values):
+        points = np.array([place(line, s) for s in stations])                      # (stations, coordinate, point)
+        surface = pyvista.StructuredGrid(*(points[:, k, :, None] for k in range(3)))
+        surface["ratio"] = np.tile(values, (len(stations), 1)).ravel(order="F")
+        return surface
+
+    ratio = profile.wall_ratio
+    beyond = distance_to_line(profile.top, profile.bottom) / profile.original_thickness
+    rim = np.linspace(profile.bottom[-1], profile.top[-1], 3)[1:-1]
+    line = np.vstack([profile.bottom, rim, profile.top[::-1]])
+    values = np.concatenate([ratio, np.full(len(rim), ratio[-1]), beyond[::-1]])
+    plotter = pyvista.Plotter(off_screen=True, window_size=(1000, 800))
+    plotter.set_background("white")
+    bar = {"title": title + "\n", "color": "black", "vertical": True, "position_x": 0.85, "position_y": 0.2,
+           "height": 0.6, "width": 0.07, "title_font_size": 20, "label_font_size": 18, "fmt": "%.2f", "n_labels": 5}
+    middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), 0.01) / 2     # a flat sheet is of one colour
+    shades = {"scalars": "ratio", "cmap": "viridis_r", "clim": (middle - half, middle + half)}
+    plotter.add_mesh(swept(line, values), **shades, smooth_shading=True, scalar_bar_args=bar,
+                     ambient=0.45, diffuse=0.65, specular=0.25, specular_power=20, split_sharp_edges=True)
+    for s in (stations[0], stations[-1]):              # the cut faces
+        faces = [np.column_stack(place(side, s)) for side in (profile.bottom, profile.top)]
+        section = pyvista.StructuredGrid(*(np.stack([f[:, k] for f in faces], 1)[..., None] for k in range(3)))
+        section["ratio"] = np.tile(ratio, 2)
+        plotter.add_mesh(section, **shades, lighting=False, show_scalar_bar=False)
+        points = np.vstack([faces[0], faces[1][::-1]])
+        plotter.add_mesh(pyvista.lines_from_points(points, close=True), color="black", line_width=2)
+    plotter.camera_position = [camera, (0, 0, 0), (0, 0, 1)]
+    plotter.reset_camera()
+    _fit(plotter, np.vstack([np.column_stack(place(line, s)) for s in stations]))
+    plotter.enable_anti_aliasing("ssaa")
+    try:
+        plotter.screenshot(file)
+    finally:                                           # before its screen goes
+        plotter.close()
+
+
+def _fit(plotter: Any, points: np.ndarray) -> None:
+    """Turn the zoom and shift the picture so that points, shape (n, 3), fill the window beside the colour bar."""
+    camera, (width, height) = plotter.camera, plotter.window_size
+    matrix = camera.GetCompositeProjectionTransformMatrix(width / height, -1, 1)
+    matrix = np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
+    projected = np.column_stack([points, np.ones(len(points))]) @ matrix.T
+    projected = projected[:, :2] / projected[:, 3:]                        # the window is [-1, 1]^2
+    low, high = projected.min(0), projected.max(0)
+    zoom = min(np.array([1.5, 1.85]) / (high - low))
+    camera.view_angle = 2 * np.degrees(np.arctan(np.tan(np.radians(camera.view_angle) / 2) / zoom))
+    camera.SetWindowCenter(*(zoom * (low + high) / 2 - (-0.2, 0.0)))
+
+
+@contextlib.contextmanager
+def _screen() -> Iterator[None]:
+    """A display to draw on: the one that is there, or an Xvfb of our own that ends with the block.
+
+    Debian's VTK aborts without one.
+    """
+    if os.environ.get("DISPLAY"):
+        yield
+        return
+    if shutil.which("Xvfb") is None:
+        raise InputError("a 3-D view needs a screen (DISPLAY) or the program Xvfb: install the package xvfb")
+    read, write = os.pipe()
+    server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", "1600x1200x24", "-nolisten", "tcp"],
+                              pass_fds=(write,), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    os.close(write)
+    try:
+        with os.fdopen(read) as answer:
+            number = answer.readline().strip()
+        if not number:
+            raise InputError("a 3-D view needs a screen: Xvfb did not start")
+        os.environ["DISPLAY"] = f":{number}"
+        yield
+    finally:
+        os.environ.pop("DISPLAY", None)
+        server.terminate()
+        server.wait()

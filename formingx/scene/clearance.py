@@ -1,0 +1,84 @@
+"""Whether the tools of a process can move as its stages say: before anything is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..physics.contact import Contact
+from .scene import Scene
+
+_LOOKS = 50            # how often the tools are looked at on the way of a stage
+
+
+def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None) -> list[Any]:
+    """An InputError if tools of a stage overlap, or one goes through a boundary that is held.
+
+    Returns the plans to check once more when their turn comes: a travel at their beginning is not known yet.
+
+    plans: of the stages, with `stage`, `numbers` of what it drives, `tables` [(number, table)], numbers that are `off`.
+    stands: travels at the beginning {number: length}, default 0.
+    Where a travel cannot be known before the run (a stage that ends at a pole height) its tool is left out from there.
+    """
+    tools = {i: thing for i, thing in enumerate(scene.things) if isinstance(thing, Contact)}
+    outlines = {i: _outline(tool) for i, tool in tools.items()}
+    stands, unsure = stands or dict.fromkeys(tools, 0.0), []
+    for plan in plans:
+        if not all(map(np.isfinite, stands.values())):
+            unsure.append(plan)
+        present = {i: tool for i, tool in tools.items() if i not in plan.off}
+        for where in _legs(plan, stands):
+            for i in (i for i in present if where[i] != stands[i] and np.isfinite(where[i])):
+                try:
+                    scene.check_travel(tools[i], where[i])
+                except InputError as error:
+                    raise InputError(f"{plan.stage.who}: {error}") from None
+            for part in np.linspace(0, 1, _LOOKS):
+                now = {i: stands[i] + part * (where[i] - stands[i]) for i in tools}
+                _check_overlap(scene, plan.stage.who, present, outlines, now)
+            stands = where
+    return unsure
+
+
+def _legs(plan: Any, stands: dict[int, float]) -> Iterator[dict[int, float]]:
+    """Where all tools are at the ends of the straight pieces of a stage."""
+    if plan.tables:
+        for time in sorted({t for _, table in plan.tables for t in table[:, 0]}):
+            yield stands | {i: float(np.interp(time, *table.T)) for i, table in plan.tables
+                            if i in stands and time >= table[0, 0]}
+    else:
+        until = plan.stage.until
+        end = until.value if until is not None and until.name.endswith("travel") else np.nan
+        yield stands | {i: end for i in plan.numbers if i in stands}
+
+
+def _check_overlap(scene: Scene, who: str, present: dict[int, Contact], outlines: dict[int, np.ndarray],
+                   where: dict[int, float]) -> None:
+    near = 1e-6 * max(scene.extent)
+    for i, a in present.items():
+        for j, b in present.items():
+            if j <= i or j in scene.together(i) or not np.isfinite(where[i] + where[j]):
+                continue
+            shift = where[i] * np.array(a.moves or (0, 0)) - where[j] * np.array(b.moves or (0, 0))
+            for points, other, back in ((outlines[i] + shift, b, 0.0), (outlines[j], a, shift)):
+                depth = other.tool.signed_distance(points - back)
+                worst = int(np.argmax(depth))
+                if depth[worst] > near:
+                    r, z = points[worst] + where[j] * np.array(b.moves or (0, 0))
+                    raise InputError(f"{who}: tools overlap: with {_at(a, where[i])} and {_at(b, where[j])} one reaches"
+                                     f" {depth[worst]:.6g} into the other at (R, Z) = ({r:.6g}, {z:.6g}); leave one out"
+                                     f" with without=[...], or end the travel earlier")
+
+
+def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
+    """Points along a tool's profile, shape (n, 2)."""
+    corners = contact.tool.outline()
+    parts = np.linspace(0, 1, pieces, endpoint=False)[:, None]
+    return np.concatenate([*(a + parts * (b - a) for a, b in zip(corners, corners[1:])), corners[-1:]])
+
+
+def _at(contact: Contact, travel: float) -> str:
+    return f"{contact!r}" + (f" at travel {travel:g}" if contact.moves else "")

@@ -1,0 +1,299 @@
+"""What the user declares, checked before anything is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from ..errors import InputError, count, known, several
+from ..materials.hyperelastic import Material
+from ..mesh.mesh import Mesh
+from ..physics.contact import Contact
+from ..physics.kinematics import Axisymmetric
+from ..physics.models import DisplacementPenalty, Membrane, MixedPressure
+from ..physics.supports import Held
+
+
+class Scene:
+    """A body, what it is made of, how it is held and what loads it.
+
+    Args:
+        mesh: from `formingx.mesh`.
+        materials: {layer name: material}, or one material for all layers.
+        supports: see `formingx.physics.supports`.
+        loads: see `formingx.physics.loads`. One load, support or tool may be driven (controlled by the run), several by
+            a `formingx.Process`.
+            (Contacts of one tool with several faces, of the same `moves` and name, count as one.)
+        contacts: faces of the body that rigid tools stop, see `formingx.Contact`.
+        model: how the scene is modelled: `MixedPressure()` (default) or `DisplacementPenalty()`, a solid; `Membrane()`.
+        kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
+        quadrature_degree: of the energy; 5 (seven points) is the thesis' rule.
+
+    Raises:
+        InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, two
+            driven objects that no name tells apart.
+    """
+
+    def __init__(self, *, mesh: Mesh, materials: Material | Mapping[str, Material], supports: Sequence[Any],
+                 loads: Sequence[Any] = (), contacts: Sequence[Contact] = (), model: Any = None, kinematics: Any = None,
+                 quadrature_degree: int = 5):
+        if not isinstance(mesh, Mesh):
+            raise InputError(f"Scene: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")
+        if isinstance(materials, Material):
+            materials = dict.fromkeys(mesh.layers, materials)
+        if not isinstance(materials, Mapping):
+            raise InputError(f"Scene: materials = {materials!r}: must be a formingx material, or {{layer: material}}")
+        self.mesh = mesh
+        self.materials = dict(materials)
+        self.supports = _all_with("constraints", "supports", supports, "supports, such as Clamped('rim')")
+        self.loads = _all_with("virtual_work", "loads", loads, "loads, such as Pressure('bottom')")
+        self.contacts = _all_with("law", "contacts", contacts, "Contact(...)")
+        self.model = model if model is not None else MixedPressure()
+        if not isinstance(self.model, MixedPressure | DisplacementPenalty | Membrane):
+            raise InputError(f"Scene: model = {model!r}: must be a MixedPressure, a DisplacementPenalty or a Membrane")
+        self.kinematics = kinematics if kinematics is not None else Axisymmetric()
+        if not hasattr(self.kinematics, "dimension_of_volume") or isinstance(self.kinematics, type):
+            raise InputError(f"Scene: kinematics = {kinematics!r}: must be Axisymmetric() or PlaneStrain()")
+        self.quadrature_degree = count("Scene: quadrature_degree", quadrature_degree)
+        self._check_names()
+        self._check_materials()
+        self._check_boundaries()
+        self.check_held(self.supports)
+        if isinstance(self.model, Membrane):
+            self.model.check(self)
+        else:
+            self._check_hinges()
+        if self.contacts and isinstance(self.model, Membrane):
+            raise InputError(f"Scene: {self.contacts[0]!r}: a membrane has no contact yet: use a solid model,"
+                             f" MixedPressure() for one")
+        for contact in self.contacts:
+            self._check_contact(contact)
+
+    @property
+    def things(self) -> list[Any]:
+        """Loads, supports and contacts, in order."""
+        return [*self.loads, *self.supports, *self.contacts]
+
+    @property
+    def drivable(self) -> list[Any]:
+        """What can be driven; of a tool that meets several faces its first contact."""
+        return [thing for i, thing in enumerate(self.things)
+                if getattr(thing, "driven", False) and self.together(i)[0] == i]
+
+    def together(self, number: int) -> list[int]:
+        """Numbers of the things that move as this one does: contacts with the same `moves` and name are of one tool."""
+        thing = self.things[number]
+        if getattr(thing, "moves", None) is None:
+            return [number]
+        return [i for i, other in enumerate(self.things)
+                if (getattr(other, "moves", None), getattr(other, "name", None)) == (thing.moves, thing.name)]
+
+    @property
+    def driven(self) -> Any:
+        """What a run with one control drives: the only thing that can be driven, or None."""
+        drivable = self.drivable
+        return drivable[0] if len(drivable) == 1 else None
+
+    def only_driven(self, who: str) -> Any:
+        """`driven`, or an InputError unless one thing can be driven."""
+        if not self.drivable:
+            raise InputError(f"{who}: nothing is driven: give one load no value, as Pressure('bottom'), or"
+                             " add a Displaced support")
+        if len(self.drivable) > 1:
+            raise InputError(f"{who}: {', '.join(map(repr, self.drivable))} are all driven: one control drives a run;"
+                             f" give the others a value, or drive them in stages with formingx.Process")
+        self.check_driven(self.supports)
+        return self.driven
+
+    def number(self, who: str, thing: Any) -> int:
+        """The place in `things` of a thing, given as itself or by its name; an InputError if it is not there."""
+        for i, known_thing in enumerate(self.things):
+            if thing is known_thing or isinstance(thing, str) and thing == getattr(known_thing, "name", None):
+                return i
+        names = [t.name for t in self.things if getattr(t, "name", None)]
+        raise InputError(f"{who}: {thing!r} is not in the scene; it has {', '.join(map(repr, self.things))}"
+                         + (f", of which some are called {', '.join(map(repr, names))}" if names else ""))
+
+    def column(self, thing: Any) -> str:
+        """Name of the column of what can be driven: "pressure" or "travel", its name in front if there are several."""
+        alone = len(self.drivable) == 1 or not thing.name
+        return thing.quantity if alone else f"{thing.name}_{thing.quantity}"
+
+    def check_held(self, supports: Sequence[Any], touched: bool = False) -> None:
+        """Raise an InputError unless these supports hold the axis and, if no tool touches, every rigid motion."""
+        self._check_axis(supports)
+        if not touched:
+            self._check_rigid_body(supports)
+
+    def check_driven(self, supports: Sequence[Any]) -> None:
+        """An InputError if what one of these supports drives is held by another."""
+        held = [(support, h) for support in supports for h in support.constraints()]
+        for mine, driven in held:
+            for other, h in held if getattr(driven, "driven", False) else ():
+                if other is not mine and (h.on, h.component) == (driven.on, driven.component):
+                    raise InputError(f"{mine!r}: {other!r} holds the same component of the same boundary")
+
+    def _check_names(self) -> None:
+        names = [thing.name for thing in self.things if getattr(thing, "name", None) is not None]
+        for name in names:
+            if not isinstance(name, str) or not name:
+                raise InputError(f"Scene: name = {name!r}: must be a word")
+            called = [i for i, thing in enumerate(self.things) if getattr(thing, "name", None) == name]
+            if called != self.together(called[0]) and len(called) > 1:
+                raise InputError(f"Scene: two things are called {name!r}: names must differ")
+        columns = [self.column(thing) for thing in self.drivable]
+        for column in columns:
+            if columns.count(column) > 1:
+                same = [repr(t) for t in self.drivable if self.column(t) == column]
+                raise InputError(f"Scene: {', '.join(same)} are all driven: one control drives a run: give the others a"
+                                 f" value, or each a name=... and drive them in stages with formingx.Process")
+
+    def _check_materials(self) -> None:
+        layers = self.mesh.layers
+        for name, material in self.materials.items():
+            known("Scene: materials: layer", name, layers)
+            if not isinstance(material, Material):
+                raise InputError(f"Scene: materials[{name!r}] = {material!r}: must be a formingx material")
+            material.check()
+        missing = [name for name in layers if name not in self.materials]
+        if missing:
+            raise InputError(f"Scene: layer {', '.join(map(repr, missing))} has no material;"
+                             f" materials are given for {', '.join(map(repr, self.materials)) or 'none'}")
+
+    def _check_boundaries(self) -> None:
+        for thing in (*self.loads, *self.supports, *self.contacts):
+            if not hasattr(thing, "on"):
+                continue
+            on = thing.on
+            known(f"{thing!r}: boundary", on, self.mesh.boundaries)
+            if self.mesh.comm.allreduce(len(self.mesh.facets_of(on)), MPI.SUM) == 0:
+                raise InputError(f"{thing!r}: boundary {on!r} is empty: no facet of the mesh carries it")
+
+    def _check_contact(self, contact: Contact) -> None:
+        """The body starts outside the tool, the face looks at it, and the pressure does not push away from it."""
+        mesh, near = self.mesh, 1e-6 * max(self.extent)
+        face = mesh.nodes_of(contact.on)
+        comm = mesh.comm
+        points = np.concatenate(comm.allgather(mesh.domain.geometry.x[:, :2]))
+        depth = contact.tool.signed_distance(points)
+        worst = int(np.argmax(depth))
+        if depth[worst] > near:
+            raise InputError(f"{contact!r}: the body starts inside the tool: {depth[worst]:.6g} deep at (R, Z) ="
+                             f" ({points[worst, 0]:.6g}, {points[worst, 1]:.6g})")
+        if depth[worst] > contact.tool.signed_distance(face).max() + near:
+            raise InputError(f"{contact!r}: the tool is behind this face of the body: another face is closer to it;"
+                             f" boundaries are {list(mesh.boundaries)}")
+        if any(load is self.driven and load.on == contact.on for load in self.loads):
+            raise InputError(f"{contact!r}: the driven pressure acts on the same face and pushes it away from the tool:"
+                             f" no tool faces the pressure")
+
+    def check_travel(self, contact: Contact, travel: float) -> None:
+        """An InputError if a tool's travel (length) would put a held boundary as a whole inside the tool."""
+        moves = np.array(contact.moves)
+        for support in self.supports:
+            for held in support.constraints():
+                if not isinstance(held, Held) or held.on is None or moves[held.component] == 0:
+                    continue
+                depth = contact.tool.signed_distance(self.mesh.nodes_of(held.on) - travel * moves)
+                if depth.min() >= 0:
+                    raise InputError(f"travel = {travel:g}: {contact!r} would go through the whole height of the"
+                                     f" body to {held.on!r}, which is held: the travel must be less than"
+                                     f" {travel - depth.max() / np.hypot(*moves):.6g}")
+
+    def _check_axis(self, supports: Sequence[Any]) -> None:
+        if not isinstance(self.kinematics, Axisymmetric):
+            return
+        geometry = self.mesh.domain.geometry
+        comm = self.mesh.comm
+        low = comm.allreduce(geometry.x[:, 0].min(initial=np.inf), MPI.MIN)
+        size = comm.allreduce(np.abs(geometry.x).max(initial=0.0), MPI.MAX)
+        if low < -1e-12 * size:
+            raise InputError(f"Scene: the mesh crosses the axis: its smallest R is {low:.6g}, must be at least 0")
+        if low > 1e-12 * size:
+            return
+        for support in supports:
+            for held in support.constraints():
+                if isinstance(held, Held) and held.component == 0 and held.on is not None \
+                        and np.all(self.mesh.nodes_of(held.on)[:, 0] <= 1e-12 * size):
+                    return
+        raise InputError(f"Scene: the mesh touches the axis R = 0, but no support holds u_r there: add"
+                         f" Symmetry of one of {list(self.mesh.boundaries)}")
+
+    def _check_rigid_body(self, supports: Sequence[Any]) -> None:
+        """The supports must hold every rigid motion that the kinematics allows."""
+        if isinstance(self.kinematics, Axisymmetric):
+            names, modes = ["translation along Z"], [lambda X: np.stack([0 * X[:, 0], 1 + 0 * X[:, 0]], 1)]
+        else:
+            names = ["translation along R", "translation along Z", "rotation"]
+            modes = [lambda X: np.stack([1 + 0 * X[:, 0], 0 * X[:, 0]], 1),
+                     lambda X: np.stack([0 * X[:, 0], 1 + 0 * X[:, 0]], 1),
+                     lambda X: np.stack([-X[:, 1], X[:, 0]], 1)]
+        gram = np.zeros((len(modes), len(modes)))
+        size = max(self.extent)
+        for support in supports:
+            for held in support.constraints():
+                point = getattr(held, "point", None)
+                X = (np.array([point]) if point is not None else self.mesh.nodes_of(held.on)) / size
+                rows = np.stack([mode(X)[:, held.component] for mode in modes], 1)
+                if not isinstance(held, Held):
+                    rows = rows.mean(0, keepdims=True)
+                gram += rows.T @ rows / len(rows)
+        values, vectors = np.linalg.eigh(gram)
+        if values[0] < 1e-12:
+            free = names[int(np.argmax(np.abs(vectors[:, 0])))]
+            raise InputError(f"Scene: too little support: the body is free to move as a rigid body ({free});"
+                             f" supports are {supports!r}; hold that motion, with Clamped or SimplySupported"
+                             f" for one")
+
+    def _check_hinges(self) -> None:
+        """What a hinge asks of the soft one of two layers must not be a hundred times too much for it.
+
+        A plain mean pulls all layers with one traction; and a hinged rim face is free, so a pressure on a soft layer
+        squeezes it out there.
+        """
+        moduli = {name: material.shear_modulus for name, material in self.materials.items()}
+        for held in (held for support in self.supports for held in support.constraints()):
+            if isinstance(held, Held):
+                continue
+            at_rim = self._layers_at(held.on)
+            hard = max(at_rim, key=moduli.__getitem__)
+            soft = min(at_rim, key=moduli.__getitem__)
+            if not held.by_stiffness and moduli[hard] > 100 * moduli[soft]:
+                raise InputError(f"Scene: SimplySupported({held.on!r}) pulls all layers with the same traction, but"
+                                 f" layer {soft!r} is {moduli[hard] / moduli[soft]:.3g} times softer than {hard!r}: use"
+                                 f" SimplySupported({held.on!r}, weight='stiffness')")
+            pressed = {name for load in self.loads for name in self._layers_at(load.on)} & at_rim
+            for name in pressed:
+                if moduli[hard] > 50 * moduli[name]:
+                    raise InputError(f"Scene: the pressure that bends layer {hard!r} would squeeze layer {name!r},"
+                                     f" {moduli[hard] / moduli[name]:.3g} times softer, out of the free face of the"
+                                     f" hinge SimplySupported({held.on!r}): use Clamped({held.on!r})")
+
+    def _layers_at(self, boundary: str) -> set[str]:
+        """Names of the layers whose cells have a facet on a boundary, all ranks."""
+        topology, cells = self.mesh.domain.topology, self.mesh.cells
+        topology.create_connectivity(1, 2)
+        touching = {topology.connectivity(1, 2).links(f)[0] for f in self.mesh.facets_of(boundary)}
+        mine = set(cells.values[np.isin(cells.indices, sorted(touching))].tolist())
+        tags = set().union(*self.mesh.comm.allgather(mine))
+        return {name for name, tag in self.mesh.layers.items() if tag in tags}
+
+    @property
+    def extent(self) -> np.ndarray:
+        """Size of the mesh along R and Z, shape (2,), all ranks."""
+        X, comm = self.mesh.domain.geometry.x[:, :2], self.mesh.comm
+        high = np.array([comm.allreduce(X[:, i].max(initial=-np.inf), MPI.MAX) for i in (0, 1)])
+        low = np.array([comm.allreduce(X[:, i].min(initial=np.inf), MPI.MIN) for i in (0, 1)])
+        return high - low
+
+
+def _all_with(method: str, name: str, things: Any, what: str) -> list[Any]:
+    """A list of things that all have a method, or an InputError."""
+    things = several(f"Scene: {name}", things, what)
+    for thing in things:
+        if not hasattr(thing, method) or isinstance(thing, type):
+            raise InputError(f"Scene: {name}: {thing!r} is not allowed here: must be a list of {what}")
+    return things

@@ -1,0 +1,233 @@
+"""A branch of solutions (x, control): its metric, its tangents, and solving for single states on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..errors import ConvergenceError
+from ..results.path import State
+from .diagnose import Attempt, diagnose
+from .newton import UNLOADED, BorderedNewton, Failure, Tolerances
+
+CONTROL_WEIGHT = 0.1
+"""Weight of the squared control against the mean squared displacement in arc length (both dimensionless)."""
+
+
+class Branch:
+    """Solves for states of a problem and knows how far apart they are.
+
+    Attributes:
+        iterations: Newton iterations spent, whether they led to a state or not.
+    """
+
+    def __init__(self, problem: Any, tolerances: Tolerances):
+        self.problem = problem
+        self.newton = BorderedNewton(problem, tolerances, self.norm)
+        self.iterations = 0
+        self._x, self._a, self._b = (problem.x.duplicate() for _ in range(3))
+
+    def norm(self, x: Any, control: float) -> float:
+        """Arc length of a straight piece (x, control) of path."""
+        return float(np.sqrt(self.problem.inner(x, x) + CONTROL_WEIGHT * control**2))
+
+    def start(self) -> State:
+        """The body at control 0, in equilibrium with whatever else acts on it, and the tangent there."""
+        history: list = []
+        self._x.set(0)
+        self.problem.residual(self._x, 0.0, self.newton.F)
+        if self.newton.F.norm() > Tolerances().residual * (self.problem.force_scale + UNLOADED):
+            try:
+                _, history = self.newton.correct(self._x, 0.0, _no_control)
+            except Failure as failure:
+                found = diagnose(self, [], failure.reason, self._attempt())
+                fixed = [repr(load) for load in self.problem.scene.loads if not load.driven]
+                words, advice = (f", under {', '.join(fixed)}", "drive the largest of them instead") if fixed else (
+                    "", "a tool touches the body at rest: give its Contact a smaller ramp")
+                raise ConvergenceError(f"no equilibrium was found before anything is driven{words}: {failure.reason};"
+                                       f" {advice}", diagnosis=found) from None
+            self.iterations += len(history) - 1
+        else:
+            self.problem.stiff_state(self._x)
+            if not self.newton.tangent(self._x, 0.0):
+                raise ConvergenceError("the unloaded body has a singular tangent: something in it is not held, or has"
+                                       " no stiffness")
+            self._x.set(0)
+        return self._state(0.0, history, "start", None)
+
+    def resume(self, x: np.ndarray, control: float) -> State:
+        """A state once more, under the setting that the problem has taken, and the tangent there."""
+        self._x.array_w[:] = x
+        self.problem.residual(self._x, control, self.newton.F)
+        if not self.newton.tangent(self._x, control):
+            raise Failure("the tangent is singular: something in the body is held no more, or has no stiffness", [])
+        return self._state(control, [], "start", None)
+
+    def solve(self, x: np.ndarray, control: float, constraint: Callable, kind: str, before: State) -> State:
+        """The solution of F = 0 and of the constraint, from a guess; raises `Failure`."""
+        self._x.array_w[:] = x
+        try:
+            control, history = self.newton.correct(self._x, control, constraint)
+        except Failure as failure:
+            self.iterations += len(failure.history)
+            failure.attempt = self._attempt()
+            raise
+        self.iterations += len(history) - 1
+        if self.problem.folded(self._x, control):               # forces of 1/J know no sign
+            raise Failure("an element turned inside out", history)
+        return self._state(control, history, kind, before)
+
+    def adopt(self, x: Any, control: float, history: list, before: State) -> State:
+        """A solution found elsewhere as a state, with the tangent there."""
+        x.copy(self._x)
+        self.newton.tangent(x, control)
+        return self._state(control, history, "step", before)
+
+    def look_ahead(self, state: State) -> None:
+        """The tangent of an accepted state once more: the problem remembers the state now."""
+        self._x.array_w[:] = state.x
+        if self.newton.tangent(self._x, state.control, ahead=True):
+            size = self.norm(self.newton.b, 1.0)
+            direction, slope = self.newton.b.array_r / size, 1 / size
+            sense = np.sign(self._inner(direction, slope, state.direction, state.slope)) or 1.0
+            state.direction, state.slope = sense * direction, sense * slope
+
+    def guess_from_rest(self, rest: State, control: float) -> np.ndarray:
+        """A guess of the state at a control, to correct at that control: rest, with what is held moved.
+
+        Where rest has no stiffness (a flat membrane) it is the state in the first direction on which F does no work.
+        """
+        if not self.problem.forms.slack_at_rest or control == 0:
+            return self.problem.motion(control)
+        sign, low, high = np.sign(control), 0.0, 1e-6
+
+        def work(length):
+            self._x.array_w[:] = sign * length * rest.direction
+            self.problem.residual(self._x, control, self.newton.F)
+            self._b.array_w[:] = rest.direction
+            return sign * self.newton.F.dot(self._b)
+
+        while work(high) < 0 and high < 1:
+            low, high = high, 2 * high
+        for _ in range(10):
+            middle = (low + high) / 2
+            low, high = (middle, high) if work(middle) < 0 else (low, middle)
+        return sign * high * rest.direction
+
+    def step(self, old: State, length: float) -> State:
+        """One step: predict along the tangent, correct in the plane normal to it at that distance (4.14 to 4.31)."""
+        x, control = old.x + length * old.direction, old.control + length * old.slope
+        return self.solve(x, control, self._plane(old, x, control), "step", old)
+
+    def step_to(self, old: State, length: float, equation: Callable) -> State:
+        """Predict along the tangent, correct to where an equation such as "measure = target" holds."""
+        return self.solve(old.x + length * old.direction, old.control + length * old.slope, equation, "target", old)
+
+    def progress(self, old: State, new: State) -> float:
+        """Distance from old to new along the tangent of old."""
+        return self._inner(old.direction, old.slope, new.x - old.x, new.control - old.control)
+
+    def value(self, bound: Any, x: np.ndarray, control: float) -> float:
+        """A bound measure at (x, control)."""
+        self._b.array_w[:] = x
+        return bound.value(self._b, control)
+
+    def interpolate(self, a: State, b: State, fraction: float) -> tuple[np.ndarray, float]:
+        """(x, control) on the cubic through two states and their tangents."""
+        s, h = fraction, self.distance(a, b)
+        weights = (1 - 3 * s**2 + 2 * s**3, 3 * s**2 - 2 * s**3, h * (s - 2 * s**2 + s**3), h * (s**3 - s**2))
+        x = weights[0] * a.x + weights[1] * b.x + weights[2] * a.direction + weights[3] * b.direction
+        control = weights[0] * a.control + weights[1] * b.control + weights[2] * a.slope + weights[3] * b.slope
+        return x, control
+
+    def between(self, a: State, b: State, bound: Any, target: float) -> State:
+        """The state between two where a measure has a target value that lies between theirs; raises `Failure`."""
+        low, high = 0.0, 1.0
+        sign = self.value(bound, a.x, a.control) - target
+        for _ in range(40):
+            middle = (low + high) / 2
+            if (self.value(bound, *self.interpolate(a, b, middle)) - target) * sign > 0:
+                low = middle
+            else:
+                high = middle
+        return self.solve(*self.interpolate(a, b, low), bound.equation(target), "target", a)
+
+    def find(self, a: State, b: State, bound: Any, target: Any) -> State:
+        """`between` for a target that lies between two states; raises `ConvergenceError`."""
+        try:
+            return self.between(a, b, bound, target.value)
+        except Failure as failure:
+            raise ConvergenceError(f"the path passes {target} between two of its states, but no state was found there:"
+                                   f" {failure.reason}; run with through=[...] to have one") from None
+
+    def limit_point(self, a: State, b: State) -> State:
+        """The state between two where the control is stationary; raises `Failure`.
+
+        The root of the derivative of the cubic through both ends, solved for and repeated on the smaller bracket until
+        the control differs from its extremum by less than 1e-12 of itself, as slope and curvature tell.
+        """
+        for _ in range(8):
+            chord = self.distance(a, b)
+            x, control = self.interpolate(a, b, _stationary(a, b, chord))
+            found = self.solve(x, control, self._plane(a, x, control), "limit point", a)
+            curvature = abs(a.slope - b.slope) / chord
+            if found.slope**2 < 2e-12 * curvature * abs(found.control):
+                break
+            a, b = (found, b) if found.slope * a.slope > 0 else (a, found)
+        return found
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        self.newton.destroy()
+        for vector in (self._x, self._a, self._b):
+            vector.destroy()
+
+    def _attempt(self) -> Attempt:
+        control, step = self.newton.reached
+        return Attempt(self._x.array_r.copy(), control, self.newton.a.array_r.copy(), step)
+
+    def _state(self, control: float, history: list, kind: str, before: State | None) -> State:
+        """The state at (self._x, control); its tangent, from the last factorisation, points away from `before`."""
+        b = self.newton.b
+        size = self.norm(b, 1.0)
+        state = State(self._x.array_r.copy(), control, b.array_r / size, 1 / size, history=history, kind=kind)
+        if before is not None and self._inner(state.direction, state.slope, state.x - before.x,
+                                              control - before.control) < 0:
+            state.direction, state.slope = -state.direction, -state.slope
+        return state
+
+    def _inner(self, x: np.ndarray, control: float, y: np.ndarray, other: float) -> float:
+        self._a.array_w[:] = x
+        self._b.array_w[:] = y
+        return self.problem.inner(self._a, self._b) + CONTROL_WEIGHT * control * other
+
+    def distance(self, a: State, b: State) -> float:
+        """Length of the straight line between two states."""
+        return float(np.sqrt(self._inner(b.x - a.x, b.control - a.control, b.x - a.x, b.control - a.control)))
+
+    def _plane(self, old: State, x0: np.ndarray, control0: float) -> Callable:
+        """The plane through (x0, control0) normal to the tangent of `old`, as a constraint."""
+        def c(x, control, gradient):
+            self._a.array_w[:] = old.direction
+            self.problem.metric_times(self._a, gradient)
+            self._b.array_w[:] = x.array_r - x0
+            weight = CONTROL_WEIGHT * old.slope
+            return gradient.dot(self._b) + weight * (control - control0), weight
+        return c
+
+
+def _no_control(x: Any, control: float, gradient: Any) -> tuple[float, float]:
+    """The constraint control = 0."""
+    gradient.set(0)
+    return control, 1.0
+
+
+def _stationary(a: State, b: State, chord: float) -> float:
+    """Fraction of the way from a to b at which the cubic of the control has no slope (slopes of opposite sign)."""
+    jump = (b.control - a.control) / chord
+    c2, c1, c0 = 3 * (a.slope + b.slope - 2 * jump), 6 * jump - 4 * a.slope - 2 * b.slope, a.slope
+    roots = np.roots([c2, c1, c0])
+    inside = [r.real for r in roots if abs(r.imag) < 1e-12 and 0 <= r.real <= 1]
+    return inside[0] if inside else a.slope / (a.slope - b.slope)

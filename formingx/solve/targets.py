@@ -1,0 +1,233 @@
+"""What a run can aim at: pole height, stretch, volume, pressure, travel, time."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import ufl
+
+from ..discrete.probes import probe
+from ..errors import InputError, finite, known, pair, positive
+
+
+class Bound:
+    """A measure of one problem: its value, and the equation measure = target for a run that aims at it.
+
+    Attributes:
+        size: what counts as one of it, in the user's units: 1e-12 of that is nothing.
+    """
+
+    size = 0.0
+
+    def value(self, x: Any, control: float) -> float:
+        """The measure at a state, in the user's units."""
+        raise NotImplementedError
+
+    def equation(self, target: float) -> Any:
+        """c(x, control, gradient) -> (c, dc/dcontrol), zero where the measure has the target value."""
+        raise NotImplementedError
+
+
+class Amplitude(Bound):
+    """Of a thing that can be driven (by its number in the scene), of the process time (-1), or the control (None)."""
+
+    def __init__(self, problem: Any, number: int | None):
+        self._problem, self._number = problem, number
+        self._scale = self.size = 1.0 if number is None else problem.forms.scales[number]
+
+    @property
+    def moves(self) -> bool:
+        """True if the control changes it now."""
+        return self._number is None or self._problem.setting.rate[self._number] != 0
+
+    def _amplitude(self, control: float) -> float:
+        return control if self._number is None else self._problem.setting.amplitude(self._number, control)
+
+    def value(self, x, control):
+        return self._scale * self._amplitude(control)
+
+    def equation(self, target):
+        slope = 1.0 if self._number is None else self._problem.setting.rate[self._number]
+
+        def c(x, control, gradient):
+            gradient.set(0)
+            return self._amplitude(control) - target / self._scale, slope
+        return c
+
+
+class _Linear(Bound):
+    """value = of(offset + row . x); `back` is the inverse of `of`."""
+
+    def __init__(self, problem, row, offset=0.0, of=lambda y: y, back=lambda v: v):
+        self._row, self._offset, self._of, self._back = problem.x.duplicate(), offset, of, back
+        problem.fill(self._row, row)
+
+    def value(self, x, control):
+        return self._of(self._offset + self._row.dot(x))
+
+    def equation(self, target):
+        y = self._back(target)
+
+        def c(x, control, gradient):
+            self._row.copy(gradient)
+            return self._offset + self._row.dot(x) - y, 0.0
+        return c
+
+
+class _Form(Bound):
+    """scale times the value of a scalar form (minus its value at rest)."""
+
+    def __init__(self, problem, form, scale):
+        self._problem, self._scale = problem, scale
+        self._value = problem.forms.compile(form)
+        self._derivative = problem.forms.compile(
+            ufl.derivative(form, problem.forms.w, problem.forms.test_function()))
+        at_rest = problem.x.duplicate()
+        at_rest.set(0)
+        self._rest = 0.0
+        self._rest = self.value(at_rest, 0.0)
+        at_rest.destroy()
+
+    def value(self, x, control):
+        self._problem.set_state(x, control)
+        return self._scale * self._problem.assemble_scalar(self._value) - self._rest
+
+    def equation(self, target):
+        def c(x, control, gradient):
+            value = self.value(x, control)
+            self._problem.fill(gradient, self._problem.assemble(self._derivative))
+            return (value - target) / self._scale, 0.0
+        return c
+
+
+class Target(NamedTuple):
+    """What a run aims at: a measure (by name), its value, and whether it changes sign with the control."""
+
+    name: str
+    value: float
+    bind: Any
+    signed: bool = True
+
+    def __str__(self) -> str:
+        return f"{self.name.replace('_', ' ')} = {self.value:g}"
+
+
+def pressure(value: float, *, of: str | None = None) -> Target:
+    """The driven pressure, or the one called `of`, reaches `value` (stress)."""
+    return _driven("pressure", value, of)
+
+
+def travel(value: float, *, of: str | None = None) -> Target:
+    """The driven support or tool, or the one called `of`, has moved by `value` (a length)."""
+    return _driven("travel", value, of)
+
+
+def process_time(value: float) -> Target:
+    """The time of a process, as its tables give it, reaches `value`."""
+    return Target("process_time", finite("process_time", value), lambda problem: Amplitude(problem, -1))
+
+
+def changed() -> Target:
+    """What has left the scene, or come into it, has done so wholly (`Setting.fading`)."""
+    return Target("change", 1.0, lambda problem: Amplitude(problem, None))
+
+
+def _driven(quantity: str, value: float, of: str | None) -> Target:
+    def bind(problem):
+        scene, rate = problem.scene, problem.setting.rate
+        found = [i for i, t in enumerate(scene.things)
+                 if any(t is d for d in scene.drivable) and t.quantity == quantity]
+        if of is not None:
+            known(f"{quantity}: of =", of, [n for n in (scene.things[i].name for i in found) if n])
+            return Amplitude(problem, next(i for i in found if scene.things[i].name == of))
+        moving = [i for i in found if rate[i]] or found
+        if len(moving) != 1:
+            raise InputError(f"{quantity} = {value:g}: the scene has {len(moving) or 'no'} {quantity} that can be"
+                             " driven" + (", say which with of=..." if moving
+                                          else f": what can be is {scene.drivable}"))
+        return Amplitude(problem, moving[0])
+    return Target(quantity if of is None else f"{of}_{quantity}", finite(quantity, value), bind)
+
+
+def pole_height(value: float) -> Target:
+    """The displacement u_z of the mid-thickness point on the axis reaches `value` (a length)."""
+    return Target("pole_height", finite("pole_height", value), bind_pole_height)
+
+
+def pole_stretch(value: float) -> Target:
+    """The in-plane stretch at the pole, (thickness/original)^(-1/2), reaches `value`.
+
+    A run raises an InputError if no material of the scene can be stretched so far (Gent, Arruda-Boyce).
+    """
+    def bind(problem):
+        if problem.scene.kinematics.dimension_of_volume == 3:
+            limits = {m.largest_stretch("equibiaxial"): m for m in problem.scene.materials.values()}
+            largest = max(limits)
+            if value >= largest:
+                raise InputError(f"pole_stretch = {value:g}: must be less than {largest:.6g}, where I1 comes to the"
+                                 f" limit {limits[largest].largest_I1:g} of {limits[largest]}")
+        return bind_pole_stretch(problem)
+    return Target("pole_stretch", positive("pole_stretch", value), bind, signed=False)
+
+
+def enclosed_volume(value: float) -> Target:
+    """The volume swept by the driven face reaches `value` (length^3; per depth in plane strain)."""
+    return Target("enclosed_volume", finite("enclosed_volume", value), bind_volume)
+
+
+def displacement(value: float, *, at: tuple[float, float], component: str = "z") -> Target:
+    """The displacement component ("r" or "z") of the reference point `at` = (R, Z) reaches `value` (a length)."""
+    at = pair("displacement: at", at)
+    if component not in ("r", "z"):
+        raise InputError(f"displacement: component = {component!r}: must be 'r' or 'z'")
+
+    def bind(problem):
+        return _displacement(problem, [at], [[1.0, 0.0] if component == "r" else [0.0, 1.0]])
+    return Target(f"u_{component}_at_{at[0]:g}_{at[1]:g}", finite("displacement", value), bind)
+
+
+def bind_pole_height(problem: Any) -> Bound:
+    """See `pole_height`."""
+    low, high = _pole(problem)
+    return _displacement(problem, [(0.0, (low + high) / 2)], [[0.0, 1.0]])
+
+
+def bind_pole_stretch(problem: Any) -> Bound:
+    """See `pole_stretch`."""
+    low, high = _pole(problem)
+    row, power = probe(problem, [(0.0, low), (0.0, high)]).across()
+    return _Linear(problem, row, 1.0, lambda t: max(t, 1e-300) ** power, lambda s: s ** (1 / power))
+
+
+def bind_volume(problem: Any) -> Bound:
+    """See `enclosed_volume`: minus the integral of (z - z_lowest) n_z da over the face of the (first) driven load."""
+    driven = next((t for t in problem.scene.drivable if t.quantity == "pressure"), problem.scene.driven)
+    if driven is None:
+        raise InputError("enclosed_volume: the scene has no driven pressure whose face would enclose it")
+    kinematics, forms = problem.scene.kinematics, problem.forms
+    z0 = forms.constant(problem.scene.mesh.nodes_of(driven.on)[:, 1].min())
+    N, face = forms.face(driven.on, 5)
+    area = kinematics.area_vector(forms.u, forms.X, N)
+    scale = forms.length**kinematics.dimension_of_volume
+    height = forms.X[1] + forms.u[1] - z0
+    return _Form(problem, -height * area[1] / forms.constant(scale) * face, scale)
+
+
+def _displacement(problem, points, factors):
+    row = probe(problem, points).row(np.asarray(factors))
+    return _Linear(problem, row * problem.forms.length)
+
+
+def _pole(problem):
+    """Z of the bottom and the top of the axis."""
+    mesh = problem.scene.mesh
+    if "axis" not in mesh.boundaries:
+        raise InputError(f"the pole needs a boundary named 'axis'; the mesh has {list(mesh.boundaries)}")
+    nodes = mesh.nodes_of("axis")
+    return float(nodes[:, 1].min()), float(nodes[:, 1].max())
+
+
+def is_met(target: Target, bound: Bound, value: float) -> bool:
+    """True if a value of the target's measure is the target's, to round-off."""
+    return abs(value - target.value) <= 1e-12 * max(abs(value), abs(target.value), bound.size)
