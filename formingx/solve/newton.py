@@ -67,13 +67,13 @@ class _Kinks:
     def look(self, moved: float) -> None:
         """To be called once an iteration, after the residual was computed; moved: by the correction before."""
         self._iteration += 1
-        now = self._problem.branch
+        now = self._problem.active_set
         if now != self._last and self._last is not None:
             self.changed = self._iteration
             if now in self._seen:
                 self.share = max(self.share / 2, 0.25)
             else:
-                self.found += moved < SMALL and not self._problem.memory
+                self.found += moved < SMALL and not self._problem.has_history
         elif self._iteration > self.changed + 1:
             self.share = 1.0
         self._seen[now] = self._iteration
@@ -148,8 +148,10 @@ class BorderedNewton:
         self.b.scale(-1)
         return bool(np.isfinite(self.b.norm()))
 
-    def correct(self, x: PETSc.Vec, control: float, constraint: Any) -> tuple[float, list[Iteration]]:
+    def correct(self, x: PETSc.Vec, control: float, constraint: Any, old: Any = None) -> tuple[float, list[Iteration]]:
         """Iterate x (in place) and control to convergence; returns the control and the history.
+
+        `old`: the state that they are a guess ahead of, if there is one.
 
         Afterwards `self.b` is dx/dcontrol at the solution (to the accuracy of the last correction).
 
@@ -158,7 +160,7 @@ class BorderedNewton:
         """
         problem = self.problem
         history: list[Iteration] = []
-        problem.begin()
+        problem.begin(old)
         problem.residual(x, control, self.F)
         self.a.set(0)
         self.reached = control, 0.0
