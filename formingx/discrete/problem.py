@@ -18,12 +18,9 @@ from ..errors import InputError
 from ..physics.supports import Held
 from ..scene.scene import Scene
 from .contact_nodes import NodalContact
+from .formulations import formulate
 from .matrix import ExtendedMatrix
-from .membrane import MidSurface
 from .schedule import Setting
-from .solid import Solid
-
-_FORMULATIONS = {"solid": Solid, "membrane": MidSurface}
 
 
 class Problem:
@@ -41,7 +38,7 @@ class Problem:
     """
 
     def __init__(self, scene: Scene):
-        self.scene, self.forms = scene, _FORMULATIONS[scene.model.body](scene)
+        self.scene, self.forms = scene, formulate(scene)
         self.comm = self.forms.comm
         forms = self.forms
         index_map = forms.space.dofmap.index_map
@@ -57,7 +54,7 @@ class Problem:
         self._motors: list[int] = []
         self._collect()
         self._by_motion = self._lift = None
-        if any(getattr(thing, "constraints", None) for thing in scene.drivable):
+        if any(thing.constraints() for thing in scene.drivable):
             self._lift = fem.Function(forms.space)              # held unknowns move the others through the tangent
             self._by_motion = forms.compile(ufl.action(tangent, self._lift))
         self._matrix = ExtendedMatrix(forms.compile(tangent), index_map, [bc for _, bc, _, _ in self._holds],
@@ -77,7 +74,7 @@ class Problem:
     @property
     def symmetric(self) -> bool:
         """True if the tangent is symmetric: no follower load in the scene."""
-        return all(getattr(x, "symmetric", False) for x in (*self.scene.loads, *self.scene.contacts))
+        return all(x.symmetric for x in (*self.scene.loads, *self.scene.contacts))
 
     @property
     def has_kinks(self) -> bool:
@@ -318,8 +315,6 @@ class Problem:
         self._holds: list[tuple[int, Any, np.ndarray, bool]] = []
         self._means: list[tuple[int, np.ndarray]] = []
         for i, support in enumerate(self.scene.things):
-            if getattr(support, "constraints", None) is None:
-                continue
             for item in forms.constraints(support):
                 if isinstance(item, Held):
                     sub = forms.space.sub(0).sub(item.component)
