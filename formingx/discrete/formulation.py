@@ -191,6 +191,19 @@ class Formulation(ABC):
         """Volume of the body over the area of a boundary, length."""
         return self.volume / self.integral(self.scene.kinematics.weight(self.X) * self.face(boundary, 2)[1])
 
+    def set_constant(self, layer: str, name: str, value: float) -> None:
+        """Give a material's constant, in all layers of that material, another value; scales stay as they are.
+
+        Raises:
+            InputError: the constant is not a number, or the material does not allow the value.
+        """
+        self._terms[layer].set(name, value)
+
+    def constant_derivative(self, layer: str, name: str) -> Any:
+        """dresidual/dconstant (UFL, rank 1) of a material's constant; of one that varies, for the same added to all."""
+        v, instead = self._terms[layer].as_variable(name)
+        return ufl.derivative(ufl.diff(ufl.replace(self.potential, instead), v), self.w, self.test_function())
+
     def time_at(self, control: float) -> float:
         """Process time at a control, under the setting that holds now."""
         base, rate = self._time

@@ -48,7 +48,8 @@ class LoadedBody:
 
     def face(self, on: str, quadrature_degree: int = 5) -> Face:
         """A boundary by its name (of a membrane its lower or its upper face)."""
-        return Face(*self._forms.face(on, quadrature_degree), self.kinematics.weight(self.X))
+        normal, measure = self._forms.face(on, quadrature_degree)
+        return Face(normal, measure, self.kinematics.weight(self.X))
 
     def constant(self, value: float) -> fem.Constant:
         """A number for a form, which is not compiled again when it changes."""

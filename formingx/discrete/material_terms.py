@@ -36,7 +36,8 @@ class MaterialTerms:
         self.places = basix.make_quadrature(cell, degree)[0]
         self.constants = {name: value.expression(self) if isinstance(value, Varying) else forms.constant(value)
                           for name, value in material.constants().items()}
-        self.rest_stress = self._rest_stress() if material.varies else forms.constant(material.rest_stress)
+        self.rest_stress = self._rest_stress(self.constants) if material.varies else forms.constant(
+            material.rest_stress)
         self.internal = {name: self.quadrature_function(np.shape(value)) for name, value in material.internal.items()}
         self.start = forms.constant(0.0)
 
@@ -89,7 +90,23 @@ class MaterialTerms:
     def _time_step(self) -> Any:
         return self.forms.time - self.start
 
-    def _rest_stress(self) -> Any:
-        """dW/dF11 at F = I with constants that vary."""
+    def set(self, name: str, value: float) -> None:
+        """Give a constant that is a number another value; the rest stress follows."""
+        if self.material.varies:
+            raise InputError(f"{self.material}: has constants that vary: make another scene for other values")
+        self.constants[name].value = value
+        values = [float(c.value) for c in self.constants.values()]
+        self.rest_stress.value = self.material.with_constants(values).rest_stress
+
+    def as_variable(self, name: str) -> tuple[Any, dict[Any, Any]]:
+        """(a constant as a UFL variable v, {what is in the forms: what is there instead as a function of v})."""
+        v = ufl.variable(self.constants[name])
+        instead = {self.constants[name]: v}
+        if not self.material.varies:
+            instead[self.rest_stress] = self._rest_stress(self.constants | {name: v})
+        return v, instead
+
+    def _rest_stress(self, constants: dict[str, Any]) -> Any:
+        """dW/dF11 at F = I (UFL scalar)."""
         F = ufl.variable(ufl.Identity(3))
-        return ufl.diff(self.material.strain_energy(F, **self.constants), F)[0, 0]
+        return ufl.diff(self.material.strain_energy(F, **constants), F)[0, 0]

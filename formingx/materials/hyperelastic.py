@@ -81,8 +81,9 @@ class Yeoh(Material):
         self.parameters = {"c10": c10, "c20": c20, "c30": c30}
         self.check()
 
-    def check_constants(self, c10, c20, c30):
-        super().check_constants(c10=c10, c20=c20, c30=c30)
+    def check_constants(self, **constants):
+        super().check_constants(**constants)
+        c10, c20, c30 = constants.values()
         positive(f"{self}: c10", c10)
         if c30 < 0 or c20 < 0 and c20**2 >= 3 * c10 * c30:
             raise InputError(f"{self} is not stable: its energy does not grow with I1 everywhere; c30 must be at least"
@@ -154,7 +155,8 @@ class ArrudaBoyce(Material):
         self.parameters = {"mu": mu, "N": N}
         self.check()
 
-    def check_constants(self, mu, N):
+    def check_constants(self, **constants):
+        mu, N = constants.values()
         positive(f"{self}: mu", mu)
         if finite(f"{self}: N", N) <= 1:
             raise InputError(f"{self}: N = {N!r}: must be greater than 1, or the chains are fully stretched at rest")

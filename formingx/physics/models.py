@@ -116,8 +116,8 @@ class DisplacementPenalty(Model):
     def check(self, scene):
         for layer, material in scene.materials.items():
             if material.varies or material.internal:
-                raise InputError(f"Scene: layer {layer!r}: {material} with model={type(self).__name__}(): its reduced rule"
-                                 f" knows no constants that vary and no history; use MixedPressure()")
+                raise InputError(f"Scene: layer {layer!r}: {material} with model={type(self).__name__}(): its reduced"
+                                 f" rule knows no constants that vary and no history; use MixedPressure()")
 
     def terms(self, J, p, modulus, eps):
         """[(energy density, quadrature metadata)] for J = det F and the layer's shear modulus; p is not used."""

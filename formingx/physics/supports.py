@@ -31,8 +31,8 @@ class MeanHeld(NamedTuple):
     component: int
     on: str
     by_stiffness: bool = False
-    point = None
-    driven = False
+    point: None = None
+    driven: bool = False
 
 
 class Support(Part):
@@ -82,6 +82,8 @@ class SimplySupported(Support):
         weight: "area": the plain mean, so that every layer is pulled with the same traction; "stiffness": layers count
             by their shear modulus, for layers so different that the soft one could not carry that traction.
     """
+
+    on: str
 
     def __init__(self, on: str, weight: str = "area"):
         super().__init__(on)
