@@ -9,9 +9,9 @@ from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivli
 from .physics import tools
 from .physics.contact import Contact
 from .physics.kinematics import Axisymmetric, PlaneStrain
-from .physics.loads import Pressure
+from .physics.loads import Load, Pressure
 from .physics.models import DisplacementPenalty, Membrane, MixedPressure
-from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Symmetry
+from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Support, Symmetry
 from .physics.tools import Tool
 from .results.compare import Comparison, compare
 from .results.compare_nodes import NodalComparison, compare_nodes, write_nodes

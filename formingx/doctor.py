@@ -11,7 +11,7 @@ from mpi4py import MPI
 from . import _compat
 from .discrete.elements import place, shape_quality
 from .errors import instance, several
-from .physics.models import DisplacementPenalty, Membrane
+from .physics.models import DisplacementPenalty
 from .physics.tools import Arc
 from .scene.scene import Scene
 from .solve.targets import Target
@@ -99,7 +99,7 @@ class _Sheet:
         self.area = self.quality * (self.edges**2).sum(1) / (4 * np.sqrt(3))
         self.length = float(max(scene.extent))
         self.thickness = float(self.area.sum()) / self.length
-        self.moduli = {name: material.shear_modulus for name, material in scene.materials.items()}
+        self.moduli = {name: scene.shear_modulus(name) for name in scene.materials}
 
 
 def _folded(nodes: np.ndarray) -> np.ndarray:
@@ -128,7 +128,7 @@ def _elements(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
         at = place(scene.mesh, sheet.corners[np.argmax(sheet.folded)].mean(0))
         yield Finding("error", "mesh", f"{int(sheet.folded.sum())} elements are turned inside out at rest, one of them"
                                        f" at {at}: a curved edge is bent too much for them; use smaller elements there")
-    if isinstance(scene.model, Membrane):
+    if not scene.model.solid:
         return
     slender = sheet.edges.max(1) ** 2 / (2 * np.maximum(sheet.area, 1e-300))
     worst = int(np.argmax(slender))
@@ -141,7 +141,7 @@ def _elements(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
 
 def _layers(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
     """A thick layer that one element spans cannot show how strain varies through it."""
-    if isinstance(scene.model, Membrane):
+    if not scene.model.solid:
         return
     for name in scene.mesh.layers:
         mine = sheet.layer == name
@@ -186,7 +186,8 @@ def _own(scene: Scene, facets: np.ndarray) -> int:
 def _contact_penalties(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
     """Penetration over thickness is traction / (penalty mu); the tangent's condition grows with the penalty."""
     stress = max(sheet.moduli.values())
-    presses = [abs(t.value) for t in targets if t.name == "pressure"] if hasattr(scene.driven, "virtual_work") else []
+    pressed = scene.driven is not None and scene.driven.quantity == "pressure"
+    presses = [abs(t.value) for t in targets if t.name == "pressure"] if pressed else []
     for contact in scene.contacts:
         traction = max([stress * sheet.thickness / sheet.length, *presses])
         depth = traction / (contact.penalty * stress)
@@ -206,7 +207,7 @@ def _contact_penalties(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Fi
 def _volume_penalty(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
     """The volume changes by about eps stretch^2 / 8: pressure near mu stretch^2 over a bulk modulus 8 mu/eps."""
     model = scene.model
-    if isinstance(model, Membrane):
+    if not model.solid:
         return
     stretch = max([t.value for t in targets if t.name == "pole_stretch"], default=1.0)
     change = model.eps * stretch**2 / 8
@@ -226,7 +227,7 @@ def _volume_penalty(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Findi
 def _units(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
     """Sizes that belong together and differ by orders of magnitude."""
     natural = max(sheet.moduli.values()) * sheet.thickness / sheet.length
-    fixed = [(repr(load), load.value) for load in scene.loads if not load.driven]
+    fixed = [(repr(load), load.value) for load in scene.loads if load.quantity == "pressure" and not load.driven]
     aimed = [(str(t), t.value) for t in targets if t.name == "pressure"] if not scene.contacts else []
     for name, value in (*fixed, *aimed):
         if abs(value) > 1e3 * natural or 0 < abs(value) < 1e-6 * natural:
@@ -248,7 +249,7 @@ def _units(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
 
 def _targets(scene: Scene, sheet: _Sheet, targets: Sequence[Target]) -> Iterator[Finding]:
     for target in targets:
-        if target.name == "pole_stretch" and scene.kinematics.dimension_of_volume == 3:
+        if target.name == "pole_stretch" and scene.kinematics.axisymmetric:
             largest = max(m.largest_stretch("equibiaxial") for m in scene.materials.values())
             if target.value >= largest:
                 yield Finding("error", str(target), f"no material of the scene can be stretched that far: the limit is"
@@ -257,8 +258,8 @@ def _targets(scene: Scene, sheet: _Sheet, targets: Sequence[Target]) -> Iterator
         if is_length and abs(target.value) > 20 * sheet.length:
             yield Finding("warning", str(target), f"that is {abs(target.value) / sheet.length:.3g} times the length of"
                                                   f" the body, {sheet.length:.4g}: are the units of length the same?")
-        moved = not hasattr(scene.driven, "virtual_work")
-        if scene.driven is not None and target.name == ("pressure" if moved else "travel"):
+        driven = scene.driven
+        if driven is not None and target.name in ("pressure", "travel") and target.name != driven.quantity:
             yield Finding("error", str(target), f"the run drives {scene.driven!r}, which has no {target.name}")
         inside = [c for c in scene.contacts if target.name == "pole_height" and _beyond(c, sheet, target.value, scene)]
         for contact in inside:

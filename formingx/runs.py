@@ -107,11 +107,9 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     name = scene.driven.quantity
     targets = [(Target(name, to * k / increments, None), Amplitude(problem, driven)) for k in range(1, increments + 1)]
     with _carried(path):
-        first = begin(curve)
-        whole = abs(to / problem.forms.control_scale / first.slope)      # arc length, were the path straight
-        step = StepControl(length=1.01 * whole / increments, largest=1.01 * whole / increments,
-                           smallest=1e-5 * whole / increments)
-        Run(path.record, targets, step).follow(count("solve: max_steps", max_steps), False, first)
+        increment = abs(to / problem.forms.control_scale) / increments
+        step = StepControl(length=1.01 * increment, largest=1.01 * increment, smallest=1e-5 * increment)
+        Run(path.record, targets, step).follow(count("solve: max_steps", max_steps), False, begin(curve))
     return path
 
 

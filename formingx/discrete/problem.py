@@ -19,12 +19,9 @@ from petsc4py import PETSc
 from ..scene.scene import Scene
 from .constraints import Active, Constraints
 from .contact_nodes import ContactNodes
+from .formulations import formulate
 from .matrix import ExtendedMatrix
-from .membrane import MidSurface
 from .schedule import Setting
-from .solid import Solid
-
-_FORMULATIONS = {"solid": Solid, "membrane": MidSurface}
 
 
 class _Stage(NamedTuple):
@@ -59,7 +56,7 @@ class Problem:
     """
 
     def __init__(self, scene: Scene):
-        self.scene, self.forms = scene, _FORMULATIONS[scene.model.body](scene)
+        self.scene, self.forms = scene, formulate(scene)
         self.comm = self.forms.comm
         forms = self.forms
         index_map = forms.space.dofmap.index_map
@@ -69,7 +66,7 @@ class Problem:
         self._residual = forms.compile(forms.residual)
         self._by_control = forms.control_derivative and forms.compile(forms.control_derivative)
         self.contacts = [ContactNodes(forms, contact, self.assemble) for contact in scene.contacts]
-        self.histories = [contact for contact in self.contacts if contact.law.remembers]
+        self.histories = [*(contact for contact in self.contacts if contact.law.remembers), *forms.histories]
         folded = ufl.conditional(ufl.gt(forms.J, forms.constant(0.0)), forms.constant(0.0), forms.constant(1.0))
         self._folded = forms.compile(folded * forms.dx)
         self._constraints = Constraints(forms, self.assemble)
@@ -94,7 +91,7 @@ class Problem:
     @property
     def symmetric(self) -> bool:
         """True if the tangent is symmetric: no follower load in the scene."""
-        return all(getattr(x, "symmetric", False) for x in (*self.scene.loads, *self.scene.contacts))
+        return all(x.symmetric for x in (*self.scene.loads, *self.scene.contacts))
 
     @property
     def setting(self) -> Setting:
@@ -257,6 +254,9 @@ class Problem:
 
     def advance(self, x: np.ndarray, control: float) -> None:
         """A state is accepted: what has a history takes it up. x: own part, shape (n,)."""
+        if self.forms.histories:
+            self.forms.control.value = control
+            self._set_own(x)
         for history in self.histories:
             history.advance(x[: self._n], control)
 
@@ -301,8 +301,11 @@ class Problem:
 
     def set_fields(self, x: PETSc.Vec) -> None:
         """Put the fields of x where the forms see them."""
+        self._set_own(x.array_r)
+
+    def _set_own(self, x: np.ndarray) -> None:
         w = self.forms.w.x
-        w.array[: self._n] = x.array_r[: self._n]
+        w.array[: self._n] = x[: self._n]
         w.scatter_forward()
 
     def stiff_state(self, out: PETSc.Vec) -> None:

@@ -104,7 +104,7 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     for i, thing in enumerate(scene.things):
         if any(thing is t for t in scene.drivable):
             found[column := scene.column(thing)] = Amplitude(problem, i)
-            if hasattr(thing, "constraints"):
+            if thing in scene.supports:
                 found["support_force" if column == thing.quantity else f"{thing.name}_force"] = _Reaction(problem, i)
     if "axis" in scene.mesh.boundaries:
         found["pole_height"] = bind_pole_height(problem)

@@ -90,7 +90,7 @@ class Execution:
 
     def _travels(self) -> dict[int, float]:
         """How far each tool of the scene has come, {number: length}."""
-        return {i: self._stands(i) for i, thing in enumerate(self.scene.things) if hasattr(thing, "moves")}
+        return {i: self._stands(i) for i, thing in enumerate(self.scene.things) if thing in self.scene.contacts}
 
     def _stands(self, number: int) -> float:
         """Value of a thing now, in the user's units."""

@@ -98,16 +98,16 @@ def plan(scene: Scene, stage: Stage) -> Plan:
     numbers = [scene.number(who, thing) for thing in driven]
     for number in numbers:
         thing = scene.things[number]
-        if not getattr(thing, "driven", False):
+        if not thing.driven:
             raise InputError(f"{who}: {thing!r} cannot be driven: a Pressure without value, a Displaced support, or"
                              f" a Contact that moves can")
-        if number in off and not hasattr(thing, "moves"):                  # a tool may go home while it is away
+        if number in off and thing.moves is None:                  # a tool may go home while it is away
             raise InputError(f"{who}: {thing!r} is both driven and left out")
     if len({scene.together(number)[0] for number in numbers}) < len(numbers):
         raise InputError(f"{who}: one thing has two tables")
     there = [thing for i, thing in enumerate(scene.things) if i not in off]
     try:
-        supports = [t for t in there if hasattr(t, "constraints")]
+        supports = [t for t in there if t in scene.supports]
         scene.check_held(supports, any(t in there for t in scene.contacts))
         scene.check_driven(supports)
     except InputError as error:
