@@ -62,7 +62,8 @@ class OfPosition(Varying):
         try:
             found = np.broadcast_to(np.asarray(self.function(R, Z), dtype=float), np.shape(R))
         except (TypeError, ValueError) as error:
-            raise InputError(f"the constant {self!r} must take arrays (R, Z), shape (n,), and give one: {error}") from None
+            raise InputError(f"the constant {self!r} must be a function of arrays (R, Z), shape (n,):"
+                             f" {error}") from None
         for i in np.flatnonzero(~np.isfinite(found))[:1]:
             raise InputError(f"the constant {self!r} is {found[i]} at (R, Z) = ({R[i]:.6g}, {Z[i]:.6g})")
         return found
