@@ -99,6 +99,11 @@ class Problem:
         return self._stage.setting
 
     @property
+    def control(self) -> float:
+        """The control that the forms see now; inside `at` that of the state."""
+        return float(self.forms.control.value)
+
+    @property
     def held(self) -> np.ndarray:
         """Local numbers of the owned unknowns that supports hold now."""
         return self._stage.active.dofs[self._stage.active.owned]
@@ -154,7 +159,7 @@ class Problem:
 
         state: anything with x (own part), control, setting (a `Setting` as plain data, or empty) and memory.
         """
-        fields, control = self.forms.w.x.array.copy(), float(self.forms.control.value)
+        fields, control = self.forms.w.x.array.copy(), self.control
         stage, memory, x = self._stage, self.memory, self.x.array_r.copy()
         try:
             self.stand(state)
