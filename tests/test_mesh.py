@@ -197,10 +197,14 @@ def test_parts_refuse(wrong, words):
         mesh.with_part(**{"name": "plug", "of": "top", "within": (0, 0.5), **wrong})
 
 
-def test_a_part_is_not_written(tmp_path):
+@pytest.mark.parametrize("suffix", ["msh", "txt"])
+def test_a_part_is_written_and_read(tmp_path, suffix):
     mesh = fx.mesh.disc(radius=1.0, thickness=0.1, elements=(10, 1)).with_part("plug", "top", (0, 0.5))
-    with pytest.raises(fx.InputError, match="boundary 'top' has a part with a name of its own"):
-        fx.mesh.write(mesh, tmp_path / "part.msh")
+    fx.mesh.write(mesh, tmp_path / f"part.{suffix}")
+    again = fx.mesh.read(tmp_path / f"part.{suffix}")
+    for name in ("plug", "top", "rim"):
+        np.testing.assert_array_equal(again.nodes_of(name), mesh.nodes_of(name))
+    assert set(again.facets_of("plug")) < set(again.facets_of("top"))
 
 
 @pytest.mark.parametrize("wrong, words", [
