@@ -181,8 +181,11 @@ run_mounted() {
         done
         [ -e "$root$here/fx" ] || exit 125
         for d in proc sys dev; do mount --rbind /$d "$root/$d" || exit 125; done
-        for f in /etc/resolv.conf /etc/hosts; do
-            [ ! -e "$f" ] || [ ! -f "$root$f" ] || mount --bind "$f" "$root$f"
+        for f in /etc/resolv.conf /etc/hosts /etc/ssl/certs /etc/pip.conf; do         # for pip
+            if [ -d "$f" ]; then mkdir -p "$root$f"
+            elif [ ! -f "$f" ]; then continue
+            elif [ ! -e "$root$f" ]; then : >"$root$f"; fi
+            mount --bind "$f" "$root$f"
         done
         for d in "$root"/tmp/ompi.*.0; do       # a session folder of MPI that is not ours: it gets one of its own
             [ ! -d "$d" ] || [ -O "$d" ] || mount -t tmpfs mpi "$d"

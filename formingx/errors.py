@@ -52,8 +52,8 @@ def non_negative(name: str, value: Any) -> float:
 def finite(name: str, value: Any) -> float:
     """`value` as a float, or an InputError unless it is a finite number."""
     try:
-        if isinstance(value, str | bytes | bytearray) or getattr(value, "ndim", 0) or isinstance(value, Complex) and \
-                not isinstance(value, Real):
+        not_a_number = isinstance(value, str | bytes | bytearray) or getattr(value, "ndim", 0) > 0
+        if not_a_number or isinstance(value, Complex) and not isinstance(value, Real):
             raise TypeError
         number = float(value)
     except (TypeError, ValueError):

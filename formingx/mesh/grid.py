@@ -109,7 +109,7 @@ def _tagged(grid: Grid, what: str) -> tuple:
     cell_tags = np.repeat(np.arange(1, len(layers) + 1), [len(rows) for rows in grid.layers.values()])
     width = 3 if triangles.shape[1] == 6 else 2
     first = len(layers) + 1
-    tags = {(k,): first + k for k in range(len(grid.boundaries))}
+    tags: dict[tuple[int, ...], int] = {(k,): first + k for k in range(len(grid.boundaries))}
     owners: dict[tuple[int, int], tuple[list, list[int]]] = {}
     for k, (name, rows) in enumerate(grid.boundaries.items()):
         for row in _of_elements(number[rows[:, :width]], triangles, f"{what}: boundary {name!r}", points):

@@ -23,7 +23,7 @@ from .profile import Arc, Line
 _OPERATORS: dict[type, Any] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.Pow: operator.pow, ast.USub: operator.neg, ast.UAdd: operator.pos}
-_FUNCTIONS = {"Sqrt": math.sqrt, "Sin": math.sin, "Cos": math.cos, "Tan": math.tan, "Fabs": abs}
+_FUNCTIONS: dict[str, Any] = {"Sqrt": math.sqrt, "Sin": math.sin, "Cos": math.cos, "Tan": math.tan, "Fabs": abs}
 _NUMBER = re.compile(r"[A-Za-z_]\w*")
 _ENTITY = re.compile(r"(Point|Line|Circle)\s*\(([^(){}]*)\)\s*=\s*\{([^{}]*)\}")
 _PASSED_OVER = re.compile(r"(?:(?:Curve|Line) Loop|Plane Surface|Surface|Ruled Surface"
