@@ -199,16 +199,20 @@ def _grading(kind: str, grading: Any) -> float:
 
 def _counts(kind: str, along_what: str, elements: Any, layers: int) -> tuple[int, list[int]]:
     """Numbers of elements along the sheet and through each layer."""
-    if not (isinstance(elements, tuple | list | np.ndarray) and np.ndim(elements[:1]) == 1 and len(elements) == 2):
+    if not _is_row(elements) or len(elements) != 2:
         raise InputError(f"{kind}: elements = {elements!r}: must be (along the {along_what}, through each layer)")
     along = count(f"{kind}: elements along the {along_what}", elements[0])
-    through = list(elements[1]) if isinstance(elements[1], tuple | list | np.ndarray) else [elements[1]] * layers
+    through = list(elements[1]) if _is_row(elements[1]) else [elements[1]] * layers
     if len(through) != layers:
         raise InputError(f"{kind}: elements through the layers = {through!r}: {layers} layers need as many counts")
     through = [count(f"{kind}: elements through a layer", n) for n in through]
     if along * sum(through) > _MOST:
         raise InputError(f"{kind}: elements = {elements!r}: {along * sum(through)} rectangles: at most {_MOST}")
     return along, through
+
+
+def _is_row(values: Any) -> bool:
+    return isinstance(values, tuple | list) or isinstance(values, np.ndarray) and values.ndim == 1
 
 
 def _graded(along: int, grading: float) -> np.ndarray:
