@@ -26,3 +26,5 @@ from .solve.stage import Stage
 from .solve.state import State
 from .solve.stepping import StepControl
 from .solve.targets import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel
+
+__version__ = "0.1.0"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Hashable, Iterable
+from numbers import Complex, Real
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +52,9 @@ def non_negative(name: str, value: Any) -> float:
 def finite(name: str, value: Any) -> float:
     """`value` as a float, or an InputError unless it is a finite number."""
     try:
+        not_a_number = isinstance(value, str | bytes | bytearray) or getattr(value, "ndim", 0) > 0
+        if not_a_number or isinstance(value, Complex) and not isinstance(value, Real):
+            raise TypeError
         number = float(value)
     except (TypeError, ValueError):
         raise InputError(f"{name} = {value!r}: must be a number") from None
@@ -79,7 +83,7 @@ def instance(name: str, value: Any, kind: Any, what: str) -> Any:
 def several(name: str, values: Any, what: str) -> list[Any]:
     """`values` as a list, or an InputError unless it is a list, a tuple or the like."""
     alone = isinstance(values, str | bytes | dict) or hasattr(values, "_fields")         # a NamedTuple is one thing
-    if not isinstance(values, Iterable) or alone:
+    if not isinstance(values, Iterable) or alone or getattr(values, "ndim", 1) == 0:
         raise InputError(f"{name} = {values!r}: must be a list of {what}")
     return list(values)
 
