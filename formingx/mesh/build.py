@@ -12,7 +12,10 @@ from .gmsh import from_gmsh
 from .mesh import Mesh
 
 ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
-"""Elements (along the radius, through each layer) of a disc: see the README for the error that each promises."""
+"""Elements of a disc (along the radius, least number through each layer): see the README for what each promises."""
+_TALLEST = 1.5
+"""Height over width of such elements at most: the inf-sup constant of P2 + bubble / P1dg falls as triangles get slim,
+and across a thick sheet, which bends, they lock (benchmarks/thickness.py)."""
 
 
 def disc(*, radius: float, thickness: float | Mapping[str, float], accuracy: str = "standard",
@@ -25,7 +28,8 @@ def disc(*, radius: float, thickness: float | Mapping[str, float], accuracy: str
     Args:
         radius, inner_radius: lengths.
         thickness: a length (one layer, called `sheet`), or {layer name: its thickness} from bottom to top.
-        accuracy: "draft", "standard" or "fine": how many elements.
+        accuracy: "draft", "standard" or "fine": how many elements; more of them through layers so thick that they would
+            be more than 1.5 times taller than wide (as for `thickness` = `radius` in thicker ones).
         elements: (along the radius, through each layer), in place of `accuracy`; the latter may be a tuple, one count
             per layer. Each rectangle is two triangles.
         grading: size of the last element at the rim over that of the first at the axis.
@@ -43,7 +47,7 @@ def disc(*, radius: float, thickness: float | Mapping[str, float], accuracy: str
         raise InputError(f"disc: inner_radius = {inner_radius!r}: must be at least 0 and below radius = {radius!r}")
     sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
     known("disc: accuracy", accuracy, ACCURACY)
-    elements = ACCURACY[accuracy] if elements is None else elements
+    elements = _preset(accuracy, radius - inner_radius, thickness) if elements is None else elements
     sizes = None if concentrate is None else _sizes(concentrate, inner_radius, radius)
     if sizes and grading != 1:
         raise InputError(f"disc: grading = {grading!r} and concentrate = {concentrate!r}: give one of them")
@@ -53,6 +57,22 @@ def disc(*, radius: float, thickness: float | Mapping[str, float], accuracy: str
         half = np.rint(2 * along * (x[:, 0] - inner_radius) / (radius - inner_radius))      # gmsh has some 12 digits
         x[:, 0] = np.interp(half / 2, np.arange(along + 1), _concentrated(inner_radius, radius, along, sizes))
     return mesh
+
+
+def _preset(accuracy: str, length: float, thickness: float | Mapping[str, float]) -> tuple[int, list[int]]:
+    """(elements along, through each layer) of a disc: near squares in thick layers."""
+    along, least = ACCURACY[accuracy]
+    tallest = _TALLEST * length / along
+    return along, [max(least, int(np.ceil(min(h, length) / tallest - 1e-9)))
+                   for h in _heights("disc", thickness, "sheet").values()]
+
+
+def _heights(kind: str, thickness: float | Mapping[str, float], layer: str) -> dict[str, float]:
+    """{layer name: its thickness}, checked."""
+    layers = dict(thickness) if isinstance(thickness, Mapping) else {layer: thickness}
+    if not layers:
+        raise InputError(f"{kind}: thickness = {{}}: must name at least one layer")
+    return {name: positive(f"{kind}: thickness of {name!r}", h) for name, h in layers.items()}
 
 
 def _sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
@@ -159,10 +179,7 @@ def parison(*, inner_radius: float, thickness: float | Mapping[str, float], leng
 def _layered(kind: str, ends: tuple, bottom: float, thickness: float | Mapping[str, float], elements: tuple,
              grading: float, sides: tuple, comm: MPI.Comm, layer: str = "sheet") -> Mesh:
     """Layers of triangles over the interval `ends`, from `bottom` up; `sides` names left, right, bottom and top."""
-    layers = dict(thickness) if isinstance(thickness, Mapping) else {layer: thickness}
-    if not layers:
-        raise InputError(f"{kind}: thickness = {{}}: must name at least one layer")
-    heights = [positive(f"{kind}: thickness of {name!r}", h) for name, h in layers.items()]
+    layers = _heights(kind, thickness, layer)
     if not (hasattr(elements, "__len__") and len(elements) == 2):
         raise InputError(f"{kind}: elements = {elements!r}: must be (along the {_ALONG[kind]}, through each layer)")
     along = count(f"{kind}: elements along the {_ALONG[kind]}", elements[0])
@@ -174,7 +191,7 @@ def _layered(kind: str, ends: tuple, bottom: float, thickness: float | Mapping[s
 
     def build(model):
         geo = model.geo
-        levels = np.concatenate([[bottom], bottom + np.cumsum(heights)])
+        levels = np.concatenate([[bottom], bottom + np.cumsum(list(layers.values()))])
         points = [[geo.addPoint(r, z, 0) for r in ends] for z in levels]
         across = [geo.addLine(*p) for p in points]
         left = [geo.addLine(a[0], b[0]) for a, b in zip(points, points[1:])]
