@@ -17,6 +17,7 @@ from .scene.scene import Scene
 from .solve.targets import Target
 
 _FLATTEST = 110.0          # longest edge over height: discs of aspect 100 end right in benchmarks/extremes.py
+_SLIM, _TOO_STIFF, _WRONG = 3.0, 0.003, 0.02      # height over width; expected error that is worth a word, or not a run
 _PER_FILLET = 2.0          # elements along a fillet
 _PENETRATION = 0.01        # of the thickness
 
@@ -68,7 +69,7 @@ def doctor(scene: Scene, *, targets: Sequence[Target] = ()) -> Report:
     for target in several("doctor: targets", targets, "targets, such as [pole_stretch(3)]"):
         instance("doctor: targets: target", target, Target, "a target, such as pole_stretch(3)")
     sheet = _Sheet(scene)
-    checks = (_driven, _elements, _layers, _fillets, _contact_penalties, _volume_penalty, _units)
+    checks = (_driven, _elements, _locking, _layers, _fillets, _contact_penalties, _volume_penalty, _units)
     findings = [finding for check in checks for finding in check(scene, sheet, targets)]
     return Report([*findings, *_targets(scene, sheet, targets)])
 
@@ -137,6 +138,31 @@ def _elements(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
         yield Finding("warning", "mesh", f"an element at {at} is {slender[worst]:.3g} times longer than high (up to"
                                          f" 100 was tried): use more elements along the sheet, or Membrane()"
                                          f" for one so thin")
+
+
+def _locking(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+    """Triangles that are slim across a thick sheet, for whose element its bending is too stiff.
+
+    Its inf-sup constant falls as 2 width/height. Hinged sheets 2 to 15 times wider than thick came out wrong by up to
+    0.3 (height/width) (height/length of the body)^2.5, at most (benchmarks/thickness.py); along a thin sheet slim
+    triangles do no harm, and where one of them spans the sheet every pressure space is as wrong (see `_layers`).
+    """
+    pressure = getattr(scene.model, "pressure", None)
+    if pressure is None or not pressure.bubble:
+        return
+    height = sheet.edges.max(1)
+    slim = height**2 / (2 * np.maximum(sheet.area, 1e-300))
+    error = np.where((height < sheet.thickness) & (slim > _SLIM), 0.3 * slim * (height / sheet.length) ** 2.5, 0.0)
+    mean = float((error * sheet.area).sum() / sheet.area.sum())
+    if mean > _TOO_STIFF:
+        worst = int(np.argmax(error))
+        at = place(scene.mesh, sheet.corners[worst].mean(0), str(sheet.layer[worst]))
+        severity, by = ("error", "several") if mean > _WRONG else ("warning", "about one")
+        yield Finding(severity, "mesh",
+                      f"triangles are up to {slim[worst]:.3g} times taller than wide across the thickness (at {at}):"
+                      f" the default element locks in them, and bending comes out too stiff, by {by} per cent: use"
+                      f" more elements through the thickness (at most 1.5 times taller than wide), fewer"
+                      f" along the sheet, or MixedPressure(space='P1')")
 
 
 def _layers(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:

@@ -13,7 +13,10 @@ from .grid import Grid, to_mesh
 from .mesh import Mesh
 
 ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
-"""Elements (along the radius, through each layer) of a disc: see the README for the error that each promises."""
+"""Elements of a disc (along the radius, least number through each layer): see the README for what each promises."""
+_TALLEST = 1.5
+"""Height over width of such elements at most: the inf-sup constant of P2 + bubble / P1dg falls as triangles get slim,
+and across a thick sheet, which bends, they lock (benchmarks/thickness.py)."""
 _MOST = 250_000            # rectangles of a mesh
 
 Thickness = float | Callable[[float], float] | Mapping[float, float]
@@ -33,7 +36,8 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
         thickness: a length (one layer, called `sheet`), or {layer name: its thickness} from bottom to top. Each may
             vary with the radius: a function of R, or a table {R: thickness}, linear between its radii (all nodes lie
             on it, those on edges too).
-        accuracy: "draft", "standard" or "fine": how many elements.
+        accuracy: "draft", "standard" or "fine": how many elements; more of them through layers so thick that they would
+            be more than 1.5 times taller than wide (as for `thickness` = `radius` in thicker ones).
         elements: (along the radius, through each layer), in place of `accuracy`; the latter may be a tuple, one count
             per layer. Each rectangle is two triangles.
         grading: size of the last element at the rim over that of the first at the axis, 1e-6 to 1e6.
@@ -53,7 +57,9 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
     sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
     known("disc: accuracy", accuracy, ACCURACY)
     layers = _layers("disc", thickness, "sheet", "R")
-    along, through = _counts("disc", "radius", ACCURACY[accuracy] if elements is None else elements, len(layers))
+    if elements is None:
+        elements = _preset(accuracy, inner_radius, radius, layers)
+    along, through = _counts("disc", "radius", elements, len(layers))
     sizes = None if concentrate is None else _sizes(concentrate, inner_radius, radius)
     if sizes and grading != 1:
         raise InputError(f"disc: grading = {grading!r} and concentrate = {concentrate!r}: give one of them")
@@ -62,6 +68,15 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
     R = _with_middles(joints)
     Z = _levels(layers, through, R)
     return _mesh("disc", np.stack([np.broadcast_to(R, Z.shape), Z], axis=-1), list(layers), through, sides, comm)
+
+
+def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[int, list[int]]:
+    """(elements along, through each layer) of a disc: near squares in thick layers."""
+    along, least = ACCURACY[accuracy]
+    length, R = high - low, np.linspace(low, high, along + 1)
+    tallest = _TALLEST * length / along
+    return along, [max(least, int(np.ceil(min(float(thickness_at(R).max()), length) / tallest - 1e-9)))
+                   for thickness_at in layers.values()]
 
 
 def _sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
@@ -163,6 +178,7 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
     return _mesh("parison", points, list(layers), through, ("neck", "axis", "inner", "outer"), comm)
 
 
+<<<<<<< HEAD
 def _layers(kind: str, thickness: Any, alone: str, coordinate: str) -> dict[str, Callable]:
     """{name of a layer: its thickness at coordinates, shape (n,)}; `coordinate` is "" where it cannot vary."""
     named = isinstance(thickness, Mapping) and all(isinstance(name, str) for name in thickness)
@@ -209,6 +225,45 @@ def _counts(kind: str, along_what: str, elements: Any, layers: int) -> tuple[int
     if along * sum(through) > _MOST:
         raise InputError(f"{kind}: elements = {elements!r}: {along * sum(through)} rectangles: at most {_MOST}")
     return along, through
+=======
+def _layered(kind: str, ends: tuple, bottom: float, thickness: float | Mapping[str, float], elements: tuple,
+             grading: float, sides: tuple, comm: MPI.Comm, layer: str = "sheet") -> Mesh:
+    """Layers of triangles over the interval `ends`, from `bottom` up; `sides` names left, right, bottom and top."""
+    layers = _heights(kind, thickness, layer)
+    if not (hasattr(elements, "__len__") and len(elements) == 2):
+        raise InputError(f"{kind}: elements = {elements!r}: must be (along the {_ALONG[kind]}, through each layer)")
+    along = count(f"{kind}: elements along the {_ALONG[kind]}", elements[0])
+    through = elements[1] if hasattr(elements[1], "__len__") else [elements[1]] * len(layers)
+    if len(through) != len(layers):
+        raise InputError(f"{kind}: elements through the layers = {through!r}: {len(layers)} layers need as many counts")
+    through = [count(f"{kind}: elements through a layer", n) for n in through]
+    ratio = grading ** (1 / (along - 1)) if along > 1 else 1.0
+
+    def build(model):
+        geo = model.geo
+        levels = np.concatenate([[bottom], bottom + np.cumsum(list(layers.values()))])
+        points = [[geo.addPoint(r, z, 0) for r in ends] for z in levels]
+        across = [geo.addLine(*p) for p in points]
+        left = [geo.addLine(a[0], b[0]) for a, b in zip(points, points[1:])]
+        right = [geo.addLine(a[1], b[1]) for a, b in zip(points, points[1:])]
+        for line in across:
+            geo.mesh.setTransfiniteCurve(line, along + 1, "Progression", ratio)
+        faces = []
+        for k, n in enumerate(through):
+            for line in (left[k], right[k]):
+                geo.mesh.setTransfiniteCurve(line, n + 1)
+            faces.append(geo.addPlaneSurface([geo.addCurveLoop([across[k], right[k], -across[k + 1], -left[k]])]))
+            geo.mesh.setTransfiniteSurface(faces[-1], "AlternateLeft")
+        geo.synchronize()
+        for name, face in zip(layers, faces):
+            model.addPhysicalGroup(2, [face], name=name)
+        for name, lines in zip(sides, (left, right, across[:1], across[-1:])):
+            model.addPhysicalGroup(1, lines, name=name)
+        model.mesh.generate(2)
+        model.mesh.setOrder(2)
+
+    return from_gmsh(build, comm)
+>>>>>>> w-thick
 
 
 def _is_row(values: Any) -> bool:
