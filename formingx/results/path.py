@@ -286,3 +286,57 @@ class Path:
         from .show import views
         axisymmetric = self.problem.scene.kinematics.dimension_of_volume == 3
         (views.revolved if axisymmetric else views.extruded)(self.profile(state), file, self.problem.comm)
+
+    def wall(self, state: State | None = None) -> Any:
+        """The wall of the part at a state (default: the last), place by place (`Wall`): to_csv, to_excel."""
+        from .evaluate.wall import Walls
+        self._walls = getattr(self, "_walls", None) or Walls(self)
+        return self._walls.of(state or self.last)
+
+    def part(self, state: State | None = None, *, density: float | None = None, trim: Any = None, heights: Any = (),
+             units: Any = None) -> Any:
+        """The formed part in numbers (`Part`): volume, weight, area, least wall and where, evenness; print it.
+
+        Args:
+            state: default the last.
+            density: in g/cm3, for the weight in grams; say the unit of length with `units` (without, it is cm).
+            trim: the radius at which the part is cut off, or ("height", h), lengths: the last place from the axis where
+                the middle line goes beyond it.
+            heights: give the wall at these heights too (`Wall.height`).
+            units: a `formingx.Units`.
+
+        Raises:
+            InputError: the mesh is no sheet, or the part does not reach the trim or a height.
+        """
+        from ..units import NONE
+        from .evaluate.part import part
+        axisymmetric = self.problem.scene.kinematics.dimension_of_volume == 3
+        return part(self.wall(state), axisymmetric, density, trim, heights, units or NONE)
+
+    def filling(self, tool: Any = None) -> Any:
+        """The gap that is left in each corner of a tool, state by state (`Filling`), and the pressure to fill it.
+
+        Args:
+            tool: its name, the `Tool` or the `Contact`; may be left out where there is one.
+
+        Raises:
+            InputError: there is no such tool, or it has no corner that the body must fill.
+        """
+        from .evaluate.contact_face import contact_of
+        from .evaluate.filling import filling
+        return filling(self, contact_of(self, tool, "filling")[0])
+
+    def contact(self, tool: Any = None, state: State | None = None) -> Any:
+        """Contact pressure, friction and gap along the face that meets a tool (`ContactTable`): to_csv, to_excel."""
+        from .evaluate.contact_face import ContactFace, contact_of
+        return ContactFace(self, contact_of(self, tool, "contact")[0]).of(state or self.last)
+
+    def tool_forces(self) -> dict[str, np.ndarray]:
+        """{tool: its force at all states}: positive when it resists its travel; of a tool that stays, along Z."""
+        from .evaluate.contact_face import tool_forces
+        return tool_forces(self)
+
+    def work(self) -> dict[str, np.ndarray]:
+        """{what: work done on the body up to each state}: by the pressure, by tools; and the energy that it holds."""
+        from .evaluate.work import work
+        return work(self)
