@@ -19,6 +19,7 @@ from .results.evaluate.profile import Profile
 from .results.evaluate.stress import Stress, StressField
 from .results.files.checkpoint import load
 from .results.path import Path, State
+from .results.show.report import report
 from .scene.scene import Scene
 from .solve.fixed import solve
 from .solve.follow import trace

@@ -255,18 +255,22 @@ class Path:
         from .show import animation
         animation.animate(self, file, frames, seconds)
 
-    def report(self, file: Any, title: str = "", failure: Any = None) -> None:
-        """Write one HTML file that shows the run: inputs, curves, thickness, warnings, convergence (rank 0 writes).
+    def report(self, file: Any, title: str = "", failure: Any = None, *, units: Any = None,
+               density: float | None = None, trim: Any = None) -> None:
+        """Write one HTML file that shows the run: the part, the process, curves, inputs, warnings (rank 0 writes).
 
         Args:
             title: its heading.
             failure: the `ConvergenceError` that ended the run, if one did.
+            units: a `formingx.Units`, for the labels; density, trim: see `Path.part`.
 
         Raises:
+            InputError: plotly is not installed.
             OSError: the file cannot be written.
         """
+        from ..units import NONE
         from .show import report
-        report.write(report.of_path(self), file, title, failure, self.problem.comm)
+        report.write(report.of_path(self), file, title, failure, self.problem.comm, units or NONE, density, trim)
 
     def plot(self, y: str, x: str, axes: Any = None, **style: Any) -> Any:
         """Draw column `y` over column `x`; returns the matplotlib axes."""
