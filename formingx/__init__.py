@@ -19,6 +19,7 @@ from .results.compare_nodes import NodalComparison, compare_nodes, write_nodes
 from .results.evaluate.profile import Profile
 from .results.evaluate.stress import Stress, StressField
 from .results.path import Path
+from .results.show.report import report
 from .runs import Process, load, solve, trace
 from .scene.scene import Scene
 from .solve.newton import Tolerances
@@ -26,5 +27,6 @@ from .solve.stage import Stage
 from .solve.state import State
 from .solve.stepping import StepControl
 from .solve.targets import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel
+from .units import Units
 
 __version__ = "0.1.0"

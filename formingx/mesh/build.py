@@ -178,7 +178,6 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
     return _mesh("parison", points, list(layers), through, ("neck", "axis", "inner", "outer"), comm)
 
 
-<<<<<<< HEAD
 def _layers(kind: str, thickness: Any, alone: str, coordinate: str) -> dict[str, Callable]:
     """{name of a layer: its thickness at coordinates, shape (n,)}; `coordinate` is "" where it cannot vary."""
     named = isinstance(thickness, Mapping) and all(isinstance(name, str) for name in thickness)
@@ -225,45 +224,6 @@ def _counts(kind: str, along_what: str, elements: Any, layers: int) -> tuple[int
     if along * sum(through) > _MOST:
         raise InputError(f"{kind}: elements = {elements!r}: {along * sum(through)} rectangles: at most {_MOST}")
     return along, through
-=======
-def _layered(kind: str, ends: tuple, bottom: float, thickness: float | Mapping[str, float], elements: tuple,
-             grading: float, sides: tuple, comm: MPI.Comm, layer: str = "sheet") -> Mesh:
-    """Layers of triangles over the interval `ends`, from `bottom` up; `sides` names left, right, bottom and top."""
-    layers = _heights(kind, thickness, layer)
-    if not (hasattr(elements, "__len__") and len(elements) == 2):
-        raise InputError(f"{kind}: elements = {elements!r}: must be (along the {_ALONG[kind]}, through each layer)")
-    along = count(f"{kind}: elements along the {_ALONG[kind]}", elements[0])
-    through = elements[1] if hasattr(elements[1], "__len__") else [elements[1]] * len(layers)
-    if len(through) != len(layers):
-        raise InputError(f"{kind}: elements through the layers = {through!r}: {len(layers)} layers need as many counts")
-    through = [count(f"{kind}: elements through a layer", n) for n in through]
-    ratio = grading ** (1 / (along - 1)) if along > 1 else 1.0
-
-    def build(model):
-        geo = model.geo
-        levels = np.concatenate([[bottom], bottom + np.cumsum(list(layers.values()))])
-        points = [[geo.addPoint(r, z, 0) for r in ends] for z in levels]
-        across = [geo.addLine(*p) for p in points]
-        left = [geo.addLine(a[0], b[0]) for a, b in zip(points, points[1:])]
-        right = [geo.addLine(a[1], b[1]) for a, b in zip(points, points[1:])]
-        for line in across:
-            geo.mesh.setTransfiniteCurve(line, along + 1, "Progression", ratio)
-        faces = []
-        for k, n in enumerate(through):
-            for line in (left[k], right[k]):
-                geo.mesh.setTransfiniteCurve(line, n + 1)
-            faces.append(geo.addPlaneSurface([geo.addCurveLoop([across[k], right[k], -across[k + 1], -left[k]])]))
-            geo.mesh.setTransfiniteSurface(faces[-1], "AlternateLeft")
-        geo.synchronize()
-        for name, face in zip(layers, faces):
-            model.addPhysicalGroup(2, [face], name=name)
-        for name, lines in zip(sides, (left, right, across[:1], across[-1:])):
-            model.addPhysicalGroup(1, lines, name=name)
-        model.mesh.generate(2)
-        model.mesh.setOrder(2)
-
-    return from_gmsh(build, comm)
->>>>>>> w-thick
 
 
 def _is_row(values: Any) -> bool:
