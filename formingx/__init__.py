@@ -26,3 +26,5 @@ from .solve.newton import Tolerances
 from .solve.process import Process, Stage
 from .solve.stepping import StepControl
 from .solve.targets import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel
+from .tables import table
+from .time_temperature import WLF, Arrhenius
