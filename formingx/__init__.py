@@ -3,6 +3,10 @@
 from . import mesh
 from .doctor import doctor
 from .errors import ConvergenceError, InputError
+from .heat.boundaries import Absorption, Convection, FixedTemperature, HeatFlux, Radiation, ThermalProperties
+from .heat.contact import ConductingTool, ContactWithTool
+from .heat.result import HeatRun
+from .heat.run import heat
 from .materials.data import treloar1944
 from .materials.fit import Fit, fit
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
