@@ -1,7 +1,7 @@
 """A flat sheet of 1 mm at 150 C laid on a cold tool that conducts: aluminium, syntactic foam, steel.
 
 The tool is 20 mm thick, its back held at 30 C, the contact's conductance 1000 W/(m2 K); air at 25 C above. Each
-temperature is held against a Laplace transform of both bodies (formingx/heat/reference.py). SI units, temperatures in C.
+temperature is held against a Laplace transform of both bodies (formingx/heat/reference.py). SI units, C.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from formingx.results import files
 THICKNESS, START, CONDUCTANCE = 1e-3, 150.0, 1000.0
 H, AIR = 10.0, 25.0
 DEPTH, BACK = 20e-3, 30.0                                           # of the tool
-TOOLS = {"aluminium": (167.0, 2.4192e6), "foam": (0.17, 0.84e6), "steel": (40.0, 3.611e6)}     # k, density heat capacity
+TOOLS = {"aluminium": (167.0, 2.4192e6), "foam": (0.17, 0.84e6), "steel": (40.0, 3.611e6)}   # k, rho c
 TIMES = (0.05, 0.2, 1, 3, 10)
 NAMES = ("face", "mid", "top", "tool_face")
 
@@ -38,15 +38,14 @@ def exact(conductivity, capacity):
     return np.column_stack([sheet, tool])
 
 
-def draw_tool(axes, run):
+def draw_tool(axes, _, run):
     """The tool below the sheet, as far as it is warm."""
     for t, line in zip(TIMES, list(axes.lines)):
         depth, T = run.tool_profile("bottom", (0.0, 0.0), t)
         near = depth < 2 * THICKNESS
-        axes.plot(-depth[near], T[near], color=line.get_color())
-        line.set_label(f"{t:g} s")
-    axes.axvspan(-2 * THICKNESS, 0, color="0.92", zorder=0)
-    axes.set(xlabel="m above the tool's face", xlim=(-2 * THICKNESS, THICKNESS))
+        axes.plot(-1e3 * depth[near], T[near], color=line.get_color())
+    axes.axvspan(-2e3 * THICKNESS, 0, color="0.92", zorder=0)
+    axes.set(xlabel="above the tool's face, mm", xlim=(-2e3 * THICKNESS, 1e3 * THICKNESS))
 
 
 def main():
@@ -58,7 +57,7 @@ def main():
         errors[name] = print_errors(name, NAMES, TIMES, found, exact(conductivity, capacity), START - AIR, runs[name])
         summary[name] = at_times(NAMES, TIMES, found)
         runs[name].to_csv(args.out / f"{name}.csv")
-    draw(runs, args.out / "through_sheet_and_tool.png", 3, draw_tool)
+    draw(runs, args.out / "through_sheet_and_tool.png", 2, draw_tool)
     summarise(args.out, {**summary, "largest_error_over_span": errors, "versions": files.versions()})
 
 

@@ -74,9 +74,10 @@ def main():
         "radiation_450_350": (by_heaters(mesh, 450.0, 350.0, tolerance), faces),
         "absorbed": (by_absorption(mesh, tolerance), {"face": 0.0, "mid": 0.5}),
     }
-    summary, errors = {}, {}
+    summary, errors, dots = {}, {}, {}
     for name, ((heated, exact), places) in cases.items():
         names, found, right = list(places), along(heated, places.values()), exact(list(places.values()))
+        dots[name] = (1e3 * THICKNESS * np.array(list(places.values())), right)
         if name == "convection":
             s, weights = np.polynomial.legendre.leggauss(20)
             names, found = [*names, "mean"], np.column_stack([found, heated.mean_through()])
@@ -86,7 +87,8 @@ def main():
         errors[name] = print_errors(name, names, heated.outputs, found, right, span, heated)
         summary[name] = at_times(names, heated.outputs, found)
         heated.to_csv(args.out / f"{name}.csv")
-    draw({name: heated for name, ((heated, _), _) in cases.items()}, args.out / "through_the_thickness.png", 3)
+    draw({name: heated for name, ((heated, _), _) in cases.items()}, args.out / "through_the_thickness.png", 3,
+         lambda axes, name, _: axes.plot(dots[name][0], dots[name][1].T, "k.", markersize=4))
     window = cases["radiation_400_400"][0][0].time_to_reach(110.0, 150.0)
     summarise(args.out, {**summary, "largest_error_over_span": errors,
                          "radiation_400_400_whole_sheet_between_110_and_150_C_s": list(window),

@@ -45,15 +45,21 @@ def print_errors(name, names, times, values, exact, span, run):
     return float(np.abs(off).max())
 
 
-def draw(runs, file, columns, between=None):
-    """Temperature through the thickness of every run, {title: run}, one plot each; `between` adds to its axes."""
-    drawing, axes = figure(columns, width=4.4, height=3.6, rows=-(-len(runs) // columns))
-    for a, (title, run) in zip(np.atleast_1d(axes), runs.items()):
-        run.plot_through(axes=a)
-        a.set_title(title)
-        if between:
-            between(a, run)
-        a.legend(frameon=False, fontsize=7)
-    for a in np.atleast_1d(axes)[len(runs):]:
-        a.remove()
+def draw(runs, file, columns, between):
+    """Temperature through the thickness of every run, {title: run}, and its extremes over time.
+
+    between(axes, title, run) adds to a plot.
+    """
+    drawing, axes = figure(columns, width=4.4, height=4.0, rows=-(-(len(runs) + 1) // columns))
+    for a, (title, run) in zip(axes, runs.items()):
+        run.plot_through(scale=1e3, axes=a)
+        a.set(title=title, xlabel="above the bottom face, mm")
+        between(a, title, run)
+        a.legend(frameon=False, fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.14))
+    for k, (title, run) in enumerate(runs.items()):
+        extremes = [[run.coldest(t).temperature for t in run.times], [run.hottest(t).temperature for t in run.times]]
+        axes[-1].plot(run.times, extremes[0], color=f"C{k}", label=title)
+        axes[-1].plot(run.times, extremes[1], color=f"C{k}", linestyle="--")
+    axes[-1].set(title="coldest and hottest (dashed) place", xlabel="time, s", ylabel="temperature, °C")
+    axes[-1].legend(frameon=False, fontsize=8, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.14))
     save(drawing, file)

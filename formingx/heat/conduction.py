@@ -51,7 +51,7 @@ class Conduction:
     Attributes:
         mesh, comm: where. space: P2. T: the `Function` that the forms see. points: of its nodes, (R, Z), owned part.
         capacity: of the whole body, heat per degree; volume: of the reference body.
-        touches: [`Touch`], one for each ContactWithTool.
+        touches: [`Touch`], one for each ContactWithTool; who changes a conductance in it calls `update`.
         names: of what gives heat: boundaries and sources, in the order of `Stage.heats`.
     """
 
@@ -68,6 +68,7 @@ class Conduction:
         self._dx = ufl.Measure("dx", domain, subdomain_data=mesh.cells, metadata={"quadrature_degree": 6})
         self._scale, self._c = self.constant(1.0), self.constant(1.0)
         self._buffer = la.vector(self.space.dofmap.index_map, 1)
+        self._factored_for: float | None = None
         self._deform()
         one = self.constant(1.0)
         self.volume = self._integral(one * self._weight * self._dx)
@@ -77,9 +78,9 @@ class Conduction:
         self._fix([b for b in boundaries if isinstance(b, FixedTemperature)])
         self._laws = [b for b in boundaries if hasattr(b, "flux") and not isinstance(b, Absorption)]
         self._sources = [(b, fem.Function(self.space)) for b in boundaries if isinstance(b, Absorption)]
-        self.names = [repr(b) for b in [*self._laws, *(s for s, _ in self._sources)]]
-        self.names += [f"{b!r}" for b in boundaries if isinstance(b, ContactWithTool)]
-        self.names += [f"{b!r}" for b, _ in self._fixed]
+        given = [*self._laws, *(source for source, _ in self._sources),
+                 *(b for b in boundaries if isinstance(b, ContactWithTool)), *(b for b, _ in self._fixed)]
+        self.names = [f"{type(b).__name__}({b.on!r})" for b in given]
         self._compile(materials)
         self.update()
 
@@ -99,7 +100,7 @@ class Conduction:
         return [T, *(touch.start() for touch in self.touches)]
 
     def update(self) -> None:
-        """The displacement has changed: take up where faces are and how large they are."""
+        """The displacement or what touches has changed: take up where faces are and how large they are."""
         self._factored_for = None
         for touch, area in zip(self.touches, self._areas):
             touch.area = self._assemble(area)[touch.dofs]

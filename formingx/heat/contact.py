@@ -118,26 +118,34 @@ class Touch:
         dofs: of the nodes, local, shape (n,). points: (R, Z) of them, shape (n, 2), length.
         area: of the deformed face that belongs to each, shape (n,).
         conductance: at each, shape (n,): 0 where it does not touch.
+        back: temperature of the tool's back, or of a tool that is as hot as told. depths: of a line, back included.
     """
 
     def __init__(self, contact: ContactWithTool, dofs: np.ndarray, points: np.ndarray):
-        self.on, self.tool, self.dofs, self.points = contact.on, contact.tool, dofs, points
+        self.on, self.dofs, self.points = contact.on, dofs, points
         self.area = np.zeros(len(dofs))
         self.conductance = np.full(len(dofs), contact.conductance)
         tool = contact.tool
-        self._conducts = isinstance(tool, ConductingTool)
-        self.back = tool.back if isinstance(tool, ConductingTool) else tool
-        self._M, self._K = tool.matrices() if isinstance(tool, ConductingTool) else np.zeros((2, 0, 0))
+        if isinstance(tool, ConductingTool):
+            self.back, self._above, self.depths = tool.back, tool.start - tool.back, tool.depths
+            self._M, self._K = tool.matrices()
+        else:
+            self.back, self._above, self.depths = tool, 0.0, np.zeros(0)
+            self._M, self._K = np.zeros((2, 0, 0))
         self._factor = lru_cache(maxsize=4)(self._factorise)
+
+    @property
+    def conducts(self) -> bool:
+        """True if there are lines."""
+        return len(self._M) > 0
 
     def start(self) -> np.ndarray:
         """The lines at first, shape (n, m)."""
-        excess = self.tool.start - self.tool.back if self._conducts else 0.0
-        return np.full((len(self.dofs), len(self._M)), excess)
+        return np.full((len(self.dofs), len(self._M)), self._above)
 
     def face(self, lines: np.ndarray) -> np.ndarray:
         """Temperature of the tool's face at the nodes, shape (n,)."""
-        return self.back + lines[:, 0] if self._conducts else np.full(len(self.dofs), self.back)
+        return self.back + lines[:, 0] if self.conducts else np.full(len(self.dofs), self.back)
 
     def rates(self, lines: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(q, heat per time and area into the nodes of the lines) for body temperatures T, shape (n,)."""
@@ -152,7 +160,7 @@ class Touch:
         `absolute` = False: lines count from 0, not from the tool's back (for differences of temperatures).
         """
         back = self.back if absolute else 0.0
-        if not self._conducts:
+        if not self.conducts:
             return Answer(np.full(len(self.dofs), back), self.conductance, lines, np.zeros(0))
         inverse, column = self._factor(c)
         change = (known - c * lines @ self._K) @ inverse

@@ -17,7 +17,7 @@ from ..tables import Table
 
 
 def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperature") -> np.ndarray:
-    """A field at points of a mesh, shape (n, 2), length; each rank may have points of its own; collective.
+    """A field at points of a mesh, shape (n, 2), length; each rank may have points of its own. Collective.
 
     Args:
         field: a number; a `Table` over R; a function of arrays (R, Z), shape (n,) each; the name of a CSV file with the
@@ -28,35 +28,32 @@ def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperatu
     Raises:
         InputError: something else, a value that is not finite, a point outside a table or a file.
     """
+    parts = mesh.comm.allgather(points)
+    first = sum(len(part) for part in parts[: mesh.comm.rank])
+    # all ranks look at all points, so that they raise the same errors
+    return _values(field, np.concatenate(parts), name)[first: first + len(points)]
+
+
+def _values(field: Any, points: np.ndarray, name: str) -> np.ndarray:
+    """`values_at` points that are the same on all ranks."""
+    R, Z = points.T
     if isinstance(field, Table):
-        field.check(points[:, 0], "R")
-        found = field(points[:, 0])
+        field.check(R, "R")
+        found = field(R)
     elif isinstance(field, str | os.PathLike):
         found = _from_file(field, points)
     elif isinstance(field, fem.Function):
-        found = evaluate(field, points)
-    elif hasattr(field, "temperature") and hasattr(field, "times"):
-        found = evaluate(field.temperature(), points)
+        found = PointReader(field.function_space, points).read(field.x.array)
+    elif hasattr(field, "temperature"):
+        return _values(field.temperature(), points, name)
     elif callable(field):
-        found = np.broadcast_to(np.asarray(field(points[:, 0], points[:, 1]), dtype=float), len(points)).copy()
+        found = np.broadcast_to(np.asarray(field(R, Z), dtype=float), len(points))
     else:
         found = np.full(len(points), finite(name, field))
-    if mesh.comm.allreduce(int(np.any(~np.isfinite(found)))):
-        bad = points[~np.isfinite(found)][:1]
-        raise InputError(f"{name} = {field!r}: is not a finite number everywhere"
-                         + "".join(f", not at (R, Z) = ({r:.6g}, {z:.6g})" for r, z in bad))
+    if not np.all(np.isfinite(found)):
+        r, z = points[np.argmin(np.isfinite(found))]
+        raise InputError(f"{name} = {field!r}: is not a finite number at (R, Z) = ({r:.6g}, {z:.6g})")
     return found
-
-
-def evaluate(function: fem.Function, points: np.ndarray) -> np.ndarray:
-    """A scalar Function at points, shape (n, 2), each rank its own; collective."""
-    domain = function.function_space.mesh
-    comm = domain.comm
-    parts = comm.allgather(points)
-    everywhere = np.concatenate(parts)
-    values = PointReader(function.function_space, everywhere).read(function.x.array)
-    first = sum(len(part) for part in parts[: comm.rank])
-    return values[first: first + len(points)]
 
 
 class PointReader:

@@ -6,12 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from dolfinx import fem
-from mpi4py import MPI
 
 from ..errors import InputError, finite, known
 from ..results import files
 from .conduction import Conduction
-from .contact import ConductingTool
 from .fields import PointReader
 
 _POINTS = 201
@@ -155,7 +153,7 @@ class HeatRun:
         Raises:
             InputError: no conducting tool touches that boundary.
         """
-        conducting = {t.on: k for k, t in enumerate(self._body.touches) if isinstance(t.tool, ConductingTool)}
+        conducting = {t.on: k for k, t in enumerate(self._body.touches) if t.conducts}
         known("tool_profile: conducting tool on boundary", on, conducting)
         number = conducting[on]
         touch, lines = self._body.touches[number], self._at(time)[1 + number]
@@ -163,7 +161,7 @@ class HeatRun:
         mine = (away.min(initial=np.inf), self._comm.rank)
         nearest = min(self._comm.allgather(mine))
         line = self._comm.bcast(lines[np.argmin(away)] if nearest == mine else None, root=nearest[1])
-        return touch.tool.depths, touch.back + np.append(line, 0.0)
+        return touch.depths, touch.back + np.append(line, 0.0)
 
     def to_csv(self, file: Any) -> None:
         """Write one row per step: time, error, coldest, hottest, heat stored, heat through each boundary (rank 0)."""
@@ -180,15 +178,19 @@ class HeatRun:
         rows = np.concatenate(self._comm.allgather(table))
         files.write_rows(file, ["R", "Z", "T"], rows.tolist(), self._comm)
 
-    def plot_through(self, times: Any = None, *, line: Any = None, axes: Any = None, **style: Any) -> Any:
-        """Draw the temperature through the thickness at times (default: `outputs`); returns the matplotlib axes."""
+    def plot_through(self, times: Any = None, *, line: Any = None, scale: float = 1.0, axes: Any = None,
+                     **style: Any) -> Any:
+        """Draw the temperature through the thickness at times (default: `outputs`); returns the matplotlib axes.
+
+        scale: what lengths are multiplied with.
+        """
         from ..figures import figure
         axes = figure()[1] if axes is None else axes
         chosen = self._chosen(times)
         distance, T = self.through(chosen, line=line)
         for k, (t, row) in enumerate(zip(chosen, T)):
             shade = {"color": _shade(k, len(chosen))} | style
-            axes.plot(distance, row, **{"label": f"t = {t:g}"} | shade)
+            axes.plot(scale * distance, row, **{"label": f"t = {t:g}"} | shade)
         axes.set(xlabel="distance through the thickness", ylabel=f"temperature, {_DEGREES[self.unit]}")
         return axes
 

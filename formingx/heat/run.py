@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import ufl
+from mpi4py import MPI
 
 from ..errors import ConvergenceError, InputError, finite, instance, known, positive, several
 from ..mesh import Mesh
@@ -57,17 +57,23 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
         raise InputError(f"heat: displacement = {displacement!r}: must be a Function or expression (u_r, u_z)")
     tolerance = positive("heat: tolerance", tolerance)
     body = Conduction(mesh, materials, boundaries, kinematics, ABSOLUTE_ZERO[unit], displacement)
-    _begin(body, start, ABSOLUTE_ZERO[unit])
-    run = HeatRun(body, unit, outputs)
-    _advance(run, body, outputs, tolerance, max_steps)
+    try:
+        _begin(body, start, unit)
+        run = HeatRun(body, unit, outputs)
+        _advance(run, body, outputs, tolerance, max_steps)
+    finally:
+        body.destroy()
     return run
 
 
-def _begin(body: Conduction, start: Any, absolute_zero: float) -> None:
+def _begin(body: Conduction, start: Any, unit: str) -> None:
+    if getattr(start, "unit", unit) != unit:
+        raise InputError(f"heat: start: is in {start.unit!r}, this run in {unit!r}: must be in the same unit")
     T = fields.values_at(start, body.points, body.mesh, "heat: start")
-    lowest = T.min(initial=np.inf)
-    if body.mesh.comm.allreduce(int(lowest < absolute_zero)):
-        raise InputError(f"heat: start = {start!r}: must be at least {absolute_zero:g}, absolute zero")
+    lowest = body.comm.allreduce(T.min(initial=np.inf), MPI.MIN)
+    if lowest < ABSOLUTE_ZERO[unit]:
+        raise InputError(f"heat: start: its lowest temperature is {lowest:.6g} {unit}: must be at least"
+                         f" {ABSOLUTE_ZERO[unit]:g}, absolute zero")
     body.T.x.array[: len(T)] = T
     body.T.x.scatter_forward()
 

@@ -7,7 +7,7 @@ ringing, as it does with the trapezoidal rule.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
