@@ -3,6 +3,10 @@
 from . import mesh
 from .doctor import doctor
 from .errors import ConvergenceError, InputError
+from .heat.boundaries import Absorption, Convection, FixedTemperature, HeatFlux, Radiation, ThermalProperties
+from .heat.contact import ConductingTool, ContactWithTool
+from .heat.result import HeatRun
+from .heat.run import heat
 from .materials.data import treloar1944
 from .materials.fit import Fit, fit
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
@@ -30,3 +34,5 @@ from .solve.targets import displacement, enclosed_volume, pole_height, pole_stre
 from .units import Units
 
 __version__ = "0.1.0"
+from .tables import table
+from .time_temperature import WLF, Arrhenius
