@@ -31,8 +31,8 @@ from .solve.stage import Stage
 from .solve.state import State
 from .solve.stepping import StepControl
 from .solve.targets import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel
+from .tables import table
+from .time_temperature import WLF, Arrhenius
 from .units import Units
 
 __version__ = "0.1.0"
-from .tables import table
-from .time_temperature import WLF, Arrhenius
