@@ -84,6 +84,24 @@ class NodalContact:
         last = self._last[1]
         return (last.sense + 4 * (last.normal != 0)).astype(np.int8).tobytes()
 
+    @property
+    def status(self):
+        last = self._last[1]
+        return (last.sense + 4 * (last.normal != 0)).astype(int)
+
+    def trial(self, by):
+        """The law, linearised at the last iterate moved `by`, seen from there."""
+        x = self._last[0]
+        return self.law.tractions(x, self._memory, None, self._iterate.to(x + by))
+
+    def trial_of(self, i, by):
+        law, x = self.law, self._last[0][i]
+        part = type(law)(law.tool, law.mu, law.k, law.theta, law.shift[i], law.separates)
+        old = None if self._memory is None else type(self._memory)(*(q[i] for q in self._memory))
+        m = self._iterate
+        m = type(m)(*(q[i] for q in m))
+        return part.tractions(x, old, None, m.to(x + by))
+
     def forget(self, fields: np.ndarray, control: float) -> None:
         """The tool comes in: nothing has touched it yet."""
         self._accepted, self._arrived[:] = None, False

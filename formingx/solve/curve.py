@@ -33,6 +33,23 @@ class Branch:
         """Arc length of a straight piece (x, control) of path."""
         return float(np.sqrt(self.problem.inner(x, x) + CONTROL_WEIGHT * control**2))
 
+    def norm_of(self, x):
+        self._b.array_w[:] = x
+        return self.norm(self._b, 0.0)
+
+    def jump(self, old: State, by: float) -> State:
+        from .jump import jump
+        import logging
+        say = logging.getLogger("formingx").info
+        x, control, history, found = jump(self, old, by, say)
+        self._x.array_w[:] = x
+        self.newton.tangent(self._x, control)
+        state = self._state(control, history, "jump" if found.solves else "step", None)
+        if state.slope * by < 0:
+            state.direction, state.slope = -state.direction, -state.slope
+        state.jump = found
+        return state
+
     def start(self) -> State:
         """The body at control 0, in equilibrium with whatever else acts on it, and the tangent there."""
         history: list = []

@@ -29,6 +29,7 @@ from .stepping import StepControl
 
 log = logging.getLogger("formingx")
 
+JUMP_AT = (2, 1e-3)
 _TRY = (" Try a target within what was met, a smaller first step (step=StepControl(length=...)), more elements where"
         " the body deforms most, or more max_steps.")
 
@@ -175,6 +176,9 @@ class Run:
         Failures halve the step.
         """
         problem = self.path.problem
+        fails = 0
+        if old.kind == "limit point" and problem.memory:
+            return [self.branch.jump(old, 1e-6)]
         while True:
             length = problem.reach(old.x, old.control, old.direction, old.slope, self.step.length)
             limited = length < self.step.length
@@ -200,6 +204,12 @@ class Run:
                 self.path.counts.failures += 1
                 self.step.length = length
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
+                fails += 1
+                if problem.memory and fails >= JUMP_AT[0] and length < JUMP_AT[1]:
+                    try:
+                        return [self.branch.jump(old, max(1e-6, length * old.slope))]
+                    except Failure:
+                        log.info("jump failed")
                 if not self.step.failed():
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
                                   failure.attempt)

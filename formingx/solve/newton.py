@@ -11,6 +11,11 @@ from petsc4py import PETSc
 
 from ..errors import count, positive
 from .direct import DirectSolver
+from .settle import Settling
+
+SETTLE_FROM = 2
+FAILS = 2
+STATS = []
 
 UNLOADED = 1e-5
 """Support forces (over stress times volume over length) below which a body counts as unloaded."""
@@ -164,6 +169,7 @@ class BorderedNewton:
         self.reached = control, 0.0
         work0 = moved = 0.0
         kinks = _Kinks(problem)
+        settling_points = Settling(problem) if problem.memory else None
         while True:
             residual = self.F.norm() / (problem.force_scale + UNLOADED)
             if not np.isfinite(residual):
@@ -173,6 +179,8 @@ class BorderedNewton:
                 return control, history
             problem.linearise(x, control, self.F)
             kinks.look(moved)
+            if settling_points:
+                settling_points.look()
             quiet = history[kinks.changed:]
             grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
             if grown and not (problem.has_kinks and moved < SMALL):
@@ -192,10 +200,18 @@ class BorderedNewton:
                 raise Failure("the quantity that is aimed at does not change along the path here", history)
             step = (-c - self.gradient.dot(self.a)) / slope
             self.a.axpy(step, self.b)
+            share = kinks.share
+            if settling_points and kinks.changed == len(history) and len(history) >= SETTLE_FROM:
+                before = settling_points.failed, settling_points.inner
+                step = settling_points.correct(self, step, slope)
+                STATS.append((sum(map(np.sum, settling_points.marked)), settling_points.inner - before[1], settling_points.failed - before[0]))
+                share = 1.0
+                if settling_points.failed >= FAILS:
+                    raise Failure("contact does not settle: no state of the points at the kink is consistent", history)
             work = abs(self.F.dot(self.a))
             work0 = work0 or work or 1.0
-            x.axpy(kinks.share, self.a)
-            control += kinks.share * step
+            x.axpy(share, self.a)
+            control += share * step
             moved = self._norm(self.a, step)
             correction = moved / (self._norm(x, control) + AT_REST)
             if not np.isfinite(correction):
