@@ -19,7 +19,7 @@ import formingx as fx  # noqa: E402
 from formingx.discrete.problem import Problem  # noqa: E402
 from formingx.reference import membrane_inflation, membrane_limit_point  # noqa: E402
 from formingx.results import files  # noqa: E402
-from formingx.solve.curve import Branch  # noqa: E402
+from formingx.solve.curve import Curve  # noqa: E402
 from formingx.solve.newton import Failure  # noqa: E402
 
 RATIO = 15.24
@@ -128,11 +128,11 @@ def why():
             scale = 1 / np.sqrt(np.where(np.diag(dense) != 0, np.abs(np.diag(dense)), 1.0))
             scaled = dense * scale[:, None] * scale
             negative = int(np.sum(np.linalg.eigvalsh((scaled + scaled.T) / 2) < -1e-10))
-            branch = Branch(problem, fx.Tolerances())
-            start, step = branch.start(), 1.0
+            curve = Curve(problem, fx.Tolerances())
+            start, step = curve.start(), 1.0
             while step > 1e-9:
                 try:
-                    branch.step(start, step)
+                    curve.step(start, step)
                     break
                 except Failure:
                     step /= 2

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import formingx as fx
-from formingx.solve import curve as branch
+from formingx.solve import curve
 
 _NUMBER = {"a word": "x", "nan": math.nan, "inf": math.inf, "a bool": True, "a list": [], "an array": [1.0, 2.0],
            "huge": 10**400, "a dict": {}}
@@ -219,8 +219,8 @@ def bad_input() -> list[Outcome]:
     made, folder = _scene(), tempfile.TemporaryDirectory()
     saved = os.path.join(folder.name, "run")
     fx.trace(made, until=fx.pole_height(0.05), progress=False).save(saved)
-    start = branch.Branch.start
-    branch.Branch.start = _stop                              # whatever gets that far was taken for good input
+    start = curve.Curve.start
+    curve.Curve.start = _stop                              # whatever gets that far was taken for good input
     found = []
     try:
         for call in calls(made, saved):
@@ -239,7 +239,7 @@ def bad_input() -> list[Outcome]:
             found.append(Outcome(call.name, "no_such_argument", "unknown", *_try(call, good | {"no_such_argument": 1},
                                                                                  TypeError)))
     finally:
-        branch.Branch.start = start
+        curve.Curve.start = start
         folder.cleanup()
     return found
 

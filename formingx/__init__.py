@@ -17,12 +17,11 @@ from .results.compare import Comparison, compare
 from .results.compare_nodes import NodalComparison, compare_nodes, write_nodes
 from .results.evaluate.profile import Profile
 from .results.evaluate.stress import Stress, StressField
-from .results.files.checkpoint import load
-from .results.path import Path, State
+from .results.path import Path
+from .runs import Process, load, solve, trace
 from .scene.scene import Scene
-from .solve.fixed import solve
-from .solve.follow import trace
 from .solve.newton import Tolerances
-from .solve.process import Process, Stage
+from .solve.stage import Stage
+from .solve.state import State
 from .solve.stepping import StepControl
 from .solve.targets import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel

@@ -36,7 +36,7 @@ def random_state(problem, seed=1, size=0.004):
     x.setArray(size * rng.standard_normal(x.getLocalSize()))
     d.setArray(0.03 * rng.standard_normal(x.getLocalSize()))
     for v in (x, d):
-        v.array_w[problem._held] = 0
+        v.array_w[problem.held] = 0
     return x, d
 
 
@@ -127,7 +127,7 @@ def test_derivative_by_control(driven):
     control, h = 0.4, 1e-5
     # a held unknown follows the control in x as well as in the residual
     shift = np.zeros_like(x.array_r)
-    shift[problem._held] = problem._motion
+    shift[problem.held] = problem.held_rate
     plus, minus = x.duplicate(), x.duplicate()
     plus.setArray(x.array_r + (control + h) * shift)
     minus.setArray(x.array_r + (control - h) * shift)
@@ -136,10 +136,10 @@ def test_derivative_by_control(driven):
     exact = problem.x.duplicate()
     problem.control_derivative(x, control, exact)
     free = np.ones(len(shift), dtype=bool)
-    free[problem._held] = False
+    free[problem.held] = False
     assert np.abs(numeric - exact.array_r)[free].max() < 1e-6 * np.abs(exact.array_r).max()
     assert np.abs(exact.array_r[free]).max() > 1e-3
-    assert np.allclose(exact.array_r[problem._held], -problem._motion)
+    assert np.allclose(exact.array_r[problem.held], -problem.held_rate)
 
 
 @pytest.mark.parametrize("kinematics", [fx.Axisymmetric(), fx.PlaneStrain()], ids=lambda k: type(k).__name__)

@@ -9,7 +9,7 @@ from conftest import ROOT, treloar
 import formingx as fx
 from formingx.errors import InputError
 from formingx.reference import membrane_under_plug
-from formingx.solve.follow import Run
+from formingx.solve.follow import was_passed
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import plug_extremes  # noqa: E402
@@ -76,9 +76,8 @@ def test_a_path_never_comes_back_to_itself():
     """Beyond the pressure maximum a state of the rising branch is refused; one of the falling branch is not."""
     path = fx.trace(treloar(), until=fx.pole_stretch(4.0), progress=False)
     risen, fallen = path.at(fx.pressure(0.46)), path.at(fx.pressure(0.46), after=path.limit_points[0])
-    run = Run(path, path._branch, [(None, None)], None, None)
-    run._first = 0
-    assert run._been_at(risen, path.last)
+    curve = path.record.curve
+    assert was_passed(curve, path.states[:-1], path.last, risen)
     k = next(i for i, s in enumerate(path.states) if s.measures["pole_stretch"] > fallen.measures["pole_stretch"])
     del path.states[k:]
-    assert not run._been_at(fallen, path.last)
+    assert not was_passed(curve, path.states[:-1], path.last, fallen)

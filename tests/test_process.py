@@ -11,7 +11,7 @@ import formingx as fx
 from formingx.discrete.problem import Problem
 from formingx.discrete.schedule import Setting
 from formingx.discrete.solid import Formulation
-from formingx.results.path import State
+from formingx.solve.state import State
 
 Stage, tools = fx.Stage, fx.tools
 STEP = fx.StepControl(target=8)
@@ -176,17 +176,17 @@ def test_derivative_by_control_after_a_change_of_stage(number):
     plus, minus, exact, x = (problem.x.duplicate() for _ in range(4))
     for out, control in ((plus, h), (minus, -h)):
         x.setArray(state.x)
-        x.array_w[problem._held] += control * problem._motion
+        x.array_w[problem.held] += control * problem.held_rate
         problem.residual(x, control, out)
     x.setArray(state.x)
     problem.residual(x, 0.0, exact)
     assert exact.norm() < 1e-8 * problem.force_scale
     problem.control_derivative(x, 0.0, exact)
-    free = np.setdiff1d(np.arange(len(state.x)), problem._held)
+    free = np.setdiff1d(np.arange(len(state.x)), problem.held)
     numeric = (plus.array - minus.array) / (2 * h)
     assert np.abs(exact.array[free]).max() > 1e-4 or number == 2
     np.testing.assert_allclose(numeric[free], exact.array[free], atol=1e-5 * np.abs(exact.array).max())
-    assert np.array_equal(exact.array[problem._held], -problem._motion)
+    assert np.array_equal(exact.array[problem.held], -problem.held_rate)
 
 
 @pytest.mark.parametrize("friction", ["none", "stick", 0.3])
@@ -245,9 +245,10 @@ def test_supports_that_open_and_close():
     plain = run(hinged, air("up", 0.05, without=[grip]))
     held, opened = path.problem, end(path, "open")
     assert same(opened, plain.last)
-    assert same(end(path, "close"), plain.last, n=held._n)          # without the hinge's force
+    own = held.forms.space.dofmap.index_map.size_local
+    assert same(end(path, "close"), plain.last, n=own)      # without the hinge's force
     held.enter(Setting(**end(path, "down").setting), end(path, "down").x, 0.0)
-    assert np.abs(end(path, "down").x - opened.x)[held._held].max() < 1e-14
+    assert np.abs(end(path, "down").x - opened.x)[held.held].max() < 1e-14
     assert end(path, "down").measures["pole_height"] > 0.1                  # the turned rim keeps it bent
     assert np.abs(path.last.x).max() < 1e-8
 
@@ -300,7 +301,7 @@ def test_the_record(tmp_path, there_and_back):
     travel, pole = path.curve("plug_travel", "pole_height", points=3)
     assert len(travel) > len(path) and travel.min() == -3.0
     # measures of an earlier state are those of its own stage
-    assert path.value(path._recorded["tool_force"], end(path, "high")) == end(path, "high").measures["tool_force"]
+    assert path.value("tool_force", end(path, "high")) == end(path, "high").measures["tool_force"]
 
 
 AT_REST = Stage("up", drive="air", until=fx.pressure(0.1))
@@ -365,7 +366,7 @@ def test_ranks_agree():
 
 
 def test_a_scene_pays_for_what_is_in_it():
-    assert Problem(plugged()).memory == [] and Problem(gripped()).contacts == []
+    assert not Problem(plugged()).has_history and Problem(gripped()).contacts == []
 
 
 def test_the_stages_of_a_restart_are_those_that_were_run():

@@ -1,20 +1,31 @@
-"""Contact of one face as forces at its nodes: where `problem` meets `physics.contact`. No form is compiled per tool."""
+"""Contact of one face as forces at its nodes, and what they remember (a `History`). No form is compiled per tool."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
+from ..errors import InputError
 from ..physics.contact import Contact, Touch, Tractions
 
 HOVERING = 1e-3
 """Distances (over thickness) at which a node is as good as in touch."""
 
 
-class NodalContact:
+class Memory(NamedTuple):
+    """What the nodes of a face remember of the last accepted state.
+
+    touch: of the law of friction; arrived: which nodes came into contact in the step that ended there, shape (n,).
+    """
+
+    touch: Touch
+    arrived: np.ndarray
+
+
+class ContactNodes:
     """Residual, tangent and history of one contact, at the nodes of its face that this rank owns.
 
     Args:
@@ -44,15 +55,17 @@ class NodalContact:
         self._scale = solid.length / (solid.stress * solid.volume) * self.area
         self._motion = solid.length * np.array(contact.moves or (0.0, 0.0))
         self.base, self.rate = 0.0, float(contact.driven)   # of the travel by the control (`Setting`)
+        self.present = True                                 # it takes part in the stage
         self._last: Any = None                              # positions and tractions last computed
-        self._accepted: Any = None                          # positions at the last accepted state
-        self._iterate: Any = None                           # `Motion` at the iteration before
-        self.memory = self.law.start(self.points) if self.law.remembers else None
-        self._sense: Any = None                             # of sliding, of the iteration before
-        self._arrived = np.zeros(len(self.points), dtype=bool)     # in the step before the last accepted state
-        # without history only the step's own convergence limits how much may touch in it
+        # of Newton's method: `Motion` and sense of sliding at the iteration before
+        self._iterate: Any = None
+        self._sense: Any = None
+        # of the step ahead: nodes that it may bring into contact (without history its own convergence limits them),
+        # and that its tangent brings
         self._allowed = contact.nodes_per_step * (1 if self.law.remembers else 10)
         self._foreseen = 0
+        self._memory: Any = None
+        self.start()
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Nodes seen from the tool, shape (n, 2), length; `fields`: owned unknowns."""
@@ -62,8 +75,62 @@ class NodalContact:
         """What the law gives at a state, computed once for it."""
         x = self.positions(fields, control)
         if self._last is None or not np.array_equal(x, self._last[0]):
-            self._last = x, self.law.tractions(x, self.memory)
+            self._last = x, self.law.tractions(x, self.touch)
         return self._last[1]
+
+    @property
+    def touch(self) -> Touch | None:
+        """What the law of friction remembers; None without friction."""
+        return self._memory and self._memory.touch
+
+    def start(self) -> None:
+        """Nothing has touched the tool yet, the body being at rest."""
+        self._start_at(self.points)
+
+    def come_in(self, fields: np.ndarray, control: float) -> None:
+        """The tool comes in: nothing has touched it yet."""
+        self._start_at(self.positions(fields, control))
+
+    def _start_at(self, x: np.ndarray) -> None:
+        self.put(Memory(self.law.start(x), np.zeros(len(x), dtype=bool)) if self.law.remembers else None)
+
+    def get(self) -> Memory | None:
+        """What the nodes remember of the last accepted state; None without friction."""
+        return self._memory
+
+    def put(self, memory: Memory | None) -> None:
+        """Remember something else."""
+        if memory is not self._memory:
+            self._memory, self._last = memory, None
+
+    def advance(self, fields: np.ndarray, control: float) -> None:
+        """A state is accepted: remember it. (A tool that is away remembers nothing new.)"""
+        if self._memory is None or not self.present:
+            return
+        before, theta = self._memory.touch.distance, self.law.theta
+        touch = self.law.tractions(self.positions(fields, control), self._memory.touch).touch
+        self.put(Memory(touch, (before <= -theta) & (touch.distance > -theta)))
+
+    def save(self, memory: Memory) -> dict[str, list]:
+        """A memory as plain data, node by node with its reference position, all ranks; collective."""
+        parts = self._comm.allgather((self.points, *memory.touch, memory.arrived))
+        names = ("points", *memory.touch._fields, "arrived")
+        return {name: np.concatenate(column).tolist() for name, column in zip(names, zip(*parts, strict=True))}
+
+    def load(self, data: dict[str, list]) -> Memory:
+        """The own part of what `save` gave.
+
+        Raises:
+            InputError: a node of the face is not in it.
+        """
+        from scipy.spatial import cKDTree
+        away, rows = cKDTree(np.array(data["points"]).reshape(-1, 2)).query(self.points)
+        if np.any(away > 1e-9 * self._length):
+            raise InputError("checkpoint: a contact node of the scene is not in it: it is of another mesh")
+        like = self.law.start(self.points)
+        touch = Touch(*(np.array(data[name], dtype=float)[rows].reshape(getattr(like, name).shape)
+                        for name in Touch._fields))
+        return Memory(touch, np.array(data["arrived"], dtype=bool)[rows])
 
     def _spread_to_axis(self, kinematics: Any) -> None:
         """Give the node on the axis some area of its facet's, so that something holds it.
@@ -79,49 +146,26 @@ class NodalContact:
                 self.area[np.abs(away - place) < 0.1] += share * at
 
     @property
-    def branch(self) -> bytes:
+    def active_set(self) -> bytes:
         """Which nodes touch and slide, of the tractions last computed."""
         last = self._last[1]
         return (last.sense + 4 * (last.normal != 0)).astype(np.int8).tobytes()
 
-    @property
-    def status(self):
-        last = self._last[1]
-        return (last.sense + 4 * (last.normal != 0)).astype(int)
-
-    def trial(self, by):
-        """The law, linearised at the last iterate moved `by`, seen from there."""
-        x = self._last[0]
-        return self.law.tractions(x, self._memory, None, self._iterate.to(x + by))
-
-    def trial_of(self, i, by):
-        law, x = self.law, self._last[0][i]
-        part = type(law)(law.tool, law.mu, law.k, law.theta, law.shift[i], law.separates)
-        old = None if self._memory is None else type(self._memory)(*(q[i] for q in self._memory))
-        m = self._iterate
-        m = type(m)(*(q[i] for q in m))
-        return part.tractions(x, old, None, m.to(x + by))
-
-    def forget(self, fields: np.ndarray, control: float) -> None:
-        """The tool comes in: nothing has touched it yet."""
-        self._accepted, self._arrived[:] = None, False
-        if self._memory is not None:
-            self.memory = self.law.start(self.positions(fields, control))
-
-    def begin(self) -> None:
-        """Newton's method begins at a guess ahead of the last accepted state."""
-        self._iterate = self._accepted if self._accepted is None else self.law.motion(self._accepted, self._memory)
+    def begin(self, x: np.ndarray | None) -> None:
+        """Newton's method begins ahead of a state with the nodes at x, shape (n, 2), if there is one."""
+        self._sense = None
+        self._iterate = None if x is None else self.law.motion(x, self.touch)
 
     def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Make the tangent at a state the one that an iteration wants, and the residual (`values`) fit to it."""
         x = self.positions(fields, control)
         plain = self.tractions(fields, control)
         if self._iterate is not None:
-            found = self.law.tractions(x, self._memory, self._sense, self._iterate.to(x))
+            found = self.law.tractions(x, self.touch, self._sense, self._iterate.to(x))
             values[self.dofs] += self._scale[:, None] * (found.force - plain.force)
             self._last = x, found
         self._sense = self._last[1].sense
-        self._iterate = self.law.motion(x, self._memory)
+        self._iterate = self.law.motion(x, self.touch)
 
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Add the nodal forces to the owned residual."""
@@ -131,7 +175,8 @@ class NodalContact:
         """Derivative of the nodal forces by the nodes' own unknowns, shape (n, 2, 2); `ahead`: see the law."""
         values = self.tractions(fields, control).stiffness
         if ahead:
-            values = self.law.stiffness_ahead(self.positions(fields, control), self._memory, self._arrived)
+            arrived = self._memory.arrived if self._memory else np.zeros(len(self.points), dtype=bool)
+            values = self.law.stiffness_ahead(self.positions(fields, control), self.touch, arrived)
         return (self._scale * self._length)[:, None, None] * values
 
     def add_control_derivative(self, values: np.ndarray, fields: np.ndarray, control: float,
@@ -141,24 +186,6 @@ class NodalContact:
             by_motion = self.stiffness(fields, control, ahead) @ (self.rate * self._motion / self._length)
             values[self.dofs] -= by_motion
 
-    def advance(self, fields: np.ndarray, control: float) -> None:
-        """A state is accepted: remember it."""
-        x = self.positions(fields, control)
-        self._accepted, self._sense, self._last = x, None, None
-        if self._memory is not None:
-            before, theta = self._memory.distance, self.law.theta
-            self.memory = self.law.tractions(x, self._memory).touch
-            self._arrived = (before <= -theta) & (self._memory.distance > -theta)
-
-    @property
-    def memory(self) -> Touch | None:
-        """What the nodes remember of the last accepted state; None without friction."""
-        return self._memory
-
-    @memory.setter
-    def memory(self, memory: Touch | None) -> None:
-        self._memory, self._last = memory, None
-
     def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step along a tangent may be: to the first touch, or until enough new nodes touch.
 
@@ -166,7 +193,7 @@ class NodalContact:
         """
         start = self.positions(fields, control)
         velocity = self._length * direction[self.dofs] - slope * self.rate * self._motion
-        free = ~self.law.touching(start, self._memory)
+        free = ~self.law.touching(start, self.touch)
         times = self._arrivals(start, velocity, length)
         ahead = (times > 0.02 * length) & (times < length)         # nearer ones are as good as in touch
         times = np.sort(np.concatenate(self._comm.allgather(times[ahead])))
@@ -181,12 +208,13 @@ class NodalContact:
         times = self._arrivals(start, velocity, length)
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         if self._memory is not None:
-            self.memory = self._memory._replace(arrival=start + times[:, None] * velocity)
+            touch = self._memory.touch._replace(arrival=start + times[:, None] * velocity)
+            self.put(self._memory._replace(touch=touch))
 
     def _arrivals(self, start: np.ndarray, velocity: np.ndarray, length: float) -> np.ndarray:
         """Arc length at which free nodes meet the ramp, `length` if they do not before, shape (n,)."""
         before = -self.law.theta - self.law.distance(start)
-        free, at, times = ~self.law.touching(start, self._memory) & (self.area > 0), 0.0, np.full(len(start), length)
+        free, at, times = ~self.law.touching(start, self.touch) & (self.area > 0), 0.0, np.full(len(start), length)
         for s in length * np.linspace(0, 1, 17)[1:]:
             now = -self.law.theta - self.law.distance(start + s * velocity)
             hit = free & (now <= 0)
@@ -204,7 +232,7 @@ class NodalContact:
 
     def touching(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Which nodes touch, or are held, shape (n,)."""
-        return self.law.touching(self.positions(fields, control), self._memory)
+        return self.law.touching(self.positions(fields, control), self.touch)
 
     def largest_penetration(self, fields: np.ndarray, control: float) -> float:
         """Depth of the deepest node inside the tool, 0 if none is, length, all ranks."""

@@ -39,7 +39,7 @@ class Probe:
 
     def displacement(self, x: Any) -> np.ndarray:
         """u at the points in the user's unit, shape (n, 2), all ranks."""
-        self._problem.set_state(x, float(self._problem.forms.control.value))
+        self._problem.set_fields(x)
         w = self._problem.forms.w.x.array
         values = np.zeros((len(self.points), 2))
         values[self._mine] = self._problem.forms.length * self._local(w[self._dofs])

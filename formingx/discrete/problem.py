@@ -1,12 +1,14 @@
 """The discrete equations of a scene, F(x, control) = 0: what `solve` sees. Everything in it is created once.
 
-x holds the fields (dimensionless, see `solid`) and, at the end of the last rank's part, one Lagrange multiplier for
-each `MeanHeld` support.
+x holds the fields (dimensionless, see `formulation`) and, at the end of the last rank's part, one Lagrange multiplier
+for each `MeanHeld` support.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import contextlib
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -14,16 +16,31 @@ from dolfinx import fem, la
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..errors import InputError
-from ..physics.supports import Held
 from ..scene.scene import Scene
-from .contact_nodes import NodalContact
+from .constraints import Active, Constraints
+from .contact_nodes import ContactNodes
 from .matrix import ExtendedMatrix
 from .membrane import MidSurface
 from .schedule import Setting
 from .solid import Solid
 
 _FORMULATIONS = {"solid": Solid, "membrane": MidSurface}
+
+
+class _Stage(NamedTuple):
+    """What a setting makes of the equations, from a state on.
+
+    setting: the `Setting`; active: what is held; place, rate: of the held owned unknowns, place + rate * control, shape
+    (n,); means: values that the means are held at; left: forces without balance that a fading setting takes away, over
+    1 - control, owned part of F, or None.
+    """
+
+    setting: Setting
+    active: Active
+    place: np.ndarray
+    rate: np.ndarray
+    means: list[float]
+    left: np.ndarray | None = None
 
 
 class Problem:
@@ -33,9 +50,10 @@ class Problem:
         scene: the scene.
         forms: its fields, forms and scales (a `Formulation`).
         comm: communicator.
-        x: a vector of unknowns to duplicate.
+        x: a vector of unknowns; inside `at` those of the state.
         matrix: the tangent, refilled by `tangent`.
-        contacts: the nodal forces of the scene's contacts (`NodalContact`); touching: of those that are there now.
+        contacts: the nodal forces of the scene's contacts (`ContactNodes`); touching: of those that take part now.
+        histories: what F depends on besides x and control (`History`).
         setting: the `Setting` that x and control are seen under; see `enter`.
         force_scale: norm of all support forces at the state whose residual was last computed.
     """
@@ -50,21 +68,20 @@ class Problem:
         tangent = ufl.derivative(forms.residual, forms.w, ufl.TrialFunction(forms.space))
         self._residual = forms.compile(forms.residual)
         self._by_control = forms.control_derivative and forms.compile(forms.control_derivative)
-        self.contacts = [NodalContact(forms, contact, self.assemble) for contact in scene.contacts]
+        self.contacts = [ContactNodes(forms, contact, self.assemble) for contact in scene.contacts]
+        self.histories = [contact for contact in self.contacts if contact.law.remembers]
         folded = ufl.conditional(ufl.gt(forms.J, forms.constant(0.0)), forms.constant(0.0), forms.constant(1.0))
         self._folded = forms.compile(folded * forms.dx)
-        self._left: Any = None
-        self._motors: list[int] = []
-        self._collect()
+        self._constraints = Constraints(forms, self.assemble)
         self._by_motion = self._lift = None
-        if any(getattr(thing, "constraints", None) for thing in scene.drivable):
+        if self._constraints.can_move:
             self._lift = fem.Function(forms.space)              # held unknowns move the others through the tangent
             self._by_motion = forms.compile(ufl.action(tangent, self._lift))
-        self._matrix = ExtendedMatrix(forms.compile(tangent), index_map, [bc for _, bc, _, _ in self._holds],
-                                      [row for _, row in self._means], self.comm, self.symmetric)
+        self._matrix = ExtendedMatrix(forms.compile(tangent), index_map, [e.bc for e in self._constraints.entries],
+                                      [row for _, row in self._constraints.means], self.comm, self.symmetric)
         self.matrix = self._matrix.mat
         self.x = self.matrix.createVecRight()
-        self.setting: Any = None
+        self._stage: Any = None
         self.enter(Setting.first(scene), np.zeros(self.x.getLocalSize()), 0.0)
         self._metric = np.maximum(self.assemble(forms.compile(forms.metric_row())), 0)
         self.force_scale = 0.0
@@ -80,24 +97,44 @@ class Problem:
         return all(getattr(x, "symmetric", False) for x in (*self.scene.loads, *self.scene.contacts))
 
     @property
+    def setting(self) -> Setting:
+        """What the stage that the problem stands in has set."""
+        return self._stage.setting
+
+    @property
+    def held(self) -> np.ndarray:
+        """Local numbers of the owned unknowns that supports hold now."""
+        return self._stage.active.dofs[self._stage.active.owned]
+
+    @property
+    def held_rate(self) -> np.ndarray:
+        """Derivative of the held unknowns by the control, in the order of `held`."""
+        return self._stage.rate
+
+    @property
     def has_kinks(self) -> bool:
         """True if F has kinks, where the tangent ahead of a state differs from that behind it (`tangent`)."""
         return bool(self.touching)
 
     @property
-    def branch(self) -> Any:
-        """On which side of its kinks F was when the residual was last computed, the same on all ranks; hashable."""
-        return tuple(self.comm.allgather(tuple(c.branch for c in self.touching))) if self.touching else None
+    def active_set(self) -> Any:
+        """Which points touch and slide, of the residual last computed, the same on all ranks; hashable; None: none."""
+        return tuple(self.comm.allgather(tuple(c.active_set for c in self.touching))) if self.touching else None
+
+    @property
+    def has_history(self) -> bool:
+        """True if F depends on more than x and control."""
+        return bool(self.histories)
 
     @property
     def memory(self) -> list[Any]:
-        """What F depends on besides x and control: of every contact with friction, its last accepted state."""
-        return [contact.memory for contact in self.contacts if contact.memory is not None]
+        """What each history remembers of the last accepted state."""
+        return [history.get() for history in self.histories]
 
     @memory.setter
     def memory(self, memory: list[Any]) -> None:
-        for contact, touch in zip([c for c in self.contacts if c.memory is not None], memory, strict=True):
-            contact.memory = touch
+        for history, remembered in zip(self.histories, memory, strict=True):
+            history.put(remembered)
 
     @property
     def why_not_finite(self) -> str:
@@ -114,32 +151,64 @@ class Problem:
         name = "process time" if number == len(things) else self.scene.column(things[number]).replace("_", " ")
         return name, self.forms.scales[number] * self.setting.amplitude(number, control)
 
+    @contextlib.contextmanager
+    def at(self, state: Any) -> Iterator[Problem]:
+        """Stand at a state: its setting, histories, unknowns (`x`, `forms.w`) and control; all restored on leaving.
+
+        state: anything with x (own part), control, setting (a `Setting` as plain data, or empty) and memory.
+        """
+        fields, control = self.forms.w.x.array.copy(), float(self.forms.control.value)
+        stage, memory, x = self._stage, self.memory, self.x.array_r.copy()
+        try:
+            self.stand(state)
+            self.x.array_w[:] = state.x
+            self.set_state(self.x, state.control)
+            yield self
+        finally:
+            self.memory = memory
+            self._take(stage)
+            self.x.array_w[:] = x
+            self.forms.w.x.array[:] = fields
+            self.forms.control.value = control
+
+    def stand(self, state: Any) -> None:
+        """Go on from an accepted state: its setting and its histories are what they were then."""
+        if self.has_history:
+            self.memory = state.memory
+        if state.setting:
+            self.enter(Setting(**state.setting), state.x, state.control)
+
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         """out = F(x, control); sets `force_scale`."""
-        multipliers, fields = self.set_state(x, control), x.array_r[: self._n]
+        stage, multipliers, fields = self._stage, self.set_state(x, control), x.array_r[: self._n]
         values = self._forces(fields, control)
         self.force_scale = np.sqrt(self._dot(values, values))
-        for multiplier, row in zip(multipliers, self._rows, strict=True):
+        for multiplier, row in zip(multipliers, stage.active.rows, strict=True):
             values += multiplier * row
-        values[self._held] = fields[self._held] - self._place - self._motion * control
-        self.fill(out, values, [self._dot(row, fields) - mean if there else multiplier for row, mean, there, multiplier
-                                in zip(self._rows, self._at, self._there, multipliers, strict=True)])
-        if self._left is not None:
-            out.axpy(control - 1, self._left)
+        held = self.held
+        values[held] = fields[held] - stage.place - stage.rate * control
+        self.fill(out, values, [self._dot(row, fields) - mean if present else multiplier
+                                for row, mean, present, multiplier in
+                                zip(stage.active.rows, stage.means, stage.active.present, multipliers, strict=True)])
+        if stage.left is not None:
+            out.array_w += (control - 1) * stage.left
 
     def reaction(self, number: int, x: PETSc.Vec, control: float) -> float:
         """Force of the body on what a support (its number in the scene) drives, along its motion, all ranks.
 
         Stress length^2 (per depth: length): of the forces that are left over at the unknowns that it holds.
         """
-        self.set_state(x, control)
-        dofs = np.unique(np.concatenate([dofs for i, _, dofs, driven in self._holds if i == number and driven]))
-        left = self._forces(x.array_r[: self._n], control)[dofs[dofs < self._n]].sum()
+        left = self.forces(x, control)[self._constraints.driven_by(number)].sum()
         forms = self.forms
         return -float(self.comm.allreduce(left, MPI.SUM)) * forms.stress * forms.volume / forms.length
 
+    def forces(self, x: PETSc.Vec, control: float) -> np.ndarray:
+        """Internal less external forces at (x, control), which supports carry; owned part of the fields, shape (n,)."""
+        self.set_state(x, control)
+        return self._forces(x.array_r[: self._n], control)
+
     def _forces(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Internal less external forces at the state last set, which supports carry; owned part, shape (n,)."""
+        """`forces` at the state last set."""
         values = self.assemble(self._residual)
         for contact in self.touching:
             contact.add_residual(values, fields, control)
@@ -150,10 +219,10 @@ class Problem:
         self.set_state(x, control)
         return self.assemble_scalar(self._folded) > 0
 
-    def begin(self) -> None:
-        """Newton's method begins."""
+    def begin(self, old: Any = None) -> None:
+        """Newton's method begins at a guess ahead of a state (None: of none)."""
         for contact in self.touching:
-            contact.begin()
+            contact.begin(None if old is None else contact.positions(old.x[: self._n], old.control))
 
     def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
         """Ready the tangent at (x, control) for an iteration, and F, the residual there, for the solve with it."""
@@ -161,7 +230,7 @@ class Problem:
             values = F.array_r[: self._n].copy()
             for contact in self.touching:
                 contact.linearise(values, x.array_r[: self._n], control)
-            values[self._held] = F.array_r[: self._n][self._held]
+            values[self.held] = F.array_r[: self._n][self.held]
             F.array_w[: self._n] = values
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> PETSc.Mat:
@@ -177,26 +246,19 @@ class Problem:
         """out = dF/dcontrol at (x, control); `ahead`: as in `tangent`."""
         self.set_state(x, control)
         values = self.assemble(self._by_control) if self._by_control else np.zeros(self._n)
-        if self._moving:
+        if self._by_motion and np.any(self._stage.rate):
             values += self.assemble(self._by_motion)
         for contact in self.touching:
             contact.add_control_derivative(values, x.array_r[: self._n], control, ahead)
-        values[self._held] = -self._motion
+        values[self.held] = -self._stage.rate
         self.fill(out, values)
-        if self._left is not None:
-            out.axpy(1.0, self._left)
+        if self._stage.left is not None:
+            out.array_w += self._stage.left
 
     def advance(self, x: np.ndarray, control: float) -> None:
         """A state is accepted: what has a history takes it up. x: own part, shape (n,)."""
-        for contact in self.touching:
-            contact.advance(x[: self._n], control)
-
-    def remember(self, state: Any) -> None:
-        """Go on from a state that was accepted before: its history is what it was then."""
-        if state.setting:
-            self.enter(Setting(**state.setting), state.x, state.control)
-        self.advance(state.x, state.control)
-        self.memory = state.memory
+        for history in self.histories:
+            history.advance(x[: self._n], control)
 
     def reach(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step of at most `length` from x along (direction, slope) may be. Arrays: own part."""
@@ -217,7 +279,7 @@ class Problem:
     def motion(self, control: float) -> np.ndarray:
         """The held unknowns at their values for a control, all else 0, shape (owned part of x,)."""
         values = np.zeros(self.x.getLocalSize())
-        values[self._held] = self._place + self._motion * control
+        values[self.held] = self._stage.place + self._stage.rate * control
         return values
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
@@ -230,14 +292,18 @@ class Problem:
 
     def set_state(self, x: PETSc.Vec, control: float) -> np.ndarray:
         """Put the fields of x and the control where the forms see them; returns the multipliers, all ranks."""
-        w = self.forms.w.x
         self.forms.control.value = control
-        w.array[: self._n] = x.array_r[: self._n]
-        w.scatter_forward()
-        if not self._rows:
+        self.set_fields(x)
+        if not self._stage.active.rows:
             return np.zeros(0)
         last = self.comm.size - 1
         return self.comm.bcast(x.array_r[self._n:].copy() if self.comm.rank == last else None, root=last)
+
+    def set_fields(self, x: PETSc.Vec) -> None:
+        """Put the fields of x where the forms see them."""
+        w = self.forms.w.x
+        w.array[: self._n] = x.array_r[: self._n]
+        w.scatter_forward()
 
     def stiff_state(self, out: PETSc.Vec) -> None:
         """out = a state near rest with a regular tangent, for the first direction of a path: for a solid, rest."""
@@ -266,8 +332,6 @@ class Problem:
         """Free the PETSc objects (collective)."""
         self._matrix.destroy()
         self.x.destroy()
-        if self._left is not None:
-            self._left.destroy()
 
     def enter(self, setting: Setting, x: np.ndarray, control: float) -> None:
         """Take a setting: from here on F is that of the setting, and (x, control) is a state on its path.
@@ -275,89 +339,39 @@ class Problem:
         What is held is held where x has it, now or, if it is driven, at this control; if the setting fades what is left
         without balance, that is what makes (x, control) a state. x: own part.
         """
-        if setting == self.setting:
+        before = self._stage
+        if before is not None and setting == before.setting:
             return
-        forms, before, off = self.forms, self.setting, set(setting.off)
-        self.setting, number = setting, {id(thing): i for i, thing in enumerate(self.scene.things)}
-        forms.set_loads(setting)
-        for contact in self.contacts:
-            i = number[id(contact.contact)]
-            contact.base, contact.rate = setting.base[i], setting.rate[i]
-        self.touching = [c for c in self.contacts if number[id(c.contact)] not in off]
-        if before is None or before.off != setting.off:
-            self._hold(off)
-        rate = np.append(setting.rate, 0.0)[self._movers]
-        self._motion = rate[self._own]
-        self._place = x[self._held] - self._motion * control
-        self._moving = bool(np.any(np.array(setting.rate)[self._motors])) if self._by_motion else False
-        if self._lift is not None:
-            self._lift.x.array[:] = 0
-            self._lift.x.array[self._holding] = rate
-        self._at = [self._dot(row, x[: self._n]) for row in self._rows]
-        self._leave(x, control)
-
-    def _leave(self, x: np.ndarray, control: float) -> None:
-        """`_left`: the forces without balance that a fading setting takes away, or None."""
-        if self._left is not None:
-            self._left.destroy()
-            self._left = None
-        if self.setting.fading and control < 1:
+        same = before is not None and before.setting.off == setting.off
+        active = before.active if same else self._constraints.without(set(setting.off))
+        rate = np.append(setting.rate, 0.0)[active.driver][active.owned]
+        place = x[active.dofs[active.owned]] - rate * control
+        stage = _Stage(setting, active, place, rate, [self._dot(row, x[: self._n]) for row in active.rows])
+        self._take(stage)
+        if setting.fading and control < 1:
             at, left = self.x.duplicate(), self.x.duplicate()
             at.array_w[:] = x
             self.residual(at, control, left)
-            left.scale(1 / (1 - control))
-            self._left = left
+            self._stage = stage._replace(left=left.array_r / (1 - control))
             at.destroy()
+            left.destroy()
 
-    def _collect(self) -> None:
-        """Everything that can be held: `_holds` [(thing's number, bc, local dofs, driven)], `_means` [(number, row)].
-
-        The number is -1 for unknowns that no equation holds.
-        """
-        forms, zero = self.forms, PETSc.ScalarType(0)
-        self._holds: list[tuple[int, Any, np.ndarray, bool]] = []
-        self._means: list[tuple[int, np.ndarray]] = []
-        for i, support in enumerate(self.scene.things):
-            if getattr(support, "constraints", None) is None:
-                continue
-            for item in forms.constraints(support):
-                if isinstance(item, Held):
-                    sub = forms.space.sub(0).sub(item.component)
-                    found = self._dofs_of(support, sub, item)
-                    self._holds.append((i, fem.dirichletbc(zero, found, sub), found, item.driven))
-                else:
-                    self._means.append((i, self.assemble(forms.compile(forms.mean_row(item)))))
-        for sub, found in forms.idle_unknowns():
-            self._holds.append((-1, fem.dirichletbc(zero, found, sub), found, False))
-        self._motors = sorted({i for i, _, _, driven in self._holds if driven})
-
-    def _hold(self, off: set[int]) -> None:
-        """Hold what is not off: `_held` (owned dofs), `_holding` (all), `_movers` (thing that moves each, or -1),
-        `_rows`, `_there` (which of them hold)."""
-        holds = [hold for hold in self._holds if hold[0] not in off]
-        numbers = np.concatenate([np.zeros(0, dtype=np.int32), *(dofs for _, _, dofs, _ in holds)])
-        movers = np.concatenate([np.zeros(0, dtype=int),
-                                 *(np.full(len(dofs), i if driven else -1) for i, _, dofs, driven in holds)])
-        order = np.argsort(movers < 0, kind="stable")           # where two supports meet, the driven one counts
-        self._holding, first = np.unique(numbers[order], return_index=True)
-        self._movers, self._own = movers[order][first], self._holding < self._n
-        self._held = self._holding[self._own]
-        self._there = [i not in off for i, _ in self._means]
-        self._rows = [there * row for (_, row), there in zip(self._means, self._there, strict=True)]
-        for row in self._rows:
-            row[self._held] = 0
-        self._matrix.hold([bc for _, bc, _, _ in holds], self._rows)
-
-    def _dofs_of(self, support: Any, sub: Any, item: Held) -> np.ndarray:
-        if item.on is not None:
-            mesh = self.forms.mesh
-            return fem.locate_dofs_topological(sub, mesh.facets.dim, mesh.facets_of(item.on))
-        near, point = 1e-8 * self.forms.length, self.forms.nearest(np.array([item.point])).T
-        found = fem.locate_dofs_geometrical((sub, sub.collapse()[0]),
-                                            lambda X: np.hypot(*(X[:2] - point)) < near)[0]
-        if self.comm.allreduce(len(found), MPI.MAX) == 0:
-            raise InputError(f"{support!r}: the mesh has no node at this place")
-        return found
+    def _take(self, stage: _Stage) -> None:
+        """Make the forms, the contacts and the matrix those of a stage."""
+        before, self._stage = self._stage, stage
+        if before is stage:
+            return
+        setting, number = stage.setting, {id(thing): i for i, thing in enumerate(self.scene.things)}
+        self.forms.set_loads(setting)
+        for contact in self.contacts:
+            i = number[id(contact.contact)]
+            contact.base, contact.rate, contact.present = setting.base[i], setting.rate[i], i not in setting.off
+        self.touching = [contact for contact in self.contacts if contact.present]
+        if before is None or before.active is not stage.active:
+            self._matrix.hold(stage.active.bcs, stage.active.rows)
+        if self._lift is not None:
+            self._lift.x.array[:] = 0
+            self._lift.x.array[stage.active.dofs] = np.append(setting.rate, 0.0)[stage.active.driver]
 
     def _dot(self, a: np.ndarray, b: np.ndarray) -> float:
         return float(self.comm.allreduce(float(np.dot(a, b)), MPI.SUM))

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..solve.targets import Amplitude, Bound, bind_pole_height, bind_pole_stretch, bind_volume
+from ..errors import InputError
+from ..solve.targets import Amplitude, Bound, Target, bind_pole_height, bind_pole_stretch, bind_volume
+
+Measure = Target | Callable[[Any], float]
+"""What a user's own column records, see `formingx.trace`."""
 
 
-class _Scalar(Bound):
-    """of(value of a scalar form); recorded only."""
+class _Recorded(Bound):
+    """A measure that depends on more than the displacements: between two states it is not that of a guessed body."""
+
+    smooth = False
+
+
+class _Scalar(_Recorded):
+    """of(value of a scalar form)."""
 
     def __init__(self, problem, form, of):
         self._problem, self._form, self._of = problem, problem.forms.compile(form), of
@@ -18,8 +29,8 @@ class _Scalar(Bound):
         return self._of(self._problem.assemble_scalar(self._form))
 
 
-class _Nodal(Bound):
-    """A number of every contact, put together by `over`; recorded only."""
+class _Nodal(_Recorded):
+    """A number of every contact, put together by `over`."""
 
     def __init__(self, problem, of, over, contacts=None):
         self._problem, self._of, self._over = problem, of, over
@@ -30,14 +41,51 @@ class _Nodal(Bound):
         return float(self._over([0.0, *(self._of(contact, x.array_r, control) for contact in there)]))
 
 
-class _Reaction(Bound):
-    """Force of the body on a driven support (by its number in the scene); recorded only."""
+class _Reaction(_Recorded):
+    """Force of the body on a driven support (by its number in the scene)."""
 
     def __init__(self, problem, number):
         self._problem, self._number = problem, number
 
     def value(self, x, control):
         return self._problem.reaction(self._number, x, control)
+
+
+class _Own(_Recorded):
+    """A function of the problem, by the user."""
+
+    def __init__(self, problem, name, function):
+        self._problem, self._name, self._function = problem, name, function
+
+    def value(self, x, control):
+        self._problem.set_state(x, control)
+        found = self._function(self._problem)
+        try:
+            return float(found)
+        except (TypeError, ValueError):
+            raise InputError(f"record: {self._name!r} gave {found!r}: must be a number") from None
+
+
+def own(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Bound]) -> dict[str, Bound]:
+    """The user's columns.
+
+    Raises:
+        InputError: a name that is taken or no word, or a measure that is neither a target nor a function.
+    """
+    if not isinstance(columns, Mapping):
+        raise InputError(f"record = {columns!r}: must be {{name: measure}}")
+    found: dict[str, Bound] = {}
+    for name, measure in columns.items():
+        if not isinstance(name, str) or not name or name in taken:
+            raise InputError(f"record: name = {name!r}: must be a word that is no column yet; columns are"
+                             f" {', '.join(taken)}")
+        if isinstance(measure, Target):
+            found[name] = measure.bind(problem)
+        elif callable(measure):
+            found[name] = _Own(problem, name, measure)
+        else:
+            raise InputError(f"record: {name} = {measure!r}: must be a function of the problem, or a target")
+    return found
 
 
 def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:

@@ -146,7 +146,7 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     for name, size, other in zip(names, scale, _ranges(b)):
         if not size > 0 or not other > 0:
             raise InputError(f"compare: column {name!r} does not vary on {'our' if not size > 0 else 'their'} side")
-    curve = np.column_stack(plots.line(ours, *names)) if hasattr(ours, "curve") else a
+    curve = np.column_stack(ours.curve(*names)) if hasattr(ours, "curve") else a
     smooth = Smooth(curve / scale)
     line = smooth.line * scale
     matched, partners = _pair(b / scale, smooth)

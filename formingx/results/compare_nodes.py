@@ -136,6 +136,5 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
 def _displacements(path: Any, state: Any, points: np.ndarray) -> np.ndarray:
     """u at reference points in a state (default: the last), shape (n, 2)."""
     problem, state = path.problem, state or path.last
-    problem.x.array_w[:] = state.x
-    problem.forms.control.value = state.control
-    return probe(problem, points).displacement(problem.x)
+    with problem.at(state):
+        return probe(problem, points).displacement(problem.x)

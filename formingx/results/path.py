@@ -2,78 +2,65 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
+import itertools
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ..discrete.schedule import Setting
-from ..errors import InputError
-from ..solve import targets
-from ..solve.targets import Target
-from . import columns
+from ..errors import ConvergenceError, InputError
+from ..solve.follow import Run
+from ..solve.newton import Failure
+from ..solve.state import Counts, Record, Segment, State
+from ..solve.stepping import StepControl
+from ..solve.targets import Bound, Target, is_met
+from . import columns as standard_columns
 from .evaluate.profile import Profile, Profiles
 from .evaluate.stress import Stresses, StressField
 
 
-@dataclass
-class State:
-    """One converged state.
+class _View:
+    """What is read off the states of one problem: created once."""
 
-    Attributes:
-        x: the unknowns, this rank's part (dimensionless).
-        control: the dimensionless control.
-        direction, slope: dx and dcontrol by arc length: the unit tangent of the path.
-        measures: {name: value} in the user's units.
-        history: the Newton iterations that led to it (`formingx.solve.bordered.Iteration`).
-        kind: "start", "step", "target" or "limit point".
-        met: the target that it hits, or None.
-        memory: what the problem remembers from here on (friction).
-        stage: name of the stage of a process; setting: what the stage had set, as plain data (`Setting`).
-        stepping: what a run goes on with: its next step, its counts and its target; empty inside a step.
-    """
-
-    x: np.ndarray
-    control: float
-    direction: np.ndarray
-    slope: float
-    measures: dict[str, float] = field(default_factory=dict)
-    history: list = field(default_factory=list)
-    kind: str = "step"
-    met: Target | None = None
-    memory: list = field(default_factory=list)
-    stage: str = ""
-    setting: dict = field(default_factory=dict)
-    stepping: dict = field(default_factory=dict)
-
-
-@dataclass
-class Counts:
-    """What a run cost: accepted states (without the start), failed attempts, all Newton iterations, seconds."""
-
-    steps: int = 0
-    failures: int = 0
-    iterations: int = 0
-    seconds: float = 0.0
+    def __init__(self, problem: Any, timed: bool, columns: Mapping[str, Any]):
+        self.columns = standard_columns.standard(problem, timed)
+        self.columns |= standard_columns.own(problem, columns, self.columns)
+        self.profiles, self.stresses = Profiles(problem), Stresses(problem)
 
 
 class Path:
     """The states of a run, from the unloaded body to the target.
 
     Attributes:
-        states: all accepted states, in order along the path.
-        counts: what the run cost (`Counts`).
-        problem: the `Problem`, for further evaluation.
-        stage: name of the stage that is being recorded.
+        record: what the solver keeps of the run (`formingx.solve.state.Record`).
     """
 
-    def __init__(self, problem: Any, branch: Any, start: Path | None = None, timed: bool = False):
-        self.problem, self._branch, self.stage = problem, branch, ""
-        self._recorded = columns.standard(problem, timed)
-        self._profiles, self._stresses = Profiles(problem), Stresses(problem)
-        self.states: list[State] = list(start.states) if start else []
-        self.counts: Counts = replace(start.counts) if start else Counts()
-        branch.iterations += self.counts.iterations
+    def __init__(self, record: Record, timed: bool = False, columns: Mapping[str, Any] | None = None):
+        self.record, self._timed, self._own = record, timed, {} if columns is None else columns
+        self._views: dict[int, _View] = {}
+        self._view(record.segments[-1])                      # so that nothing is compiled on the way
+        record.on_state.append(self._measure)
+
+    @property
+    def segments(self) -> list[Segment]:
+        """(problem, states) one after the other: one, unless the run changed its problem on the way."""
+        return self.record.segments
+
+    @property
+    def states(self) -> list[State]:
+        """All accepted states, in order along the path."""
+        return self.record.states
+
+    @property
+    def counts(self) -> Counts:
+        """What the run cost."""
+        return self.record.counts
+
+    @property
+    def problem(self) -> Any:
+        """The (last) `Problem`, for further evaluation: `with path.problem.at(state): ...`."""
+        return self.record.problem
 
     def __len__(self) -> int:
         return len(self.states)
@@ -82,11 +69,6 @@ class Path:
         """One measure over all states, shape (len(path),), in the user's units."""
         self._check(name)
         return np.array([state.measures[name] for state in self.states])
-
-    def _check(self, *names: str) -> None:
-        for name in names:
-            if name not in self.columns:
-                raise InputError(f"Path: column {name!r} is not known; known: {', '.join(self.columns)}")
 
     @property
     def columns(self) -> list[str]:
@@ -101,29 +83,20 @@ class Path:
     @property
     def last(self) -> State:
         """The last accepted state."""
-        return self.states[-1]
+        return self.record.last
 
     def met(self, target: Target) -> State | None:
         """The state that hit a target of the run, or None."""
         return next((state for state in self.states if state.met and state.met[:2] == target[:2]), None)
 
-    def record(self, state: State) -> None:
-        """Take up a state: what has a history goes on from it; evaluate the measures there."""
-        self.problem.advance(state.x, state.control)
-        state.memory, state.stage, state.setting = self.problem.memory, self.stage, asdict(self.problem.setting)
-        state.measures = {name: self.value(bound, state) for name, bound in self._recorded.items()}
-        self.states.append(state)
-        self.counts.steps += state.kind != "start"
-
-    def value(self, bound: Any, state: State) -> float:
-        """A measure bound to this problem (`Target.bind`) at a state."""
-        self.go_to(state)
-        return self._branch.value(bound, state.x, state.control)
-
-    def go_to(self, state: State) -> None:
-        """Make the problem that of the state's stage."""
-        if state.setting:
-            self.problem.enter(Setting(**state.setting), state.x, state.control)
+    def value(self, measure: str | Bound, state: State) -> float:
+        """A column, by its name, or a measure bound to the state's problem (`Target.bind`), at a state."""
+        segment = self._segment(state)
+        if isinstance(measure, str):
+            self._check(measure)
+            measure = self._view(segment).columns[measure]
+        with segment.problem.at(state) as problem:
+            return measure.value(problem.x, state.control)
 
     def at(self, target: Target, after: State | None = None) -> State:
         """The first state of the path that meets the target: solved for, not interpolated; the path stays as it is.
@@ -136,83 +109,144 @@ class Path:
             InputError: the path does not pass through that value there.
             ConvergenceError: it does, between two states, but no state was found there.
         """
-        first = next((i for i, s in enumerate(self.states) if s is after), 0 if after is None else None)
-        if first is None:
+        if after is not None and after not in self.states:
             raise InputError("Path.at: after: must be a state of this path")
-        states = self.states[first:]
         values: list[float] = []
         refused: list[InputError] = []
-        for left, right in zip(states, states[1:]):
-            if left.setting != right.setting:
-                continue
-            self.go_to(left)                                 # a travel is that of what the stage drives
-            try:
-                bound = target.bind(self.problem)
-            except InputError as error:
-                refused.append(error)
-                continue
-            a, b = ends = [self.value(bound, state) for state in (left, right)]
-            for value, state in zip(ends, (left, right)):
-                if targets.is_met(target, bound, value):
-                    return state
-            if (a - target.value) * (b - target.value) < 0:
-                now, self.problem.memory = self.problem.memory, left.memory
-                try:
-                    found = self._branch.find(left, right, bound, target)
-                finally:
-                    self.problem.memory = now
-                found.stage, found.setting = left.stage, left.setting
-                found.measures = {name: self.value(m, found) for name, m in self._recorded.items()}
-                return found
-            values += ends
+        started = after is None
+        for segment in self.segments:
+            for left, right in zip(segment.states, segment.states[1:]):
+                started = started or left is after
+                if not started or left.setting != right.setting:
+                    continue
+                with segment.problem.at(left):              # a travel is that of what the stage drives
+                    try:
+                        bound = target.bind(segment.problem)
+                    except InputError as error:
+                        refused.append(error)
+                        continue
+                    a, b = ends = [segment.curve.value(bound, s.x, s.control) for s in (left, right)] \
+                        if bound.smooth else [self.value(bound, s) for s in (left, right)]
+                    for value, state in zip(ends, (left, right)):
+                        if is_met(target, bound, value):
+                            return state
+                    if (a - target.value) * (b - target.value) < 0:
+                        return self._between(segment, left, right, target, bound)
+                    values += ends
         if refused and not values:
             raise refused[0]
         raise InputError(f"the path does not pass {target}: " + (
             f"its values lie between {min(values):.6g} and {max(values):.6g}" if values else "it has one state there"))
 
-    def between(self, a: State, b: State, fraction: float) -> tuple[np.ndarray, float]:
-        """(x, control) on the smooth (cubic) path from a state to the next; for drawing."""
+    def _between(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
+        """The state between two neighbours that meets a target; the problem stands at the first."""
+        if segment.problem.has_history:                      # what lies between depends on how it is come to
+            found = self._run_to(segment, left, target, bound)
+        else:
+            found = segment.curve.find(left, right, bound, target)
+            found.stage, found.setting = left.stage, left.setting
+        segment.curve.spent()
+        found.measures = self._measures(segment, found)
+        return found
+
+    def _run_to(self, segment: Segment, left: State, target: Target, bound: Bound) -> State:
+        """The state that a run would come to that goes on from `left` to the target."""
+        record = Record(segment.problem, segment.curve)
+        record.segments[-1].states.append(replace(left, met=None))
+        record.stage = left.stage
+        before = segment.states[: segment.states.index(left) + 1]
+        step = next((s.stepping["step"] for s in reversed(before) if s.stepping and s.setting == left.setting), {})
+        try:
+            Run(record, [(target, bound)], StepControl(**step)).follow(200, False, None)
+        except (ConvergenceError, Failure) as error:
+            raise ConvergenceError(f"the path passes {target} between two of its states, but no state was found there:"
+                                   f" {error}; run with through=[...] to have one") from None
+        return record.last
+
+    def between(self, a: State, b: State, fraction: float) -> State:
+        """A body on the smooth (cubic) path from a state to the next; for drawing: it is no solution."""
         if a.setting != b.setting:                           # a stage begins
-            return b.x, b.control
-        return self._branch.interpolate(a, b, fraction)
+            return b
+        x, control = self._segment(b).curve.interpolate(a, b, fraction)
+        return replace(b, x=x, control=control)
 
     def distance(self, a: State, b: State) -> float:
         """Arc length from a state to the next along the tangent (dimensionless)."""
-        return self._branch.progress(a, b) if a.setting == b.setting else 0.0
-
-    def measured(self, at: Any, *columns: str) -> list[float]:
-        """Columns at anything that has x, control and setting."""
-        return [self.value(self._recorded[c], at) for c in columns]
+        return self._segment(b).curve.progress(a, b) if a.setting == b.setting else 0.0
 
     def curve(self, *columns: str, points: int = 12) -> list[np.ndarray]:
-        """Columns along the smooth (cubic) path through the states, `points` to each piece; for drawing.
+        """Columns along the smooth path through the states, `points` to each piece; for drawing.
 
-        Values at the states themselves are theirs; between them they are interpolated, not solved for.
+        Values at the states themselves are theirs. Between them, what follows from displacements and control alone is
+        that of the cubic path; other columns (forces, energies) follow a monotone cubic through their values, by arc
+        length.
         """
         self._check(*columns)
-        rows = [[self.states[0].measures[c] for c in columns]]
-        for a, b in zip(self.states, self.states[1:]):
-            self.go_to(b)
-            for k in range(1, points if a.setting == b.setting else 0):
-                at = self._branch.interpolate(a, b, k / points)
-                rows.append([self._branch.value(self._recorded[c], *at) for c in columns])
-            rows.append([b.measures[c] for c in columns])
+        rows = []
+        for segment in self.segments:
+            for states in _pieces(segment.states):
+                rows.append([states[0].measures[c] for c in columns])
+                rows += self._smooth(segment, states, columns, points) if len(states) > 1 else []
         return list(np.array(rows).T)
+
+    def _smooth(self, segment: Segment, states: list[State], columns: Any, points: int) -> list[list[float]]:
+        """Rows of columns after the first, to the last, of states with one setting."""
+        from scipy.interpolate import PchipInterpolator
+        bounds = [self._view(segment).columns.get(c) for c in columns]
+        at = np.concatenate([[0.0], np.cumsum([max(segment.curve.distance(a, b), 1e-300)
+                                               for a, b in zip(states, states[1:])])])
+        through = {c: PchipInterpolator(at, [s.measures[c] for s in states]) for c, bound in zip(columns, bounds)
+                   if bound is None or not bound.smooth}
+        rows = []
+        with segment.problem.at(states[0]):
+            for k, (a, b) in enumerate(zip(states, states[1:])):
+                for fraction in np.arange(1, points) / points:
+                    there = segment.curve.interpolate(a, b, fraction)
+                    s = at[k] + fraction * (at[k + 1] - at[k])
+                    rows.append([float(through[c](s)) if c in through else segment.curve.value(bound, *there)
+                                 for c, bound in zip(columns, bounds)])
+                rows.append([b.measures[c] for c in columns])
+        return rows
 
     def profile(self, state: State | None = None) -> Profile:
         """Deformed outline and thickness of a sheet at a state (default: the last)."""
-        return self._profiles.of(state or self.last)
+        state = state or self.last
+        return self._view(self._segment(state)).profiles.of(state)
 
     def stress(self, state: State | None = None) -> StressField:
         """Stresses and stretches at a state (default: the last), layer by layer."""
-        return self._stresses.of(state or self.last)
+        state = state or self.last
+        return self._view(self._segment(state)).stresses.of(state)
 
     def describe(self, state: State) -> str:
         """A state's main numbers in one line."""
-        scene = self.problem.scene
-        columns = ("process_time", *map(scene.column, scene.drivable), "pole_height", "pole_stretch")
-        return f"stage {state.stage!r}, " * bool(state.stage) + ", ".join(
-            f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in columns if k in state.measures)
+        return self.record.describe(state)
+
+    def _check(self, *names: str) -> None:
+        for name in names:
+            if name not in self.columns:
+                raise InputError(f"Path: column {name!r} is not known; known: {', '.join(self.columns)}")
+
+    def _measure(self, state: State) -> None:
+        """Fill the columns of an accepted state."""
+        state.measures = self._measures(self.segments[-1], state)
+
+    def _measures(self, segment: Segment, state: State) -> dict[str, float]:
+        columns = self._view(segment).columns
+        with segment.problem.at(state) as problem:
+            return {name: bound.value(problem.x, state.control) for name, bound in columns.items()}
+
+    def _segment(self, state: State) -> Segment:
+        """The segment that a state is of; the last one if it is of none."""
+        if len(self.segments) > 1:
+            return next((s for s in self.segments if any(state is one for one in s.states)), self.segments[-1])
+        return self.segments[-1]
+
+    def _view(self, segment: Segment) -> _View:
+        key = id(segment.problem)
+        if key not in self._views:
+            self._views[key] = _View(segment.problem, self._timed, self._own)
+        return self._views[key]
 
     def to_csv(self, file: Any) -> None:
         """Write one row per state: stage (of a process), kind, iterations and every measure (rank 0 writes)."""
@@ -286,3 +320,8 @@ class Path:
         from .show import views
         axisymmetric = self.problem.scene.kinematics.dimension_of_volume == 3
         (views.revolved if axisymmetric else views.extruded)(self.profile(state), file, self.problem.comm)
+
+
+def _pieces(states: list[State]) -> list[list[State]]:
+    """Neighbours with the same setting."""
+    return [list(group) for _, group in itertools.groupby(states, key=lambda state: state.setting)]

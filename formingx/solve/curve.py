@@ -1,4 +1,4 @@
-"""A branch of solutions (x, control): its metric, its tangents, and solving for single states on it."""
+"""The curve of solutions (x, control): its metric, its tangents, and solving for single states on it."""
 
 from __future__ import annotations
 
@@ -8,50 +8,40 @@ from typing import Any
 import numpy as np
 
 from ..errors import ConvergenceError
-from ..results.path import State
 from .diagnose import Attempt, diagnose
 from .newton import UNLOADED, BorderedNewton, Failure, Tolerances
+from .state import State
 
 CONTROL_WEIGHT = 0.1
 """Weight of the squared control against the mean squared displacement in arc length (both dimensionless)."""
 
 
-class Branch:
+class Curve:
     """Solves for states of a problem and knows how far apart they are.
 
     Attributes:
-        iterations: Newton iterations spent, whether they led to a state or not.
+        fixed_control: True if it cannot pass a limit point.
     """
+
+    fixed_control = False
 
     def __init__(self, problem: Any, tolerances: Tolerances):
         self.problem = problem
         self.newton = BorderedNewton(problem, tolerances, self.norm)
-        self.iterations = 0
+        self._iterations = 0
         self._x, self._a, self._b = (problem.x.duplicate() for _ in range(3))
 
     def norm(self, x: Any, control: float) -> float:
         """Arc length of a straight piece (x, control) of path."""
         return float(np.sqrt(self.problem.inner(x, x) + CONTROL_WEIGHT * control**2))
 
-    def norm_of(self, x):
-        self._b.array_w[:] = x
-        return self.norm(self._b, 0.0)
-
-    def jump(self, old: State, by: float) -> State:
-        from .jump import jump
-        import logging
-        say = logging.getLogger("formingx").info
-        x, control, history, found = jump(self, old, by, say)
-        self._x.array_w[:] = x
-        self.newton.tangent(self._x, control)
-        state = self._state(control, history, "jump" if found.solves else "step", None)
-        if state.slope * by < 0:
-            state.direction, state.slope = -state.direction, -state.slope
-        state.jump = found
-        return state
-
     def start(self) -> State:
-        """The body at control 0, in equilibrium with whatever else acts on it, and the tangent there."""
+        """The body at control 0, in equilibrium with whatever else acts on it, and the tangent there.
+
+        Raises:
+            Failure: Newton's method does not find it from rest.
+            ConvergenceError: the body has no stiffness.
+        """
         history: list = []
         self._x.set(0)
         self.problem.residual(self._x, 0.0, self.newton.F)
@@ -59,13 +49,10 @@ class Branch:
             try:
                 _, history = self.newton.correct(self._x, 0.0, _no_control)
             except Failure as failure:
-                found = diagnose(self, [], failure.reason, self._attempt())
-                fixed = [repr(load) for load in self.problem.scene.loads if not load.driven]
-                words, advice = (f", under {', '.join(fixed)}", "drive the largest of them instead") if fixed else (
-                    "", "a tool touches the body at rest: give its Contact a smaller ramp")
-                raise ConvergenceError(f"no equilibrium was found before anything is driven{words}: {failure.reason};"
-                                       f" {advice}", diagnosis=found) from None
-            self.iterations += len(history) - 1
+                self._iterations += len(failure.history)
+                failure.attempt = self._attempt()
+                raise
+            self._iterations += len(history) - 1
         else:
             self.problem.stiff_state(self._x)
             if not self.newton.tangent(self._x, 0.0):
@@ -73,6 +60,20 @@ class Branch:
                                        " no stiffness")
             self._x.set(0)
         return self._state(0.0, history, "start", None)
+
+    def no_start(self, failure: Failure) -> ConvergenceError:
+        """The error of a body for which no first state was found."""
+        found = diagnose(self, [], failure.reason, failure.attempt)
+        fixed = [repr(load) for load in self.problem.scene.loads if not load.driven]
+        words, advice = (f", under {', '.join(fixed)}", "drive the largest of them instead") if fixed else (
+            "", "a tool touches the body at rest: give its Contact a smaller ramp")
+        return ConvergenceError(f"no equilibrium was found before anything is driven{words}: {failure.reason};"
+                                f" {advice}", diagnosis=found)
+
+    def spent(self) -> int:
+        """Newton iterations since this was last asked, whether they led to a state or not."""
+        spent, self._iterations = self._iterations, 0
+        return spent
 
     def resume(self, x: np.ndarray, control: float) -> State:
         """A state once more, under the setting that the problem has taken, and the tangent there."""
@@ -86,21 +87,15 @@ class Branch:
         """The solution of F = 0 and of the constraint, from a guess; raises `Failure`."""
         self._x.array_w[:] = x
         try:
-            control, history = self.newton.correct(self._x, control, constraint)
+            control, history = self.newton.correct(self._x, control, constraint, before)
         except Failure as failure:
-            self.iterations += len(failure.history)
+            self._iterations += len(failure.history)
             failure.attempt = self._attempt()
             raise
-        self.iterations += len(history) - 1
+        self._iterations += len(history) - 1
         if self.problem.folded(self._x, control):               # forces of 1/J know no sign
             raise Failure("an element turned inside out", history)
         return self._state(control, history, kind, before)
-
-    def adopt(self, x: Any, control: float, history: list, before: State) -> State:
-        """A solution found elsewhere as a state, with the tangent there."""
-        x.copy(self._x)
-        self.newton.tangent(x, control)
-        return self._state(control, history, "step", before)
 
     def look_ahead(self, state: State) -> None:
         """The tangent of an accepted state once more: the problem remembers the state now."""

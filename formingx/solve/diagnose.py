@@ -30,17 +30,17 @@ class Found(NamedTuple):
     point: np.ndarray
 
 
-def diagnose(branch: Any, states: list, reason: str, attempt: Attempt | None = None, pace: str = "",
-             target: float | None = None, fixed_control: bool = False) -> Diagnosis:
+def diagnose(curve: Any, states: list, reason: str, attempt: Attempt | None = None, pace: str = "",
+             target: float | None = None) -> Diagnosis:
     """Everything that the last good state and the failed attempt tell; collective.
 
     Args:
-        branch: a `Branch`. states: the accepted ones, may be empty. attempt: None: no iteration failed.
+        curve: a `Curve`. states: the accepted ones, may be empty. attempt: None: no iteration failed.
         pace: what more is known if the run was ended in good health. target: of the control (the user's units), if that
-            is what the run aims at. fixed_control: the run cannot pass a limit point.
+            is what the run aims at.
     """
-    problem = branch.problem
-    x, keep = problem.x.duplicate(), problem.memory
+    problem = curve.problem
+    x = problem.x.duplicate()
     last = states[-1] if states else None
     facts: dict[str, Any] = {"reason": reason, "step": len(states) if states else 0,
                              "control": problem.shown(last.control)[1] if last else 0.0,
@@ -67,9 +67,8 @@ def diagnose(branch: Any, states: list, reason: str, attempt: Attempt | None = N
     if last:
         facts["touching"] = problem.comm.allreduce(
             sum(int(np.sum(touch)) for touch in _touching(problem, last.x, last.control)), MPI.SUM)
-        facts |= _tangents(branch, states, x)
-        problem.memory = keep
-    causes, advice = _verdict(facts, fixed_control, pace, target)
+        facts |= _tangents(curve, states)
+    causes, advice = _verdict(facts, curve.fixed_control, pace, target)
     x.destroy()
     tooling = Tooling.of_problem(problem)
     tools = tooling.placed(tooling.travels(last.setting, last.control)) if last else []
@@ -155,27 +154,26 @@ def _flips(problem: Any, attempt: Attempt) -> int | None:
     before = attempt.x - attempt.dx, attempt.control - attempt.dcontrol
     for contact, a, b in zip(problem.touching, _touching(problem, *before),
                              _touching(problem, attempt.x, attempt.control), strict=True):
-        slides = [contact.law.tractions(contact.positions(x[:n], c), contact.memory).sense
+        slides = [contact.law.tractions(contact.positions(x[:n], c), contact.touch).sense
                   for x, c in (before, (attempt.x, attempt.control))]
         count += int(np.sum((a != b) | (a & b & (slides[0] != slides[1]))))
     return problem.comm.allreduce(count, MPI.SUM)
 
 
-def _tangents(branch: Any, states: list, x: Any) -> dict[str, Any]:
+def _tangents(curve: Any, states: list) -> dict[str, Any]:
     """Condition and signs of the determinant along the path, and the limit point that the last slopes point to.
 
     A limit point is where the determinant of dF/dx changes its sign and the control is stationary; where it changes
     without that, another branch starts. The sign at two states says whether there was an odd number of changes
     between them; bisection finds one.
     """
-    problem = branch.problem
+    problem = curve.problem
     solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
 
     def sign(state):
-        problem.memory = state.memory
-        x.array_w[:] = state.x
-        problem.tangent(x, state.control)
-        return solver.sign() if solver.factorise() else 0
+        with problem.at(state):
+            problem.tangent(problem.x, state.control)
+            return solver.sign() if solver.factorise() else 0
 
     limits = tuple(problem.shown(s.control)[1] for s in states if s.kind == "limit point")
     facts: dict[str, Any] = {"limit_points": limits}
@@ -184,7 +182,7 @@ def _tangents(branch: Any, states: list, x: Any) -> dict[str, Any]:
     end = sign(states[-1])
     if end:
         facts["condition"] = condition(problem.matrix, solver)
-    if len(usable) > 1 and not problem.memory:
+    if len(usable) > 1 and not problem.has_history:
         # one sign per stretch between limit points: there it cannot change unless another branch starts
         turned = _changes(states, usable, sign)
     facts["turned"] = tuple((problem.shown(a.control)[1], problem.shown(b.control)[1]) for a, b in turned)

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import itertools
-import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
-from ..discrete.problem import Problem
-from ..errors import ConvergenceError, count, finite, instance
-from ..results.path import Path
-from ..scene.scene import Scene
-from .curve import Branch
-from .diagnose import Attempt, diagnose
+from .curve import Curve
+from .diagnose import Attempt
 from .direct import configure
-from .newton import UNLOADED, Iteration, Tolerances
-from .stepping import StepControl
+from .newton import UNLOADED, Failure, Iteration, Tolerances
+from .state import State
 
 _prefixes = itertools.count()
 
@@ -79,55 +75,38 @@ class FixedControl:
         return PETSc.SNES.ConvergedReason.ITERATING
 
 
-def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerances | None = None) -> Path:
-    """Load the body to a value of the control in increments, each by Newton's method at fixed control.
+class FixedControlCurve(Curve):
+    """States at given values of the control, by PETSc SNES: for curves without limit point."""
 
-    For scenes without limit point before `to`; `trace` passes limit points and picks its own steps.
+    fixed_control = True
 
-    Args:
-        to: pressure (stress) or travel (length) of what is driven.
-        increments: number of equal increments; one that fails is halved.
-        tolerances: when a state counts as converged; default `Tolerances()`.
+    def __init__(self, problem: Any, tolerances: Tolerances):
+        super().__init__(problem, tolerances)
+        self._fixed = FixedControl(problem, tolerances)
 
-    Raises:
-        InputError: nothing is driven, or an argument is not allowed.
-        ConvergenceError: an increment did not converge; it carries the path so far.
-    """
-    instance("solve: scene", scene, Scene, "a formingx.Scene")
-    instance("solve: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
-    scene.only_driven("solve")
-    to, increments = finite("solve: to", to), count("solve: increments", increments)
-    problem, began = Problem(scene), time.perf_counter()
-    tolerances = tolerances or Tolerances()
-    branch, newton = Branch(problem, tolerances), FixedControl(problem, tolerances)
-    path, x = Path(problem, branch), problem.x.duplicate()
-    path.record(branch.start())
-    step = StepControl(length=1 / increments, largest=1 / increments, smallest=1e-5 / increments)
-    done = 0.0                                               # fraction of `to`
-    while done < 1:
-        old, fraction = path.last, min(done + step.length, 1.0)
-        if 1 - fraction < 1e-9:
-            fraction = 1.0
-        control = fraction * to / problem.forms.control_scale
-        lead = (control - old.control) / old.slope           # along the tangent, as far as the control asks
-        problem.prepare(old.x, old.control, old.direction, old.slope, lead)
-        x.array_w[:] = branch.guess_from_rest(old, control) if old.kind == "start" else old.x + lead * old.direction
-        converged = newton.solve(x, control) and not problem.folded(x, control)
-        path.counts.iterations += len(newton.history) - 1
-        if converged:
-            path.record(branch.adopt(x, control, newton.history, old))
-            step.accepted(len(newton.history) - 1)
-            done = fraction
-            continue
-        path.counts.failures += 1
-        if not step.failed():
-            attempt = Attempt(x.array_r.copy(), control, newton.correction(), 0.0)
-            found = diagnose(branch, path.states, "Newton's method at fixed control did not converge", attempt,
-                             fixed_control=True)
-            raise ConvergenceError(
-                f"no equilibrium was found beyond {path.describe(old)} by Newton's method at fixed control, however"
-                f" small the increment: the path may turn back there. That state is the last good one; it is kept in"
-                f" the error's `path`. Try `trace`, which passes limit points.", path, found)
-    path.counts.seconds = time.perf_counter() - began
-    newton.destroy()
-    return path
+    def step(self, old: State, length: float) -> State:
+        """One step to the control that the tangent foretells."""
+        return self._correct(old, length, "step")
+
+    def step_to(self, old: State, length: float, equation: Callable) -> State:
+        """The same, to where an equation for the control holds."""
+        return self._correct(old, length, "target")
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        super().destroy()
+        self._fixed.destroy()
+
+    def _correct(self, old: State, length: float, kind: str) -> State:
+        control = old.control + length * old.slope
+        rest = old.kind == "start" and not np.any(old.x)
+        self._x.array_w[:] = self.guess_from_rest(old, control) if rest else old.x + length * old.direction
+        good = self._fixed.solve(self._x, control)
+        history = self._fixed.history
+        self._iterations += len(history) - 1
+        if not good or self.problem.folded(self._x, control):
+            failure = Failure("Newton's method at fixed control did not converge", history)
+            failure.attempt = Attempt(self._x.array_r.copy(), control, self._fixed.correction(), 0.0)
+            raise failure
+        self.newton.tangent(self._x, control)
+        return self._state(control, history, kind, old)

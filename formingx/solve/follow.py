@@ -10,127 +10,75 @@ import itertools
 import logging
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ..discrete.problem import Problem
-from ..errors import ConvergenceError, InputError, count, instance, several
-from ..physics.contact import Contact
-from ..results.files.checkpoint import Checkpoint
-from ..results.path import Path, State
-from ..scene.scene import Scene
-from . import targets as goals
-from .curve import Branch
+from ..errors import ConvergenceError
+from .curve import Curve
 from .diagnose import diagnose
-from .newton import Failure, Tolerances
+from .newton import Failure
+from .state import Record, State
 from .stepping import StepControl
+from .targets import Amplitude, Bound, Target, is_met
 
 log = logging.getLogger("formingx")
 
-JUMP_AT = (2, 1e-3)
 _TRY = (" Try a target within what was met, a smaller first step (step=StepControl(length=...)), more elements where"
         " the body deforms most, or more max_steps.")
 
 
-def trace(scene: Scene, *, until: goals.Target, through: Sequence[goals.Target] = (),
-          step: StepControl | None = None, tolerances: Tolerances | None = None, max_steps: int = 200,
-          progress: bool = True, start: Path | None = None, checkpoint: Any = None) -> Path:
-    """Follow the equilibrium path from the unloaded body until a target is reached, through limit points.
-
-    Args:
-        scene: with one driven load or support.
-        until: the target that ends the run, e.g. `pole_stretch(8.5)`; hit exactly.
-        through: more targets to hit exactly on the way; those that are not met are left out.
-        step: step control; default `StepControl()`.
-        tolerances: when a state counts as converged; default `Tolerances()`.
-        max_steps: accepted states before the run gives up.
-        progress: show a progress bar on runs of more than two seconds (rank 0).
-        start: a path of this scene to go on from, also one that `formingx.load` read; it stays as it is. Its steps go
-            on as they were, unless `step` is given; targets that it has met count as met.
-        checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
-
-    Raises:
-        InputError: nothing is driven, a target needs something that the scene does not have, `start` is of another
-            scene, or the checkpoint holds another run.
-        ConvergenceError: the target was not reached. It carries the path so far and says what to try.
-        OSError: the checkpoint cannot be written; the states in it are kept.
-    """
-    instance("trace: scene", scene, Scene, "a formingx.Scene")
-    through = several("trace: through", through, "targets, such as pole_stretch(3)")
-    for target in (until, *through):
-        instance("trace: target", target, goals.Target, "a target, such as pole_stretch(3)")
-        if target.name == "travel" and isinstance(scene.driven, Contact):
-            scene.check_travel(scene.driven, target.value)
-    instance("trace: step", step, StepControl | None, "a StepControl or None")
-    instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
-    max_steps = count("trace: max_steps", max_steps)
-    scene.only_driven("trace")
-    if start is not None and (not isinstance(start, Path) or start.problem.scene is not scene or not start.states):
-        raise InputError("trace: start: must be a path of this very scene: fx.load(folder, scene), or what trace gave"
-                         " back")
-    problem = Problem(scene) if start is None else start.problem
-    branch = Branch(problem, tolerances or Tolerances())
-    path = Path(problem, branch, start)
-    targets = [(target, target.bind(problem)) for target in (*through, until)]
-    run = Run(path, branch, targets, step, None if checkpoint is None else Checkpoint(checkpoint, path))
-    run.trace(max_steps, progress, None if path.states else branch.start())
-    return path
-
-
 class Run:
-    """A path that grows with one control, and the targets still open.
+    """States with one control that follow each other, and the targets still open.
 
     Args:
-        path: where the states go; branch: solves for them.
+        record: where the states go; its curve solves for them.
         targets: (target, its measure): the last one ends the run, the others are met on the way.
-        step: step control; default that of the path's last states, or `StepControl()`.
-        checkpoint: where states are written after each step, or None.
+        step: step control; default that of the record's last states, or `StepControl()`.
         turns: False: the control must not turn back (it is the time).
     """
 
-    def __init__(self, path: Path, branch: Branch, targets: Sequence[tuple[goals.Target, goals.Bound]],
-                 step: StepControl | None, checkpoint: Checkpoint | None, turns: bool = True):
-        self.path, self.branch, self.checkpoint, self._turns = path, branch, checkpoint, turns
+    def __init__(self, record: Record, targets: Sequence[tuple[Target, Bound]], step: StepControl | None = None,
+                 turns: bool = True):
+        self.record, self.curve, self.problem, self._turns = record, record.curve, record.problem, turns
         self.open = list(targets)
         self.until, self._aim = self.open[-1]
         self._step, self._best, self._began = step, 0.0, time.perf_counter()
+        self._values: list[float] = []                      # what is aimed at, in the states of this run
 
-    def trace(self, max_steps: int, progress: bool, start: State | None) -> None:
-        """Follow the path from a state, or on from the last one, until the last target is met."""
-        path, before = self.path, self.path.counts.steps
+    def follow(self, max_steps: int, progress: bool, start: State | None) -> None:
+        """Follow the path from a state, or on from the last one, until the last target is met.
+
+        Raises:
+            ConvergenceError: it cannot be reached; without the path, which the record holds.
+        """
+        record, before = self.record, self.record.counts.steps
         kept: dict[str, Any] = {}
-        self._first = len(path.states)
-        bar = _progress_bar(path.problem.comm, self.until, progress)
+        self._first = len(record.states)
+        bar = _progress_bar(self.problem.comm, self.until, progress)
         try:
             if start is None:
-                self._first -= sum(1 for _ in itertools.takewhile(lambda s: s.setting == path.last.setting,
-                                                                  reversed(path.states)))
-                kept = next((s.stepping["step"] for s in reversed(self.states) if s.stepping), {})
-                path.problem.remember(path.last)
-                self._best = max(map(self._gained, self.states))
-                met = [s.met[:2] for s in self.states if s.met]
-                self.open = [(target, bound) for target, bound in self.open if target[:2] not in met]
+                kept = self._go_on()
             else:
-                self._record(self._facing_target(start))
+                self._accept(self._facing_target(start))
             self.step = replace(self._step or StepControl(**kept))
-            self._close_met(path.last)
+            self._close_met(record.last)
             self._settle()
             while self._is_open(self.until):
-                if path.counts.steps - before >= max_steps:
+                if record.counts.steps - before >= max_steps:
                     self._give_up(f"{max_steps} states were accepted before it", pace=self._pace(max_steps))
-                for state in self._next(path.last):
-                    self._record(state)
+                for state in self._next(record.last):
+                    self._accept(state)
                     if state.kind == "limit point" and not self._turns:
                         self._give_up("no state follows in time: what the tables drive has a limit point here")
-                    if path.problem.memory or not self._is_open(self.until) and state.met is self.until:
+                    if self.problem.has_history or not self._is_open(self.until) and state.met is self.until:
                         break                           # with a history, the rest of the step starts from here
                 self._settle()
                 self._check_direction()
-                _show(bar, self.states, self.until)
+                _show(bar, self._gained(self._values[-1]), len(self.states))
         except BaseException:
-            path.counts.seconds += self._elapsed()
+            record.counts.seconds += self._elapsed()
             raise
         finally:
             bar.close()
@@ -138,7 +86,19 @@ class Run:
     @property
     def states(self) -> list[State]:
         """Those of this run."""
-        return self.path.states[self._first:]
+        return self.record.states[self._first:]
+
+    def _go_on(self) -> dict[str, Any]:
+        """Take up the states with the last one's setting as those of this run; the step control that they left."""
+        record = self.record
+        self._first -= sum(1 for _ in itertools.takewhile(lambda s: s.setting == record.last.setting,
+                                                          reversed(record.states)))
+        self.problem.stand(record.last)
+        self._values = [self.curve.value(self._aim, s.x, s.control) for s in self.states]
+        self._best = max(map(self._gained, self._values))
+        met = [s.met[:2] for s in self.states if s.met]
+        self.open = [(target, bound) for target, bound in self.open if target[:2] not in met]
+        return next((s.stepping["step"] for s in reversed(self.states) if s.stepping), {})
 
     def _elapsed(self) -> float:
         """Seconds since this was last asked."""
@@ -146,19 +106,19 @@ class Run:
         return self._began - before
 
     def _settle(self) -> None:
-        """A step is complete: note how the run goes on from here, on disk too."""
-        self.path.counts.seconds += self._elapsed()
-        settle(self.path, self.step, self.until, self.checkpoint)
+        """A step is complete."""
+        self.record.counts.seconds += self._elapsed()
+        self.record.settle(self.step, self.until)
 
     def _facing_target(self, start: State) -> State:
         """The start, its tangent turned if the target lies the other way.
 
         (At rest a target that does not change sign with the control may be reached both ways.)
         """
-        if self.until.signed or self.path.states:
+        if self.until.signed or self.record.states:
             size = 1.0 if self.until.signed else 1e-3
-            now = self.branch.value(self._aim, start.x, start.control)
-            ahead = self.branch.value(self._aim, start.x + size * start.direction, start.control + size * start.slope)
+            now = self.curve.value(self._aim, start.x, start.control)
+            ahead = self.curve.value(self._aim, start.x + size * start.direction, start.control + size * start.slope)
             if (ahead - now) * (self.until.value - now) < 0:
                 start.direction, start.slope = -start.direction, -start.slope
         return start
@@ -166,7 +126,7 @@ class Run:
     def _close_met(self, start: State) -> None:
         """Close the targets that hold at the start already, to round-off."""
         for target, bound in list(self.open):
-            if goals.is_met(target, bound, self.branch.value(bound, start.x, start.control)):
+            if is_met(target, bound, self.curve.value(bound, start.x, start.control)):
                 start.met = start.met or target
                 self.open = [(t, b) for t, b in self.open if t is not target]
 
@@ -175,10 +135,7 @@ class Run:
 
         Failures halve the step.
         """
-        problem = self.path.problem
-        fails = 0
-        if old.kind == "limit point" and problem.memory:
-            return [self.branch.jump(old, 1e-6)]
+        problem = self.problem
         while True:
             length = problem.reach(old.x, old.control, old.direction, old.slope, self.step.length)
             limited = length < self.step.length
@@ -186,43 +143,27 @@ class Run:
             problem.prepare(old.x, old.control, old.direction, old.slope, reach)
             try:
                 if target is None:
-                    new = self.branch.step(old, length)
+                    new = self.curve.step(old, length)
                 else:
-                    new = self.branch.step_to(old, reach, bound.equation(target.value))
-                    if not 0 < self.branch.progress(old, new) < 2 * length:
+                    new = self.curve.step_to(old, reach, bound.equation(target.value))
+                    if not 0 < self.curve.progress(old, new) < 2 * length:
                         raise Failure("the target was met on a far part of the path", [])
                     new.met = target
                 if problem.too_far(old.x, old.control, new.x, new.control):
                     raise Failure("too much came into contact in one step", [])
-                if self._been_at(new, old):
+                if was_passed(self.curve, self.states[:-1], old, new):
                     raise Failure("the iteration fell back to a part of the path that was passed", [])
                 states = self._sorted_into(old, new)
                 if target is None and not limited:
                     self.step.accepted(len(new.history) - 1)
                 return states
             except Failure as failure:
-                self.path.counts.failures += 1
+                self.record.counts.failures += 1
                 self.step.length = length
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
-                fails += 1
-                if problem.memory and fails >= JUMP_AT[0] and length < JUMP_AT[1]:
-                    try:
-                        return [self.branch.jump(old, max(1e-6, length * old.slope))]
-                    except Failure:
-                        log.info("jump failed")
                 if not self.step.failed():
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
                                   failure.attempt)
-
-    def _been_at(self, new: State, old: State) -> bool:
-        """True if a state found from `old` lies on an earlier piece of the path, which never comes back to itself."""
-        near, passed = 0.1 * self.branch.distance(old, new), self.states[:-1]
-        for a, b in zip(passed, passed[1:]):
-            if (a.control - new.control) * (b.control - new.control) < 0:
-                x, control = self.branch.interpolate(a, b, (new.control - a.control) / (b.control - a.control))
-                if self.branch.distance(new, replace(new, x=x, control=control)) < near:
-                    return True
-        return False
 
     def _check_direction(self) -> None:
         """Stop if the path has turned back: its target further away than half of what had been gained.
@@ -231,24 +172,23 @@ class Run:
         """
         if not self._is_open(self.until):
             return
-        gained = self._gained(self.path.last)
+        gained = self._gained(self._values[-1])
         self._best = max(self._best, gained)
-        kept = 0.0 if isinstance(self._aim, goals.Amplitude) else 0.5
+        kept = 0.0 if isinstance(self._aim, Amplitude) else 0.5
         if self._best > 0.05 and gained < kept * self._best or gained < -0.05:
             self._give_up("the path turned back, which a crease at a singular corner (a clamped rim on a fine mesh) can"
                           " cause")
 
-    def _gained(self, state: State) -> float:
-        """How far a state has come, from the first state (0) to the target (1)."""
-        start = self.path.value(self._aim, self.states[0])
-        return (self.path.value(self._aim, state) - start) / ((self.until.value - start) or 1.0)
+    def _gained(self, value: float) -> float:
+        """How far a value of what is aimed at has come, from that of the first state (0) to the target (1)."""
+        return (value - self._values[0]) / ((self.until.value - self._values[0]) or 1.0)
 
     def _within_reach(self, old: State, length: float) -> tuple:
         """(target, its measure, distance) of the first open target that the tangent meets within `length`."""
         best: tuple = (None, None, length)
         for target, bound in self.open:
-            now = self.branch.value(bound, old.x, old.control)
-            ahead = self.branch.value(bound, old.x + length * old.direction, old.control + length * old.slope)
+            now = self.curve.value(bound, old.x, old.control)
+            ahead = self.curve.value(bound, old.x + length * old.direction, old.control + length * old.slope)
             if (now - target.value) * (ahead - target.value) < 0:
                 reach = length * (target.value - now) / (ahead - now)
                 if reach < best[2]:
@@ -263,41 +203,42 @@ class Run:
         found = []
         if old.slope * new.slope < 0 and old.kind != "limit point":
             try:
-                found.append(self.branch.limit_point(old, new))
+                found.append(self.curve.limit_point(old, new))
             except Failure as failure:
                 raise Failure(f"a limit point lies ahead but could not be located: {failure.reason}", []) from None
         for target, bound in self.open:
             if target is new.met:
                 continue
-            a, b = (self.branch.value(bound, s.x, s.control) - target.value for s in (old, new))
+            a, b = (self.curve.value(bound, s.x, s.control) - target.value for s in (old, new))
             if a * b < 0:
                 try:
-                    state = self.branch.between(old, new, bound, target.value)
+                    state = self.curve.between(old, new, bound, target.value)
                 except Failure as failure:
                     raise Failure(f"{target} was passed but could not be solved for: {failure.reason}", []) from None
                 state.met = target
                 found.append(state)
-        found.sort(key=lambda state: self.branch.progress(old, state))
+        found.sort(key=lambda state: self.curve.progress(old, state))
         return [*found, new]
 
-    def _record(self, state: State) -> None:
+    def _accept(self, state: State) -> None:
         """Take up a state and close the target that it meets."""
-        path = self.path
-        path.record(state)
-        if path.problem.has_kinks:
-            self.branch.look_ahead(state)
-        path.counts.iterations = self.branch.iterations
+        record = self.record
+        record.accept(state)
+        if self.problem.has_kinks:
+            self.curve.look_ahead(state)
+        self._values.append(self.curve.value(self._aim, state.x, state.control))
+        record.counts.iterations += self.curve.spent()
         self.open = [(t, b) for t, b in self.open if t is not state.met]
-        log.info("state %d: %s, %d iterations", path.counts.steps, path.describe(state), len(state.history) - 1)
+        log.info("state %d: %s, %d iterations", record.counts.steps, record.describe(state), len(state.history) - 1)
 
-    def _is_open(self, target: goals.Target) -> bool:
+    def _is_open(self, target: Target) -> bool:
         return any(t is target for t, _ in self.open)
 
     def _pace(self, max_steps: int) -> str:
         """How far a run had come when its steps ran out."""
-        path, aim = self.path, self.until.value
-        start, before, now = (path.value(self._aim, s) for s in (self.states[0], path.states[-2], path.last))
-        part = (now - start) / ((aim - start) or 1.0)
+        aim = self.until.value
+        before, now = self._values[-2:]
+        part = self._gained(now)
         if not (aim - now) * (now - before) > 0:
             return f"max_steps = {max_steps} ran out, and the last step led away from the target"
         return (f"max_steps = {max_steps} ran out in good health at {100 * part:.3g} % of the target: the last step"
@@ -305,41 +246,71 @@ class Run:
                 f" {int(np.ceil((aim - now) / (now - before)))} steps more at that pace")
 
     def _give_up(self, why: str, attempt: Any = None, pace: str = "") -> None:
-        found = diagnose(self.branch, self.states, why, attempt, pace,
-                         self.until.value if isinstance(self._aim, goals.Amplitude) else None)
+        self.record.counts.iterations += self.curve.spent()
+        found = diagnose(self.curve, self.states, why, attempt, pace,
+                         self.until.value if isinstance(self._aim, Amplitude) else None)
+        self.curve.spent()                                  # the diagnosis is not part of the run
         raise self._error(f"{why}.", found)
 
     def _error(self, why: str, diagnosis: Any) -> ConvergenceError:
         """What happened, what was met, what to try."""
-        path = self.path
-        states = self.states
-        values = [path.value(self._aim, s) for s in states]
+        record, states, values = self.record, self.states, self._values
         best = int(np.argmin([abs(v - self.until.value) for v in values]))
-        limits = "".join(f" A limit point was passed at {path.describe(s)}." for s in states if s.kind == "limit point")
+        limits = "".join(f" A limit point was passed at {record.describe(s)}." for s in states
+                         if s.kind == "limit point")
         return ConvergenceError(
-            f"{f'Stage {path.stage!r}: ' * bool(path.stage)}{self.until} was not reached: {why} The nearest met was"
-            f" {values[best]:.6g}, at {path.describe(states[best])}.{limits} The last good state is"
-            f" {path.describe(path.last)}; it is kept in the error's `path`."
-            + ("" if diagnosis.advice else _TRY), path, diagnosis)
+            f"{f'Stage {record.stage!r}: ' * bool(record.stage)}{self.until} was not reached: {why} The nearest met was"
+            f" {values[best]:.6g}, at {record.describe(states[best])}.{limits} The last good state is"
+            f" {record.describe(record.last)}; it is kept in the error's `path`."
+            + ("" if diagnosis.advice else _TRY), diagnosis=diagnosis)
 
 
-def settle(path: Path, step: StepControl, until: goals.Target, checkpoint: Checkpoint | None) -> None:
-    """Note in the last state of a path how the run goes on from it, on disk too."""
-    path.last.stepping = {"step": asdict(step), "counts": asdict(path.counts), "until": [until.name, until.value]}
-    if checkpoint is not None:
-        checkpoint.write()
+def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) -> bool:
+    """True if a state found from `old` lies on a piece of the path passed earlier, to which it never comes back."""
+    near = 0.1 * curve.distance(old, new)
+    for a, b in zip(passed, passed[1:]):
+        if (a.control - new.control) * (b.control - new.control) < 0:
+            x, control = curve.interpolate(a, b, (new.control - a.control) / (b.control - a.control))
+            if curve.distance(new, replace(new, x=x, control=control)) < near:
+                return True
+    return False
 
 
-def _progress_bar(comm: Any, until: goals.Target, progress: bool) -> Any:
+def begin(curve: Curve) -> State:
+    """The first state of a path: the body at control 0, in equilibrium with whatever else acts on it.
+
+    Fixed loads for which Newton's method finds no equilibrium from rest are brought in gradually.
+
+    Raises:
+        ConvergenceError: there is none.
+    """
+    problem = curve.problem
+    try:
+        return curve.start()
+    except Failure as failure:
+        first, rest = problem.setting, np.zeros(problem.x.getLocalSize())
+        if not any(not load.driven for load in problem.scene.loads):
+            raise curve.no_start(failure) from None
+        record = Record(problem, curve)
+        target = Target("change", 1.0, None)
+        try:
+            problem.enter(replace(first, rate=[0.0] * len(first.rate), fading=True), rest, 0.0)
+            run = Run(record, [(target, Amplitude(problem, None))])
+            run.follow(1000, False, curve.resume(rest, 0.0))
+        except (ConvergenceError, Failure):
+            raise curve.no_start(failure) from None
+        problem.enter(first, record.last.x, 0.0)
+        return curve.resume(record.last.x, 0.0)
+
+
+def _progress_bar(comm: Any, until: Target, progress: bool) -> Any:
     from tqdm import tqdm
     return tqdm(total=1.0, desc=f"to {until}", delay=2, disable=not progress or comm.rank != 0, leave=False,
                 bar_format="{desc}: {percentage:3.0f}% |{bar}| {elapsed}{postfix}")
 
 
-def _show(bar: Any, states: list[State], until: goals.Target) -> None:
-    now = states[-1].measures.get(until.name)
-    if not bar.disable and now is not None:
-        first = states[0].measures[until.name]
-        bar.n = min(max((now - first) / ((until.value - first) or 1.0), 0.0), 1.0)
-        bar.set_postfix_str(f"state {len(states)}", refresh=False)
+def _show(bar: Any, gained: float, states: int) -> None:
+    if not bar.disable:
+        bar.n = min(max(gained, 0.0), 1.0)
+        bar.set_postfix_str(f"state {states}", refresh=False)
         bar.update(0)

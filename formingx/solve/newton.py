@@ -11,11 +11,6 @@ from petsc4py import PETSc
 
 from ..errors import count, positive
 from .direct import DirectSolver
-from .settle import Settling
-
-SETTLE_FROM = 2
-FAILS = 2
-STATS = []
 
 UNLOADED = 1e-5
 """Support forces (over stress times volume over length) below which a body counts as unloaded."""
@@ -72,13 +67,13 @@ class _Kinks:
     def look(self, moved: float) -> None:
         """To be called once an iteration, after the residual was computed; moved: by the correction before."""
         self._iteration += 1
-        now = self._problem.branch
+        now = self._problem.active_set
         if now != self._last and self._last is not None:
             self.changed = self._iteration
             if now in self._seen:
                 self.share = max(self.share / 2, 0.25)
             else:
-                self.found += moved < SMALL and not self._problem.memory
+                self.found += moved < SMALL and not self._problem.has_history
         elif self._iteration > self.changed + 1:
             self.share = 1.0
         self._seen[now] = self._iteration
@@ -153,8 +148,10 @@ class BorderedNewton:
         self.b.scale(-1)
         return bool(np.isfinite(self.b.norm()))
 
-    def correct(self, x: PETSc.Vec, control: float, constraint: Any) -> tuple[float, list[Iteration]]:
+    def correct(self, x: PETSc.Vec, control: float, constraint: Any, old: Any = None) -> tuple[float, list[Iteration]]:
         """Iterate x (in place) and control to convergence; returns the control and the history.
+
+        `old`: the state that they are a guess ahead of, if there is one.
 
         Afterwards `self.b` is dx/dcontrol at the solution (to the accuracy of the last correction).
 
@@ -163,13 +160,12 @@ class BorderedNewton:
         """
         problem = self.problem
         history: list[Iteration] = []
-        problem.begin()
+        problem.begin(old)
         problem.residual(x, control, self.F)
         self.a.set(0)
         self.reached = control, 0.0
         work0 = moved = 0.0
         kinks = _Kinks(problem)
-        settling_points = Settling(problem) if problem.memory else None
         while True:
             residual = self.F.norm() / (problem.force_scale + UNLOADED)
             if not np.isfinite(residual):
@@ -179,8 +175,6 @@ class BorderedNewton:
                 return control, history
             problem.linearise(x, control, self.F)
             kinks.look(moved)
-            if settling_points:
-                settling_points.look()
             quiet = history[kinks.changed:]
             grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
             if grown and not (problem.has_kinks and moved < SMALL):
@@ -200,18 +194,10 @@ class BorderedNewton:
                 raise Failure("the quantity that is aimed at does not change along the path here", history)
             step = (-c - self.gradient.dot(self.a)) / slope
             self.a.axpy(step, self.b)
-            share = kinks.share
-            if settling_points and kinks.changed == len(history) and len(history) >= SETTLE_FROM:
-                before = settling_points.failed, settling_points.inner
-                step = settling_points.correct(self, step, slope)
-                STATS.append((sum(map(np.sum, settling_points.marked)), settling_points.inner - before[1], settling_points.failed - before[0]))
-                share = 1.0
-                if settling_points.failed >= FAILS:
-                    raise Failure("contact does not settle: no state of the points at the kink is consistent", history)
             work = abs(self.F.dot(self.a))
             work0 = work0 or work or 1.0
-            x.axpy(share, self.a)
-            control += share * step
+            x.axpy(kinks.share, self.a)
+            control += kinks.share * step
             moved = self._norm(self.a, step)
             correction = moved / (self._norm(x, control) + AT_REST)
             if not np.isfinite(correction):

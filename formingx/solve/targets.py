@@ -16,9 +16,11 @@ class Bound:
 
     Attributes:
         size: what counts as one of it, in the user's units: 1e-12 of that is nothing.
+        smooth: True if it is a smooth function of the displacements and the control alone.
     """
 
     size = 0.0
+    smooth = True
 
     def value(self, x: Any, control: float) -> float:
         """The measure at a state, in the user's units."""

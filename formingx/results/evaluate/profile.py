@@ -98,9 +98,8 @@ class Profiles:
     def of(self, state: Any) -> Profile:
         """The profile of a state (collective)."""
         self._probe = at = self._probe or self._make_probe()
-        self._problem.x.array_w[:] = state.x
-        self._problem.forms.control.value = state.control
-        deformed = at.points + at.displacement(self._problem.x)
+        with self._problem.at(state) as problem:
+            deformed = at.points + at.displacement(problem.x)
         n = len(at.points) // 2
         return Profile(at.points[:n].copy(), at.points[n:].copy(), deformed[:n], deformed[n:])
 

@@ -232,7 +232,10 @@ class Stresses:
 
     def project(self, state: Any) -> np.ndarray:
         """Nodal values of F and S, shape (nodes, layers, _COUNT), ghosts included."""
-        self._set(state)
+        with self.problem.at(state):
+            return self._projected()
+
+    def _projected(self) -> np.ndarray:
         n = self.space.dofmap.index_map.size_local + self.space.dofmap.index_map.num_ghosts
         nodes = np.zeros((n, len(self.cells), _COUNT))
         b, x = self._b, self._x
@@ -294,7 +297,6 @@ class Stresses:
         Shapes (m, q, 2), (m, q, _COUNT), (m, q).
         """
         forms = self.problem.forms
-        self._set(state)
         number = next(i for i, (_, names) in enumerate(forms.bodies) if layer in names)
         if number not in self._raw:
             parts = self._parts(*forms.bodies[number])
@@ -312,13 +314,10 @@ class Stresses:
             self._raw[number] = *(fem.Expression(e, points) for e in (values, where)), weights
         values, where, weights = self._raw[number]
         cells, q = self._owned(layer), len(weights)
-        values, where = (e.eval(forms.domain, cells).reshape(-1, q, n) if len(cells) else np.zeros((0, q, n))
-                         for e, n in ((values, _COUNT), (where, 3)))
+        with self.problem.at(state):
+            values, where = (e.eval(forms.domain, cells).reshape(-1, q, n) if len(cells) else np.zeros((0, q, n))
+                             for e, n in ((values, _COUNT), (where, 3)))
         return where[..., :2], values, where[..., 2] * weights
-
-    def _set(self, state: Any) -> None:
-        self.problem.x.array_w[:] = state.x
-        self.problem.set_state(self.problem.x, state.control)
 
     def _parts(self, material: Any, names: list[str]) -> list[tuple[Any, dict]]:
         """[(entries of S (UFL), quadrature metadata)] of a body: of its material, and of what keeps its volume."""

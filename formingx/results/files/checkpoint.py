@@ -1,12 +1,12 @@
 """Checkpoints: a folder that holds every accepted state of a run, from which the run goes on, on any number of ranks.
 
     run/scene.json               what the scene is, and versions
-    run/0000/state.json          the state's numbers, what contact remembers, and checksums of the two fields:
+    run/0000/state.json          the state's numbers, what its histories remember, and checksums of the two fields:
     run/0000/x.bp, direction.bp  unknowns and tangent of the path, written by adios4dolfinx
 
 A state is written beside its place and then renamed: what has its name is complete, whenever a run is killed. Fields
-are kept by the order of the cells in the script's mesh, which does not depend on the number of ranks; what contact
-remembers, by the nodes' reference positions.
+are kept by the order of the cells in the script's mesh, which does not depend on the number of ranks; what histories
+remember, by node or by cell, likewise.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from ... import _compat
 from ...discrete.problem import Problem
 from ...errors import InputError, instance, place
 from ...scene.scene import Scene
-from ...solve.curve import Branch
+from ...solve.curve import Curve
 from ...solve.newton import Iteration, Tolerances
+from ...solve.state import Counts, Record, State
 from ...solve.targets import Target
 from .. import files
-from ..path import Counts, Path, State
 from .description import describe, differences, summary
 
-FORMAT = 1
+FORMAT = 2
 _FIELDS = ("x", "direction")
 
 
@@ -43,14 +43,14 @@ class Checkpoint:
 
     Args:
         folder: made, or looked at, at once.
-        path: of the run; what is in the folder must be its beginning.
+        path: the `Path` of the run; what is in the folder must be its beginning.
 
     Raises (collective):
         InputError: the folder holds another run, or something else.
         OSError: it cannot be written.
     """
 
-    def __init__(self, folder: Any, path: Path):
+    def __init__(self, folder: Any, path: Any):
         self.folder, self._path, self._problem = place("checkpoint", folder), path, path.problem
         self._w = fem.Function(path.problem.forms.space)
         self._there = self._begin()                         # states in the folder
@@ -98,7 +98,8 @@ class Checkpoint:
         final = self.folder / _name(number)
         part = final.with_name(final.name + ".part")
         n = problem.forms.space.dofmap.index_map.size_local
-        data = _plain_state(state) | {"memory": _gather_memory(problem, state), "profile": profile}
+        memory = [history.save(kept) for history, kept in zip(problem.histories, state.memory, strict=True)]
+        data = _plain_state(state) | {"memory": memory, "profile": profile}
         for name in _FIELDS:
             tails = comm.allgather(getattr(state, name)[n:].tolist())
             data[f"{name}_tail"] = tails[-1]
@@ -126,18 +127,8 @@ class Checkpoint:
         return 16 * (cells * (dofmap.list.shape[1] + 3) + dofmap.index_map.size_global) + more + 2**16
 
 
-def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
-    """The path in a checkpoint, to look at or to go on from: `trace(scene, until=..., start=load("run", scene))`.
-
-    Args:
-        folder: what `trace(..., checkpoint=folder)` or `Path.save(folder)` wrote, on any number of ranks.
-        scene: the same scene, made by the same script.
-        state: go on from this state (0: the start), and leave out what came after; default the last.
-
-    Raises:
-        InputError: there is no checkpoint, it is damaged, or it is of another mesh or scene; the message says what
-            differs.
-    """
+def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
+    """The record of the run in a checkpoint; see `formingx.load`."""
     folder, problem = place("load: folder", folder), Problem(instance("load: scene", scene, Scene, "a formingx.Scene"))
     about = describe(problem)
 
@@ -158,13 +149,14 @@ def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
                                  f" (load's state= picks an earlier one)")
         return found
     found = files.on_root(problem.comm, look)
-    path = Path(problem, Branch(problem, Tolerances()))
-    path.states = [_read_state(folder / _name(k), data, problem) for k, data in enumerate(found)]
-    kept = next((s.stepping for s in reversed(path.states) if s.stepping), None)
-    path.counts = Counts(**kept["counts"]) if kept else Counts()
-    path.counts.steps = sum(s.kind != "start" for s in path.states)
-    problem.remember(path.last)
-    return path
+    record = Record(problem, Curve(problem, Tolerances()))
+    states = [_read_state(folder / _name(k), data, problem) for k, data in enumerate(found)]
+    record.segments[-1].states += states
+    kept = next((s.stepping for s in reversed(states) if s.stepping), None)
+    record.counts = Counts(**kept["counts"]) if kept else Counts()
+    record.counts.steps = sum(s.kind != "start" for s in states)
+    problem.stand(record.last)
+    return record
 
 
 def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
@@ -208,7 +200,7 @@ def _read_state(folder: FilePath, data: dict, problem: Any) -> State:
     met = data.pop("met")
     return State(**arrays, met=Target(met[0], met[1], None, met[2]) if met else None,
                  history=[Iteration(*row) for row in data.pop("history")],
-                 memory=_scatter_memory(problem, data.pop("memory")),
+                 memory=_read_memory(problem, data.pop("memory")),
                  **{f.name: data[f.name] for f in fields(State) if f.name in data})
 
 
@@ -220,34 +212,13 @@ def _plain_state(state: State) -> dict[str, Any]:
                    "history": [list(i) for i in state.history]}
 
 
-def _remembering(problem: Any) -> list[Any]:
-    return [contact for contact in problem.contacts if contact.memory is not None]
+def _read_memory(problem: Any, memory: list[dict[str, Any]]) -> list[Any]:
+    if len(memory) != len(problem.histories):
+        raise InputError("checkpoint: its states remember other things than this scene does: it is of another scene")
+    return [history.load(data) for history, data in zip(problem.histories, memory, strict=True)]
 
 
-def _gather_memory(problem: Any, state: State) -> list[dict[str, Any]]:
-    """What each contact with friction remembers, node by node with its reference position, all ranks."""
-    found = []
-    for contact, touch in zip(_remembering(problem), state.memory, strict=True):
-        parts = problem.comm.allgather((contact.points, *touch))
-        columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
-        found.append(dict(zip(("points", *touch._fields), (c.tolist() for c in columns), strict=True)))
-    return found
-
-
-def _scatter_memory(problem: Any, memory: list[dict[str, Any]]) -> list[Any]:
-    from scipy.spatial import cKDTree
-    found = []
-    for contact, data in zip(_remembering(problem), memory, strict=True):
-        away, rows = cKDTree(np.array(data["points"]).reshape(-1, 2)).query(contact.points)
-        if np.any(away > 1e-9 * problem.forms.length):
-            raise InputError("checkpoint: a contact node of the scene is not in it: it is of another mesh")
-        kind = contact.memory
-        found.append(kind._replace(**{name: np.array(data[name], dtype=float)[rows].reshape(getattr(kind, name).shape)
-                                      for name in kind._fields}))
-    return found
-
-
-def _profile(path: Path, state: State) -> dict[str, list] | None:
+def _profile(path: Any, state: State) -> dict[str, list] | None:
     """The outline and the thickness of a sheet, so that a report needs no scene; None where there is no sheet."""
     try:
         profile = path.profile(state)

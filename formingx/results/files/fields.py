@@ -56,9 +56,8 @@ class Fields:
     def of(self, state: Any) -> dict[str, np.ndarray]:
         """{name: values, shape (cells, nodes, components)} of a state; collective."""
         problem, shape = self._problem, self.points.shape[:2]
-        problem.x.array_w[:] = state.x
-        problem.set_state(problem.x, state.control)
-        found = {"displacement": self._eval(self._u)}
+        with problem.at(state):
+            found = {"displacement": self._eval(self._u)}
         moved = self.points + found["displacement"]
         if self.dimension == 2:
             field = self._path.stress(state)
@@ -91,13 +90,9 @@ class Fields:
         problem, pressure = self._problem, np.zeros(self.points.shape[:2])
         forms = problem.forms
         fields, near = state.x[: forms.space.dofmap.index_map.size_local], 1e-9 * forms.length
-        self._path.go_to(state)
-        now, problem.memory = problem.memory, state.memory
-        try:
-            tractions = [contact.traction(fields, state.control) for contact in problem.touching]
-        finally:
-            problem.memory = now
-        for contact, (points, values) in zip(problem.touching, tractions):
+        with problem.at(state):
+            tractions = [(contact, contact.traction(fields, state.control)) for contact in problem.touching]
+        for contact, (points, values) in tractions:
             tree = cKDTree(points)
             total = np.zeros((len(points), 2))               # sum of area ratios, and of how many facets
             for cell, facet in self._facets(contact.contact.on):

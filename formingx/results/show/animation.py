@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,14 +24,11 @@ def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
     x, y = plots.main_columns(path.columns)
     shapes, tools, now, tooling = [], [], [], Tooling.of_problem(path.problem)
     for a, b, fraction in _spread(path, frames):
-        path.go_to(b)
-        x_there, control = path.between(a, b, fraction)
-        at = replace(b, x=x_there, control=control)
+        at = path.between(a, b, fraction)
         shapes.append(path.profile(at))
-        now.append([a.measures[c] + fraction * (b.measures[c] - a.measures[c]) if plots.of_contact(c) else value
-                    for c, value in zip((x, y), path.measured(at, x, y))])
+        now.append([a.measures[c] + fraction * (b.measures[c] - a.measures[c]) for c in (x, y)])
         tools.append(tooling.placed(tooling.travels(at.setting, at.control)))
-    curve = plots.line(path, x, y)
+    curve = path.curve(x, y)
     axisymmetric = path.problem.scene.kinematics.dimension_of_volume == 3
 
     def draw(stream):

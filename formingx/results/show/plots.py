@@ -7,23 +7,13 @@ from typing import Any
 from ...figures import figure
 
 
-def of_contact(column: str) -> bool:
-    """True of what a stiff contact gives: meaningless between states, where the body is but guessed."""
-    return column.endswith(("force", "penetration", "contact_length"))
-
-
-def line(path: Any, *columns: str) -> list[Any]:
-    """Columns along a path: the smooth curve through its states; the states alone if one of them is `of_contact`."""
-    return [path[c] for c in columns] if any(map(of_contact, columns)) else path.curve(*columns)
-
-
 def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
     """Column y over column x of a path: the states as dots, the path as a line, limit points ringed.
 
     Returns the axes; `axes.figure.savefig` saves.
     """
     axes = axes if axes is not None else figure()[1]
-    drawn, = axes.plot(*line(path, x, y), **style)
+    drawn, = axes.plot(*path.curve(x, y), **style)
     axes.plot(path[x], path[y], ".", color=drawn.get_color())
     for state in path.limit_points:
         axes.plot(state.measures[x], state.measures[y], "o", color=drawn.get_color(), fillstyle="none", markersize=9)

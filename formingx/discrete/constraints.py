@@ -1,0 +1,108 @@
+"""What supports hold: unknowns, and means over boundaries; and which of it holds in a stage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ..errors import InputError
+from ..physics.supports import Held
+
+
+class Entry(NamedTuple):
+    """Unknowns that one thing of the scene can hold.
+
+    thing: its number in `Scene.things`, -1 for unknowns that no equation holds; bc: the DirichletBC; dofs: local
+    numbers, ghosts too, shape (n,); driven: they follow the control.
+    """
+
+    thing: int
+    bc: Any
+    dofs: np.ndarray
+    driven: bool
+
+
+class Active(NamedTuple):
+    """What holds when some things take no part.
+
+    bcs: DirichletBCs; dofs: local numbers of the held unknowns, ghosts too, ascending, shape (n,); owned: which of them
+    this rank owns, shape (n,); driver: number of the thing that moves each, or -1, shape (n,); rows: of the means that
+    could be held, each the owned part, 0 where it does not hold; present: which of the means hold.
+    """
+
+    bcs: list[Any]
+    dofs: np.ndarray
+    owned: np.ndarray
+    driver: np.ndarray
+    rows: list[np.ndarray]
+    present: list[bool]
+
+
+class Constraints:
+    """Everything in a scene that can be held.
+
+    Args:
+        forms: the `Formulation`. assemble: gives the owned part of a compiled linear form.
+
+    Attributes:
+        entries: list of `Entry`; means: [(number of the thing, row: owned part, shape (n,))].
+    """
+
+    def __init__(self, forms: Any, assemble: Callable[[Any], np.ndarray]):
+        self._forms, zero = forms, PETSc.ScalarType(0)
+        self._n = forms.space.dofmap.index_map.size_local
+        self.entries: list[Entry] = []
+        self.means: list[tuple[int, np.ndarray]] = []
+        for i, support in enumerate(forms.scene.things):
+            if getattr(support, "constraints", None) is None:
+                continue
+            for item in forms.constraints(support):
+                if isinstance(item, Held):
+                    sub = forms.space.sub(0).sub(item.component)
+                    dofs = self._dofs_of(support, sub, item)
+                    self.entries.append(Entry(i, fem.dirichletbc(zero, dofs, sub), dofs, item.driven))
+                else:
+                    self.means.append((i, assemble(forms.compile(forms.mean_row(item)))))
+        for sub, dofs in forms.idle_unknowns():
+            self.entries.append(Entry(-1, fem.dirichletbc(zero, dofs, sub), dofs, False))
+
+    @property
+    def can_move(self) -> bool:
+        """True if some held unknowns follow the control."""
+        return any(entry.driven for entry in self.entries)
+
+    def driven_by(self, thing: int) -> np.ndarray:
+        """Local numbers of the owned unknowns that a thing of the scene moves."""
+        dofs = np.unique(np.concatenate([e.dofs for e in self.entries if e.thing == thing and e.driven]))
+        return dofs[dofs < self._n]
+
+    def without(self, off: set[int]) -> Active:
+        """What holds when these things take no part."""
+        entries = [entry for entry in self.entries if entry.thing not in off]
+        numbers = np.concatenate([np.zeros(0, dtype=np.int32), *(e.dofs for e in entries)])
+        drivers = np.concatenate([np.zeros(0, dtype=int),
+                                  *(np.full(len(e.dofs), e.thing if e.driven else -1) for e in entries)])
+        order = np.argsort(drivers < 0, kind="stable")          # where two supports meet, the driven one counts
+        dofs, first = np.unique(numbers[order], return_index=True)
+        owned = dofs < self._n
+        present = [thing not in off for thing, _ in self.means]
+        rows = [there * row for (_, row), there in zip(self.means, present, strict=True)]
+        for row in rows:
+            row[dofs[owned]] = 0
+        return Active([entry.bc for entry in entries], dofs, owned, drivers[order][first], rows, present)
+
+    def _dofs_of(self, support: Any, sub: Any, item: Held) -> np.ndarray:
+        forms = self._forms
+        if item.on is not None:
+            return fem.locate_dofs_topological(sub, forms.mesh.facets.dim, forms.mesh.facets_of(item.on))
+        near, point = 1e-8 * forms.length, forms.nearest(np.array([item.point])).T
+        found = fem.locate_dofs_geometrical((sub, sub.collapse()[0]),
+                                            lambda X: np.hypot(*(X[:2] - point)) < near)[0]
+        if forms.comm.allreduce(len(found), MPI.MAX) == 0:
+            raise InputError(f"{support!r}: the mesh has no node at this place")
+        return found

@@ -1,0 +1,234 @@
+"""What a user runs: a path with one control, Newton's method at fixed control, a process in stages.
+
+The solvers emit states; a `Path` and, if asked for, a `Checkpoint` are told of each.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from .discrete.problem import Problem
+from .errors import ConvergenceError, InputError, count, finite, instance, several
+from .physics.contact import Contact
+from .results.columns import Measure
+from .results.files.checkpoint import Checkpoint, read
+from .results.path import Path
+from .scene import clearance
+from .scene.scene import Scene
+from .solve.curve import Curve
+from .solve.fixed import FixedControlCurve
+from .solve.follow import Run, begin
+from .solve.newton import Tolerances
+from .solve.process import Execution
+from .solve.stage import Stage, plan
+from .solve.state import Record, State
+from .solve.stepping import StepControl
+from .solve.targets import Amplitude, Target
+
+
+def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: StepControl | None = None,
+          tolerances: Tolerances | None = None, max_steps: int = 200, progress: bool = True, start: Path | None = None,
+          checkpoint: Any = None, record: Mapping[str, Measure] | None = None) -> Path:
+    """Follow the equilibrium path from the unloaded body until a target is reached, through limit points.
+
+    Args:
+        scene: with one driven load or support.
+        until: the target that ends the run, e.g. `pole_stretch(8.5)`; hit exactly.
+        through: more targets to hit exactly on the way; those that are not met are left out.
+        step: step control; default `StepControl()`.
+        tolerances: when a state counts as converged; default `Tolerances()`.
+        max_steps: accepted states before the run gives up.
+        progress: show a progress bar on runs of more than two seconds (rank 0).
+        start: a path of this scene to go on from, also one that `formingx.load` read; it stays as it is. Its steps go
+            on as they were, unless `step` is given; targets that it has met count as met.
+        checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
+        record: {name: measure} of columns of your own: a function of the `Problem`, called while it stands at the
+            state, that returns a number; or a target such as `displacement(0, at=(1, 0))`, whose measure is recorded.
+
+    Raises:
+        InputError: nothing is driven, a target needs something that the scene does not have, `start` is of another
+            scene, or the checkpoint holds another run.
+        ConvergenceError: the target was not reached. It carries the path so far and says what to try.
+        OSError: the checkpoint cannot be written; the states in it are kept.
+    """
+    instance("trace: scene", scene, Scene, "a formingx.Scene")
+    through = several("trace: through", through, "targets, such as pole_stretch(3)")
+    for target in (until, *through):
+        instance("trace: target", target, Target, "a target, such as pole_stretch(3)")
+        if target.name == "travel" and isinstance(scene.driven, Contact):
+            scene.check_travel(scene.driven, target.value)
+    instance("trace: step", step, StepControl | None, "a StepControl or None")
+    instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
+    max_steps = count("trace: max_steps", max_steps)
+    scene.only_driven("trace")
+    if start is not None and (not isinstance(start, Path) or start.problem.scene is not scene or not start.states):
+        raise InputError("trace: start: must be a path of this very scene: fx.load(folder, scene), or what trace gave"
+                         " back")
+    problem = Problem(scene) if start is None else start.problem
+    path = _path(Curve(problem, tolerances or Tolerances()), start, record)
+    targets = [(target, target.bind(problem)) for target in (*through, until)]
+    _keep(path, checkpoint)
+    with _carried(path):
+        run = Run(path.record, targets, step)
+        run.follow(max_steps, progress, None if path.states else begin(path.record.curve))
+    return path
+
+
+def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerances | None = None, max_steps: int = 1000,
+          record: Mapping[str, Measure] | None = None) -> Path:
+    """Load the body to a value of the control in increments, each by PETSc's SNES at fixed control.
+
+    For scenes without limit point before `to`; `trace` passes limit points and picks its own steps. Options such as
+    -formingx_0_snes_monitor (0: the first such run of a script) reach the SNES.
+
+    Args:
+        to: pressure (stress) or travel (length) of what is driven.
+        increments: number of equal increments; one that fails is halved, and new contact shortens them.
+        tolerances: when a state counts as converged; default `Tolerances()`.
+        max_steps: accepted states before the run gives up.
+        record: see `trace`.
+
+    Raises:
+        InputError: nothing is driven, or an argument is not allowed.
+        ConvergenceError: an increment did not converge; it carries the path so far.
+    """
+    instance("solve: scene", scene, Scene, "a formingx.Scene")
+    instance("solve: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
+    scene.only_driven("solve")
+    to, increments = finite("solve: to", to), count("solve: increments", increments)
+    if to == 0:
+        raise InputError("solve: to = 0: the body is at rest there")
+    problem = Problem(scene)
+    curve = FixedControlCurve(problem, tolerances or Tolerances())
+    path = _path(curve, None, record)
+    driven = scene.things.index(scene.driven)
+    name = scene.driven.quantity
+    targets = [(Target(name, to * k / increments, None), Amplitude(problem, driven)) for k in range(1, increments + 1)]
+    with _carried(path):
+        first = begin(curve)
+        whole = abs(to / problem.forms.control_scale / first.slope)      # arc length, were the path straight
+        step = StepControl(length=1.01 * whole / increments, largest=1.01 * whole / increments,
+                           smallest=1e-5 * whole / increments)
+        Run(path.record, targets, step).follow(count("solve: max_steps", max_steps), False, first)
+    return path
+
+
+class Process:
+    """Stages on one scene, run in order, each from where the one before ended.
+
+    A pressure, support or tool of the scene that can be driven (`Pressure` without value, `Displaced`, `Contact` with
+    `moves`) starts at 0, and stays where it is in stages that do not drive it.
+
+    Args:
+        scene: with any number of things that can be driven.
+    """
+
+    def __init__(self, scene: Scene):
+        self.scene = instance("Process: scene", scene, Scene, "a formingx.Scene")
+
+    def run(self, stages: Sequence[Stage], *, step: StepControl | None = None, tolerances: Tolerances | None = None,
+            max_steps: int = 200, progress: bool = True, start: Path | State | None = None,
+            checkpoint: Any = None, record: Mapping[str, Measure] | None = None) -> Path:
+        """Run the stages; one path holds the states of all of them, every stage from a state of kind "start" on.
+
+        Args:
+            stages: in order.
+            step: step control of the stages that have none of their own, at their start; default `StepControl()`.
+            tolerances: when a state counts as converged; default `Tolerances()`.
+            max_steps: accepted states of a stage (of a straight piece of its tables) before the run gives up.
+            progress: show a progress bar on what takes more than two seconds (rank 0).
+            start: a path of these stages to go on from, also one that `formingx.load` read, or a state of one.
+            checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
+            record: {name: measure} of columns of your own, see `trace`.
+
+        Raises:
+            InputError: a stage drives or leaves out something that the scene does not have, leaves the body free to
+                move, or lets tools overlap; a target does not fit its stage; a table does not begin where its thing
+                stands; a tool comes in where the body is; a moving tool does not meet its face within the rim.
+            ConvergenceError: a target was not reached. It carries the path so far and says what to try.
+            OSError: the checkpoint cannot be written; the states in it are kept.
+        """
+        stages = self._checked(stages)
+        instance("Process: step", step, StepControl | None, "a StepControl or None")
+        instance("Process: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
+        instance("Process: start", start, Path | State | None, "a path, a state or None")
+        plans = [plan(self.scene, stage) for stage in stages]
+        unsure = clearance.check(self.scene, plans)
+        if isinstance(start, Path) and start.problem.scene is not self.scene:
+            raise InputError("Process: start: must be a path of this very scene: fx.load(folder, scene), or what run"
+                             " gave back")
+        problem = start.problem if isinstance(start, Path) else Problem(self.scene)
+        for state in [start] if isinstance(start, State) else start.states[-1:] if start else []:
+            _check_start(state, stages, problem)
+        tolerances = tolerances or Tolerances()
+        path = _path(Curve(problem, tolerances), start, record, any(p.tables for p in plans))
+        _keep(path, checkpoint)
+        with _carried(path):
+            execution = Execution(path.record, plans, unsure, step, tolerances.residual)
+            execution.run(count("Process: max_steps", max_steps), progress)
+        return path
+
+    def _checked(self, stages: Any) -> list[Stage]:
+        stages = several("Process: stages", stages, "stages, such as Stage('vacuum', drive=vacuum, until=pressure(1))")
+        if not stages:
+            raise InputError("Process: stages = []: must have at least one Stage")
+        for stage in stages:
+            instance("Process: stage", stage, Stage, "a formingx.Stage")
+        for stage in stages:
+            if sum(other.name == stage.name for other in stages) > 1:
+                raise InputError(f"Process: two stages are called {stage.name!r}: names must differ")
+        return stages
+
+
+def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
+    """The path in a checkpoint, to look at or to go on from: `trace(scene, until=..., start=load("run", scene))`.
+
+    Args:
+        folder: what `trace(..., checkpoint=folder)` or `Path.save(folder)` wrote, on any number of ranks.
+        scene: the same scene, made by the same script.
+        state: go on from this state (0: the start), and leave out what came after; default the last.
+
+    Raises:
+        InputError: there is no checkpoint, it is damaged, or it is of another mesh or scene; the message says what
+            differs.
+    """
+    return Path(read(folder, scene, state))
+
+
+def _check_start(state: State, stages: list[Stage], problem: Problem) -> None:
+    """An InputError unless a process of these stages can go on from the state."""
+    number = state.setting.get("stage", -1)
+    if len(state.x) != problem.x.getLocalSize() or not 0 <= number < len(stages):
+        raise InputError("Process: start: must be of this process: its last state is of another scene or stage")
+    if stages[number].name != state.stage:
+        raise InputError(f"Process: start: its last state is of stage {state.stage!r}, number {number + 1}, but"
+                         f" stage {number + 1} is {stages[number].name!r} now: give the stages of the whole"
+                         f" process, those that are done too")
+
+
+def _path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measure] | None, timed: bool = False) -> Path:
+    """A path to be solved for by `curve`, that begins with the states of another, or with a state."""
+    record = Record(curve.problem, curve)
+    if isinstance(start, Path):
+        record.go_on_from(start.record)
+    elif start is not None:
+        record.segments[-1].states.append(start)
+    return Path(record, timed=timed, columns=columns)
+
+
+def _keep(path: Path, checkpoint: Any) -> None:
+    """Let a checkpoint be written after each step."""
+    if checkpoint is not None:
+        path.record.on_step.append(Checkpoint(checkpoint, path).write)
+
+
+@contextlib.contextmanager
+def _carried(path: Path) -> Iterator[None]:
+    """Errors carry the path as far as it has come."""
+    try:
+        yield
+    except (ConvergenceError, InputError) as error:
+        error.path = path if path.states else None
+        raise

@@ -1,0 +1,116 @@
+"""A stage of a process as the user declares it, and by the numbers of the things of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import InputError, finite, instance, several
+from ..scene.scene import Scene
+from .stepping import StepControl
+from .targets import Target
+
+
+class Stage:
+    """One stage of a process: it drives one thing to a target, follows tables, or only changes what takes part.
+
+    Args:
+        name: of the stage, in the record.
+        drive: the load, support or contact to drive, itself or its name.
+        until: the target that ends the stage, hit exactly, from either side, e.g. `travel(6.0)` (from the reference,
+            not from here); with `follow` a `process_time`, or None: the end of the tables.
+        through: more targets to hit exactly on the way; those that are not met are left out.
+        without: what is not there during the stage, itself or its name: a support that is open, a tool that is away, a
+            load that is off. A support takes hold of the body where it is when it comes back.
+        follow: instead of `drive`: {thing: [(time, value), ...]}, piecewise linear in time, values in the user's units
+            (the last one stays). A table that begins later than the stage is reached in a straight line from
+            where the thing stands. Process time is 0 at first and runs in such stages only.
+        step: step control of this stage; default that of the run.
+
+    Raises:
+        InputError: no target, both `drive` and `follow`, a table that goes back in time, an argument not allowed.
+    """
+
+    def __init__(self, name: str, drive: Any = None, until: Target | None = None,
+                 through: Sequence[Target] = (), without: Sequence[Any] = (), *,
+                 follow: Mapping[Any, Sequence] | None = None, step: StepControl | None = None):
+        if not isinstance(name, str) or not name:
+            raise InputError(f"Stage: name = {name!r}: must be a word")
+        who = self.who = f"Stage {name!r}"
+        self.name, self.drive, self.until = name, drive, until
+        self.through = several(f"{who}: through", through, "targets, such as pole_stretch(3)")
+        self.without = several(f"{who}: without", without, "things of the scene")
+        self.step = instance(f"{who}: step", step, StepControl | None, "a StepControl or None")
+        for target in (*([] if until is None else [until]), *self.through):
+            instance(f"{who}: target", target, Target, "a target, such as pole_stretch(3)")
+        if drive is not None and follow is not None:
+            raise InputError(f"{who}: both drive and follow are given: a stage has one control")
+        if drive is not None and until is None:
+            raise InputError(f"{who}: drives {drive!r} without a target: give it until=..., such as travel(3)")
+        if drive is None and follow is None and (until is not None or self.through):
+            raise InputError(f"{who}: has a target but drives nothing: give it drive=... or follow=...")
+        if follow is not None and until is not None and until.name != "process_time":
+            raise InputError(f"{who}: until = {until}: tables are followed until a process_time, or to their end")
+        self.tables = [] if follow is None else self._tables(follow)
+
+    def _tables(self, follow: Any) -> list[tuple[Any, np.ndarray]]:
+        """[(thing, knots, shape (n, 2))]."""
+        if not isinstance(follow, Mapping) or not follow:
+            raise InputError(f"{self.who}: follow = {follow!r}: must be {{thing: [(time, value), ...]}}")
+        tables = []
+        for thing, knots in follow.items():
+            table = f"{self.who}: the table of {thing!r}"
+            rows = [several(table, row, "two numbers") for row in several(table, knots, "(time, value)")]
+            if not rows or any(len(row) != 2 for row in rows):
+                raise InputError(f"{table}: must be [(time, value), ...]")
+            numbers = [(finite(f"{table}: time", t), finite(f"{table}: value", v)) for t, v in rows]
+            for (a, _), (b, _) in zip(numbers, numbers[1:]):
+                if b <= a:
+                    raise InputError(f"{table} goes back in time, or stands still: {b:g} after {a:g}; times must"
+                                     f" grow")
+            tables.append((thing, np.array(numbers)))
+        return tables
+
+    def __repr__(self) -> str:
+        return f"Stage({self.name!r})"
+
+
+class Plan(NamedTuple):
+    """A stage with the things of the scene by their numbers: what it drives, [(number, table)], what is left out."""
+
+    stage: Stage
+    numbers: list[int]
+    tables: list[tuple[int, np.ndarray]]
+    off: list[int]
+
+
+def plan(scene: Scene, stage: Stage) -> Plan:
+    """A stage by the numbers of the things of its scene.
+
+    Raises:
+        InputError: it drives or leaves out something that is not there, or leaves the body free to move.
+    """
+    who = stage.who
+    off = sorted({i for thing in stage.without for i in scene.together(scene.number(f"{who}: without", thing))})
+    driven = [stage.drive] if stage.drive is not None else [thing for thing, _ in stage.tables]
+    numbers = [scene.number(who, thing) for thing in driven]
+    for number in numbers:
+        thing = scene.things[number]
+        if not getattr(thing, "driven", False):
+            raise InputError(f"{who}: {thing!r} cannot be driven: a Pressure without value, a Displaced support, or"
+                             f" a Contact that moves can")
+        if number in off and not hasattr(thing, "moves"):                  # a tool may go home while it is away
+            raise InputError(f"{who}: {thing!r} is both driven and left out")
+    if len({scene.together(number)[0] for number in numbers}) < len(numbers):
+        raise InputError(f"{who}: one thing has two tables")
+    there = [thing for i, thing in enumerate(scene.things) if i not in off]
+    try:
+        supports = [t for t in there if hasattr(t, "constraints")]
+        scene.check_held(supports, any(t in there for t in scene.contacts))
+        scene.check_driven(supports)
+    except InputError as error:
+        raise InputError(f"{who}: {error}") from None
+    tables = [(i, table) for number, (_, table) in zip(numbers, stage.tables) for i in scene.together(number)]
+    return Plan(stage, scene.together(numbers[0]) if stage.drive is not None else [], tables, off)

@@ -1,0 +1,139 @@
+"""Converged states, and the record of a run that they make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from .targets import Target
+
+
+@dataclass(eq=False, repr=False)
+class State:
+    """One converged state. Two states are equal only if they are the same object.
+
+    Attributes:
+        x: the unknowns, this rank's part (dimensionless).
+        control: the dimensionless control.
+        direction, slope: dx and dcontrol by arc length: the unit tangent of the path.
+        measures: {name: value} in the user's units.
+        history: the Newton iterations that led to it (`formingx.solve.newton.Iteration`).
+        kind: "start", "step", "target" or "limit point".
+        met: the target that it hits, or None.
+        memory: what each history of the problem remembers from here on (`Problem.histories`).
+        stage: name of the stage of a process; setting: what the stage had set, as plain data (`Setting`).
+        stepping: what a run goes on with: its next step, its counts and its target; empty inside a step.
+    """
+
+    x: np.ndarray
+    control: float
+    direction: np.ndarray
+    slope: float
+    measures: dict[str, float] = field(default_factory=dict)
+    history: list = field(default_factory=list)
+    kind: str = "step"
+    met: Target | None = None
+    memory: list = field(default_factory=list)
+    stage: str = ""
+    setting: dict = field(default_factory=dict)
+    stepping: dict = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        numbers = ", ".join(f"{name}={value:.6g}" for name, value in self.measures.items())
+        return f"State({self.kind!r}, " + f"stage={self.stage!r}, " * bool(self.stage) + f"{numbers})"
+
+
+@dataclass
+class Counts:
+    """What a run cost: accepted states (without the start), failed attempts, all Newton iterations, seconds."""
+
+    steps: int = 0
+    failures: int = 0
+    iterations: int = 0
+    seconds: float = 0.0
+
+
+@dataclass(eq=False)
+class Segment:
+    """States of one problem, in order; a run that changes its problem goes on in another segment.
+
+    Attributes:
+        problem: the `Problem`; curve: the `Curve` that solves for its states; states: list of `State`.
+    """
+
+    problem: Any
+    curve: Any
+    states: list[State] = field(default_factory=list)
+
+
+class Record:
+    """The accepted states of a run, in order, and who is told of them.
+
+    Attributes:
+        segments: list of `Segment`, the last of which grows.
+        counts: what the run cost (`Counts`).
+        stage: name of the stage of a process that is going on.
+        on_state: functions called with every accepted state, while the problem stands there (they fill `measures`).
+        on_step: functions called whenever a step is complete.
+    """
+
+    def __init__(self, problem: Any, curve: Any):
+        self.segments = [Segment(problem, curve)]
+        self.counts, self.stage = Counts(), ""
+        self.on_state: list[Callable[[State], None]] = []
+        self.on_step: list[Callable[[], None]] = []
+
+    @property
+    def problem(self) -> Any:
+        """The problem that is being solved."""
+        return self.segments[-1].problem
+
+    @property
+    def curve(self) -> Any:
+        """What solves for its states."""
+        return self.segments[-1].curve
+
+    @property
+    def states(self) -> list[State]:
+        """All accepted states."""
+        if len(self.segments) == 1:
+            return self.segments[0].states
+        return [state for segment in self.segments for state in segment.states]
+
+    @property
+    def last(self) -> State:
+        """The last accepted state."""
+        return self.segments[-1].states[-1]
+
+    def go_on_from(self, other: Record) -> None:
+        """Begin with the states of another record, which stays as it is."""
+        mine = self.segments[-1]
+        *earlier, last = other.segments
+        self.segments = [*earlier, Segment(mine.problem, mine.curve, list(last.states))]
+        self.counts = replace(other.counts)
+
+    def accept(self, state: State) -> None:
+        """Take up a state: what has a history goes on from it."""
+        problem = self.problem
+        problem.advance(state.x, state.control)
+        state.memory, state.stage, state.setting = problem.memory, self.stage, asdict(problem.setting)
+        self.segments[-1].states.append(state)
+        self.counts.steps += state.kind != "start"
+        for told in self.on_state:
+            told(state)
+
+    def settle(self, step: Any, until: Target) -> None:
+        """A step is complete: note in the last state how the run goes on from it."""
+        self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value]}
+        for told in self.on_step:
+            told()
+
+    def describe(self, state: State) -> str:
+        """A state's main numbers in one line."""
+        scene = self.problem.scene
+        columns = ("process_time", *map(scene.column, scene.drivable), "pole_height", "pole_stretch")
+        return f"stage {state.stage!r}, " * bool(state.stage) + ", ".join(
+            f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in columns if k in state.measures)
