@@ -1,7 +1,12 @@
-"""Which of the points at a kink stick, slide or let go: a small problem of their own, the body between them linear.
+"""Which points of a contact with friction stick, slide or let go: a small problem of its own.
 
-An iteration of Newton's method takes every point to be what it was foretold to be; where points decide each other's lot that can go
-round for ever. Seen from a few points the body is a small compliance, and what they do can be found without it.
+An iteration of Newton's method takes every point to do what the iteration before foretold. Where points decide each
+other's lot that can go round for ever. Seen from the few points that change their minds, the body is a compliance C:
+moved by y (to first order, seen from the tool) they want
+
+    y - y0 + C (f(y) - f0 - S0 y) = 0,
+
+f the law of contact, f0 + S0 y what the iteration took it to be, which led to y0. It is solved for by itself.
 """
 
 from __future__ import annotations
@@ -9,126 +14,111 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
+from .direct import DirectSolver
 
-ITS = []
-INNER = 15
+MOST = 40
+"""Points that are settled together; with more, the iteration is left to itself."""
+
+_ITERATIONS = 15
 
 
 class Settling:
-    """The points that changed their minds in one run of Newton's method."""
+    """The points that changed their minds in one run of Newton's method.
+
+    Attributes:
+        failed: how often no consistent state of them was found.
+    """
 
     def __init__(self, problem: Any):
-        self._problem = problem
-        self.marked = [np.zeros(len(c.points), dtype=bool) for c in problem.touching]
-        self._status: Any = None
-        self.most = 40
+        self._problem, self._contacts = problem, problem.touching
+        self._marked = [np.zeros(len(c.points), dtype=bool) for c in self._contacts]
+        self._active: list[np.ndarray] = []
         self.failed = 0
-        self.inner = 0
 
     def look(self) -> None:
-        now = [c.status for c in self._problem.touching]
-        if self._status is not None:
-            for mark, a, b in zip(self.marked, self._status, now):
-                mark |= a != b
-        self._status = now
+        """To be called once an iteration, after the problem was linearised."""
+        now = [contact.active for contact in self._contacts]
+        for mark, a, b in zip(self._marked, self._active, now):
+            mark |= a != b
+        self._active = now
 
-    def correct(self, newton: Any, step: float, slope: float) -> float:
-        """Make newton.a + step b the step that suits the law at the points marked; returns the control's part."""
-        problem = self._problem
-        contacts = [(c, np.flatnonzero(m)) for c, m in zip(problem.touching, self.marked)]
-        for trial in range(4):
-            total = sum(len(i) for _, i in contacts)
-            if total == 0 or total > self.most:
+    def correct(self, solver: DirectSolver, dx: Any, step: float, border: Any) -> float:
+        """Change a correction (dx, in place, and step, of the control) to one that suits the law; returns the step.
+
+        border(v, w): what a solution v = K^-1 e becomes in the bordered system, in place; returns that of the control.
+        """
+        for _ in range(4):
+            chosen = [np.flatnonzero(mark) for mark in self._marked]
+            points = self._problem.comm.allreduce(sum(map(len, chosen)), MPI.SUM)
+            if not 0 < points <= MOST:
                 return step
-            found = self._solve(newton, step, slope, contacts)
-            if found is None:
+            small = _Points(self._problem, self._contacts, chosen, solver, border)
+            change = small.solve(dx, step)
+            if change is None:
                 self.failed += 1
                 return step
-            dx, dstep, more = found
-            if not more:
+            more, by = change
+            if not self._others(dx.array_r + more, step + by):
                 break
-            contacts = [(c, np.flatnonzero(m)) for c, m in zip(problem.touching, self.marked)]
-        newton.a.array_w[:] += dx
-        return step + dstep
+        dx.array_w += more
+        return step + by
 
-    def _solve(self, newton, step, slope, contacts):
-        problem = self._problem
-        e, v = newton.F_control, newton.gradient           # scratch ... gradient is needed
-        e = problem.x.duplicate()
-        v = problem.x.duplicate()
-        base = newton.a.array_r.copy()
-        b = newton.b.array_r
-        gradient = newton.gradient.array_r
-        V, S = [], []
-        dofs = np.concatenate([c.dofs[i].ravel() for c, i in contacts])
-        for d in dofs:
-            e.set(0)
-            e.array_w[d] = 1.0
-            newton.solver.solve(e, v)
-            V.append(v.array_r.copy())
-        e.destroy(), v.destroy()
-        V = np.array(V).T
-        by = gradient @ V / slope
-        W = V - np.outer(b, by)
-        P0, C, f0, S0, scale = [], [], [], [], []
-        for c, i in contacts:
-            d = c.dofs[i].ravel()
-            move = np.tile(c.rate * c._motion, len(i))
-            P0.append(c._length * base[d] - move * step)
-            C.append(c._length * W[d] + np.outer(move, by))
-            f0.append(c._last[1].force[i].ravel())
-            S0.append(c._last[1].stiffness[i])
-            scale.append(np.repeat(c._scale[i], 2))
-        P0, C, f0, S0, scale = (np.concatenate(q) for q in (P0, C, f0, S0, scale))
-        C = C * scale
-        y = self._inner(P0, C, f0, S0, contacts)
-        if y is None:
-            return None
-        force, stiffness, senses = self._law(y, contacts)
-        delta = scale * (force - f0)
-        delta += scale * np.einsum("nij,nj->ni", stiffness - S0, y.reshape(-1, 2)).ravel()
-        dx = -W @ delta
-        # others that change on the way
-        more = False
-        full = base + dx
-        whole = step + by @ delta
-        for k, (c, i) in enumerate(contacts):
-            P = c._length * full[c.dofs] - c.rate * c._motion * whole
-            t = c.trial(P)
-            new = (t.sense + 4 * (t.normal != 0)).astype(int)
-            flips = (new != self._status[k]) & ~self.marked[k]
-            if flips.any():
-                self.marked[k] |= flips
-                more = True
-            c._sense = np.where(self.marked[k], t.sense, c._sense)
-        return dx, by @ delta, more
+    def _others(self, dx: np.ndarray, step: float) -> bool:
+        """Mark more points that change their minds on the way; True if there are any."""
+        found = False
+        for contact, mark, active in zip(self._contacts, self._marked, self._active):
+            law = contact.foretold(contact.moved(dx, step))
+            new = (law.active != active) & ~mark
+            mark |= new
+            found |= bool(new.any())
+            contact.expect(mark, law.sense)
+        return self._problem.comm.allreduce(found, MPI.LOR)
 
-    def _law(self, y, contacts):
-        force, stiffness, senses, at = [], [], [], 0
-        for c, i in contacts:
-            t = c.trial_of(i, y[at:at + 2 * len(i)].reshape(-1, 2))
-            at += 2 * len(i)
-            force.append(t.force.ravel()), stiffness.append(t.stiffness), senses.append(t.sense + 4*(t.normal != 0))
-        return np.concatenate(force), np.concatenate(stiffness), np.concatenate(senses)
 
-    def _inner(self, P0, C, f0, S0, contacts):
-        n = len(P0)
-        y = P0.copy()
-        eye = np.eye(n)
-        tol = 1e-4 * min(c.law.theta for c, _ in contacts)
-        for it in range(INNER):
-            self.inner += 1
-            force, stiffness, _ = self._law(y, contacts)
-            jump = stiffness - S0
-            R = y - P0 + C @ (force - f0 + np.einsum("nij,nj->ni", jump, y.reshape(-1, 2)).ravel())
-            size = np.abs(R).max()
-            if size < tol:
-                ITS.append(it)
-                return y
-            J = eye.copy()
-            for k in range(n // 2):
-                J[:, 2*k:2*k+2] += C[:, 2*k:2*k+2] @ jump[k]
+class _Points:
+    """A few points and the body as they see it. Arrays: all of all ranks, but for what is said to be own."""
+
+    def __init__(self, problem: Any, contacts: list, chosen: list[np.ndarray], solver: DirectSolver, border: Any):
+        self._comm, self._contacts, self._chosen = problem.comm, contacts, chosen
+        dofs = np.concatenate([c.dofs[i].ravel() for c, i in zip(contacts, chosen)])
+        free = ~np.isin(dofs, problem.held)
+        counts = self._comm.allgather(len(dofs))
+        first = sum(counts[: self._comm.rank])
+        self._own = slice(first, first + len(dofs))
+        e, v = problem.x.duplicate(), problem.x.duplicate()
+        columns, steps = [], []
+        for rank, count in enumerate(counts):
+            for k in range(count):
+                e.set(0)
+                if rank == self._comm.rank:
+                    e.array_w[dofs[k]] = float(free[k])
+                solver.solve(e, v)
+                steps.append(border(v))
+                columns.append(v.array_r.copy())
+        e.destroy()
+        v.destroy()
+        self._columns, self._steps = np.array(columns).T, np.array(steps)      # own rows
+        scale = np.concatenate([np.repeat(c.scale[i], 2) for c, i in zip(contacts, chosen)])
+        self._scale = self._gather(scale)
+        moved = [self._moved(column, step) for column, step in zip(self._columns.T, steps)]
+        self._C = self._gather(np.array(moved).T.reshape(len(dofs), -1)) * self._scale
+
+    def solve(self, dx: Any, step: float) -> tuple[np.ndarray, float] | None:
+        """How a correction and its step change, own part; None if no consistent state was found."""
+        y0 = self._gather(self._moved(dx.array_r, step))
+        f0, S0 = self._taken()
+        y, n = y0.copy(), len(y0)
+        accuracy = 1e-4 * min(c.law.theta for c in self._contacts)
+        for _ in range(_ITERATIONS):
+            f, S = self._law(y)
+            more = f - f0 + np.einsum("nij,nj->ni", S - S0, y.reshape(-1, 2)).ravel()
+            R = y - y0 + self._C @ more
+            if np.abs(R).max() < accuracy:
+                forces = -self._scale * more
+                return self._columns @ forces, float(self._steps @ forces)
+            J = np.eye(n) + np.einsum("mni,nij->mnj", self._C.reshape(n, -1, 2), S - S0).reshape(n, n)
             try:
                 y = y - np.linalg.solve(J, R)
             except np.linalg.LinAlgError:
@@ -136,3 +126,27 @@ class Settling:
             if not np.isfinite(y).all():
                 return None
         return None
+
+    def _moved(self, dx: np.ndarray, step: float) -> np.ndarray:
+        """Own points' part of a correction, seen from their tools, flat."""
+        return np.concatenate([c.moved(dx, step)[i].ravel() for c, i in zip(self._contacts, self._chosen)])
+
+    def _taken(self) -> tuple[np.ndarray, np.ndarray]:
+        """Forces and stiffnesses that the iteration has taken."""
+        return self._all([c.taken(i) for c, i in zip(self._contacts, self._chosen)])
+
+    def _law(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forces and stiffnesses of the law, linearised where the points would be."""
+        mine, at, found = y[self._own].reshape(-1, 2), 0, []
+        for contact, i in zip(self._contacts, self._chosen):
+            law = contact.foretold(mine[at:at + len(i)], i)
+            found.append((law.force, law.stiffness))
+            at += len(i)
+        return self._all(found)
+
+    def _all(self, parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+        force, stiffness = (np.concatenate(part) for part in zip(*parts))
+        return self._gather(force).ravel(), self._gather(stiffness)
+
+    def _gather(self, values: np.ndarray) -> np.ndarray:
+        return np.concatenate(self._comm.allgather(values))
