@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from .discrete.problem import Problem
-from .errors import ConvergenceError, InputError, count, finite, instance, several
+from .errors import ConvergenceError, InputError, count, finite, instance, known, several
 from .physics.contact import Contact
 from .results.columns import Measure
 from .results.files.checkpoint import Checkpoint, read
@@ -22,7 +22,7 @@ from .solve.fixed import FixedControlCurve
 from .solve.follow import Run, begin
 from .solve.newton import Tolerances
 from .solve.process import Execution
-from .solve.stage import Stage, plan
+from .solve.stage import AT_FOLD, Stage, plan
 from .solve.state import Record, State
 from .solve.stepping import StepControl
 from .solve.targets import Amplitude, Target
@@ -30,7 +30,7 @@ from .solve.targets import Amplitude, Target
 
 def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: StepControl | None = None,
           tolerances: Tolerances | None = None, max_steps: int = 200, progress: bool = True, start: Path | None = None,
-          checkpoint: Any = None, record: Mapping[str, Measure] | None = None) -> Path:
+          checkpoint: Any = None, record: Mapping[str, Measure] | None = None, at_fold: str | None = None) -> Path:
     """Follow the equilibrium path from the unloaded body until a target is reached, through limit points.
 
     Args:
@@ -46,6 +46,10 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
         checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
         record: {name: measure} of columns of your own: a function of the `Problem`, called while it stands at the
             state, that returns a number; or a target such as `displacement(0, at=(1, 0))`, whose measure is recorded.
+        at_fold: what to do at a limit point of what is driven. "follow": go on along the path, on which it turns back.
+            "jump": it goes on, and the body snaps to its next equilibrium, see `Path.jumps`; also where no other state
+            is near. "stop": end there. None: "jump" where it can go one way only: it is time, or there is a history
+            (friction); but a pressure is followed, for what an air supply makes grow is the volume.
 
     Raises:
         InputError: nothing is driven, a target needs something that the scene does not have, `start` is of another
@@ -62,6 +66,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     instance("trace: step", step, StepControl | None, "a StepControl or None")
     instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     max_steps = count("trace: max_steps", max_steps)
+    known("trace: at_fold =", at_fold, AT_FOLD)
     scene.only_driven("trace")
     if start is not None and (not isinstance(start, Path) or start.problem.scene is not scene or not start.states):
         raise InputError("trace: start: must be a path of this very scene: fx.load(folder, scene), or what trace gave"
@@ -71,7 +76,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     targets = [(target, target.bind(problem)) for target in (*through, until)]
     _keep(path, checkpoint)
     with _carried(path):
-        run = Run(path.record, targets, step)
+        run = Run(path.record, targets, step, at_fold)
         run.follow(max_steps, progress, None if path.states else begin(path.record.curve))
     return path
 

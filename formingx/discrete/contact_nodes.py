@@ -9,7 +9,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ..errors import InputError
-from ..physics.contact import Contact, Touch, Tractions
+from ..physics.contact import Contact, Motion, Touch, Tractions
 
 HOVERING = 1e-3
 """Distances (over thickness) at which a node is as good as in touch."""
@@ -146,10 +146,14 @@ class ContactNodes:
                 self.area[np.abs(away - place) < 0.1] += share * at
 
     @property
-    def active_set(self) -> bytes:
-        """Which nodes touch and slide, of the tractions last computed."""
-        last = self._last[1]
-        return (last.sense + 4 * (last.normal != 0)).astype(np.int8).tobytes()
+    def active(self) -> np.ndarray:
+        """`Tractions.active` of those last computed, shape (n,)."""
+        return self._last[1].active
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Of the forces in F by tractions, shape (n,)."""
+        return self._scale
 
     def begin(self, x: np.ndarray | None) -> None:
         """Newton's method begins ahead of a state with the nodes at x, shape (n, 2), if there is one."""
@@ -166,6 +170,24 @@ class ContactNodes:
             self._last = x, found
         self._sense = self._last[1].sense
         self._iterate = self.law.motion(x, self.touch)
+
+    def moved(self, dx: np.ndarray, step: float) -> np.ndarray:
+        """Change of `positions` by a correction of the unknowns (own part) and of the control, shape (n, 2), length."""
+        return self._length * dx[self.dofs] - self.rate * step * self._motion
+
+    def taken(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forces and stiffnesses per area that `linearise` has taken, of some nodes, shapes (m, 2), (m, 2, 2)."""
+        return self._last[1].force[nodes], self._last[1].stiffness[nodes]
+
+    def foretold(self, by: np.ndarray, nodes: np.ndarray | slice = slice(None)) -> Tractions:
+        """The law at some nodes, linearised where they come to if they move on by so much, shape (m, 2), length."""
+        x, touch = self._last[0][nodes], self.touch and Touch(*(part[nodes] for part in self.touch))
+        iterate = Motion(*(part[nodes] for part in self._iterate))
+        return self.law.part(nodes).tractions(x, touch, None, iterate.to(x + by))
+
+    def expect(self, nodes: np.ndarray, sense: np.ndarray) -> None:
+        """Which way nodes, shape (n,), are going to slide."""
+        self._sense = np.where(nodes, sense, self._sense)
 
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Add the nodal forces to the owned residual."""

@@ -121,7 +121,7 @@ class Problem:
     @property
     def active_set(self) -> Any:
         """Which points touch and slide, of the residual last computed, the same on all ranks; hashable; None: none."""
-        return tuple(self.comm.allgather(tuple(c.active_set for c in self.touching))) if self.touching else None
+        return tuple(self.comm.allgather(tuple(c.active.tobytes() for c in self.touching))) if self.touching else None
 
     @property
     def has_history(self) -> bool:

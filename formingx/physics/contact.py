@@ -132,6 +132,11 @@ class Tractions(NamedTuple):
     tangential: np.ndarray
     sense: np.ndarray
 
+    @property
+    def active(self) -> np.ndarray:
+        """What each point does: 0 is free, 4 sticks, 3 and 5 slide either way, shape (n,)."""
+        return (self.sense + 4 * (self.normal != 0)).astype(np.int8)
+
 
 class Motion(NamedTuple):
     """Where n points are with respect to a tool, to first order.
@@ -162,6 +167,11 @@ class Law:
     def __init__(self, tool: Tool, mu: float, k: float, theta: float, shift: np.ndarray | float = 0.0,
                  separates: bool = True):
         self.tool, self.mu, self.k, self.theta, self.shift, self.separates = tool, mu, k, theta, shift, separates
+
+    def part(self, points: np.ndarray | slice) -> Law:
+        """The law of some of its points."""
+        shift = self.shift[points] if isinstance(self.shift, np.ndarray) else self.shift
+        return Law(self.tool, self.mu, self.k, self.theta, shift, self.separates)
 
     @property
     def remembers(self) -> bool:

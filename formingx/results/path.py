@@ -82,6 +82,11 @@ class Path:
         return [state for state in self.states if state.kind == "limit point"]
 
     @property
+    def jumps(self) -> list[State]:
+        """States that the body snapped to; see `State.jump`."""
+        return [state for state in self.states if state.kind == "jump"]
+
+    @property
     def last(self) -> State:
         """The last accepted state."""
         return self.record.last

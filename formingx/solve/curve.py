@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import ConvergenceError
 from .diagnose import Attempt, diagnose
+from .jump import fixed
 from .newton import UNLOADED, BorderedNewton, Failure, Tolerances
 from .state import State
 
@@ -47,7 +48,7 @@ class Curve:
         self.problem.residual(self._x, 0.0, self.newton.F)
         if self.newton.F.norm() > Tolerances().residual * (self.problem.force_scale + UNLOADED):
             try:
-                _, history = self.newton.correct(self._x, 0.0, _no_control)
+                _, history = self.newton.correct(self._x, 0.0, fixed(0.0))
             except Failure as failure:
                 self._iterations += len(failure.history)
                 failure.attempt = self._attempt()
@@ -69,6 +70,15 @@ class Curve:
             "", "a tool touches the body at rest: give its Contact a smaller ramp")
         return ConvergenceError(f"no equilibrium was found before anything is driven{words}: {failure.reason};"
                                 f" {advice}", diagnosis=found)
+
+    def spend(self, iterations: int) -> None:
+        """Count iterations that another has spent for it."""
+        self._iterations += iterations
+
+    def moved(self, a: State, b: State) -> float:
+        """How far the body moves from a to b, in the mean (dimensionless)."""
+        self._x.array_w[:] = b.x - a.x
+        return self.norm(self._x, 0.0)
 
     def spent(self) -> int:
         """Newton iterations since this was last asked, whether they led to a state or not."""
@@ -236,12 +246,6 @@ class Curve:
             weight = CONTROL_WEIGHT * old.slope
             return gradient.dot(self._b) + weight * (control - control0), weight
         return c
-
-
-def _no_control(x: Any, control: float, gradient: Any) -> tuple[float, float]:
-    """The constraint control = 0."""
-    gradient.set(0)
-    return control, 1.0
 
 
 def _stationary(a: State, b: State, chord: float) -> float:

@@ -6,6 +6,7 @@ mesh nor the units. Targets are hit exactly: within reach, the equation "measure
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import logging
 import time
@@ -18,12 +19,16 @@ import numpy as np
 from ..errors import ConvergenceError
 from .curve import Curve
 from .diagnose import diagnose
+from .jump import AHEAD, jump
 from .newton import Failure
 from .state import Record, State
 from .stepping import StepControl
 from .targets import Amplitude, Bound, Target, is_met
 
 log = logging.getLogger("formingx")
+
+_JUMPS = 1e-2, 1e-4, 1e-6, 0.0
+"""Lengths of steps below which a failure makes the body try to jump, once each."""
 
 _TRY = (" Try a target within what was met, a smaller first step (step=StepControl(length=...)), more elements where"
         " the body deforms most, or more max_steps.")
@@ -36,12 +41,14 @@ class Run:
         record: where the states go; its curve solves for them.
         targets: (target, its measure): the last one ends the run, the others are met on the way.
         step: step control; default that of the record's last states, or `StepControl()`.
-        turns: False: the control must not turn back (it is the time).
+        at_fold: what to do where the control has a limit point: "follow" the path back, "jump" to the next state, or
+            "stop"; None: jump where the process drives one way, see `_at_fold`.
     """
 
     def __init__(self, record: Record, targets: Sequence[tuple[Target, Bound]], step: StepControl | None = None,
-                 turns: bool = True):
-        self.record, self.curve, self.problem, self._turns = record, record.curve, record.problem, turns
+                 at_fold: str | None = None):
+        self.record, self.curve, self.problem = record, record.curve, record.problem
+        self._at_fold = at_fold or _usual(self.problem)
         self.open = list(targets)
         self.until, self._aim = self.open[-1]
         self._step, self._best, self._began = step, 0.0, time.perf_counter()
@@ -70,10 +77,12 @@ class Run:
                     self._give_up(f"{max_steps} states were accepted before it", pace=self._pace(max_steps))
                 for state in self._next(record.last):
                     self._accept(state)
-                    if state.kind == "limit point" and not self._turns:
-                        self._give_up("no state follows in time: what the tables drive has a limit point here")
-                    if self.problem.has_history or not self._is_open(self.until) and state.met is self.until:
-                        break                           # with a history, the rest of the step starts from here
+                    if state.kind == "limit point" and self._at_fold == "stop":
+                        self._give_up("the control has a limit point here")
+                    if self.problem.has_history or self._at_fold == "jump":
+                        break                           # the rest of the step starts from here
+                    if not self._is_open(self.until) and state.met is self.until:
+                        break
                 self._settle()
                 self._check_direction()
                 _show(bar, self._gained(self._values[-1]), len(self.states))
@@ -133,9 +142,11 @@ class Run:
     def _next(self, old: State) -> list[State]:
         """The next states: one at a target within reach, or one step ahead, and what lies on the way to it.
 
-        Failures halve the step.
+        Failures halve the step; where a short one fails, or the control has its limit, the body jumps.
         """
-        problem = self.problem
+        problem, first, jumps = self.problem, self.step.length, list(_JUMPS)
+        if old.kind == "limit point" and self._at_fold == "jump":
+            return [self._jump(old, 0.0)]
         while True:
             length = problem.reach(old.x, old.control, old.direction, old.slope, self.step.length)
             limited = length < self.step.length
@@ -147,12 +158,12 @@ class Run:
                 else:
                     new = self.curve.step_to(old, reach, bound.equation(target.value))
                     if not 0 < self.curve.progress(old, new) < 2 * length:
-                        raise Failure("the target was met on a far part of the path", [])
+                        raise _Astray("the target was met on a far part of the path", [])
                     new.met = target
                 if problem.too_far(old.x, old.control, new.x, new.control):
-                    raise Failure("too much came into contact in one step", [])
+                    raise _Astray("too much came into contact in one step", [])
                 if was_passed(self.curve, self.states[:-1], old, new):
-                    raise Failure("the iteration fell back to a part of the path that was passed", [])
+                    raise _Astray("the iteration fell back to a part of the path that was passed", [])
                 states = self._sorted_into(old, new)
                 if target is None and not limited:
                     self.step.accepted(len(new.history) - 1)
@@ -161,9 +172,32 @@ class Run:
                 self.record.counts.failures += 1
                 self.step.length = length
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
-                if not self.step.failed():
+                good = self.step.failed()
+                if self._at_fold == "jump" and length < jumps[0] and not isinstance(failure, _Astray):
+                    jumps.pop(0)
+                    with contextlib.suppress(Failure):
+                        return [self._jump(old, reach, first)]
+                if not good:
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
                                   failure.attempt)
+
+    def _jump(self, old: State, length: float, step: float = 0.0) -> State:
+        """The state that the body snaps to, the control going on as in a step of this length; raises `Failure`.
+
+        step: the length of the last step that went well.
+        """
+        sense = np.sign(self.states[0].slope) or 1.0
+        by = sense * max(AHEAD, length * old.slope * sense)
+        for target, bound in self.open:                      # of the control, which a jump must not pass
+            if isinstance(bound, Amplitude) and bound.moves:
+                ahead, now = (self.curve.value(bound, old.x, c) - target.value for c in (old.control + by, old.control))
+                by *= now / (now - ahead) if now * ahead < 0 else 1.0
+        new = jump(self.curve, old, by)
+        new.met = next((target for target, bound in self.open
+                        if is_met(target, bound, self.curve.value(bound, new.x, new.control))), None)
+        self.step.length = max(self.step.length, step / 2)
+        log.info("a jump: %s", new.jump)
+        return new
 
     def _check_direction(self) -> None:
         """Stop if the path has turned back: its target further away than half of what had been gained.
@@ -263,6 +297,24 @@ class Run:
             f" {values[best]:.6g}, at {record.describe(states[best])}.{limits} The last good state is"
             f" {record.describe(record.last)}; it is kept in the error's `path`."
             + ("" if diagnosis.advice else _TRY), diagnosis=diagnosis)
+
+
+class _Astray(Failure):
+    """A state was found, but not one that a step should come to: a shorter one will do better."""
+
+
+def _usual(problem: Any) -> str:
+    """What is done at folds: "jump" if the control goes one way.
+
+    Time does. With a history so does whatever is driven, for to follow a fold would be to let it go back; but where a
+    pressure has its maximum it is the volume of the air that goes on growing.
+    """
+    setting, things = problem.setting, problem.scene.things
+    if setting.leading == len(things):
+        return "jump"
+    if not problem.has_history or setting.leading is not None and things[setting.leading].quantity == "pressure":
+        return "follow"
+    return "jump"
 
 
 def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) -> bool:

@@ -11,6 +11,7 @@ from petsc4py import PETSc
 
 from ..errors import count, positive
 from .direct import DirectSolver
+from .settle import Settling
 
 UNLOADED = 1e-5
 """Support forces (over stress times volume over length) below which a body counts as unloaded."""
@@ -23,6 +24,9 @@ SETTLING = 40
 """At most so many iterations, points touching and letting go on the way; those that come to a new branch by a `SMALL`
 correction do not count: a slack sheet lies on a flat plug with a hundred points, which let go one or two at a time.
 (With a history, which depends on the step, a shorter step is better.)"""
+
+_UNSETTLED = 2
+"""Iterations after which points with a history that still change their minds are settled by themselves."""
 
 SMALL = 1e-3
 """Corrections (dimensionless displacement) below which growth is no sign of divergence: points touch and let go."""
@@ -166,6 +170,7 @@ class BorderedNewton:
         self.reached = control, 0.0
         work0 = moved = 0.0
         kinks = _Kinks(problem)
+        points = Settling(problem) if problem.has_history else None
         while True:
             residual = self.F.norm() / (problem.force_scale + UNLOADED)
             if not np.isfinite(residual):
@@ -175,6 +180,8 @@ class BorderedNewton:
                 return control, history
             problem.linearise(x, control, self.F)
             kinks.look(moved)
+            if points:
+                points.look()
             quiet = history[kinks.changed:]
             grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
             if grown and not (problem.has_kinks and moved < SMALL):
@@ -184,20 +191,16 @@ class BorderedNewton:
                 unsettled = settling and len(history) - kinks.changed < 3
                 raise Failure("contact does not settle: " * unsettled + f"no convergence in {len(history)} iterations",
                               history)
-            if not self.tangent(x, control):
-                raise Failure("the tangent matrix is singular", history)
-            c, c_control = constraint(x, control, self.gradient)
-            self.solver.solve(self.F, self.a)
-            self.a.scale(-1)
-            slope = self.gradient.dot(self.b) + c_control
-            if slope == 0 or not np.isfinite(slope):
-                raise Failure("the quantity that is aimed at does not change along the path here", history)
-            step = (-c - self.gradient.dot(self.a)) / slope
-            self.a.axpy(step, self.b)
+            step = self._correction(x, control, constraint, history)
+            share = kinks.share
+            if points and kinks.changed == len(history) >= _UNSETTLED:
+                step, share = points.correct(self.solver, self.a, step, self._border), 1.0
+                if points.failed == 2:
+                    raise Failure("contact does not settle: no state of the points that change is consistent", history)
             work = abs(self.F.dot(self.a))
             work0 = work0 or work or 1.0
-            x.axpy(kinks.share, self.a)
-            control += kinks.share * step
+            x.axpy(share, self.a)
+            control += share * step
             moved = self._norm(self.a, step)
             correction = moved / (self._norm(x, control) + AT_REST)
             if not np.isfinite(correction):
@@ -205,6 +208,26 @@ class BorderedNewton:
             history.append(Iteration(residual, correction, work / work0))
             self.reached = control, step
             problem.residual(x, control, self.F)
+
+    def _correction(self, x: PETSc.Vec, control: float, constraint: Any, history: list) -> float:
+        """Solve for the correction `self.a` of x and that of the control, which is returned."""
+        if not self.tangent(x, control):
+            raise Failure("the tangent matrix is singular", history)
+        c, c_control = constraint(x, control, self.gradient)
+        self.solver.solve(self.F, self.a)
+        self.a.scale(-1)
+        self._slope = self.gradient.dot(self.b) + c_control
+        if self._slope == 0 or not np.isfinite(self._slope):
+            raise Failure("the quantity that is aimed at does not change along the path here", history)
+        step = (-c - self.gradient.dot(self.a)) / self._slope
+        self.a.axpy(step, self.b)
+        return step
+
+    def _border(self, v: PETSc.Vec) -> float:
+        """Make v = K^-1 e, in place, the solution of the bordered system; returns its part of the control."""
+        step = -self.gradient.dot(v) / self._slope
+        v.axpy(step, self.b)
+        return step
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""

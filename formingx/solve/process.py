@@ -115,9 +115,9 @@ class Execution:
         self.record.accept(state)
         self.record.settle(StepControl(), changed())
 
-    def _trace(self, targets: list, control: float | None, turns: bool = True) -> list:
+    def _trace(self, targets: list, control: float | None) -> list:
         """Follow the path from a control (None: on from the last state); returns the targets that are still open."""
-        run = Run(self.record, targets, self._stage.step or self._step, turns)
+        run = Run(self.record, targets, self._stage.step or self._step, self._stage.at_fold)
         start = None if control is None else self._resumed(control)
         run.follow(self._max_steps, self._progress, start)
         return run.open
@@ -203,7 +203,7 @@ class Execution:
                 self._take_up(replace(self.record.last, control=1.0, kind="target", measures={}, history=[]))
             return through
         target = process_time(then)
-        return self._trace([*through, (target, target.bind(self.problem))], None if begun else 0.0, turns=False)
+        return self._trace([*through, (target, target.bind(self.problem))], None if begun else 0.0)
 
     def _check_beginning(self, tables: list[tuple[int, np.ndarray]], now: float, end: float) -> None:
         who = self._stage.who

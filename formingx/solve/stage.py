@@ -7,10 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, finite, instance, several
+from ..errors import InputError, finite, instance, known, several
 from ..scene.scene import Scene
 from .stepping import StepControl
 from .targets import Target
+
+AT_FOLD = (None, "follow", "jump", "stop")
+"""What a run may do where its control has a limit point."""
 
 
 class Stage:
@@ -28,6 +31,7 @@ class Stage:
             (the last one stays). A table that begins later than the stage is reached in a straight line from
             where the thing stands. Process time is 0 at first and runs in such stages only.
         step: step control of this stage; default that of the run.
+        at_fold: see `formingx.trace`.
 
     Raises:
         InputError: no target, both `drive` and `follow`, a table that goes back in time, an argument not allowed.
@@ -35,13 +39,16 @@ class Stage:
 
     def __init__(self, name: str, drive: Any = None, until: Target | None = None,
                  through: Sequence[Target] = (), without: Sequence[Any] = (), *,
-                 follow: Mapping[Any, Sequence] | None = None, step: StepControl | None = None):
+                 follow: Mapping[Any, Sequence] | None = None, step: StepControl | None = None,
+                 at_fold: str | None = None):
         if not isinstance(name, str) or not name:
             raise InputError(f"Stage: name = {name!r}: must be a word")
         who = self.who = f"Stage {name!r}"
         self.name, self.drive, self.until = name, drive, until
         self.through = several(f"{who}: through", through, "targets, such as pole_stretch(3)")
         self.without = several(f"{who}: without", without, "things of the scene")
+        known(f"{who}: at_fold =", at_fold, AT_FOLD)
+        self.at_fold = at_fold
         self.step = instance(f"{who}: step", step, StepControl | None, "a StepControl or None")
         for target in (*([] if until is None else [until]), *self.through):
             instance(f"{who}: target", target, Target, "a target, such as pole_stretch(3)")

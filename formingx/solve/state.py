@@ -21,7 +21,9 @@ class State:
         direction, slope: dx and dcontrol by arc length: the unit tangent of the path.
         measures: {name: value} in the user's units.
         history: the Newton iterations that led to it (`formingx.solve.newton.Iteration`).
-        kind: "start", "step", "target" or "limit point".
+        kind: "start", "step", "target", "limit point" or "jump" (the body snapped to it).
+        jump: of a "jump": {"dissipated": energy that was lost (stress length^3), "moved": how far the body moved from
+            the state before, mean over its volume (length)}.
         met: the target that it hits, or None.
         memory: what each history of the problem remembers from here on (`Problem.histories`).
         stage: name of the stage of a process; setting: what the stage had set, as plain data (`Setting`).
@@ -36,6 +38,7 @@ class State:
     history: list = field(default_factory=list)
     kind: str = "step"
     met: Target | None = None
+    jump: dict = field(default_factory=dict)
     memory: list = field(default_factory=list)
     stage: str = ""
     setting: dict = field(default_factory=dict)

@@ -1,0 +1,169 @@
+"""The next state where there is none to go on to: a body that moves in a viscous medium, at a fixed control.
+
+Where a process drives one way, a body snaps at a fold of its path, and at a kink beyond which there is no state nearby.
+It comes to rest in the next equilibrium. The way there is followed with vanishing viscosity,
+
+    F(x) + eta M (x - x_k) = 0,   M the lumped metric of the displacements (mean over the reference volume),
+
+from one x_k to the next, the histories taken up at each. eta falls where the body moves smoothly and grows where it
+does not; where it is 0 the body is at rest. What is out of balance on the way does work that is lost.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from .newton import UNLOADED, BorderedNewton, Failure, Tolerances
+from .state import State
+
+AHEAD = 1e-6
+"""By how much the (dimensionless) control goes on in a jump from a fold."""
+
+_FIRST, _LARGEST, _FALLS, _GROWS = 1e3, 1e10, 0.3, 10.0
+"""Of eta: at first, at most; factors after a success and a failure."""
+
+_MOST = 60
+"""Viscous solutions before the body counts as never coming to rest."""
+
+_NEAR_REST = 1e-3
+"""Viscous forces (over the support forces) below which the state at rest is looked for."""
+
+
+class _Viscous:
+    """A problem in a viscous medium: F + eta M (x - origin), but for unknowns that are held."""
+
+    def __init__(self, problem: Any):
+        self._problem, self._diagonal = problem, problem.x.duplicate()
+        ones = problem.x.duplicate()
+        ones.set(1.0)
+        problem.metric_times(ones, self._diagonal)
+        ones.destroy()
+        self._diagonal.array_w[problem.held] = 0
+        self.mass = self._diagonal.array_r.copy()
+        self.eta, self.origin = 0.0, np.zeros(0)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._problem, name)
+
+    def residual(self, x: Any, control: float, out: Any) -> None:
+        """out = F(x, control) + eta M (x - origin)."""
+        self._problem.residual(x, control, out)
+        out.array_w += self.drag(x.array_r)
+
+    def tangent(self, x: Any, control: float, ahead: bool = False) -> Any:
+        """Its derivative by x."""
+        matrix = self._problem.tangent(x, control, ahead)
+        self._diagonal.array_w[:] = self.eta * self.mass
+        matrix.setDiagonal(self._diagonal, addv=True)
+        return matrix
+
+    def drag(self, x: np.ndarray) -> np.ndarray:
+        """eta M (x - origin), own part."""
+        return self.eta * self.mass * (x - self.origin)
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        self._diagonal.destroy()
+
+
+class _Way:
+    """From a state to the next: where the body is on it, and what was lost."""
+
+    def __init__(self, curve: Any, old: State, control: float):
+        self.curve, self.problem, self.control = curve, curve.problem, control
+        self.viscous = _Viscous(curve.problem)
+        self._newton = BorderedNewton(self.viscous, Tolerances(1e-8, 1e-6), curve.norm)
+        self._x, self._drag = curve.problem.x.duplicate(), np.zeros(len(old.x))
+        self.at, self.lost, self.solved, self.rest = old, 0.0, 0, np.inf
+
+    def move(self, origin: np.ndarray, eta: float) -> bool:
+        """One viscous solution from `origin`; False if there is none."""
+        viscous = self.viscous
+        viscous.eta, viscous.origin = eta, origin
+        self._x.array_w[:] = origin
+        try:
+            _, history = self._newton.correct(self._x, self.control, fixed(self.control), self.at)
+        except Failure as failure:
+            self.curve.spend(len(failure.history))
+            return False
+        self.curve.spend(len(history) - 1)
+        if self.problem.folded(self._x, self.control):
+            return False
+        x, drag = self._x.array_r.copy(), viscous.drag(self._x.array_r)
+        self._lose(x - (self.at.x if self.solved else origin), drag)
+        self.rest = np.sqrt(self._sum(drag * drag)) / (self.problem.force_scale + UNLOADED)
+        by, self.at = x - self.at.x, replace(self.at, x=x, control=self.control)
+        self.problem.advance(x, self.control)
+        self.problem.prepare(x, self.control, by, 0.0, 1.0)
+        self.solved += 1
+        return True
+
+    def end(self, old: State) -> State | None:
+        """The state at rest, if there is one near."""
+        try:
+            state = self.curve.solve(self.at.x, self.control, fixed(self.control), "jump", self.at)
+        except Failure:
+            return None
+        self._lose(state.x - self.at.x, np.zeros(len(state.x)))
+        forms = self.problem.forms
+        state.jump = {"dissipated": self.lost * forms.stress * forms.volume,
+                      "moved": self.curve.moved(old, state) * forms.length}
+        return state
+
+    def _lose(self, by: np.ndarray, drag: np.ndarray) -> None:
+        """Work of what is out of balance where the body moves on by so much (trapezoidal rule)."""
+        self.lost += 0.5 * self._sum((self._drag + drag) * by)
+        self._drag = drag
+
+    def _sum(self, values: np.ndarray) -> float:
+        return float(self.problem.comm.allreduce(values.sum()))
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        self._newton.destroy()
+        self.viscous.destroy()
+        self._x.destroy()
+
+
+def jump(curve: Any, old: State, by: float) -> State:
+    """The state that the body comes to from `old` when the control goes on by a little; of kind "jump".
+
+    Args:
+        curve: the `Curve`. by: change of the control, dimensionless; its sign is the way that the process drives.
+
+    Raises:
+        Failure: the body comes to rest nowhere; the problem's histories are those of `old`.
+    """
+    problem, kept = curve.problem, curve.problem.memory
+    fold = old.kind == "limit point" or old.slope * by <= 0
+    way = _Way(curve, old, old.control + by)
+    origin = old.x if fold else old.x + by / old.slope * old.direction
+    eta = _FIRST
+    try:
+        while way.solved < _MOST and eta < _LARGEST:
+            if way.rest < _NEAR_REST:
+                state = way.end(old)
+                if state is not None:
+                    if state.slope * by < 0:
+                        state.direction, state.slope = -state.direction, -state.slope
+                    return state
+                way.rest = np.inf
+            moved = way.move(origin, eta)
+            origin, eta = way.at.x if way.solved else origin, eta * (_FALLS if moved else _GROWS)
+        raise Failure("no state follows that the body could snap to: it comes to rest nowhere", [])
+    except Failure:
+        problem.memory = kept
+        raise
+    finally:
+        way.destroy()
+
+
+def fixed(target: float) -> Any:
+    """The constraint control = target."""
+    def c(x: Any, control: float, gradient: Any) -> tuple[float, float]:
+        gradient.set(0)
+        return control - target, 1.0
+    return c

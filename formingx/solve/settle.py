@@ -1,0 +1,152 @@
+"""Which points of a contact with friction stick, slide or let go: a small problem of its own.
+
+An iteration of Newton's method takes every point to do what the iteration before foretold. Where points decide each
+other's lot that can go round for ever. Seen from the few points that change their minds, the body is a compliance C:
+moved by y (to first order, seen from the tool) they want
+
+    y - y0 + C (f(y) - f0 - S0 y) = 0,
+
+f the law of contact, f0 + S0 y what the iteration took it to be, which led to y0. It is solved for by itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from .direct import DirectSolver
+
+MOST = 40
+"""Points that are settled together; with more, the iteration is left to itself."""
+
+_ITERATIONS = 15
+
+
+class Settling:
+    """The points that changed their minds in one run of Newton's method.
+
+    Attributes:
+        failed: how often no consistent state of them was found.
+    """
+
+    def __init__(self, problem: Any):
+        self._problem, self._contacts = problem, problem.touching
+        self._marked = [np.zeros(len(c.points), dtype=bool) for c in self._contacts]
+        self._active: list[np.ndarray] = []
+        self.failed = 0
+
+    def look(self) -> None:
+        """To be called once an iteration, after the problem was linearised."""
+        now = [contact.active for contact in self._contacts]
+        for mark, a, b in zip(self._marked, self._active, now):
+            mark |= a != b
+        self._active = now
+
+    def correct(self, solver: DirectSolver, dx: Any, step: float, border: Any) -> float:
+        """Change a correction (dx, in place, and step, of the control) to one that suits the law; returns the step.
+
+        border(v, w): what a solution v = K^-1 e becomes in the bordered system, in place; returns that of the control.
+        """
+        for _ in range(4):
+            chosen = [np.flatnonzero(mark) for mark in self._marked]
+            points = self._problem.comm.allreduce(sum(map(len, chosen)), MPI.SUM)
+            if not 0 < points <= MOST:
+                return step
+            small = _Points(self._problem, self._contacts, chosen, solver, border)
+            change = small.solve(dx, step)
+            if change is None:
+                self.failed += 1
+                return step
+            more, by = change
+            if not self._others(dx.array_r + more, step + by):
+                break
+        dx.array_w += more
+        return step + by
+
+    def _others(self, dx: np.ndarray, step: float) -> bool:
+        """Mark more points that change their minds on the way; True if there are any."""
+        found = False
+        for contact, mark, active in zip(self._contacts, self._marked, self._active):
+            law = contact.foretold(contact.moved(dx, step))
+            new = (law.active != active) & ~mark
+            mark |= new
+            found |= bool(new.any())
+            contact.expect(mark, law.sense)
+        return self._problem.comm.allreduce(found, MPI.LOR)
+
+
+class _Points:
+    """A few points and the body as they see it. Arrays: all of all ranks, but for what is said to be own."""
+
+    def __init__(self, problem: Any, contacts: list, chosen: list[np.ndarray], solver: DirectSolver, border: Any):
+        self._comm, self._contacts, self._chosen = problem.comm, contacts, chosen
+        dofs = np.concatenate([c.dofs[i].ravel() for c, i in zip(contacts, chosen)])
+        free = ~np.isin(dofs, problem.held)
+        counts = self._comm.allgather(len(dofs))
+        first = sum(counts[: self._comm.rank])
+        self._own = slice(first, first + len(dofs))
+        e, v = problem.x.duplicate(), problem.x.duplicate()
+        columns, steps = [], []
+        for rank, count in enumerate(counts):
+            for k in range(count):
+                e.set(0)
+                if rank == self._comm.rank:
+                    e.array_w[dofs[k]] = float(free[k])
+                solver.solve(e, v)
+                steps.append(border(v))
+                columns.append(v.array_r.copy())
+        e.destroy()
+        v.destroy()
+        self._columns, self._steps = np.array(columns).T, np.array(steps)      # own rows
+        scale = np.concatenate([np.repeat(c.scale[i], 2) for c, i in zip(contacts, chosen)])
+        self._scale = self._gather(scale)
+        moved = [self._moved(column, step) for column, step in zip(self._columns.T, steps)]
+        self._C = self._gather(np.array(moved).T.reshape(len(dofs), -1)) * self._scale
+
+    def solve(self, dx: Any, step: float) -> tuple[np.ndarray, float] | None:
+        """How a correction and its step change, own part; None if no consistent state was found."""
+        y0 = self._gather(self._moved(dx.array_r, step))
+        f0, S0 = self._taken()
+        y, n = y0.copy(), len(y0)
+        accuracy = 1e-4 * min(c.law.theta for c in self._contacts)
+        for _ in range(_ITERATIONS):
+            f, S = self._law(y)
+            more = f - f0 + np.einsum("nij,nj->ni", S - S0, y.reshape(-1, 2)).ravel()
+            R = y - y0 + self._C @ more
+            if np.abs(R).max() < accuracy:
+                forces = -self._scale * more
+                return self._columns @ forces, float(self._steps @ forces)
+            J = np.eye(n) + np.einsum("mni,nij->mnj", self._C.reshape(n, -1, 2), S - S0).reshape(n, n)
+            try:
+                y = y - np.linalg.solve(J, R)
+            except np.linalg.LinAlgError:
+                return None
+            if not np.isfinite(y).all():
+                return None
+        return None
+
+    def _moved(self, dx: np.ndarray, step: float) -> np.ndarray:
+        """Own points' part of a correction, seen from their tools, flat."""
+        return np.concatenate([c.moved(dx, step)[i].ravel() for c, i in zip(self._contacts, self._chosen)])
+
+    def _taken(self) -> tuple[np.ndarray, np.ndarray]:
+        """Forces and stiffnesses that the iteration has taken."""
+        return self._all([c.taken(i) for c, i in zip(self._contacts, self._chosen)])
+
+    def _law(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forces and stiffnesses of the law, linearised where the points would be."""
+        mine, at, found = y[self._own].reshape(-1, 2), 0, []
+        for contact, i in zip(self._contacts, self._chosen):
+            law = contact.foretold(mine[at:at + len(i)], i)
+            found.append((law.force, law.stiffness))
+            at += len(i)
+        return self._all(found)
+
+    def _all(self, parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+        force, stiffness = (np.concatenate(part) for part in zip(*parts))
+        return self._gather(force).ravel(), self._gather(stiffness)
+
+    def _gather(self, values: np.ndarray) -> np.ndarray:
+        return np.concatenate(self._comm.allgather(values))
