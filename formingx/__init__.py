@@ -26,6 +26,7 @@ from .results.path import Path
 from .results.show.report import report
 from .runs import Process, load, solve, trace
 from .scene.scene import Scene
+from .solve.forces import force
 from .solve.newton import Tolerances
 from .solve.stage import Stage
 from .solve.state import State

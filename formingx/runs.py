@@ -26,6 +26,7 @@ from .solve.stage import AT_FOLD, Stage, plan
 from .solve.state import Record, State
 from .solve.stepping import StepControl
 from .solve.targets import Amplitude, Target
+from .solve.time_error import allowed as allowed_error
 
 
 def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: StepControl | None = None,
@@ -133,7 +134,8 @@ class Process:
 
     def run(self, stages: Sequence[Stage], *, step: StepControl | None = None, tolerances: Tolerances | None = None,
             max_steps: int = 200, progress: bool = True, start: Path | State | None = None,
-            checkpoint: Any = None, record: Mapping[str, Measure] | None = None) -> Path:
+            checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
+            accuracy: str | float = "standard") -> Path:
         """Run the stages; one path holds the states of all of them, every stage from a state of kind "start" on.
 
         Args:
@@ -145,6 +147,8 @@ class Process:
             start: a path of these stages to go on from, also one that `formingx.load` read, or a state of one.
             checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
             record: {name: measure} of columns of your own, see `trace`.
+            accuracy: of the steps in time of a material that relaxes, "draft", "standard" or "fine" (1, 0.2, 0.03 % of
+                stress and thickness), or such an error as a number.
 
         Raises:
             InputError: a stage drives or leaves out something that the scene does not have, leaves the body free to
@@ -157,6 +161,7 @@ class Process:
         instance("Process: step", step, StepControl | None, "a StepControl or None")
         instance("Process: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
         instance("Process: start", start, Path | State | None, "a path, a state or None")
+        allowed = allowed_error("Process", accuracy)
         plans = [plan(self.scene, stage) for stage in stages]
         unsure = clearance.check(self.scene, plans)
         if isinstance(start, Path) and start.problem.scene is not self.scene:
@@ -166,10 +171,10 @@ class Process:
         for state in [start] if isinstance(start, State) else start.states[-1:] if start else []:
             _check_start(state, stages, problem)
         tolerances = tolerances or Tolerances()
-        path = _path(Curve(problem, tolerances), start, record, any(p.tables for p in plans))
+        path = _path(Curve(problem, tolerances), start, record, any(stage.timed for stage in stages))
         _keep(path, checkpoint)
         with _carried(path):
-            execution = Execution(path.record, plans, unsure, step, tolerances.residual)
+            execution = Execution(path.record, plans, unsure, step, tolerances.residual, allowed)
             execution.run(count("Process: max_steps", max_steps), progress)
         return path
 

@@ -204,6 +204,15 @@ class Formulation(ABC):
         v, instead = self._terms[layer].as_variable(name)
         return ufl.derivative(ufl.diff(ufl.replace(self.potential, instead), v), self.w, self.test_function())
 
+    @property
+    def clock(self) -> float:
+        """Process time at control 0: of the setting, or what a run that chooses its times has set since."""
+        return float(self._time[0].value)
+
+    @clock.setter
+    def clock(self, time: float) -> None:
+        self._time[0].value = time
+
     def time_at(self, control: float) -> float:
         """Process time at a control, under the setting that holds now."""
         base, rate = self._time

@@ -63,6 +63,8 @@ class MaterialHistory:
         flat = [ufl.as_ufl(updated[name])[i] if i else ufl.as_ufl(updated[name])
                 for name, f in terms.internal.items() for i in np.ndindex(f.ufl_shape)]
         self._updated = fem.Expression(ufl.as_vector(flat), terms.places, jit_options=_compat.JIT_OPTIONS)
+        weights = terms.material.error_weights
+        self.weights = {name: weights.get(name, 1.0) for name in terms.internal}     # of errors in time
         self.start()
 
     def start(self) -> None:

@@ -89,6 +89,11 @@ class Problem:
         return int(self.x.getSize())
 
     @property
+    def n_owned(self) -> int:
+        """Number of fields' unknowns that this rank owns."""
+        return int(self._n)
+
+    @property
     def symmetric(self) -> bool:
         """True if the tangent is symmetric: no follower load in the scene."""
         return all(x.symmetric for x in (*self.scene.loads, *self.scene.contacts))
@@ -129,6 +134,16 @@ class Problem:
         return bool(self.histories)
 
     @property
+    def relaxes(self) -> bool:
+        """True if F depends on time."""
+        return bool(self.forms.histories)
+
+    @property
+    def time(self) -> float:
+        """Process time at the control that the forms see now."""
+        return self.forms.time_at(self.control)
+
+    @property
     def memory(self) -> list[Any]:
         """What each history remembers of the last accepted state."""
         return [history.get() for history in self.histories]
@@ -159,7 +174,7 @@ class Problem:
 
         state: anything with x (own part), control, setting (a `Setting` as plain data, or empty) and memory.
         """
-        fields, control = self.forms.w.x.array.copy(), self.control
+        fields, control, clock = self.forms.w.x.array.copy(), self.control, self.forms.clock
         stage, memory, x = self._stage, self.memory, self.x.array_r.copy()
         try:
             self.stand(state)
@@ -169,6 +184,7 @@ class Problem:
         finally:
             self.memory = memory
             self._take(stage)
+            self.forms.clock = clock
             self.x.array_w[:] = x
             self.forms.w.x.array[:] = fields
             self.forms.control.value = control
@@ -179,6 +195,8 @@ class Problem:
             self.memory = state.memory
         if state.setting:
             self.enter(Setting(**state.setting), state.x, state.control)
+        if not self.setting.rate[-1]:
+            self.forms.clock = state.time
 
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         """out = F(x, control); sets `force_scale`."""
@@ -200,9 +218,13 @@ class Problem:
 
         Stress length^2 (per depth: length): of the forces that are left over at the unknowns that it holds.
         """
-        left = self.forces(x, control)[self._constraints.driven_by(number)].sum()
+        left = self.forces(x, control)[self.driven_unknowns(number)].sum()
         forms = self.forms
         return -float(self.comm.allreduce(left, MPI.SUM)) * forms.stress * forms.volume / forms.length
+
+    def driven_unknowns(self, number: int) -> np.ndarray:
+        """Local numbers of the owned unknowns that a support (its number in the scene) drives."""
+        return self._constraints.driven_by(number)
 
     def forces(self, x: PETSc.Vec, control: float) -> np.ndarray:
         """Internal less external forces at (x, control), which supports carry; owned part of the fields, shape (n,)."""
@@ -264,6 +286,20 @@ class Problem:
             self._set_own(x)
         for history in self.histories:
             history.advance(x[: self._n], control)
+
+    def foretell(self, x: np.ndarray, control: float) -> dict[int, Any]:
+        """{number of a history: what it would remember, were a state accepted} of those that change with time."""
+        found, timed = {}, self.forms.histories
+        if timed:
+            self.forms.control.value = control
+            self._set_own(x)
+        for k, history in enumerate(self.histories):
+            if any(history is one for one in timed):
+                kept = history.get()
+                history.advance(x[: self._n], control)
+                found[k] = history.get()
+                history.put(kept)
+        return found
 
     def reach(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step of at most `length` from x along (direction, slope) may be. Arrays: own part."""

@@ -52,6 +52,11 @@ class Material:
                 for name, value in self.internal.items()}
         return self.step_energy(F, rest, ufl.as_ufl(0.0), **constants)
 
+    @property
+    def error_weights(self) -> dict[str, float]:
+        """{internal variable: what its relative error counts when steps in time are chosen}; default 1."""
+        return {}
+
     def step_energy(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
         """The potential of a step, per reference volume: its derivative by F is the stress at the end of the step."""
         return self.strain_energy(F, **constants)

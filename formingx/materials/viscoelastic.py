@@ -103,6 +103,12 @@ class RelaxingMaterial(Material):
         names = ["C"] * self._remembers + [f"{self._tensor}_{k}" for k, *_ in self._branches(self.parameters)]
         return dict.fromkeys(names, _IDENTITY)
 
+    @property
+    def error_weights(self) -> dict[str, float]:
+        """Of each branch its share of the instantaneous modulus; C is no unknown in time."""
+        total = self.shear_modulus
+        return {"C": 0.0} | {f"{self._tensor}_{k}": mu / total for k, mu, _ in self._branches(self.parameters)}
+
     def strain_energy(self, F, **constants):
         """The energy of F before anything has flowed."""
         mu = sum(mu for _, mu, _ in self._branches(constants))

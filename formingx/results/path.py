@@ -87,6 +87,11 @@ class Path:
         return [state for state in self.states if state.kind == "jump"]
 
     @property
+    def ended(self) -> str:
+        """Why the run ended before its targets, as a result: the body snaps, and no state follows; "" if it did not."""
+        return self.record.ended
+
+    @property
     def last(self) -> State:
         """The last accepted state."""
         return self.record.last
@@ -236,6 +241,13 @@ class Path:
     def _measure(self, state: State) -> None:
         """Fill the columns of an accepted state."""
         state.measures = self._measures(self.segments[-1], state)
+        if self.problem.relaxes:                             # by the trapezoidal rule
+            states, lost = self.segments[-1].states, 0.0
+            if len(states) > 1:
+                before = states[-2]
+                power = before.measures["dissipated_power"] + state.measures["dissipated_power"]
+                lost = before.measures["dissipated_energy"] + (state.time - before.time) * power / 2
+            state.measures["dissipated_energy"] = lost
 
     def _measures(self, segment: Segment, state: State) -> dict[str, float]:
         columns = self._view(segment).columns

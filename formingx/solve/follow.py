@@ -24,11 +24,15 @@ from .newton import Failure
 from .state import Record, State
 from .stepping import StepControl
 from .targets import Amplitude, Bound, Target, is_met
+from .time_error import TimeError
 
 log = logging.getLogger("formingx")
 
 _JUMPS = 1e-2, 1e-4, 1e-6, 0.0
 """Lengths of steps below which a failure makes the body try to jump, once each."""
+
+_TOO_MUCH = 2.0
+"""Errors in time, over what is allowed, at which a step is taken again."""
 
 _TRY = (" Try a target within what was met, a smaller first step (step=StepControl(length=...)), more elements where"
         " the body deforms most, or more max_steps.")
@@ -43,12 +47,14 @@ class Run:
         step: step control; default that of the record's last states, or `StepControl()`.
         at_fold: what to do where the control has a limit point: "follow" the path back, "jump" to the next state, or
             "stop"; None: jump where the process drives one way, see `_at_fold`.
+        accuracy: the error in time that is allowed, relative.
     """
 
     def __init__(self, record: Record, targets: Sequence[tuple[Target, Bound]], step: StepControl | None = None,
-                 at_fold: str | None = None):
+                 at_fold: str | None = None, accuracy: float = 2e-3):
         self.record, self.curve, self.problem = record, record.curve, record.problem
         self._at_fold = at_fold or _usual(self.problem)
+        self._time_error = TimeError(self.problem, accuracy) if self.problem.relaxes else None
         self.open = list(targets)
         self.until, self._aim = self.open[-1]
         self._step, self._best, self._began = step, 0.0, time.perf_counter()
@@ -78,12 +84,14 @@ class Run:
                 for state in self._next(record.last):
                     self._accept(state)
                     if state.kind == "limit point" and self._at_fold == "stop":
-                        self._give_up("the control has a limit point here")
+                        record.ended = f"the {self.problem.shown(0.0)[0]} has a limit point at {record.describe(state)}"
                     if self.problem.has_history or self._at_fold == "jump":
                         break                           # the rest of the step starts from here
                     if not self._is_open(self.until) and state.met is self.until:
                         break
                 self._settle()
+                if record.ended:
+                    break
                 self._check_direction()
                 _show(bar, self._gained(self._values[-1]), len(self.states))
         except BaseException:
@@ -103,7 +111,9 @@ class Run:
         self._first -= sum(1 for _ in itertools.takewhile(lambda s: s.setting == record.last.setting,
                                                           reversed(record.states)))
         self.problem.stand(record.last)
-        self._values = [self.curve.value(self._aim, s.x, s.control) for s in self.states]
+        for state in self.states:
+            with self.problem.at(state):
+                self._values.append(self.curve.value(self._aim, state.x, state.control))
         self._best = max(map(self._gained, self._values))
         met = [s.met[:2] for s in self.states if s.met]
         self.open = [(target, bound) for target, bound in self.open if target[:2] not in met]
@@ -146,7 +156,7 @@ class Run:
         """
         problem, first, jumps = self.problem, self.step.length, list(_JUMPS)
         if old.kind == "limit point" and self._at_fold == "jump":
-            return [self._jump(old, 0.0)]
+            return self._snap(old)
         while True:
             length = problem.reach(old.x, old.control, old.direction, old.slope, self.step.length)
             limited = length < self.step.length
@@ -164,10 +174,14 @@ class Run:
                     raise _Astray("too much came into contact in one step", [])
                 if was_passed(self.curve, self.states[:-1], old, new):
                     raise _Astray("the iteration fell back to a part of the path that was passed", [])
+                error = self._error_in_time(new)
                 states = self._sorted_into(old, new)
                 if target is None and not limited:
-                    self.step.accepted(len(new.history) - 1)
+                    self.step.accepted(len(new.history) - 1, error)
                 return states
+            except Inaccurate as found:
+                self.record.counts.failures += 1
+                self.step.length = found.share * reach
             except Failure as failure:
                 self.record.counts.failures += 1
                 self.step.length = length
@@ -180,6 +194,26 @@ class Run:
                 if not good:
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
                                   failure.attempt)
+
+    def _error_in_time(self, new: State) -> float:
+        """Of the step to a state, over what is allowed; raises `Inaccurate` if it is much more."""
+        if self._time_error is None:
+            return 0.0
+        error = self._time_error.of(self.states, new.x, new.control)
+        if error > _TOO_MUCH:
+            raise Inaccurate(error)
+        return error
+
+    def _snap(self, old: State) -> list[State]:
+        """The state that the body jumps to from a limit point; none if there is none in time: so the run ends there."""
+        try:
+            return [self._jump(old, 0.0)]
+        except Failure as failure:
+            if not self.problem.setting.rate[-1]:
+                self._give_up(f"the body snaps at a limit point, and no next state was found: {failure.reason}",
+                              failure.attempt)
+            self.record.ended = f"the body snaps at {self.record.describe(old)}: no state follows"
+            return []
 
     def _jump(self, old: State, length: float, step: float = 0.0) -> State:
         """The state that the body snaps to, the control going on as in a step of this length; raises `Failure`.
@@ -297,6 +331,14 @@ class Run:
             f" {values[best]:.6g}, at {record.describe(states[best])}.{limits} The last good state is"
             f" {record.describe(record.last)}; it is kept in the error's `path`."
             + ("" if diagnosis.advice else _TRY), diagnosis=diagnosis)
+
+
+class Inaccurate(Exception):
+    """A step is too long for the accuracy in time; share: of its length, that will do."""
+
+    def __init__(self, error: float):
+        super().__init__(error)
+        self.share = max(0.8 * error ** (-1 / 3), 0.1)
 
 
 class _Astray(Failure):
