@@ -205,11 +205,11 @@ class Run:
         return error
 
     def _snap(self, old: State) -> list[State]:
-        """The state that the body jumps to from a limit point; none if there is none in time: so the run ends there."""
+        """The state that the body jumps to from a limit point; none if there is none: a body that was left alone has then snapped."""
         try:
             return [self._jump(old, 0.0)]
         except Failure as failure:
-            if not self.problem.setting.rate[-1]:
+            if not self.problem.setting.rests:              # what is driven was to go on
                 self._give_up(f"the body snaps at a limit point, and no next state was found: {failure.reason}",
                               failure.attempt)
             self.record.ended = f"the body snaps at {self.record.describe(old)}: no state follows"

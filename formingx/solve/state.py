@@ -39,12 +39,12 @@ class State:
     history: list = field(default_factory=list)
     kind: str = "step"
     met: Target | None = None
-    jump: dict = field(default_factory=dict)
     memory: list = field(default_factory=list)
     stage: str = ""
     setting: dict = field(default_factory=dict)
     stepping: dict = field(default_factory=dict)
     time: float = 0.0
+    jump: dict = field(default_factory=dict)
 
     def __repr__(self) -> str:
         numbers = ", ".join(f"{name}={value:.6g}" for name, value in self.measures.items())
