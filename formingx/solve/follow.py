@@ -205,7 +205,7 @@ class Run:
         return error
 
     def _snap(self, old: State) -> list[State]:
-        """The state that the body jumps to from a limit point; none if there is none: a body that was left alone has then snapped."""
+        """The state that the body jumps to from a limit point; none if there is none: a body left alone has snapped."""
         try:
             return [self._jump(old, 0.0)]
         except Failure as failure:
