@@ -6,6 +6,7 @@ from .errors import ConvergenceError, InputError
 from .materials.data import treloar1944
 from .materials.fit import Fit, fit
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
+from .materials.material import Material
 from .physics import tools
 from .physics.contact import Contact
 from .physics.kinematics import Axisymmetric, PlaneStrain

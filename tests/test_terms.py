@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import ufl
+from conftest import run_json
 from dolfinx import fem
 from petsc4py import PETSc
 from scipy.integrate import quad
@@ -297,6 +298,38 @@ def test_a_memory_is_kept():
     for broken in (data | {"cells": data["cells"][:-1]}, data | {"values": {"q": data["values"]["q"]}}, {}):
         with pytest.raises(fx.InputError, match="another mesh"):
             history.load(broken)
+
+
+MEMORY = """
+import sys; sys.path.insert(0, "tests")
+import json, numpy as np, formingx as fx
+from formingx.results.files.description import describe
+from test_terms import Relaxing, relaxing
+found = []
+for model in (fx.MixedPressure(), fx.Membrane()):
+    problem = relaxing(model, Relaxing(lambda R, Z: 1 + R + Z, 2.0, 0.5))
+    forms, history, x = problem.forms, problem.forms.histories[0], problem.x.duplicate()
+    forms.w.sub(0).interpolate(lambda X: np.stack([0.1 * X[0] + 0.01 * X[0]**2, X[1] - 0.2 * X[0]]) / forms.length)
+    problem.fill(x, forms.w.x.array)
+    problem.set_state(x, 0.3)
+    history.advance(x.array_r, 0.3)
+    memory = history.get()
+    saved = history.save(memory)
+    history.start()
+    history.put(history.load(saved))
+    energy = problem.assemble_scalar(forms.compile(forms.potential))
+    found.append([saved, energy, describe(problem)["materials"]["sheet"]["sums"]])
+if problem.comm.rank == 0:
+    print(json.dumps(found))
+"""
+
+
+def test_a_memory_does_not_know_ranks():
+    for (one, energy, sums), (two, energy_two, sums_two) in zip(run_json(MEMORY, None), run_json(MEMORY, 2)):
+        assert one["cells"] == two["cells"] and energy == pytest.approx(energy_two, rel=1e-12)
+        assert sums == pytest.approx(sums_two, rel=1e-12)
+        for name in ("q", "C"):
+            np.testing.assert_allclose(one["values"][name], two["values"][name], rtol=1e-12)
 
 
 def test_a_scene_without_time_compiles_no_derivative_by_it():
