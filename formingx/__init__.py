@@ -10,6 +10,7 @@ from .heat.run import heat
 from .materials.data import treloar1944
 from .materials.fit import Fit, fit
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
+from .materials.material import Material
 from .materials.viscoelastic import TransientNetwork, Viscoelastic
 from .physics import tools
 from .physics.contact import Contact

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import ufl
+from conftest import run_json
 from dolfinx import fem
 from petsc4py import PETSc
 from scipy.integrate import quad
@@ -203,6 +204,23 @@ def test_a_step_of_a_constant_is_two_layers(model):
         assert np.abs(other - found[0]).max() < 1e-12 * np.abs(found[0]).max()
 
 
+@pytest.mark.parametrize("material", [fx.MooneyRivlin(c10=lambda R, Z: 1 + R, c01=0.1),
+                                      Relaxing(lambda R, Z: 1 + R, 2.0, 0.5)], ids=lambda m: type(m).__name__)
+def test_stresses_of_a_strain(material):
+    """Homogeneous, biaxial, incompressible: in-plane less normal Cauchy stress at every point, by its own constants."""
+    path = fx.solve(layered(material), to=1e-6)
+    problem, l, forms = path.problem, 1.2, path.problem.forms
+    forms.w.x.array[:] = 0
+    forms.w.sub(0).interpolate(lambda X: np.stack([(l - 1) * X[0], (l**-2 - 1) * X[1]]) / forms.length)
+    problem.fill(problem.x, forms.w.x.array)
+    path.last.x[:] = problem.x.array_r
+    stress = path.stress().at_quadrature_points("low")
+    c10, strain = 1 + stress.points[:, 0], (2 * l**2 + l**-4 - 3) / 2
+    slope = c10 + 0.1 * l**2 if isinstance(material, fx.MooneyRivlin) else c10 + 2.0 * strain / 2
+    sigma = stress.cauchy
+    np.testing.assert_allclose(sigma[:, 2, 2] - sigma[:, 1, 1], 2 * slope * (l**2 - l**-4), rtol=1e-8)
+
+
 @pytest.mark.parametrize("constant, message", [
     (lambda R, Z: R - 1.0, "must be at least 0"),
     (lambda R, Z: np.nan * R, "nan at"),
@@ -299,11 +317,56 @@ def test_a_memory_is_kept():
             history.load(broken)
 
 
+MEMORY = """
+import sys; sys.path.insert(0, "tests")
+import json, numpy as np, formingx as fx
+from formingx.results.files.description import describe
+from test_terms import Relaxing, relaxing
+found = []
+for model in (fx.MixedPressure(), fx.Membrane()):
+    problem = relaxing(model, Relaxing(lambda R, Z: 1 + R + Z, 2.0, 0.5))
+    forms, history, x = problem.forms, problem.forms.histories[0], problem.x.duplicate()
+    forms.w.sub(0).interpolate(lambda X: np.stack([0.1 * X[0] + 0.01 * X[0]**2, X[1] - 0.2 * X[0]]) / forms.length)
+    problem.fill(x, forms.w.x.array[:forms.space.dofmap.index_map.size_local])
+    problem.set_state(x, 0.3)
+    history.advance(x.array_r, 0.3)
+    memory = history.get()
+    saved = history.save(memory)
+    history.start()
+    history.put(history.load(saved))
+    energy = problem.assemble_scalar(forms.compile(forms.potential))
+    found.append([saved, energy, describe(problem)["materials"]["sheet"]["sums"]])
+if problem.comm.rank == 0:
+    print(json.dumps(found))
+"""
+
+
+def test_a_memory_does_not_know_ranks():
+    for (one, energy, sums), (two, energy_two, sums_two) in zip(run_json(MEMORY, None), run_json(MEMORY, 2)):
+        assert one["cells"] == two["cells"] and energy == pytest.approx(energy_two, rel=1e-12)
+        assert sums == pytest.approx(sums_two, rel=1e-12)
+        for name in ("q", "C"):
+            np.testing.assert_allclose(one["values"][name], two["values"][name], rtol=1e-12)
+
+
 def test_a_scene_without_time_compiles_no_derivative_by_it():
     scene = fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0),
                      supports=[SYMMETRY, fx.Clamped("rim"), fx.Displaced("bottom")])
     forms = Problem(scene).forms
     assert forms.control_derivative is None and not forms.histories and forms.energy is forms.potential
+
+
+def test_a_constant_can_be_set():
+    """The residual is then that of a scene with the new value, what the energy leaves at rest included."""
+    def problem(c10):
+        return Problem(layered({"low": fx.MooneyRivlin(c10=c10, c01=0.1), "high": fx.NeoHookean(c10=5.0)}))
+    one, two = problem(1.0), problem(2.0)
+    x, _ = random_state(one)
+    one.forms.set_constant("low", "c10", 2.0)
+    assert one.forms.coefficients["low", "c10"].value == 2.0
+    assert np.array_equal(residual(one, 0.3)(x), residual(two, 0.3)(x))
+    with pytest.raises(fx.InputError, match="at least 0"):
+        one.forms.set_constant("low", "c10", -1.0)
 
 
 def test_gradient_by_a_constant():

@@ -8,7 +8,7 @@ import numpy as np
 import ufl
 from dolfinx import fem, la
 
-from ..errors import InputError
+from ..errors import InputError, known
 
 
 class Face(NamedTuple):
@@ -41,10 +41,10 @@ class LoadedBody:
 
     def integral(self, integrand: Any, layer: str | None = None) -> Any:
         """The integral (UFL) over the reference volume, of all layers or of one; per unit depth in plane strain."""
-        layers = list(self._forms.mesh.layers)
-        if layer is not None and layer not in layers:
-            raise InputError(f"layer {layer!r} is not known; known: {', '.join(map(repr, layers))}")
-        return self._forms.weighted(integrand, layers if layer is None else [layer])
+        layers = self._forms.mesh.layers
+        if layer is not None:
+            known("body.integral: layer", layer, layers)
+        return self._forms.weighted(integrand, list(layers) if layer is None else [layer])
 
     def face(self, on: str, quadrature_degree: int = 5) -> Face:
         """A boundary by its name (of a membrane its lower or its upper face)."""

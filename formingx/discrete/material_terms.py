@@ -94,9 +94,9 @@ class MaterialTerms:
         """Give a constant that is a number another value; the rest stress follows."""
         if self.material.varies:
             raise InputError(f"{self.material}: has constants that vary: make another scene for other values")
+        values = {n: float(c.value) for n, c in self.constants.items()} | {name: value}
+        self.rest_stress.value = self.material.with_constants(values.values()).rest_stress
         self.constants[name].value = value
-        values = [float(c.value) for c in self.constants.values()]
-        self.rest_stress.value = self.material.with_constants(values).rest_stress
 
     def as_variable(self, name: str) -> tuple[Any, dict[Any, Any]]:
         """(a constant as a UFL variable v, {what is in the forms: what is there instead as a function of v})."""

@@ -17,12 +17,10 @@ class Kinematics:
 
     Attributes:
         axisymmetric: True if the section turns about R = 0.
-        components: names of the displacement components.
         dimension_of_volume: 3; of a volume per unit depth 2.
     """
 
     axisymmetric = False
-    components = ("r", "z")
     dimension_of_volume = 3
 
     def deformation_gradient(self, u: Any, X: Any) -> Any:
