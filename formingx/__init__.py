@@ -2,7 +2,7 @@
 
 from . import mesh
 from .doctor import doctor
-from .errors import ConvergenceError, InputError
+from .errors import ConvergenceError, InputError, Interrupted
 from .heat.boundaries import Absorption, Convection, FixedTemperature, HeatFlux, Radiation, ThermalProperties
 from .heat.contact import ConductingTool, ContactWithTool
 from .heat.result import HeatRun

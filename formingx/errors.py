@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 from collections.abc import Hashable, Iterable
 from numbers import Complex, Real
 from pathlib import Path
@@ -31,6 +32,31 @@ class ConvergenceError(RuntimeError):
     def __init__(self, message: str, path: Any = None, diagnosis: Any = None):
         super().__init__(f"{message}\n{diagnosis}" if diagnosis is not None else message)
         self.path, self.diagnosis = path, diagnosis
+
+
+class Interrupted(KeyboardInterrupt):
+    """A run was ended by Ctrl-C; one that no script catches prints one line.
+
+    Attributes:
+        path: what was computed up to there (`formingx.Path`), or None.
+    """
+
+    def __init__(self, message: str, path: Any = None):
+        super().__init__(message)
+        self.path = path
+        if sys.excepthook is not _one_line:
+            _usual.append(sys.excepthook)
+            sys.excepthook = _one_line
+
+
+_usual: list[Any] = []
+
+
+def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
+    if isinstance(error, Interrupted):
+        print(error, file=sys.stderr)
+    else:
+        _usual[-1](kind, error, trace)
 
 
 def positive(name: str, value: Any) -> float:

@@ -73,8 +73,8 @@ class Path:
 
     @property
     def columns(self) -> list[str]:
-        """Names of the recorded measures."""
-        return list(self.states[0].measures) if self.states else []
+        """Names of the measures that every state has (a run that went on may record others)."""
+        return [name for name in self.states[0].measures if name in self.last.measures] if self.states else []
 
     @property
     def limit_points(self) -> list[State]:

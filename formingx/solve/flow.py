@@ -31,9 +31,9 @@ class Flow(Run):
     """
 
     def __init__(self, record: Record, measure: Bound, table: np.ndarray,
-                 targets: Sequence[tuple[Target, Bound]], step: StepControl, accuracy: float):
+                 targets: Sequence[tuple[Target, Bound]], step: StepControl, accuracy: float, label: str = ""):
         end = process_time(float(table[-1, 0]))
-        super().__init__(record, [*targets, (end, end.bind(record.problem))], step, "follow", accuracy)
+        super().__init__(record, [*targets, (end, end.bind(record.problem))], step, "follow", accuracy, label)
         self._measure, self._table, self._duration = measure, table, float(table[-1, 0] - table[0, 0])
 
     def _facing_target(self, start: State) -> State:

@@ -31,6 +31,9 @@ log = logging.getLogger("formingx")
 _JUMPS = 1e-2, 1e-4, 1e-6, 0.0
 """Lengths of steps below which a failure makes the body try to jump, once each."""
 
+_PATIENCE = 500
+"""States that gain less than a thousandth of the way to the target, after which a run gives up."""
+
 _TOO_MUCH = 2.0
 """Errors in time, over what is allowed, at which a step is taken again."""
 
@@ -48,11 +51,12 @@ class Run:
         at_fold: what to do where the control has a limit point: "follow" the path back, "jump" to the next state, or
             "stop"; None: jump where the process drives one way, see `_at_fold`.
         accuracy: the error in time that is allowed, relative.
+        label: what is said before the target beside a progress bar.
     """
 
     def __init__(self, record: Record, targets: Sequence[tuple[Target, Bound]], step: StepControl | None = None,
-                 at_fold: str | None = None, accuracy: float = 2e-3):
-        self.record, self.curve, self.problem = record, record.curve, record.problem
+                 at_fold: str | None = None, accuracy: float = 2e-3, label: str = ""):
+        self.record, self._label, self.curve, self.problem = record, label, record.curve, record.problem
         self._at_fold = at_fold or _usual(self.problem)
         self._time_error = TimeError(self.problem, accuracy) if self.problem.relaxes else None
         self.open = list(targets)
@@ -60,8 +64,10 @@ class Run:
         self._step, self._best, self._began = step, 0.0, time.perf_counter()
         self._values: list[float] = []                      # what is aimed at, in the states of this run
 
-    def follow(self, max_steps: int, progress: bool, start: State | None) -> None:
+    def follow(self, max_steps: int | None, progress: bool, start: State | None) -> None:
         """Follow the path from a state, or on from the last one, until the last target is met.
+
+        max_steps: states before the run gives up; None: it does when `_PATIENCE` states have come no nearer.
 
         Raises:
             ConvergenceError: it cannot be reached; without the path, which the record holds.
@@ -69,7 +75,7 @@ class Run:
         record, before = self.record, self.record.counts.steps
         kept: dict[str, Any] = {}
         self._first = len(record.states)
-        bar = _progress_bar(self.problem.comm, self.until, progress)
+        bar = _progress_bar(self.problem.comm, f"{self._label}to {self.until}", progress)
         try:
             if start is None:
                 kept = self._go_on()
@@ -79,8 +85,9 @@ class Run:
             self._close_met(record.last)
             self._settle()
             while self._is_open(self.until):
-                if record.counts.steps - before >= max_steps:
+                if max_steps is not None and record.counts.steps - before >= max_steps:
                     self._give_up(f"{max_steps} states were accepted before it", pace=self._pace(max_steps))
+                self._check_progress()
                 for state in self._next(record.last):
                     self._accept(state)
                     if state.kind == "limit point" and self._at_fold == "stop":
@@ -247,6 +254,13 @@ class Run:
             self._give_up("the path turned back, which a crease at a singular corner (a clamped rim on a fine mesh) can"
                           " cause")
 
+    def _check_progress(self) -> None:
+        """Stop if many states have come no nearer to the target."""
+        if len(self._values) > _PATIENCE:
+            now, then = (self._gained(self._values[k]) for k in (-1, -1 - _PATIENCE))
+            if abs(now - then) < 1e-3:
+                self._give_up(f"the last {_PATIENCE} states came no nearer to it")
+
     def _gained(self, value: float) -> float:
         """How far a value of what is aimed at has come, from that of the first state (0) to the target (1)."""
         return (value - self._values[0]) / ((self.until.value - self._values[0]) or 1.0)
@@ -397,9 +411,9 @@ def begin(curve: Curve) -> State:
         return curve.resume(record.last.x, 0.0)
 
 
-def _progress_bar(comm: Any, until: Target, progress: bool) -> Any:
+def _progress_bar(comm: Any, words: str, progress: bool) -> Any:
     from tqdm import tqdm
-    return tqdm(total=1.0, desc=f"to {until}", delay=2, disable=not progress or comm.rank != 0, leave=False,
+    return tqdm(total=1.0, desc=words, delay=2, disable=not progress or comm.rank != 0, leave=False,
                 bar_format="{desc}: {percentage:3.0f}% |{bar}| {elapsed}{postfix}")
 
 

@@ -52,7 +52,7 @@ class Execution:
         self._targets = [self._bind(plan) for plan in plans]    # so that nothing is compiled between stages
         problem.enter(Setting.first(self.scene), self._rest, 0.0)
 
-    def run(self, max_steps: int, progress: bool) -> None:
+    def run(self, max_steps: int | None, progress: bool) -> None:
         """All stages that are left."""
         self._max_steps, self._progress = max_steps, progress
         last = self.record.last.setting if self.record.states else {"stage": 0, "piece": -1}
@@ -131,7 +131,7 @@ class Execution:
         step = self._stage.step or self._step
         if self.problem.setting.rate[-1] and self.problem.relaxes:
             step = step or _IN_TIME
-        run = Run(self.record, targets, step, self._stage.at_fold, self._accuracy)
+        run = Run(self.record, targets, step, self._stage.at_fold, self._accuracy, self._label)
         start = None if control is None else self._resumed(control)
         run.follow(self._max_steps, self._progress, start)
         return run.open
@@ -188,6 +188,10 @@ class Execution:
         self._enter(base, rate, 1, control)
         return control
 
+    @property
+    def _label(self) -> str:
+        return f"stage {self._stage.name!r} ({self._k + 1} of {len(self.plans)}), "
+
     def _amplitudes(self) -> list[float]:
         """Of all things, and the time, as they stand now."""
         setting, _, control = self._standing()
@@ -207,7 +211,8 @@ class Execution:
                                  f" {now:g}: time would stand still between")
             table = np.vstack([[now, np.interp(now, *table.T)], table[table[:, 0] > now]])
         step = stage.step or _IN_TIME
-        run = Flow(self.record, target.bind(self.problem), table, self._targets[self._k], step, self._accuracy)
+        run = Flow(self.record, target.bind(self.problem), table, self._targets[self._k], step, self._accuracy,
+                   self._label)
         run.follow(self._max_steps, self._progress, None if control is None else self._resumed(control))
 
     def _follow(self, tables: list[tuple[int, np.ndarray]], piece: int) -> None:

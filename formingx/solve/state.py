@@ -128,9 +128,13 @@ class Record:
         state.memory, state.stage, state.setting = problem.memory, self.stage, asdict(problem.setting)
         state.time = problem.forms.time_at(state.control)
         self.segments[-1].states.append(state)
+        try:
+            for told in self.on_state:
+                told(state)
+        except BaseException:
+            self.segments[-1].states.pop()
+            raise
         self.counts.steps += state.kind != "start"
-        for told in self.on_state:
-            told(state)
 
     def settle(self, step: Any, until: Target) -> None:
         """A step is complete: note in the last state how the run goes on from it."""
