@@ -80,16 +80,7 @@ class Formulation(ABC):
         self.scales = [load.unit(body) if load.driven else self.length for load in scene.loads]
         self.scales += [self.length] * (len(scene.things) - len(self.scales)) + [1.0]
         self.control_scale = next((s for s, t in zip(self.scales, scene.things) if t is scene.driven), self.length)
-        self._terms = {name: terms for material, names in self._groups()
-                       for terms in [MaterialTerms(self, material, names)] for name in names}
-        self.coefficients = {(layer, name): c for layer, terms in self._terms.items()
-                             for name, c in terms.constants.items()}
-        changing = [terms for terms in dict.fromkeys(self._terms.values()) if terms.internal]
-        self.histories: list[History] = [MaterialHistory(self, terms) for terms in changing]
-        self.potential = self._energy(MaterialTerms.step_energy)
-        self.energy = self._energy(MaterialTerms.stored_energy) if changing else self.potential
-        self.dissipation = sum(self.weighted(self._scale * terms.dissipation(self.F), terms.names)
-                               for terms in changing) if changing else None
+        self._take_materials()
         self.residual, self.control_derivative = self._residual(body)
 
     @abstractmethod
@@ -135,6 +126,19 @@ class Formulation(ABC):
     @abstractmethod
     def _energy(self, of: Any) -> Any:
         """`potential` or `energy`: of(terms, F) is the energy density (stress) of a `MaterialTerms`."""
+
+    def _take_materials(self) -> None:
+        """Coefficients, histories and energies."""
+        self._terms = {name: terms for material, names in self._groups()
+                       for terms in [MaterialTerms(self, material, names)] for name in names}
+        self.coefficients = {(layer, name): c for layer, terms in self._terms.items()
+                             for name, c in terms.constants.items()}
+        changing = [terms for terms in dict.fromkeys(self._terms.values()) if terms.internal]
+        self.histories: list[History] = [MaterialHistory(self, terms) for terms in changing]
+        self.potential = self._energy(MaterialTerms.step_energy)
+        self.energy = self._energy(MaterialTerms.stored_energy) if changing else self.potential
+        self.dissipation = sum(self.weighted(self._scale * terms.dissipation(self.F), terms.names)
+                               for terms in changing) if changing else None
 
     def cells_of(self, layers: list[str]) -> np.ndarray:
         """The cells of `mesh` in which some layers are, this rank's own and ghosts, ascending local numbers."""
