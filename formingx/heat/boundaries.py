@@ -48,7 +48,6 @@ class _Boundary:
 
     parameters: dict[str, float | Table]
     temperatures: tuple[str, ...] = ()
-    linear = True
     quadrature_degree = 5
 
     def __init__(self, on: str, **parameters: Any):
@@ -105,7 +104,6 @@ class Radiation(_Boundary):
     """
 
     temperatures = ("heater",)
-    linear = False
     quadrature_degree = 9                          # T^4 on P2 edges
 
     def __init__(self, on: str, *, emissivity: float | Table, heater: float | Table, view_factor: float | Table = 1.0,

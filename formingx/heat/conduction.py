@@ -84,11 +84,6 @@ class Conduction:
         self._compile(materials)
         self.update()
 
-    @property
-    def linear(self) -> bool:
-        """True if the rates are linear in T: nothing radiates."""
-        return all(law.linear for law in self._laws)
-
     def constant(self, value: float) -> fem.Constant:
         """A number in a form that can be changed without compiling it again."""
         return fem.Constant(self.mesh.domain, PETSc.ScalarType(value))
@@ -129,17 +124,17 @@ class Conduction:
         T = state[0]
         answers = [touch.answer(lines, k, c) for touch, lines, k in zip(self.touches, state[1:], known[1:])]
         change = np.where(self._held, 0.0, guess)
-        for _ in range(_MOST_ITERATIONS):
+        for iteration in range(_MOST_ITERATIONS):
             R = self._body_rate(T + change)
             for touch, answer in zip(self.touches, answers):
                 at = (T + change)[touch.dofs]
                 R[touch.dofs] += touch.area * answer.g * (answer.free - at)
             left = known[0] + c * R - self._mass(change)
-            self._factorise(c, answers)
+            self._factorise(c, answers, afresh=iteration % 4 == 3)        # a tangent serves the next ones too
             correction = self._solve(left)
             change += correction
             size, off = self._largest(change), self._largest(correction)
-            if off <= max(1e-9 * size, 1e-15 * self._largest(T + change)):
+            if off <= max(1e-11 * size, 1e-15 * self._largest(T + change)):
                 return self._finish(T, change, known, c, answers)
             if not np.isfinite(off):
                 break
@@ -148,7 +143,7 @@ class Conduction:
     def difference(self, known: list[np.ndarray], c: float) -> float:
         """Largest change, of body and tools, that heat `known` makes in an implicit step: (M - c R') change = known.
 
-        With the tangent of the last `stage`, which must have had the same c.
+        With a tangent of the last `stage`, which must have had the same c.
         """
         answers = [touch.answer(0 * k, k, c, absolute=False) for touch, k in zip(self.touches, known[1:])]
         left = known[0].copy()
@@ -325,9 +320,9 @@ class Conduction:
         self._change.x.scatter_forward()
         return self._assemble(self._mass_form)
 
-    def _factorise(self, c: float, answers: list[Any]) -> None:
-        """The tangent M - c R' at the T last set, what touches included."""
-        if self.linear and self._factored_for == c:
+    def _factorise(self, c: float, answers: list[Any], afresh: bool) -> None:
+        """The tangent M - c R' at the T last set, what touches included; one with the same c, unless `afresh`."""
+        if self._factored_for == c and not afresh:
             return
         self._factored_for = c
         self._c.value = c

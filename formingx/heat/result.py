@@ -37,8 +37,9 @@ class HeatRun:
     At a time between two steps the temperature is a cubic in time; times of output are ends of steps.
 
     Attributes:
-        times: of the steps, from 0, shape (n,). outputs: those asked for. unit: of temperatures, "C" or "K".
-        errors: estimated error of each step, degrees, shape (n,); the first is 0.
+        mesh: of the body.
+        outputs: times asked for.
+        unit: of temperatures, "C" or "K".
         states: [[T of the nodes, own part, then the lines of each conducting tool]] of the steps.
     """
 
