@@ -18,6 +18,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import traceback
 import warnings
 from collections import Counter
@@ -29,8 +30,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-LIMIT = 10.0                                   # seconds for one call
-SETTING_UP = 60.0                              # seconds until the first call
+LIMIT = 10.0                                   # seconds of a processor's time for one call
+LONGEST = 6 * LIMIT                            # and of any, until the first call too: the machine may be busy
 
 
 class Ending(NamedTuple):
@@ -61,10 +62,12 @@ def _watched(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> Iterat
         ready.register(child.stdout, selectors.EVENT_READ)
         buffer = b""
         while True:
-            if not ready.select(LIMIT if began else SETTING_UP):
-                child.kill()
-                yield Ending(number, began, f"no end within {LIMIT:g} s", True)
-                return
+            spent, until = _processor_time(child.pid), time.monotonic() + LONGEST
+            while not ready.select(1.0):
+                if time.monotonic() > until or began and _processor_time(child.pid) > spent + LIMIT:
+                    child.kill()
+                    yield Ending(number, began, f"no end within {LIMIT:g} s", True)
+                    return
             part = os.read(child.stdout.fileno(), 65536)
             if not part:
                 break
@@ -78,6 +81,12 @@ def _watched(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> Iterat
                     number = found[0] + 1
         if number < last:
             yield Ending(number, began, f"the process died ({child.wait()})", True)
+
+
+def _processor_time(process: int) -> float:
+    """Seconds that a process has used."""
+    words = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def child(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> None:
@@ -111,8 +120,8 @@ def child(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> None:
 
 _EXTREMES: list[Any] = [
     0, -0.0, 1, -1, 0.5, 5e-324, 1e-300, 1e300, -1e300, math.inf, -math.inf, math.nan, 10**400, 10**18, True, False,
-    None, "", "1.0", "x", "bottom", "\0", "a" * 10_000, b"1", 1j, [], [1], (), (1.0, 2.0), (1, 2, 3), [[]], {}, {"a": 1},
-    {1: 2.0, 2: 3.0}, {0.5: 0.1}, set(), object(), len, lambda x: x, lambda x: None, int, range(3), Decimal("0.5"),
+    None, "", "1.0", "x", "bottom", "\0", "a" * 10_000, b"1", 1j, [], [1], (), (1.0, 2.0), (1, 2, 3), [[]],
+    {}, {"a": 1}, {1: 2.0, 2: 3.0}, {0.5: 0.1}, set(), object(), len, lambda x: x, lambda x: None, int, range(3), Decimal("0.5"),
     Fraction(1, 3), np.float32(0.5), np.int64(3), np.array(1.0), np.array([1.0]), np.array([]), np.zeros((2, 2)),
     np.array("x"), np.complex128(1j), np.nan, Path("x"), Ellipsis, NotImplemented]
 
@@ -173,8 +182,9 @@ def damaged(data: bytes, rng: random.Random) -> bytes:
             lines[k], lines[m] = lines[m], lines[k]
             data = b"\n".join(lines)
         else:
-            words[w] = rng.choice([b"-1", b"0", b"1", b"2", b"3", b"99999999999999999999", b"nan", b"inf", b"1e300", b"",
-                                   b"1e-320", b"0.5", b'"', b"{", b"}", b"$End", b"#", b"\0", b"\xff", b"[" * 9000])
+            words[w] = rng.choice([b"-1", b"0", b"1", b"2", b"3", b"99999999999999999999", b"nan", b"inf", b"1e300",
+                                   b"1e-320", b"", b"0.5", b'"', b"{", b"}", b"$End", b"#", b"\0", b"\xff",
+                                   b"[" * 9000])
             data = b"\n".join(lines[:k] + [b" ".join(words)] + lines[k + 1:])
     return data
 

@@ -138,10 +138,10 @@ def pot(*, mouth: float, base: float, depth: float, sheet: float, fillet: float,
     mouth, base, depth = positive("pot: mouth", mouth), positive("pot: base", base), positive("pot: depth", depth)
     sheet = positive("pot: sheet", sheet)
     if base > mouth:
-        raise InputError(f"pot: base = {base!r}: must not be wider than mouth = {mouth!r}")
+        raise InputError(f"pot: base = {base:g}: must not be wider than mouth = {mouth:g}")
     radius = 0.8 * base if plug is None else positive("pot: plug", plug)
     if radius >= base:
-        raise InputError(f"pot: plug = {plug!r}: must be below base = {base!r}")
+        raise InputError(f"pot: plug = {plug!r}: must be below base = {base:g}")
     edge = radius / 2 if nose is None else positive("pot: nose", nose)
     if edge > radius:
         raise InputError(f"pot: nose = {nose!r}: must not be above the plug's radius, {radius:g}")
