@@ -96,7 +96,7 @@ def child(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> None:
     warnings.simplefilter("ignore")
     import formingx as fx
     with tempfile.TemporaryDirectory() as folder:
-        makers = cases(Path(folder))
+        makers = _itself() if kinds == ("itself",) else cases(Path(folder))
         names = [name for name in makers if not kinds or name.split()[0] in kinds]
         for number in range(first, last):
             rng = random.Random(f"{seed} {number}")
@@ -121,9 +121,9 @@ def child(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> None:
 _EXTREMES: list[Any] = [
     0, -0.0, 1, -1, 0.5, 5e-324, 1e-300, 1e300, -1e300, math.inf, -math.inf, math.nan, 10**400, 10**18, True, False,
     None, "", "1.0", "x", "bottom", "\0", "a" * 10_000, b"1", 1j, [], [1], (), (1.0, 2.0), (1, 2, 3), [[]],
-    {}, {"a": 1}, {1: 2.0, 2: 3.0}, {0.5: 0.1}, set(), object(), len, lambda x: x, lambda x: None, int, range(3), Decimal("0.5"),
-    Fraction(1, 3), np.float32(0.5), np.int64(3), np.array(1.0), np.array([1.0]), np.array([]), np.zeros((2, 2)),
-    np.array("x"), np.complex128(1j), np.nan, Path("x"), Ellipsis, NotImplemented]
+    {}, {"a": 1}, {1: 2.0, 2: 3.0}, {0.5: 0.1}, set(), object(), len, lambda x: x, lambda x: None, int, range(3),
+    Decimal("0.5"), Fraction(1, 3), np.float32(0.5), np.int64(3), np.array(1.0), np.array([1.0]), np.array([]),
+    np.zeros((2, 2)), np.array("x"), np.complex128(1j), np.nan, Path("x"), Ellipsis, NotImplemented]
 
 
 def anything(rng: random.Random) -> Any:
@@ -190,6 +190,11 @@ def damaged(data: bytes, rng: random.Random) -> bytes:
 
 
 # What is called.
+
+def _itself() -> dict[str, Callable[[random.Random], Any]]:
+    """Calls that end badly, to test what watches them."""
+    return {"itself dies": lambda rng: os.abort(), "itself raises": lambda rng: 1 / 0}
+
 
 def cases(folder: Path) -> dict[str, Callable[[random.Random], Any]]:
     """{kind and name: a call}; the first word is the kind."""
