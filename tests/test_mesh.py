@@ -276,7 +276,9 @@ def test_parison_of_programmed_wall():
 @pytest.mark.parametrize("thickness, words", [
     ({0: 0.1, 0.9: 0.2}, "must hold R from 0 to 1"), ({0: 0.1}, "must hold R from 0 to 1"),
     (lambda R: 0.5 - R, r"thickness of 'sheet' at R = 0.5 = 0.0: must be greater than 0"),
-    (lambda R: "thick", "must be a number"), ({0: 0.1, 1: -1}, "at R = 1 = -1: must be greater"),
+    (lambda R: "thick", "must be a number"),
+    (lambda R: R.x, "R = 0: the function raised AttributeError: 'float'"),
+    ({0: 0.1, 1: -1}, "at R = 1 = -1: must be greater"),
     ({"a": {0: 0.1, 2: math.nan}}, "'a' at R = 2 = nan")])
 def test_varying_thickness_refuses(thickness, words):
     with pytest.raises(fx.InputError, match=words):

@@ -192,7 +192,8 @@ def _thickness(who: str, given: Any, coordinate: str) -> Callable[[np.ndarray], 
         value = positive(who, given)
         return lambda x: np.full(len(x), value)
     if callable(given):
-        return lambda x: np.array([positive(f"{who} at {coordinate} = {v:.6g}", given(v)) for v in x.tolist()])
+        return lambda x: np.array([positive(f"{who} at {coordinate} = {v:.6g}", _called(given, v, who, coordinate))
+                                   for v in x.tolist()])
     points = sorted((finite(f"{who}: {coordinate}", at), positive(f"{who} at {coordinate} = {at!r}", h))
                     for at, h in given.items())
     at, value = np.array(points).reshape(-1, 2).T
@@ -203,6 +204,14 @@ def _thickness(who: str, given: Any, coordinate: str) -> Callable[[np.ndarray], 
             raise InputError(f"{who} = {given!r}: must hold {coordinate} from {x.min():.6g} to {x.max():.6g}")
         return np.interp(x, at, value)
     return between
+
+
+def _called(function: Callable, v: float, who: str, coordinate: str) -> Any:
+    try:
+        return function(v)
+    except Exception as error:
+        raise InputError(f"{who} at {coordinate} = {v:.6g}: the function raised {type(error).__name__}:"
+                         f" {error}") from error
 
 
 def _grading(kind: str, grading: Any) -> float:

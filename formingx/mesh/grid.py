@@ -111,8 +111,9 @@ def _tagged(grid: Grid, what: str) -> tuple:
     first = len(layers) + 1
     tags: dict[tuple[int, ...], int] = {(k,): first + k for k in range(len(grid.boundaries))}
     owners: dict[tuple[int, int], tuple[list, list[int]]] = {}
+    known = _edges(triangles)
     for k, (name, rows) in enumerate(grid.boundaries.items()):
-        for row in _of_elements(number[rows[:, :width]], triangles, f"{what}: boundary {name!r}", points):
+        for row in _of_elements(number[rows[:, :2]], known, f"{what}: boundary {name!r}", points):
             key = (min(row[:2]), max(row[:2]))
             names = owners.setdefault(key, (row, []))[1]
             if k not in names:
@@ -127,18 +128,24 @@ def _tagged(grid: Grid, what: str) -> tuple:
             layers, boundaries)
 
 
-def _of_elements(edges: np.ndarray, triangles: np.ndarray, who: str, points: np.ndarray) -> list[list[int]]:
+def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
+    """{the two ends, the lower first: the middle} of all edges; without middles: {ends: []}."""
+    found: dict[tuple[int, int], list[int]] = {}
+    for i, j, k in ((0, 1, 3), (1, 2, 4), (2, 0, 5)):
+        ends = np.sort(triangles[:, [i, j]], axis=1).tolist()
+        found |= {(a, b): middle for (a, b), middle in zip(ends, triangles[:, k:k + 1].tolist())}
+    return found
+
+
+def _of_elements(edges: np.ndarray, known: dict[tuple[int, int], list[int]], who: str,
+                 points: np.ndarray) -> list[list[int]]:
     """The edges (ends, then the middle of the element there) if they are edges of elements; [] if none is.
 
     A curve that is no part of the body (of a tool in the same file) leaves its boundary empty.
     """
-    middle = triangles.shape[1] == 6
-    known = {frozenset(row[i] for i in ends): row[k] for row in triangles.tolist()
-             for *ends, k in ((0, 1, 3 if middle else 0), (1, 2, 4 if middle else 0), (2, 0, 5 if middle else 0))}
-    found = [[a, b, known[frozenset((a, b))]][: 3 if middle else 2] for a, b in edges[:, :2].tolist()
-             if frozenset((a, b)) in known]
+    found = [[a, b, *known[min(a, b), max(a, b)]] for a, b in edges.tolist() if (min(a, b), max(a, b)) in known]
     if found and len(found) < len(edges):
-        bad = next(row for row in edges[:, :2].tolist() if frozenset(row) not in known)
+        bad = next(row for row in edges.tolist() if (min(row), max(row)) not in known)
         at = [f"({points[n, 0]:.6g}, {points[n, 1]:.6g})" if n >= 0 else "a node of no element" for n in bad]
         raise InputError(f"{who}: its edge from {at[0]} to {at[1]} is not an edge of an element")
     return found

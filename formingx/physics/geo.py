@@ -35,7 +35,7 @@ _ALLOWED = ("points, lines, circles, splines, loops, surfaces, physical groups, 
             " because a .geo file is a script and nothing in it is run: export anything else as .step or .brep")
 
 
-def curves(file: str | os.PathLike) -> dict[int, list[Line | Arc]]:
+def curves(file: str | os.PathLike) -> dict[int, Line | Arc]:
     """{number: the line or the arc} of the curves of a .geo file.
 
     Raises:
@@ -62,7 +62,7 @@ class _Drawing:
     def __init__(self) -> None:
         self.values: dict[str, float] = {"Pi": math.pi}
         self.points: dict[int, np.ndarray] = {}
-        self.curves: dict[int, list[Line | Arc]] = {}
+        self.curves: dict[int, Line | Arc] = {}
 
     def add(self, statement: str) -> None:
         """Take one statement in; a ValueError that says what is wrong with it."""
@@ -107,7 +107,7 @@ class _Drawing:
     def _keep(self, tag: int, piece: Line | Arc) -> None:
         if tag in self.curves:
             raise ValueError(f"a second curve {tag}")
-        self.curves[tag] = [piece]
+        self.curves[tag] = piece
 
     def _point(self, number: float) -> np.ndarray:
         tag = self._tag(number)

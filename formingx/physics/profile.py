@@ -36,6 +36,11 @@ class Line(NamedTuple):
         angle = math.atan2(self.b[1] - self.a[1], self.b[0] - self.a[0])
         return angle, angle
 
+    @property
+    def backwards(self) -> Line:
+        """The same from its last point to its first."""
+        return Line(self.b, self.a)
+
 
 class Arc(NamedTuple):
     """A circular piece about `centre` from polar angle `start`, `sweep` radians long, to the left if positive."""
@@ -56,6 +61,11 @@ class Arc(NamedTuple):
         """Direction of travel at both ends, radians."""
         quarter = math.copysign(math.pi / 2, self.sweep)
         return self.start + quarter, self.start + self.sweep + quarter
+
+    @property
+    def backwards(self) -> Arc:
+        """The same from its last point to its first."""
+        return self._replace(start=self.start + self.sweep, sweep=-self.sweep)
 
 
 class Nearest(NamedTuple):
@@ -180,6 +190,10 @@ class Tool:
         return self._with([Line(p.b * flip, p.a * flip) if isinstance(p, Line)
                            else Arc(p.centre * flip, p.radius, -p.start - p.sweep, p.sweep)
                            for p in reversed(self.pieces)])
+
+    def reversed(self) -> Tool:
+        """The tool whose solid is on the other side of the profile."""
+        return self._with([p.backwards for p in reversed(self.pieces)])
 
     def outline(self, per_arc: int = 24) -> np.ndarray:
         """Points along the profile for drawing, shape (n, 2)."""

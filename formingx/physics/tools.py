@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from ..errors import InputError, finite, non_negative, positive
 from .profile import TURN, Arc, Line, Nearest, Tool
 from .tool_files import read
 
-__all__ = ["Arc", "Line", "Nearest", "Tool", "bottle", "cone", "cup", "cylinder", "male", "plane", "read", "sphere"]
+__all__ = ["Arc", "Line", "Nearest", "Pot", "Tool", "bottle", "cone", "cup", "cylinder", "male", "plane", "pot",
+           "read", "sphere"]
 
 
 def plane(z: float = 0.0) -> Tool:
@@ -106,6 +108,47 @@ def sphere(*, radius: float, z: float = 0.0, r: float = 0.0) -> Tool:
     radius = positive("sphere: radius", radius)
     centre = np.array([finite("sphere: r", r), finite("sphere: z", z) + radius])
     return Tool.of_pieces([Arc(centre, radius, -math.pi / 2, TURN)], closed=True)
+
+
+class Pot(NamedTuple):
+    """The tools of a tapered cup: `mould`, above the sheet, and `plug`, below it."""
+
+    mould: Tool
+    plug: Tool
+
+
+def pot(*, mouth: float, base: float, depth: float, sheet: float, fillet: float, lip: float = 0.0,
+        plug: float | None = None, nose: float | None = None) -> Pot:
+    """Mould and plug of a tapered round cup, upside down: the sheet is formed upwards.
+
+    The sheet lies on Z from 0 to its thickness, as `mesh.disc` makes it; the mould opens downwards onto its top, the
+    plug points up and touches its bottom; drive it with `moves=(0, 1)`. Lengths in millimetres, or as the mesh.
+
+    Args:
+        mouth, base: radii of the cup at its mouth and at its base, the base not wider; depth: between the two.
+        sheet: thickness of the sheet.
+        fillet: radius of the edge between wall and base; lip: of that between wall and flange.
+        plug: radius of the flat-ended plug, smaller than the base; default 0.8 of the base.
+        nose: radius of the plug's rounded edge, at most its radius (a ball); default half of it.
+
+    Raises:
+        InputError: a length that is not positive, a base wider than the mouth, fillets that do not fit, a plug that is
+            not smaller than the base.
+    """
+    mouth, base, depth = positive("pot: mouth", mouth), positive("pot: base", base), positive("pot: depth", depth)
+    sheet = positive("pot: sheet", sheet)
+    if base > mouth:
+        raise InputError(f"pot: base = {base:g}: must not be wider than mouth = {mouth:g}")
+    radius = 0.8 * base if plug is None else positive("pot: plug", plug)
+    if radius >= base:
+        raise InputError(f"pot: plug = {plug!r}: must be below base = {base:g}")
+    edge = radius / 2 if nose is None else positive("pot: nose", nose)
+    if edge > radius:
+        raise InputError(f"pot: nose = {nose!r}: must not be above the plug's radius, {radius:g}")
+    mould = cup(radius=mouth, depth=depth, mouth=sheet, draft=math.degrees(math.atan((mouth - base) / depth)),
+                fillet=fillet, lip=lip)
+    below = 2 * depth + edge                               # the plug's shaft, longer than it travels
+    return Pot(mould, Tool([(radius, -below), (radius, 0.0), (0.0, 0.0)], [0.0, edge, 0.0]))
 
 
 def _draft(shape: str, draft: float) -> float:
