@@ -27,4 +27,5 @@ from .solve.newton import Tolerances
 from .solve.process import Process, Stage
 from .solve.stepping import StepControl
 from .solve.targets import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel
+from .study import Study, StudyRun, study
 from .units import Units
