@@ -33,6 +33,7 @@ from .solve.stage import Stage
 from .solve.state import State
 from .solve.stepping import StepControl
 from .solve.targets import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel
+from .study import Study, StudyRun, study
 from .tables import table
 from .time_temperature import WLF, Arrhenius
 from .units import Units

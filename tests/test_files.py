@@ -4,6 +4,7 @@ import base64
 import gzip
 import json
 import re
+import shutil
 from html.parser import HTMLParser
 from xml.etree import ElementTree
 
@@ -20,7 +21,8 @@ from formingx.__main__ import main
 from formingx.discrete.tooling import Tooling
 from formingx.results.files.description import describe
 from formingx.results.files.fields import Fields
-from formingx.results.show import report
+from formingx.results.files.solid import solid
+from formingx.results.show import animation, report
 
 
 @pytest.fixture(scope="module")
@@ -158,8 +160,40 @@ def test_animation(formed, tmp_path):
     for given, message in (({"frames": 0}, "frames = 0"), ({"seconds": -1}, "seconds = -1")):
         with pytest.raises(fx.InputError, match=message):
             formed.animate(tmp_path / "run.gif", **given)
-    with pytest.raises(fx.InputError, match="must end in .gif"):
-        formed.animate(tmp_path / "run.mp4")
+    with pytest.raises(fx.InputError, match="must end in .gif or .mp4"):
+        formed.animate(tmp_path / "run.avi")
+    if shutil.which("ffmpeg") is None:
+        with pytest.raises(fx.InputError, match="needs the program ffmpeg"):
+            formed.animate(tmp_path / "run.mp4")
+
+
+def test_every_stage_has_its_frames(plugged):
+    """Frames are even in the process: the plug goes down by 1 and up by 0.5."""
+    shown = [b.stage for _, b, _ in animation._spread(plugged, 60)]
+    assert 30 <= shown.count("down") <= 50 and shown.count("up") >= 10
+
+
+def test_solids_are_closed_and_hold_the_volume(formed, tmp_path):
+    """Every edge of the triangles belongs to two of them, run both ways; the volume is the part's."""
+    points, triangles = solid(formed.profile(), True, 600)
+    edges = np.concatenate([triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
+    there = {tuple(edge) for edge in edges.tolist()}
+    assert len(there) == len(edges) and all((b, a) in there for a, b in there)
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
+    assert volume == pytest.approx(formed.part().volume, rel=1e-3) and volume > 0
+    formed.to_stl(tmp_path / "cup.stl")
+    data = (tmp_path / "cup.stl").read_bytes()
+    count = int.from_bytes(data[80:84], "little")
+    assert len(data) == 84 + 50 * count and count > 1000
+    formed.to_gltf(tmp_path / "cup.glb")
+    data = (tmp_path / "cup.glb").read_bytes()
+    assert data[:4] == b"glTF" and int.from_bytes(data[8:12], "little") == len(data)
+    length = int.from_bytes(data[12:16], "little")
+    found = json.loads(data[20:20 + length])
+    assert found["asset"]["version"] == "2.0" and found["buffers"][0]["byteLength"] == len(data) - 28 - length
+    with pytest.raises(fx.InputError, match="must end in .stl"):
+        formed.to_stl("cup.obj")
 
 
 class Links(HTMLParser):

@@ -297,12 +297,14 @@ class Path:
         fields.to_xdmf(self, file, states)
 
     def animate(self, file: Any, frames: int = 60, seconds: float = 5.0) -> None:
-        """Draw the forming as a moving picture, a GIF: the section of the sheet and the loading curve (rank 0 draws).
+        """Draw the forming as a moving picture, a GIF or an MP4: the sheet's section and the loading curve (rank 0).
 
-        The frames are evenly spread over the (cubic) path through the states; the last one stands for a second more.
+        The frames are evenly spread over the process (`formingx.results.show.record.progress`), on the (cubic) path
+        through the states; the last one stands for a second more.
 
         Raises:
-            InputError: the name does not end in .gif, a number is not allowed, or the mesh is no sheet.
+            InputError: the name ends neither in .gif nor in .mp4, there is no ffmpeg to make an MP4, a number is not
+                allowed, or the mesh is no sheet.
         """
         from .show import animation
         animation.animate(self, file, frames, seconds)
@@ -340,7 +342,7 @@ class Path:
         It is revolved about the axis, or, in plane strain, extruded.
         """
         from .show import views
-        axisymmetric = self.problem.scene.kinematics.dimension_of_volume == 3
+        axisymmetric = self.problem.scene.kinematics.axisymmetric
         (views.revolved if axisymmetric else views.extruded)(self.profile(state), file, self.problem.comm)
 
     def wall(self, state: State | None = None) -> Any:
@@ -366,7 +368,7 @@ class Path:
         """
         from ..units import NONE
         from .evaluate.part import part
-        axisymmetric = self.problem.scene.kinematics.dimension_of_volume == 3
+        axisymmetric = self.problem.scene.kinematics.axisymmetric
         return part(self.wall(state), axisymmetric, density, trim, heights, units or NONE)
 
     def filling(self, tool: Any = None) -> Any:
@@ -397,6 +399,15 @@ class Path:
         from .evaluate.work import work
         return work(self)
 
+    def to_stl(self, file: Any, state: State | None = None) -> None:
+        """Write the part at a state (default: the last) as a solid of triangles, STL (rank 0 writes)."""
+        from .files.solid import to_stl
+        to_stl(self.profile(state), self.problem.scene.kinematics.axisymmetric, file, self.problem.comm)
+
+    def to_gltf(self, file: Any, state: State | None = None) -> None:
+        """Write the part at a state (default: the last) as binary glTF (.glb), coloured by its wall (rank 0 writes)."""
+        from .files.solid import to_gltf
+        to_gltf(self.profile(state), self.problem.scene.kinematics.axisymmetric, file, self.problem.comm)
 
 def _pieces(states: list[State]) -> list[list[State]]:
     """Neighbours with the same setting."""

@@ -63,22 +63,8 @@ class Record:
 
     @property
     def progress(self) -> np.ndarray:
-        """How far the process has come in each state, from 0 to 1, shape (n,).
-
-        By process time where it runs; else by what is driven, over its range, and how far the sheet moves, over the
-        whole way that it moves, in equal parts.
-        """
-        way, n = np.zeros(len(self.kinds)), len(self.kinds)
-        driven = [c for c in self.measures if c.endswith(("pressure", "travel", "displacement"))]
-        clock = self.measures.get("process_time", np.zeros(n))
-        for column in ["process_time"] if np.ptp(clock) > 0 else driven:
-            values = self.measures[column]
-            way[1:] += np.abs(np.diff(values)) / (np.ptp(values) or 1.0) / max(len(driven), 1)
-        if not np.ptp(clock) > 0 and all(p is not None for p in self.profiles):
-            moved = [np.hypot(*(b.middle - a.middle).T).mean() for a, b in zip(self.profiles, self.profiles[1:])]
-            way[1:] += np.array(moved) / (sum(moved) or 1.0)
-        done = np.cumsum(way)
-        return done / done[-1] if done[-1] > 0 else np.linspace(0, 1, n)
+        """How far the process has come in each state, see `progress`, shape (n,)."""
+        return progress(self.measures, self.profiles)
 
     def findings(self) -> list[tuple[str, str]]:
         """(how bad: "serious", "minor" or "note"; what) a reader should know before trusting the numbers."""
@@ -142,6 +128,25 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
                   [tooling.travels(s.get("setting", {}), s["control"]) for s in states],
                   _forces_of(tooling, {c: np.array([s["measures"][c] for s in states]) for c in states[0]["measures"]}),
                   [{} for _ in states], {})
+
+
+def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray:
+    """How far a process has come in each of n states, from 0 to 1, shape (n,).
+
+    By process time where it runs; else by what is driven, over its range, and how far the sheet moves, over the whole
+    way that it moves, in equal parts.
+    """
+    n = len(profiles)
+    way, clock = np.zeros(n), measures.get("process_time", np.zeros(n))
+    driven = [c for c in measures if c.endswith(("pressure", "travel", "displacement"))]
+    for column in ["process_time"] if np.ptp(clock) > 0 else driven:
+        values = measures[column]
+        way[1:] += np.abs(np.diff(values)) / (np.ptp(values) or 1.0) / len(driven)
+    if not np.ptp(clock) > 0 and all(p is not None for p in profiles):
+        moved = [np.hypot(*(b.middle - a.middle).T).mean() for a, b in zip(profiles, profiles[1:])]
+        way[1:] += np.array(moved) / (sum(moved) or 1.0)
+    done = np.cumsum(way)
+    return done / done[-1] if done[-1] > 0 else np.linspace(0, 1, n)
 
 
 def words(name: str) -> str:

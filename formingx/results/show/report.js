@@ -58,7 +58,7 @@ function sectionTraces(run, at, field, range) {
       Object.entries(at.all).map(([name, v]) => `${name}: ${format(v[i])}`).join("<br>")),
     marker: {size: 6, color: at.values, colorscale: "Viridis", reversescale: field.startsWith("wall"), cmin: range[0],
       cmax: range[1], showscale: n === 0, colorbar: {thickness: 12, len: 0.85, outlinewidth: 0,
-      title: {text: field, side: narrow() ? "top" : "right"}, ...(narrow() ? {orientation: "h", y: -0.28, len: 1} : {})}}}));
+      title: {text: field, side: narrow() ? "top" : "right"}, ...(narrow() ? {orientation: "h", y: -0.42, len: 1} : {})}}}));
   return traces;
 }
 
@@ -91,8 +91,8 @@ function process(data) {
   pick.parentElement.hidden = runs.length < 2;
   let run, timer = null;
   const unit = data.length ? `, ${data.length}` : "";
-  const layout = () => ({font, margin: {l: 55, r: 10, t: 10, b: 45}, hovermode: "closest", showlegend: false,
-    height: narrow() ? 430 : 520, xaxis: {title: `r${unit}`, range: box(run)[0], zeroline: false, gridcolor: "#eceff3",
+  const layout = () => ({font, margin: {l: 55, r: 10, t: 10, b: narrow() ? 110 : 45}, hovermode: "closest", showlegend: false,
+    height: narrow() ? 470 : 520, xaxis: {title: `r${unit}`, range: box(run)[0], zeroline: false, gridcolor: "#eceff3",
     constrain: "domain"}, yaxis: {title: `z${unit}`, range: box(run)[1], scaleanchor: "x", zeroline: false,
     gridcolor: "#eceff3", constrain: "domain"}, plot_bgcolor: "white"});
   const scene = () => { const [r, z] = box(run); return {font, margin: {l: 0, r: 0, t: 0, b: 0},

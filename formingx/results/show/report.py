@@ -6,11 +6,9 @@ made from paths or from checkpoints alone; plotly.js and the data are in the fil
 
 from __future__ import annotations
 
-import base64
 import datetime
 import html
 import importlib.metadata
-import io
 from collections.abc import Callable, Sequence
 from importlib import resources
 from pathlib import Path as FilePath
@@ -26,7 +24,7 @@ from ...units import NONE, Units
 from .. import files
 from ..evaluate.part import Part, part
 from ..evaluate.wall import Wall
-from . import interactive, plots
+from . import interactive, page, plots
 from .record import Record, of_checkpoint, of_path, words
 
 
@@ -75,7 +73,7 @@ def _part(record: Record, units: Units, density: float | None, trim: Any) -> Par
 
 
 def _page(records: list[Record], names: list[str], parts: list, title: str, failure: Any, units: Units) -> str:
-    here, alone = resources.files(__package__), len(records) == 1
+    alone = len(records) == 1
     body = [f"<h1>{html.escape(title)}</h1>", *(f"<p class=lead>{_lead(record, units)}</p>" for record in records[:1])]
     body += _trouble(failure)
     if alone:
@@ -87,13 +85,11 @@ def _page(records: list[Record], names: list[str], parts: list, title: str, fail
     for record, name in zip(records, names):
         body += [] if alone else [f"<h2>{html.escape(name)}</h2>"]
         body += _behind(record, units)
-    body += ["<h2>Made with</h2>", _table(["", ""], _made(records))]
+    body += ["<h2>Made with</h2>", page.table(["", ""], _made(records))]
     packed = (("library", interactive.library()), ("data", interactive.packed(interactive.data(records, names, units))))
-    return (f"<!doctype html>\n<html lang=en><head><meta charset=utf-8><title>{html.escape(title)}</title>"
-            f"<meta name=viewport content='width=device-width, initial-scale=1'>"
-            f"<style>{here.joinpath('report.css').read_text()}</style></head>\n<body>" + "\n".join(body)
-            + "".join(f"\n<script type='text/plain' id={name}>{text}</script>" for name, text in packed)
-            + f"\n<script>{here.joinpath('report.js').read_text()}</script></body></html>\n")
+    code = resources.files(__package__).joinpath("report.js").read_text()
+    tail = "".join(f"\n<script type='text/plain' id={name}>{text}</script>" for name, text in packed)
+    return page.page(title, body, f"{tail}\n<script>{code}</script>")
 
 
 _PROCESS = """<div id=process><h2>The process</h2>
@@ -108,9 +104,9 @@ def _trouble(failure: Any) -> list[str]:
     """What a run that could not go on says."""
     if failure is None:
         return []
-    found = [f"<div class='note bad'><h2>The run could not go on</h2><p>{_lines(str(failure))}</p></div>"]
+    found = [f"<div class='note bad'><h2>The run could not go on</h2><p>{page.lines(str(failure))}</p></div>"]
     shape = _drawn(lambda file: failure.diagnosis.picture(file)) if getattr(failure, "diagnosis", None) else None
-    return found + ([_picture(shape, "The last good state, its elements coloured by J.", "small")] if shape else [])
+    return found + ([page.picture(shape, "The last good state, its elements coloured by J.", "small")] if shape else [])
 
 
 def _behind(record: Record, units: Units) -> list[str]:
@@ -120,13 +116,14 @@ def _behind(record: Record, units: Units) -> list[str]:
         found += ["<h2>Stages</h2>", _stages(record, units)]
     if record.tooling.contacts:
         found += ["<h2>Tools</h2>", _tools(record, units)]
-    found += ["<h2>Inputs</h2>", _table(["", ""], [[k, v] for k, v in record.summary.items()]), "<h2>Warnings</h2>",
+    found += ["<h2>Inputs</h2>", page.table(["", ""], [[k, v] for k, v in record.summary.items()]), "<h2>Warnings</h2>",
               _warnings(record)]
-    found.append(_details("All measures at limit points and at the end", _key_numbers(record, units)))
-    convergence = _figure(_convergence(record), "Correction of every Newton iteration, one line a state.", "small") \
-        if any(len(h) > 1 for h in record.histories) else ""
-    found.append(_details("Convergence", convergence + _iterations(record)))
-    found.append(_details("All states", _states(record, units)))
+    found.append(page.details("All measures at limit points and at the end", _key_numbers(record, units)))
+    caption = "Correction of every Newton iteration, one line a state."
+    drawn = any(len(h) > 1 for h in record.histories)
+    convergence = page.figure(_convergence(record), caption, "small") if drawn else ""
+    found.append(page.details("Convergence", convergence + _iterations(record)))
+    found.append(page.details("All states", _states(record, units)))
     return found
 
 
@@ -177,7 +174,7 @@ def _answers(records: list[Record], names: list[str], parts: list, units: Units)
                for record, found in zip(records, parts)]
     rows = [[what, *(column.get(what, "") for column in columns)] for what in dict.fromkeys(
         what for column in columns for what in column)]
-    return _table(["", *names] if len(records) > 1 else ["", ""], rows)
+    return page.table(["", *names] if len(records) > 1 else ["", ""], rows)
 
 
 def _lead(record: Record, units: Units) -> str:
@@ -195,12 +192,12 @@ def _key_numbers(record: Record, units: Units) -> str:
     chosen = [k for k, kind in enumerate(record.kinds) if kind == "limit point"]
     head = ["", *(f"limit point {n}" for n in range(1, len(chosen) + 1)), "last state"]
     chosen.append(len(record.kinds) - 1)
-    rows = [[units.label(name), *(_number(values[k]) for k in chosen)] for name, values in record.measures.items()]
+    rows = [[units.label(name), *(page.number(values[k]) for k in chosen)] for name, values in record.measures.items()]
     if record.profiles[-1] is not None:
         ratios = [record.profiles[k].wall_ratio for k in chosen]
-        rows.append(["smallest thickness / original", *(_number(r.min()) for r in ratios)])
-        rows.append(["largest thickness / original", *(_number(r.max()) for r in ratios)])
-    return _table(head, rows)
+        rows.append(["smallest thickness / original", *(page.number(r.min()) for r in ratios)])
+        rows.append(["largest thickness / original", *(page.number(r.max()) for r in ratios)])
+    return page.table(head, rows)
 
 
 def _course_columns(record: Record) -> list[list[str]]:
@@ -217,10 +214,10 @@ def _stages(record: Record, units: Units) -> str:
         mine = [k for k, s in enumerate(record.stages) if s == stage]
         iterations = sum(max(len(record.histories[k]) - 1, 0) for k in mine)
         profile = record.profiles[mine[-1]]
-        ends = [_number(record.measures[c][mine[-1]]) for c in columns]
+        ends = [page.number(record.measures[c][mine[-1]]) for c in columns]
         rows.append([stage, str(len(mine) - 1), str(iterations), *ends,
-                     "" if profile is None else _number(profile.wall_ratio.min())])
-    return _table(["stage", "states", "iterations", *(f"{units.label(c)} at its end" for c in columns),
+                     "" if profile is None else page.number(profile.wall_ratio.min())])
+    return page.table(["stage", "states", "iterations", *(f"{units.label(c)} at its end" for c in columns),
                    "smallest thickness / original"], rows)
 
 
@@ -230,13 +227,13 @@ def _tools(record: Record, units: Units) -> str:
     for k, (contact, travel) in enumerate(zip(record.tooling.contacts, record.travels[-1])):
         force = record.forces.get(contact.name or f"tool {k + 1}")
         moves = "stays" if contact.moves is None else "moves along ({:g}, {:g})".format(*contact.moves)
-        where = "takes no part" if travel is None else _number(travel) if contact.moves else ""
+        where = "takes no part" if travel is None else page.number(travel) if contact.moves else ""
         rows.append([contact.name or "", contact.on, repr(contact.tool)[5:-1],
                      f"{contact.friction}{'' if contact.separates else ', holds what has touched'}",
-                     _number(contact.penalty), moves, where, "" if force is None else _number(force[-1])])
+                     page.number(contact.penalty), moves, where, "" if force is None else page.number(force[-1])])
     head = ["tool", "face", "profile", "friction", "penalty", "motion", units.label("travel", "travel at the end"),
             units.label("force", "force at the end")]
-    return _table(head, rows) + (
+    return page.table(head, rows) + (
         "<p class=lead>A force is positive when it resists the tool's travel; of a tool that stays, along z.</p>")
 
 
@@ -260,55 +257,14 @@ def _iterations(record: Record) -> str:
     rows = []
     for k, (kind, history) in enumerate(zip(record.kinds, record.histories)):
         corrections = ", ".join(f"{row[1]:.1e}" for row in history[:-1])
-        rows.append([str(k), kind, _number(record.measures[record.control][k]), str(max(len(history) - 1, 0)),
+        rows.append([str(k), kind, page.number(record.measures[record.control][k]), str(max(len(history) - 1, 0)),
                      corrections, f"{history[-1][0]:.1e}" if history else ""])
-    return _table(["state", "kind", words(record.control), "iterations", "corrections", "last residual"], rows)
+    return page.table(["state", "kind", words(record.control), "iterations", "corrections", "last residual"], rows)
 
 
 def _states(record: Record, units: Units) -> str:
-    rows = [[str(k), kind, *(_number(v[k]) for v in record.measures.values())] for k, kind in enumerate(record.kinds)]
-    return _table(["state", "kind", *map(units.label, record.measures)], rows)
+    rows = [[str(k), kind, *(page.number(v[k]) for v in record.measures.values())]
+            for k, kind in enumerate(record.kinds)]
+    return page.table(["state", "kind", *map(units.label, record.measures)], rows)
 
 
-def _table(head: list[str], rows: list[list[str]]) -> str:
-    """A table; columns of numbers stand to the right; with a head of empty words: two columns of words, without it."""
-    numbers = [any(head) and all(_is_number(row[k]) for row in rows) for k in range(len(head))]
-
-    def line(tag, row):
-        return "".join(f"<{tag}{' class=number' if number else ''}>{html.escape(text)}</{tag}>"
-                       for text, number in zip(row, numbers))
-    lines = [line("th", head)] if any(head) else []
-    lines += [line("td", row) for row in rows]
-    return "<div class=scroll><table>" + "".join(f"<tr>{line}</tr>" for line in lines) + "</table></div>"
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text or 0)
-    except ValueError:
-        return False
-    return True
-
-
-def _details(title: str, content: str) -> str:
-    return f"<details><summary>{html.escape(title)}</summary>{content}</details>"
-
-
-def _figure(figure: Any, caption: str, kind: str = "wide") -> str:
-    stream = io.BytesIO()
-    figure.savefig(stream, dpi=140)
-    return _picture(stream.getvalue(), caption, kind)
-
-
-def _picture(png: bytes, caption: str, kind: str) -> str:
-    text = html.escape(caption, quote=True)
-    return (f"<figure class={kind}><img alt='{text}' src='data:image/png;base64,{base64.b64encode(png).decode()}'>"
-            f"<figcaption>{text}</figcaption></figure>")
-
-
-def _lines(text: str) -> str:
-    return html.escape(text).replace("\n", "<br>")
-
-
-def _number(value: float) -> str:
-    return f"{value:.6g}"
