@@ -78,7 +78,7 @@ class Run:
                 for state in self._next(record.last):
                     self._accept(state)
                     if state.kind == "limit point" and self._at_fold == "stop":
-                        self._give_up("the control has a limit point here")
+                        self._give_up(f"the {self._driven} has a limit point here")
                     if self.problem.has_history or self._at_fold == "jump":
                         break                           # the rest of the step starts from here
                     if not self._is_open(self.until) and state.met is self.until:
@@ -91,6 +91,11 @@ class Run:
             raise
         finally:
             bar.close()
+
+    @property
+    def _driven(self) -> str:
+        """What the control stands for, in words."""
+        return self.problem.shown(0.0)[0]
 
     @property
     def states(self) -> list[State]:
@@ -146,7 +151,10 @@ class Run:
         """
         problem, first, jumps = self.problem, self.step.length, list(_JUMPS)
         if old.kind == "limit point" and self._at_fold == "jump":
-            return [self._jump(old, 0.0)]
+            try:
+                return [self._jump(old, 0.0)]
+            except Failure as failure:
+                self._give_up(f"the {self._driven} has a limit point here, and {failure.reason}", failure.attempt)
         while True:
             length = problem.reach(old.x, old.control, old.direction, old.slope, self.step.length)
             limited = length < self.step.length
