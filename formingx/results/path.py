@@ -409,6 +409,7 @@ class Path:
         from .files.solid import to_gltf
         to_gltf(self.profile(state), self.problem.scene.kinematics.axisymmetric, file, self.problem.comm)
 
+
 def _pieces(states: list[State]) -> list[list[State]]:
     """Neighbours with the same setting."""
     return [list(group) for _, group in itertools.groupby(states, key=lambda state: state.setting)]

@@ -91,7 +91,7 @@ class Run:
                 for state in self._next(record.last):
                     self._accept(state)
                     if state.kind == "limit point" and self._at_fold == "stop":
-                        record.ended = f"the {self.problem.shown(0.0)[0]} has a limit point at {record.describe(state)}"
+                        record.ended = f"the {self._driven} has a limit point at {record.describe(state)}"
                     if self.problem.has_history or self._at_fold == "jump":
                         break                           # the rest of the step starts from here
                     if not self._is_open(self.until) and state.met is self.until:
@@ -106,6 +106,11 @@ class Run:
             raise
         finally:
             bar.close()
+
+    @property
+    def _driven(self) -> str:
+        """What the control stands for, in words."""
+        return self.problem.shown(0.0)[0]
 
     @property
     def states(self) -> list[State]:
@@ -217,8 +222,7 @@ class Run:
             return [self._jump(old, 0.0)]
         except Failure as failure:
             if not self.problem.setting.rests:              # what is driven was to go on
-                self._give_up(f"the body snaps at a limit point, and no next state was found: {failure.reason}",
-                              failure.attempt)
+                self._give_up(f"the {self._driven} has a limit point here, and {failure.reason}", failure.attempt)
             self.record.ended = f"the body snaps at {self.record.describe(old)}: no state follows"
             return []
 

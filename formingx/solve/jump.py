@@ -25,7 +25,7 @@ AHEAD = 1e-6
 _FIRST, _LARGEST, _FALLS, _GROWS = 1e3, 1e10, 0.3, 10.0
 """Of eta: at first, at most; factors after a success and a failure."""
 
-_MOST = 60
+_MOST = 200
 """Viscous solutions before the body counts as never coming to rest."""
 
 _NEAR_REST = 1e-3
@@ -77,7 +77,8 @@ class _Way:
         self.viscous = _Viscous(curve.problem)
         self._newton = BorderedNewton(self.viscous, Tolerances(1e-8, 1e-6), curve.norm)
         self._x, self._drag = curve.problem.x.duplicate(), np.zeros(len(old.x))
-        self.at, self.lost, self.solved, self.rest = old, 0.0, 0, np.inf
+        self.at, self.lost, self.solved = old, 0.0, 0
+        self.rest, self.settles = np.inf, False             # what is out of balance; it is little, and fades
 
     def move(self, origin: np.ndarray, eta: float) -> bool:
         """One viscous solution from `origin`; False if there is none."""
@@ -93,8 +94,9 @@ class _Way:
         if self.problem.folded(self._x, self.control):
             return False
         x, drag = self._x.array_r.copy(), viscous.drag(self._x.array_r)
-        self._lose(x - (self.at.x if self.solved else origin), drag)
-        self.rest = np.sqrt(self._sum(drag * drag)) / (self.problem.force_scale + UNLOADED)
+        before, self.rest = self.rest, np.sqrt(self._sum(drag * drag)) / (self.problem.force_scale + UNLOADED)
+        self.settles = self.rest < min(_NEAR_REST, before)
+        self._lose(self.at.x if self.solved else origin, x, drag)
         by, self.at = x - self.at.x, replace(self.at, x=x, control=self.control)
         self.problem.advance(x, self.control)
         self.problem.prepare(x, self.control, by, 0.0, 1.0)
@@ -107,15 +109,17 @@ class _Way:
             state = self.curve.solve(self.at.x, self.control, fixed(self.control), "jump", self.at)
         except Failure:
             return None
-        self._lose(state.x - self.at.x, np.zeros(len(state.x)))
+        self._lose(self.at.x, state.x, np.zeros(len(state.x)))
         forms = self.problem.forms
         state.jump = {"dissipated": self.lost * forms.stress * forms.volume,
                       "moved": self.curve.moved(old, state) * forms.length}
         return state
 
-    def _lose(self, by: np.ndarray, drag: np.ndarray) -> None:
-        """Work of what is out of balance where the body moves on by so much (trapezoidal rule)."""
-        self.lost += 0.5 * self._sum((self._drag + drag) * by)
+    def _lose(self, a: np.ndarray, x: np.ndarray, drag: np.ndarray) -> None:
+        """Work of what is out of balance from a to x (Simpson's rule)."""
+        self._x.array_w[:] = (a + x) / 2
+        self.problem.residual(self._x, self.control, self._newton.F)
+        self.lost += self._sum((self._drag + drag - 4 * self._newton.F.array_r) * (x - a)) / 6
         self._drag = drag
 
     def _sum(self, values: np.ndarray) -> float:
@@ -144,13 +148,13 @@ def jump(curve: Any, old: State, by: float) -> State:
     eta = _FIRST
     try:
         while way.solved < _MOST and eta < _LARGEST:
-            if way.rest < _NEAR_REST:
+            if way.settles:
                 state = way.end(old)
                 if state is not None:
                     if state.slope * by < 0:
                         state.direction, state.slope = -state.direction, -state.slope
                     return state
-                way.rest = np.inf
+                way.settles = False
             moved = way.move(origin, eta)
             origin, eta = way.at.x if way.solved else origin, eta * (_FALLS if moved else _GROWS)
         raise Failure("no state follows that the body could snap to: it comes to rest nowhere", [])

@@ -1,0 +1,144 @@
+"""Where there is no state nearby to go on to: jumps to the next one."""
+
+import numpy as np
+import pytest
+from scipy import integrate, optimize
+
+import formingx as fx
+from formingx import tools
+from formingx.solve import jump
+
+
+class Balloon:
+    """A hollow sphere, outer over inner radius 1.1, Mooney: pressure and energy at an inner stretch, closed form."""
+
+    c10, c01, inner, outer = 1.0, 0.1, 1.0, 1.1
+
+    def scene(self):
+        mesh = fx.mesh.sphere(inner_radius=self.inner, thickness=self.outer - self.inner, elements=(4, 2))
+        return fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=self.c10, c01=self.c01), loads=[fx.Pressure("inner")],
+                        supports=[fx.Symmetry("axis"), fx.Symmetry("equator", normal="z")])
+
+    def energy_density(self, l):
+        return self.c10 * (2 * l**2 + l**-4 - 3) + self.c01 * (l**4 + 2 * l**-2 - 3)
+
+    def stretch_at(self, R, l):
+        """Of the sphere of reference radius R where the inner one is stretched l."""
+        return (1 + (l**3 - 1) * self.inner**3 / R**3) ** (1 / 3)
+
+    def pressure(self, l):
+        def slope(s):
+            return (4 * self.c10 * (s - s**-5) + 4 * self.c01 * (s**3 - s**-3)) / (s**3 - 1)
+        return integrate.quad(slope, self.stretch_at(self.outer, l), l)[0]
+
+    def energy(self, l):
+        """Of the half sphere."""
+        return 2 * np.pi * integrate.quad(lambda R: self.energy_density(self.stretch_at(R, l)) * R**2, self.inner,
+                                          self.outer)[0]
+
+
+@pytest.fixture(scope="module")
+def balloon():
+    """(closed form, path): over the maximum of its pressure, at which it snaps."""
+    ball = Balloon()
+    limit = optimize.minimize_scalar(lambda l: -ball.pressure(l), bounds=(1.1, 2.5), method="bounded").x
+    return ball, limit, fx.trace(ball.scene(), until=fx.pressure(1.1 * ball.pressure(limit)), at_fold="jump")
+
+
+def test_a_balloon_snaps_to_the_state_of_the_same_pressure(balloon):
+    ball, limit, path = balloon
+    (before,), (after,) = path.limit_points, path.jumps
+    assert path.states.index(after) == path.states.index(before) + 1
+    assert before.measures["pressure"] == pytest.approx(ball.pressure(limit), rel=1e-4)
+    assert after.measures["pressure"] == pytest.approx(before.measures["pressure"], rel=1e-4)
+    beyond = optimize.brentq(lambda l: ball.pressure(l) - ball.pressure(limit), limit + 1, 20)
+    volume = after.measures["enclosed_volume"]
+    assert beyond > 4 and volume == pytest.approx(2 * np.pi / 3 * (beyond**3 - 1), rel=1e-3)
+    assert path["pressure"][-1] > 1.09 * ball.pressure(limit)
+
+
+def test_what_a_balloon_loses_is_the_work_of_the_pressure_less_the_energy_gained(balloon):
+    ball, limit, path = balloon
+    (before,), (after,) = path.limit_points, path.jumps
+    lost = after.jump["dissipated"]
+    work = before.measures["pressure"] * (after.measures["enclosed_volume"] - before.measures["enclosed_volume"])
+    assert lost > 0
+    assert lost == pytest.approx(work - (after.measures["strain_energy"] - before.measures["strain_energy"]), rel=2e-2)
+
+
+def plug(mu=3.0, thickness=1 / 3):
+    """A flat plug with a fillet on a clamped sheet: with these, points that leave the edge find no state nearby."""
+    mesh = fx.mesh.disc(radius=10.0, thickness=thickness, elements=(60, 2), concentrate={1.5: 0.2, 2.5: 0.2})
+    tool = tools.male(radius=2.5, height=60.0, base=-60.0, fillet=0.5).mirrored().moved(z=thickness)
+    return fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=0.4, c01=0.04),
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                    contacts=[fx.Contact("top", tool, mu, moves=(0, -1))])
+
+
+def pushed(travel, **options):
+    return fx.trace(plug(), until=fx.travel(travel), step=fx.StepControl(target=6), progress=False, **options)
+
+
+def balance(path):
+    """(work of the tool, energy gained, work of the tractions at the points, lost in jumps), trapezoidal rule."""
+    contact, n = path.problem.contacts[0], path.problem.forms.space.dofmap.index_map.size_local
+    rows = []
+    for state in path.states:
+        with path.problem.at(state):
+            fields = state.x[:n]
+            rows.append((contact.positions(fields, state.control),
+                         contact.area[:, None] * contact.tractions(fields, state.control).force))
+    slips = sum(0.5 * float(np.sum((f + g) * (b - a))) for (a, f), (b, g) in zip(rows, rows[1:]))
+    return (np.trapezoid(path["tool_force"], path["travel"]), path["strain_energy"][-1] - path["strain_energy"][0],
+            slips, sum(state.jump["dissipated"] for state in path.jumps))
+
+
+@pytest.fixture(scope="module")
+def rough():
+    return pushed(3.5)
+
+
+def test_a_rough_plug_goes_on_where_points_leave_its_edge(rough):
+    assert rough.last.met == fx.travel(3.5) or rough["travel"][-1] == pytest.approx(3.5)
+    assert np.all(np.diff(rough["travel"]) > 0)
+    assert all(state.jump["dissipated"] > 0 and state.jump["moved"] > 0 for state in rough.jumps)
+
+
+def test_friction_keeps_its_law_through_jumps(rough):
+    contact, n = rough.problem.contacts[0], rough.problem.forms.space.dofmap.index_map.size_local
+    for state in rough.states:
+        with rough.problem.at(state):
+            found = contact.law.tractions(contact.positions(state.x[:n], state.control), contact.touch)
+        assert np.all(np.abs(found.tangential) <= 3.0 * found.normal * (1 + 1e-9) + 1e-12)
+
+
+def test_work_is_energy_and_friction_and_what_jumps_lose(rough):
+    work, energy, slips, lost = balance(rough)
+    assert work == pytest.approx(energy + slips + lost, rel=5e-3)
+
+
+@pytest.mark.slow
+def test_where_a_jump_ends_does_not_depend_on_how_eta_falls(rough, monkeypatch):
+    monkeypatch.setattr(jump, "_FIRST", 1e4)
+    monkeypatch.setattr(jump, "_FALLS", 0.5)
+    other = pushed(3.5)
+    assert len(other.jumps) == len(rough.jumps)
+    assert other["tool_force"][-1] == pytest.approx(rough["tool_force"][-1], rel=1e-4)
+
+
+def test_what_comes_to_rest_nowhere_is_said_in_bounded_time():
+    mesh = fx.mesh.disc(radius=10.0, thickness=0.3, elements=(12, 1))
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.4), loads=[fx.Pressure("bottom")],
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    with pytest.raises(fx.ConvergenceError, match="comes to rest nowhere") as error:
+        fx.trace(scene, until=fx.pressure(1.0), at_fold="jump")
+    assert error.value.path.last.kind == "limit point"
+    with pytest.raises(fx.ConvergenceError, match="the pressure has a limit point"):
+        fx.trace(scene, until=fx.pressure(1.0), at_fold="stop")
+
+
+def test_at_fold_is_one_of_three():
+    with pytest.raises(fx.InputError, match="at_fold = 'leap' is not known"):
+        fx.trace(plug(), until=fx.travel(1.0), at_fold="leap")
+    with pytest.raises(fx.InputError, match="at_fold"):
+        fx.Stage("push", drive="plug", until=fx.travel(1.0), at_fold="leap")
