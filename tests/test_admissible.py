@@ -8,6 +8,7 @@ from conftest import run_json, treloar
 from dolfinx import fem
 
 import formingx as fx
+from formingx.discrete import elements
 from formingx.discrete.admissible import Admissible
 from formingx.discrete.problem import Problem
 
@@ -55,6 +56,12 @@ def test_values_are_those_of_the_deformation_gradient(space):
         assert found[quantity][:, : len(inside)] == pytest.approx(expected, abs=1e-12)
 
 
+def smallest_J(problem):
+    """det F where the energy looks."""
+    problem.fill(problem.x, problem.forms.w.x.array[:problem.n_owned])
+    return elements.body(problem, problem.x, 0.0).J.min()
+
+
 def test_beyond_the_axis():
     """A ring pushed through the axis: J > 0 everywhere, both of its factors negative there."""
     problem = ring()
@@ -62,15 +69,15 @@ def test_beyond_the_axis():
     assert whole.holds() and whole.least().value == pytest.approx(1.0)
     # r = (R - 4)(R - 1)/10: 2 < R < 2.5 lies beyond the axis, where r falls with R
     body = displaced(problem, lambda X: ((X[0] - 4) * (X[0] - 1) / 10 - X[0], 0 * X[0]))
-    assert problem.assemble_scalar(problem._folded) > 0            # 2.5 < R < 4 turns inside out
+    assert smallest_J(problem) < 0                          # 2.5 < R < 4 turns inside out
     assert not body.holds()
     turned = displaced(problem, lambda X: (-2 * X[0], 0 * X[0]))
-    assert problem.assemble_scalar(problem._folded) == 0           # J = 1: what was looked at until now
+    assert smallest_J(problem) == pytest.approx(1.0)
     assert not turned.holds() and turned.least().value == pytest.approx(-1.0)
 
 
 def test_beside_the_quadrature_points():
-    """A midpoint moved along its edge beyond a quarter: det < 0 at the near corner, det F > 0 where forms look."""
+    """A midpoint moved along its edge: det < 0 near a corner, det F > 0 where the energy looks."""
     problem = ring("P1")
     forms = problem.forms
     dofs = Admissible(forms)._dofs[1]
@@ -78,15 +85,15 @@ def test_beside_the_quadrature_points():
     collapsed = forms.space.sub(0).sub(1).collapse()[1]
     edge = collapsed[np.argmin(np.hypot(nodes[:, 0] - 10, nodes[:, 1] - 0.5))]          # on the rim, along Z
     assert edge in dofs
-    for share, good in ((0.2, True), (0.27, False)):
+    for share, good in ((0.2, True), (0.3, False)):
         forms.w.x.array[:] = 0
         forms.w.x.array[edge] = share / forms.length
         body = Admissible(forms)
-        assert problem.assemble_scalar(problem._folded) == 0
+        assert smallest_J(problem) > 0
         assert body.holds() is good
     least = body.least()
-    assert least.quantity == "in-plane determinant" and least.value == pytest.approx(1 - 4 * 0.27)
-    assert least.point == pytest.approx((10.0, 1.0))
+    assert least.quantity == "in-plane determinant" and 1 - 4 * 0.3 < least.value < 0
+    assert least.point == pytest.approx((10.0, 1.0), abs=0.1)
 
 
 def test_the_axis_has_the_limit_of_the_hoop_stretch():
@@ -118,6 +125,7 @@ RANKS = """
 import json
 import numpy as np
 import formingx as fx
+from formingx.discrete import elements
 from formingx.discrete.admissible import Admissible
 from formingx.discrete.problem import Problem
 mesh = fx.mesh.disc(radius=1.0, thickness=0.2, elements=(8, 1))

@@ -14,8 +14,9 @@ import numpy as np
 
 from .. import _compat
 
-_CORNERS_AND_MIDDLES = {basix.CellType.triangle: [[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]],
-                        basix.CellType.interval: [[0], [1], [0.5]]}
+_MIDDLES = {basix.CellType.triangle: [[0.5, 0.5], [0, 0.5], [0.5, 0]], basix.CellType.interval: [[0.5]]}
+"""Of the edges. (Corners are left out: where a free side turns onto a plate a corner is singular, and the determinant
+there has no limit.)"""
 
 
 class Least(NamedTuple):
@@ -28,7 +29,7 @@ class Least(NamedTuple):
 
 
 class Admissible:
-    """Hoop stretch and in-plane determinant of a formulation at quadrature points, corners and edge midpoints of cells.
+    """Hoop stretch and in-plane determinant of a formulation at two sets of quadrature points and at edge midpoints.
 
     The in-plane determinant is det(1 + grad u) of the two in-plane components; on the axis the hoop stretch is its
     limit, dr/dR. Membranes have a hoop stretch only. All that does not depend on the state is computed once; a
@@ -41,10 +42,12 @@ class Admissible:
     def __init__(self, forms: Any):
         self._forms, domain = forms, forms.domain
         self._solid = domain.topology.dim == 2
-        self._has_hoop = forms.scene.kinematics.dimension_of_volume == 3
+        self._has_hoop = forms.scene.kinematics.axisymmetric
         cell = basix.CellType[domain.topology.cell_name()]
-        inside = basix.make_quadrature(cell, forms.scene.quadrature_degree)[0]
-        points = np.concatenate([inside, np.array(_CORNERS_AND_MIDDLES[cell], dtype=float)])
+        scene = forms.scene
+        inside = basix.make_quadrature(cell, scene.quadrature_degree)[0]
+        beside = basix.make_quadrature(cell, scene.quadrature_degree + 1)[0]
+        points = np.concatenate([inside, beside, np.array(_MIDDLES[cell], dtype=float)])
         n = domain.topology.index_map(domain.topology.dim).size_local
         self._dofs = [forms.space.sub(0).sub(i).dofmap.list[:n] for i in (0, 1)]
         shapes = forms.displacement_element.tabulate(1, points)                    # (1 + dim, points, dofs)

@@ -17,6 +17,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..scene.scene import Scene
+from .admissible import Admissible
 from .constraints import Active, Constraints
 from .contact_nodes import ContactNodes
 from .formulations import formulate
@@ -67,8 +68,7 @@ class Problem:
         self._by_control = forms.control_derivative and forms.compile(forms.control_derivative)
         self.contacts = [ContactNodes(forms, contact, self.assemble) for contact in scene.contacts]
         self.histories = [*(contact for contact in self.contacts if contact.law.remembers), *forms.histories]
-        folded = ufl.conditional(ufl.gt(forms.J, forms.constant(0.0)), forms.constant(0.0), forms.constant(1.0))
-        self._folded = forms.compile(folded * forms.dx)
+        self._admissible = Admissible(forms)
         self._constraints = Constraints(forms, self.assemble)
         self._by_motion = self._lift = None
         if self._constraints.can_move:
@@ -239,9 +239,9 @@ class Problem:
         return values
 
     def folded(self, x: PETSc.Vec, control: float) -> bool:
-        """True if an element is turned inside out: J is not positive at some quadrature point."""
+        """True if the body has no shape: a hoop stretch or an in-plane determinant is not positive (`Admissible`)."""
         self.set_state(x, control)
-        return self.assemble_scalar(self._folded) > 0
+        return not self._admissible.holds()
 
     def begin(self, old: Any = None) -> None:
         """Newton's method begins at a guess ahead of a state (None: of none)."""
