@@ -85,14 +85,14 @@ def test_beside_the_quadrature_points():
     collapsed = forms.space.sub(0).sub(1).collapse()[1]
     edge = collapsed[np.argmin(np.hypot(nodes[:, 0] - 10, nodes[:, 1] - 0.5))]          # on the rim, along Z
     assert edge in dofs
-    for share, good in ((0.2, True), (0.3, False)):
+    for share, good in ((0.2, True), (0.33, False)):
         forms.w.x.array[:] = 0
         forms.w.x.array[edge] = share / forms.length
         body = Admissible(forms)
         assert smallest_J(problem) > 0
         assert body.holds() is good
     least = body.least()
-    assert least.quantity == "in-plane determinant" and 1 - 4 * 0.3 < least.value < 0
+    assert least.quantity == "in-plane determinant" and -0.1 < least.value < 0
     assert least.point == pytest.approx((10.0, 1.0), abs=0.1)
 
 
