@@ -30,11 +30,15 @@ from formingx.results import files  # noqa: E402
 STRETCHES = (1.02, 1.2, 2.0, 3.0)
 # r0/h0: elements of the reference, and the size of its last element at the rim over that of the first
 RATIOS = {1: ((60, 60), 1.0), 1.25: ((60, 48), 1.0), 2: ((80, 40), 1.0), 3: ((90, 30), 1.0), 5: ((120, 24), 1.0),
-          10: ((140, 14), 1.0), 15.24: ((160, 10), 1.0), 50: ((200, 4), 0.3), 200: ((400, 2), 0.2), 2000: ((800, 2), 0.1)}
+          10: ((140, 14), 1.0), 15.24: ((160, 10), 1.0), 50: ((200, 4), 0.3), 200: ((400, 2), 0.2),
+          2000: ((800, 2), 0.1)}
 CREASED = {1: (1.02, 1.1)}       # a hinge's rim face creases at 1.2 in so thick a disc: no mesh converges beyond
 MATERIALS = {"neo-Hookean": 0.0, "Mooney": 0.2}        # c01 of c10 + c01 = 1
 QUANTITIES = ("pressure", "pole_thickness", "rim_stress")
 SLIM = ((20, 7), (40, 14), (40, 7), (40, 5), (40, 4), (40, 2), (80, 4), (80, 2))      # at r0/h0 = 2
+
+
+TALL = (0.1, 0.5, 1, 2, 4, 8, 16, 32)                  # height over width of triangles in a strip
 
 
 def inflate(ratio, c01=0.0, space="P1dg", heights=None, **mesh):
@@ -137,9 +141,6 @@ def inf_sup_constants():
     for space, values in results.items():
         say(f"{space:8}" + "".join(f"{beta:9.3f}" for beta in values))
     return results
-
-
-TALL = (0.1, 0.5, 1, 2, 4, 8, 16, 32)
 
 
 def main():

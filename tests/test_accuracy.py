@@ -2,12 +2,14 @@
 
 import sys
 
+import numpy as np
 import pytest
 from conftest import ROOT
 
 import formingx as fx
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
+import thickness  # noqa: E402
 import trade  # noqa: E402
 
 PROMISED = {"draft": 0.01, "standard": 0.002, "fine": 0.0003}
@@ -27,3 +29,45 @@ def test_promised_error_is_kept(scene, accuracy):
     found = trade.one(scene, {"model": "P2+/P1dg", "along": along, "through": through})
     for quantity in trade.QUANTITIES:
         assert found[quantity] == pytest.approx(REFERENCE[scene][quantity], rel=PROMISED[accuracy]), quantity
+
+
+NEAR_RIM = {"draft": 0.01, "standard": 0.003, "fine": 0.0006}      # of thick discs, from a stretch of 1.02 on
+# r0/h0: P2/P1, near-square elements, at stretches 1.02, 1.2, 2 and 3: benchmarks/thickness.py computes them
+THICK = {
+    2: {"heights": [0.1888225, 0.5682093, 1.099515, 1.498082], "pressure": [0.224952, 1.093486, 1.923727, 1.836576],
+        "pole_thickness": [0.4805844, 0.3472222, 0.125, 0.05555556],
+        "rim_stress": [0.8109052, 2.761758, 6.138181, 9.058476]},
+    5: {"heights": [0.184565, 0.5416611, 1.086439, 1.490737],
+        "pressure": [0.0379808, 0.4046242, 0.7508341, 0.7249202],
+        "pole_thickness": [0.1922338, 0.1388889, 0.05, 0.02222222],
+        "rim_stress": [0.3911326, 2.056991, 3.947821, 4.554468]},
+}
+
+
+@pytest.mark.parametrize("ratio", THICK)
+@pytest.mark.parametrize("accuracy", [pytest.param("draft"), pytest.param("standard", marks=pytest.mark.slow),
+                                      pytest.param("fine", marks=pytest.mark.slow)])
+def test_promised_error_is_kept_in_thick_discs(ratio, accuracy):
+    found, _ = thickness.inflate(ratio, heights=THICK[ratio]["heights"], accuracy=accuracy)
+    for quantity, error in thickness.errors(found, THICK[ratio]).items():
+        assert len(error) == 4
+        assert error.max() < (NEAR_RIM if quantity == "rim_stress" else PROMISED)[accuracy], quantity
+
+
+def test_slim_triangles_lose_the_inf_sup_constant():
+    """That of P2 + bubble / P1dg halves as triangles get twice as slim; continuous pressures keep theirs."""
+    slim = {space: np.array([thickness.inf_sup(space, tall) for tall in (1, 16, 32)]) for space in ("P1dg", "P1")}
+    assert slim["P1dg"][0] > 0.4 and slim["P1dg"][1] / slim["P1dg"][2] == pytest.approx(2, rel=0.1)
+    assert slim["P1"].min() > 0.5
+
+
+def test_presets_are_near_square_in_thick_layers_only():
+    def counts(accuracy, **disc):
+        mesh = fx.mesh.disc(accuracy=accuracy, **disc)
+        return [len(mesh.cells.find(tag)) for tag in mesh.layers.values()]
+    for ratio in (15.24, 200):
+        for accuracy, (along, through) in fx.mesh.ACCURACY.items():
+            assert counts(accuracy, radius=1.0, thickness=1 / ratio) == [2 * along * through]
+    assert counts("standard", radius=2.0, thickness=1.0) == [2 * 40 * 14]
+    assert counts("draft", radius=1.0, thickness={"thick": 0.5, "thin": 0.01}) == [2 * 20 * 7, 2 * 20]
+    assert counts("draft", radius=1.0, thickness=1e6) == [2 * 20 * 14]        # a column is not a sheet

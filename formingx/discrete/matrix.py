@@ -68,8 +68,7 @@ class ExtendedMatrix:
         for dofs, values in blocks:
             free = ~self._held[dofs]
             values = values * free[:, :, None] * free[:, None, :]
-            for numbers, block in zip(dofs, values):
-                A.setValuesLocal(numbers, numbers, block, addv=add)
+            A.setValuesLocalRCV(dofs, dofs, values.reshape(len(dofs), -1), addv=add)
         for k, (mine, weights, everyone, all_weights) in enumerate(self._entries):
             if len(mine):
                 A.setValues(mine.astype(PETSc.IntType), [self._first + k], weights, addv=add)
@@ -86,17 +85,18 @@ class ExtendedMatrix:
         plain.assemble()
         indptr, indices, _ = plain.getValuesCSR()
         plain.destroy()
-        parts = np.split(indices, indptr[1:-1])
-        for k, row in enumerate(rows):
-            for i in np.flatnonzero(row):
-                parts[i] = np.append(parts[i], self._first + k)
+        there = [np.flatnonzero(row) for row in rows]        # the multipliers' columns come after all others
+        more = np.concatenate([np.full(len(i), self._first + k) for k, i in enumerate(there)]) if rows else []
+        at = np.concatenate(there) if rows else np.zeros(0, dtype=int)
+        order = np.lexsort((more, at)) if rows else at
+        columns = np.insert(indices, indptr[1:][at[order]], np.asarray(more, dtype=indices.dtype)[order])
+        lengths = np.diff(indptr) + np.bincount(at, minlength=len(indptr) - 1)
         if self._last_rank:
             tail = self._first + np.arange(m)
-            parts += [np.concatenate([everyone, tail]) for _, _, everyone, _ in self._entries]
-        lengths = [len(part) for part in parts]
-        pointers = np.concatenate([[0], np.cumsum(lengths)]).astype(PETSc.IntType)
-        columns = np.concatenate([np.sort(part) for part in parts]) if parts else np.zeros(0)
-        return pointers, columns.astype(PETSc.IntType)
+            parts = [np.concatenate([np.sort(everyone), tail]) for _, _, everyone, _ in self._entries]
+            columns, lengths = np.concatenate([columns, *parts]), np.append(lengths, [len(part) for part in parts])
+        pointers = np.concatenate([[0], np.cumsum(lengths)])
+        return pointers.astype(PETSc.IntType), columns.astype(PETSc.IntType)
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""

@@ -72,7 +72,8 @@ class MixedPressure(Model):
         eps: dimensionless penalty parameter; 0 keeps the volume exactly (weakly, in the pressure space).
         space: "P1": continuous in each layer (Taylor-Hood); "P0": one value in each element, cheap, displacements
             converge with order 2 instead of 3; "P1dg": linear in each element, the P2 displacement enriched by a cubic
-            bubble (Crouzeix and Raviart 1973). Both of these keep the volume of each element.
+            bubble (Crouzeix and Raviart 1973). Both of these keep the volume of each element. Triangles of "P1dg" must
+            not be slim across a thick sheet: its inf-sup constant falls as their width over height, and it locks.
     """
 
     stress_free = True
