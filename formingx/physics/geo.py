@@ -92,7 +92,7 @@ class _Drawing:
         if len(numbers) == 3:
             first, centre, last = (self._point(n) for n in numbers)
             (a, begin), (b, end) = ((math.dist(p, centre), math.atan2(*(p - centre)[::-1])) for p in (first, last))
-            if not 0 < a or abs(a - b) > 1e-9 * a:
+            if not a > 0 or abs(a - b) > 1e-9 * a:
                 raise ValueError(f"the ends are {a:.6g} and {b:.6g} away from the centre: must be the same")
             sweep = math.remainder(end - begin, 2 * math.pi)
             self._keep(tag, Arc(centre, a, begin, sweep))
