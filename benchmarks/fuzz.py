@@ -224,7 +224,10 @@ def _kind(name: str) -> str:
 def _required(call: Any, good: dict[str, Any], rng: random.Random) -> dict[str, Any]:
     """Varied arguments; those without a default are there: to leave one out is a TypeError, as of any function."""
     import inspect
-    needed = {name for name, p in inspect.signature(call.make).parameters.items()
+
+    import formingx as fx
+    make = fx.Process.run if call.name == "Process.run" else call.make
+    needed = {name for name, p in inspect.signature(make).parameters.items()
               if p.default is p.empty and p.kind is not p.VAR_KEYWORD}
     given = varied(good, rng)
     return {k: v for k, v in good.items() if k in needed and k not in given} | given

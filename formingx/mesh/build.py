@@ -193,16 +193,16 @@ def _thickness(who: str, given: Any, coordinate: str) -> Callable[[np.ndarray], 
         return lambda x: np.full(len(x), value)
     if callable(given):
         return lambda x: np.array([positive(f"{who} at {coordinate} = {v:.6g}", _called(given, v, who, coordinate))
-                                   for v in x.tolist()])
+                                   for v in map(float, x)])
     points = sorted((finite(f"{who}: {coordinate}", at), positive(f"{who} at {coordinate} = {at!r}", h))
                     for at, h in given.items())
-    at, value = np.array(points).reshape(-1, 2).T
+    ends, values = np.array(points).reshape(-1, 2).T
 
     def between(x):
         near = 1e-9 * max(np.abs(x).max(), 1e-300)
-        if len(at) < 2 or x.min() < at[0] - near or x.max() > at[-1] + near:
+        if len(ends) < 2 or x.min() < ends[0] - near or x.max() > ends[-1] + near:
             raise InputError(f"{who} = {given!r}: must hold {coordinate} from {x.min():.6g} to {x.max():.6g}")
-        return np.interp(x, at, value)
+        return np.interp(x, ends, values)
     return between
 
 

@@ -60,7 +60,7 @@ def to_grid(mesh: Mesh) -> Grid:
     boundaries = {}
     for name in mesh.boundaries:
         ends = entities_to_geometry(domain, 1, mesh.facets_of(name))[:, :2]
-        rows = [edges[frozenset(pair)] for pair in ends.tolist()]
+        rows = [edges[frozenset((int(a), int(b)))] for a, b in ends]
         boundaries[name] = np.array(rows, dtype=np.int64).reshape(len(rows), 3 if triangles.shape[1] == 6 else 2)
     return Grid(points, np.arange(1, len(points) + 1), layers, boundaries)
 
@@ -143,9 +143,10 @@ def _of_elements(edges: np.ndarray, known: dict[tuple[int, int], list[int]], who
 
     A curve that is no part of the body (of a tool in the same file) leaves its boundary empty.
     """
-    found = [[a, b, *known[min(a, b), max(a, b)]] for a, b in edges.tolist() if (min(a, b), max(a, b)) in known]
+    pairs = [(int(a), int(b)) for a, b in edges]
+    found = [[a, b, *known[min(a, b), max(a, b)]] for a, b in pairs if (min(a, b), max(a, b)) in known]
     if found and len(found) < len(edges):
-        bad = next(row for row in edges.tolist() if (min(row), max(row)) not in known)
+        bad = next(pair for pair in pairs if (min(pair), max(pair)) not in known)
         at = [f"({points[n, 0]:.6g}, {points[n, 1]:.6g})" if n >= 0 else "a node of no element" for n in bad]
         raise InputError(f"{who}: its edge from {at[0]} to {at[1]} is not an edge of an element")
     return found

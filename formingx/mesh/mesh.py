@@ -112,7 +112,7 @@ class Mesh:
         domain = self.domain
         facets = self.facets_of(boundary)
         domain.topology.create_connectivity(1, 2)
-        nodes = np.unique(entities_to_geometry(domain, 1, facets)) if len(facets) else []
+        nodes = np.unique(entities_to_geometry(domain, 1, facets)) if len(facets) else np.zeros(0, dtype=np.int64)
         local = domain.geometry.x[nodes, :2].reshape(-1, 2)
         points = np.concatenate(self.comm.allgather(local))
         scale = np.ptp(points, axis=0).max() if len(points) else 1.0

@@ -233,6 +233,10 @@ class _Numbers:
         """The next n whole numbers of four bytes."""
         return self._whole(self._take(n, "i4"))
 
+    def few(self, n: int) -> list[int]:
+        """`ints` as a list."""
+        return [int(value) for value in self.ints(n)]
+
     def sizes(self, n: int) -> np.ndarray:
         """The next n whole numbers of the file's own width (counts, and numbers of nodes and elements)."""
         return self._whole(self._take(n, f"u{self._width}"))
@@ -287,7 +291,7 @@ def _elements_2(section: _Numbers) -> list[Block]:
     n, got = section.line() if section.binary else _count(section.ints(1), section), 0
     while got < n:
         # binary: type, number of such elements, number of tags, then elements; text: number, type, number of tags
-        head = section.ints(3).tolist()
+        head = section.few(3)
         kind, many, tags = head if section.binary else (head[1], 1, head[2])
         if kind not in _KINDS or many < 1 or not 2 <= tags <= 1000:
             raise InputError(f"{section.where}: element {got + 1}: type {kind} with {tags} tags is not known")
@@ -303,22 +307,22 @@ def _elements_2(section: _Numbers) -> list[Block]:
 def _groups(section: _Numbers) -> dict[tuple[int, int], tuple[int, ...]]:
     """{(dimension, entity): its physical groups}."""
     found = {}
-    counts = section.sizes(4).tolist()
-    for dim, many in enumerate(counts):
-        for _ in range(many):
-            tag = int(section.ints(1)[0])
+    for dim, many in enumerate(section.sizes(4)):
+        for _ in range(int(many)):
+            tag, = section.few(1)
             section.reals(3 if dim == 0 else 6)
-            groups = section.ints(_count(section.sizes(1), section))
+            groups = section.few(_count(section.sizes(1), section))
             if dim:
                 section.ints(_count(section.sizes(1), section))
-            found[dim, tag] = tuple(dict.fromkeys(np.abs(groups).tolist()))
+            found[dim, tag] = tuple(dict.fromkeys(map(abs, groups)))
     return found
 
 
 def _nodes_4(section: _Numbers) -> tuple[np.ndarray, np.ndarray]:
-    numbers, points = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 3))]
+    numbers: list[np.ndarray] = [np.zeros(0, dtype=np.int64)]
+    points: list[np.ndarray] = [np.zeros((0, 3))]
     for _ in range(_count(section.sizes(4), section)):
-        dim, _, parametric = section.ints(3).tolist()
+        dim, _, parametric = section.few(3)
         n = _count(section.sizes(1), section)
         numbers.append(section.sizes(n))
         width = 3 + (dim if parametric else 0)
@@ -329,7 +333,7 @@ def _nodes_4(section: _Numbers) -> tuple[np.ndarray, np.ndarray]:
 def _elements_4(section: _Numbers, groups: dict[tuple[int, int], tuple[int, ...]]) -> list[Block]:
     blocks = []
     for _ in range(_count(section.sizes(4), section)):
-        dim, entity, kind = section.ints(3).tolist()
+        dim, entity, kind = section.few(3)
         n = _count(section.sizes(1), section)
         if kind not in _KINDS or _KINDS[kind][0] != dim:
             raise InputError(f"{section.where}: elements of type {kind} and dimension {dim} are not known")

@@ -53,8 +53,9 @@ class Arc(NamedTuple):
     @property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
         """First and last point."""
-        return tuple(self.centre + self.radius * np.array([math.cos(a), math.sin(a)])
-                     for a in (self.start, self.start + self.sweep))
+        first, last = (self.centre + self.radius * np.array([math.cos(a), math.sin(a)])
+                       for a in (self.start, self.start + self.sweep))
+        return first, last
 
     @property
     def angles(self) -> tuple[float, float]:
@@ -102,18 +103,18 @@ class Tool:
     """
 
     def __init__(self, points: Sequence[Sequence[float]], fillets: float | Sequence[float] = 0.0, closed: bool = False):
-        points = np.array([pair("Tool: points", p) for p in several("Tool: points", points, "points (R, Z)")])
-        if len(points) < (3 if closed else 2):
-            raise InputError(f"Tool: {len(points)} points: a{' closed' if closed else 'n open'} profile needs at least"
+        corners = np.array([pair("Tool: points", p) for p in several("Tool: points", points, "points (R, Z)")])
+        if len(corners) < (3 if closed else 2):
+            raise InputError(f"Tool: {len(corners)} points: a{' closed' if closed else 'n open'} profile needs at least"
                              f" {3 if closed else 2}")
-        n = len(points)
+        n = len(corners)
         each = np.ndim(fillets) > 0
         radii: list = list(np.asarray(fillets)) if each else [
             fillets if closed or 0 < i < n - 1 else 0.0 for i in range(n)]
         if len(radii) != n:
             raise InputError(f"Tool: {len(radii)} fillets for {n} points: give one number, or one for each point")
         radii = [non_negative(f"Tool: fillet at point {i}", r) for i, r in enumerate(radii)]
-        pieces = _rounded(points, radii, closed, each)
+        pieces = _rounded(corners, radii, closed, each)
         if not each and non_negative("Tool: fillets", fillets) > 0 and not any(isinstance(p, Arc) for p in pieces):
             raise InputError(f"Tool: fillets = {fillets!r}: the profile has no corner to round (an end on R = 0 is"
                              f" rounded by a list with a radius for each point)")

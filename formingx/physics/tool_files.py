@@ -129,14 +129,14 @@ def _of_geo(file: str, tolerance: float | None) -> _Curves:
 
 def _of_mesh(file: str, tolerance: float | None) -> _Curves:
     found = msh.content(file)
-    points = dict(zip(found.numbers.tolist(), found.points[:, :2]))
-    lines: dict[int, list[list[int]]] = {}
+    points = dict(zip(map(int, found.numbers), found.points[:, :2]))
+    lines: dict[int, list[tuple[int, int]]] = {}
     for block in found.blocks:
         if block.kind in (1, 8):
-            lines.setdefault(block.entity, []).extend(block.nodes[:, :2].tolist())
+            lines.setdefault(block.entity, []).extend((int(a), int(b)) for a, b in block.nodes[:, :2])
 
     def piece(tag: int) -> list[Line | Arc]:
-        ends = list(dict.fromkeys(map(tuple, lines[tag])))           # an element of two groups is there twice
+        ends = list(dict.fromkeys(lines[tag]))           # an element of two groups is there twice
         nodes = [ends[0][0], *(end for _, end in ends)]
         if any(a[1] != b[0] for a, b in zip(ends, ends[1:])) or not all(n in points for n in nodes):
             raise InputError(f"tool file {file!r}: the elements of curve {tag} do not follow one another")
