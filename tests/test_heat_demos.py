@@ -15,8 +15,12 @@ PLACES = {"convection": ("mid", "quarter", "face", "mean"), "two_sides": ("0", "
           **dict.fromkeys(("aluminium", "foam", "steel"), ("face", "mid", "top", "tool_face"))}
 
 
-@pytest.mark.parametrize("options, allowed", [(("--quick",), 1e-4), pytest.param((), 2e-5, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("demo", ["heating", "chilling"])
+@pytest.mark.parametrize("demo, options, allowed", [
+    ("chilling", ("--quick",), 1e-4),
+    pytest.param("heating", ("--quick",), 1e-4, marks=pytest.mark.slow),
+    pytest.param("chilling", (), 2e-5, marks=pytest.mark.slow),
+    pytest.param("heating", (), 2e-5, marks=pytest.mark.slow),
+])
 def test_keys(demo, options, allowed, tmp_path):
     run(f"demos/{demo}.py", "--out", tmp_path, *options)
     found = json.loads((tmp_path / "summary.json").read_text())

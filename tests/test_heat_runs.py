@@ -109,7 +109,9 @@ def test_ranks_agree():
     assert two == pytest.approx(one, rel=1e-8)
 
 
-MESH = {"radius": 5e-3, "thickness": D, "elements": (1, 1)}
+@pytest.fixture(scope="module")
+def small():
+    return fx.mesh.disc(radius=5e-3, thickness=D, elements=(1, 1))
 
 
 @pytest.mark.parametrize("make, words", [
@@ -153,8 +155,8 @@ def test_laws_that_are_refused(make, words):
     ({"mesh": "disc"}, "must come from formingx.mesh"),
 ])
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-def test_runs_that_are_refused(changes, words):
-    arguments = {"mesh": fx.mesh.disc(**MESH), "materials": SHEET, "boundaries": [], "start": 25.0, "times": 1.0,
+def test_runs_that_are_refused(changes, words, small):
+    arguments = {"mesh": small, "materials": SHEET, "boundaries": [], "start": 25.0, "times": 1.0,
                  "unit": "C"} | changes
     with pytest.raises(fx.InputError, match=words):
         fx.heat(arguments.pop("mesh"), arguments.pop("materials"), arguments.pop("boundaries"), **arguments)

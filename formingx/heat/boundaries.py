@@ -61,7 +61,7 @@ class _Boundary:
         for number in value.y if isinstance(value, Table) else [value]:
             if not low <= number <= high:
                 allowed = f"at least {low:g}" if high == float("inf") else f"from {low:g} to {high:g}"
-                raise InputError(f"{type(self).__name__}({self.on!r}): {name} = {number!r}: must be {allowed}")
+                raise InputError(f"{type(self).__name__}({self.on!r}): {name} = {float(number)!r}: must be {allowed}")
 
     def check(self, mesh: Any, absolute_zero: float) -> None:
         """An InputError unless temperatures are above absolute zero and tables cover the boundary."""

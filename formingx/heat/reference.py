@@ -32,7 +32,7 @@ class Slab:
 
 def series(slab: Slab, start: float, h: tuple[float, float], air: tuple[float, float], x: Any, times: Any,
            source: Callable | None = None, terms: int = 200) -> np.ndarray:
-    """Temperatures, shape (len(times), len(x)); faces x = 0 and x = d lose h (T - air), `source`(x) heats the inside.
+    """Temperatures, shape (len(times), len(x)); faces x = 0 and x = d lose h (T - air), source(x) heats the inside.
 
     The first root must belong to a decaying mode: at least one h above 0.
     """

@@ -135,7 +135,9 @@ class Mesh:
         domain.topology.create_connectivity(2, 1)
         mid_edge = _compat.coordinate_map(domain).degree == 2
         # of an edge: its two ends and, on second-order geometry, its middle
-        nodes = entities_to_geometry(domain, 1, self.facets_of(boundary)).reshape(-1, 3 if mid_edge else 2)
+        facets = self.facets_of(boundary)             # entities_to_geometry divides by zero if there are none
+        nodes = entities_to_geometry(domain, 1, facets) if len(facets) else np.zeros(0, dtype=np.int32)
+        nodes = nodes.reshape(-1, 3 if mid_edge else 2)
         edges = np.concatenate(self.comm.allgather(domain.geometry.x[nodes][..., :2]))
         corners, ends = np.unique(np.round(edges[:, :2].reshape(-1, 2) / max(np.ptp(edges, axis=(0, 1)).max(), 1e-300),
                                            12), axis=0, return_inverse=True)
