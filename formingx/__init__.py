@@ -5,6 +5,7 @@ from .doctor import doctor
 from .errors import ConvergenceError, InputError
 from .materials.data import treloar1944
 from .materials.fit import Fit, fit
+from .materials.fit_in_time import TimedTest
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from .materials.viscoelastic import TransientNetwork, Viscoelastic
 from .physics import tools
