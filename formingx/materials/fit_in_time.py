@@ -122,9 +122,8 @@ class _Data:
     def undetermined(self, material: RelaxingMaterial) -> tuple[str, ...]:
         """The names of the constants whose standard error is more than half of their size."""
         values, first = np.array(list(material.parameters.values())), self.residual(material)
-        slopes = np.stack([(self.residual(material.with_constants(values * np.where(np.arange(len(values)) == i,
-                                                                                    1 + 1e-4, 1))) - first) / 1e-4
-                           for i in range(len(values))], axis=1)
+        moved = [material.with_constants(values * (1 + 1e-4 * unit)) for unit in np.eye(len(values))]
+        slopes = np.stack([self.residual(cast(RelaxingMaterial, m)) - first for m in moved], axis=1) / 1e-4
         sizes = np.linalg.norm(slopes, axis=0)
         _, s, V = np.linalg.svd(slopes / np.maximum(sizes, 1e-300), full_matrices=False)
         noise = max(_NOISE, np.sqrt(np.mean(first**2)))
