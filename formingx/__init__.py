@@ -9,6 +9,7 @@ from .heat.result import HeatRun
 from .heat.run import heat
 from .materials.data import treloar1944
 from .materials.fit import Fit, fit
+from .materials.fit_in_time import TimedTest
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from .materials.material import Material
 from .materials.viscoelastic import TransientNetwork, Viscoelastic

@@ -15,15 +15,12 @@ import numpy as np
 from ..errors import ConvergenceError, InputError, known
 from .homogeneous import MODES
 
-_ACCURACY = 1e-10
-"""Relative error of a step in time; a test of some hundred steps keeps 1e-8."""
-
 BETWEEN = ("stretch", "strain")
 """What grows at a constant rate between two times: the stretch, or the logarithmic strain (a constant Hencky rate)."""
 
 
 def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stretches: np.ndarray,
-                    between: str = "stretch") -> np.ndarray:
+                    between: str = "stretch", accuracy: float = 1e-10) -> np.ndarray:
     """w_i of every branch at every time, shape (n, branches, 3).
 
     Args:
@@ -32,7 +29,12 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
         mode: a test of `homogeneous.MODES`.
         times, stretches: shape (n,). At rest before; a change of the stretch without one of the time is a jump.
         between: one of `BETWEEN`.
+        accuracy: of a step in time, relative; a test keeps about a hundredfold of it.
+
+    Raises:
+        ConvergenceError: the integration came to an end before.
     """
+    from scipy.integrate import solve_ivp
     direction = np.array([1, MODES[mode], -1 - MODES[mode]])
     strain, tau = np.log(stretches), np.asarray(tau, float)[:, None]
     w = np.empty((len(times), len(tau), 3))
@@ -49,26 +51,12 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
             x = x.reshape(-1, 3)
             return (r * direction - flow(x) / (2 * tau)).ravel()
 
-        w[first + 1:last + 1] = integrate(rate, w[first].ravel(), times[first + 1:last + 1] - times[first],
-                                          band=2).reshape(last - first, -1, 3)
+        found = solve_ivp(rate, (0, duration), w[first].ravel(), method="LSODA", t_eval=times[first + 1:last + 1]
+                          - times[first], rtol=accuracy, atol=accuracy / 10, lband=2, uband=2)
+        if not found.success or not np.all(np.isfinite(found.y)):
+            raise ConvergenceError(f"the branches cannot be integrated in time: {found.message}")
+        w[first + 1:last + 1] = found.y.T.reshape(last - first, -1, 3)
     return w
-
-
-def integrate(rate: Callable, start: np.ndarray, times: np.ndarray, band: int | None = None) -> np.ndarray:
-    """The solution of dy/dt = rate(t, y), y(0) = start, at ascending times above 0; shape (n, unknowns).
-
-    Args:
-        band: the unknowns that depend on each other are at most so far apart; None: all may.
-
-    Raises:
-        ConvergenceError: the integration came to an end before.
-    """
-    from scipy.integrate import solve_ivp
-    found = solve_ivp(rate, (0, times[-1]), start, method="LSODA", t_eval=times, rtol=_ACCURACY, atol=_ACCURACY / 10,
-                      lband=band, uband=band)
-    if not found.success or not np.all(np.isfinite(found.y)):
-        raise ConvergenceError(f"the branches cannot be integrated in time: {found.message}")
-    return found.y.T
 
 
 def checked(name: str, mode: Any, times: Any, stretches: Any, between: Any) -> tuple[np.ndarray, np.ndarray]:

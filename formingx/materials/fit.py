@@ -8,7 +8,9 @@ import numpy as np
 
 from ..errors import InputError, known
 from . import homogeneous
+from .fit_in_time import fitted_in_time
 from .material import Material
+from .viscoelastic import RelaxingMaterial
 
 _FIRST, _LAST = 20, 400
 """Evaluations for every first guess, and then for the best three."""
@@ -18,20 +20,23 @@ class Fit(NamedTuple):
     """What a fit found.
 
     material: the material with the fitted constants, in the data's unit of stress.
-    rms: {test: root mean square of the nominal stress' residual}, same unit.
+    rms: {test: root mean square of the nominal stress' residual}, same unit; tests in time are numbered.
     rms_total: the same over all points of all tests: what was made small.
+    undetermined: of tests in time, the names of the constants that they leave open.
     """
 
     material: Material
     rms: dict[str, float]
     rms_total: float
+    undetermined: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         parts = ", ".join(f"{mode} {value:.4g}" for mode, value in self.rms.items())
-        return f"{self.material}: rms {self.rms_total:.4g} ({parts})"
+        open_ = f"; the data do not determine {', '.join(self.undetermined)}" if self.undetermined else ""
+        return f"{self.material}: rms {self.rms_total:.4g} ({parts}){open_}"
 
 
-def fit(material: type[Material] | Material, data: dict[str, Any], terms: int | None = None) -> Fit:
+def fit(material: type[Material] | Material, data: Any, terms: int | None = None) -> Fit:
     """Fit the constants of a material to tests, all points of all tests with the same weight.
 
     Least squares of the nominal stress, from several first guesses, of which the best result counts. The constants
@@ -42,7 +47,9 @@ def fit(material: type[Material] | Material, data: dict[str, Any], terms: int | 
             `Hyperelastic` must be given so.
         data: {test: (stretch, nominal stress)}, each of shape (n,), for any of "uniaxial", "pure_shear" (planar)
             and "equibiaxial". Force over reference area, in any unit: the constants get the same.
-        terms: number of terms if `material` is the class `Ogden`, default 3.
+            For a material that relaxes: a list of `TimedTest`.
+        terms: number of terms if `material` is the class `Ogden`, default 3; number of branches if it is one that
+            relaxes (its equilibrium is then neo-Hookean), default as many as the data determine.
 
     Raises:
         InputError: data that are not finite, not positive stretches, of different length, fewer than the constants,
@@ -51,6 +58,10 @@ def fit(material: type[Material] | Material, data: dict[str, Any], terms: int | 
     """
     from scipy.optimize import least_squares
 
+    if isinstance(material, RelaxingMaterial) or isinstance(material, type) and issubclass(material, RelaxingMaterial):
+        relaxing, misfits, undetermined = fitted_in_time(material, data, terms)
+        numbered = {f"{i} {test.mode}": _rms(m) for i, (test, m) in enumerate(zip(data, misfits), 1)}
+        return Fit(relaxing, numbered, _rms(np.concatenate(misfits)), undetermined)
     stretches, measured, parts = _checked(data)
     guesses = _guesses(material, stretches, measured, terms)
     response, n = guesses[0].response, len(guesses[0].parameters)

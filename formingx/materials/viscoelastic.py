@@ -183,9 +183,9 @@ class RelaxingMaterial(Material):
 
     @classmethod
     def unit_stress(cls, mode: str, tau: Any, times: np.ndarray, stretches: np.ndarray,
-                    between: str = "stretch") -> np.ndarray:
-        """Nominal stress over mu, shape (n, branches), of branches with these tau; arguments as of `stress`."""
-        w = tests.elastic_strains(cls._flow, tau, mode, times, stretches, between)
+                    between: str = "stretch", accuracy: float = 1e-10) -> np.ndarray:
+        """Nominal stress over mu, shape (n, branches), of branches with these tau; see `branches.elastic_strains`."""
+        w = tests.elastic_strains(cls._flow, tau, mode, times, stretches, between, accuracy)
         return (np.exp(2 * w[..., 0]) - np.exp(2 * w[..., 2])) / stretches[:, None]
 
     def relaxation(self, mode: str, stretch: float, times: Any) -> np.ndarray:

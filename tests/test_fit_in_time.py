@@ -1,0 +1,91 @@
+"""Fits to tests in time: constants recovered, what the data leave open, bad input."""
+
+import numpy as np
+import pytest
+
+import formingx as fx
+
+T, L = np.geomspace(0.05, 40, 25), np.linspace(1.1, 3.5, 13)
+
+
+def relaxation(material, mode, stretch, times=T, noise=0.0):
+    P = material.relaxation(mode, stretch, times)
+    return fx.TimedTest.relaxation(mode, stretch, times, P * (1 + noise * np.random.default_rng(3).normal(size=len(P))))
+
+
+def rates(material, mode, rate, noise=0.0):
+    P = material.constant_rate(mode, rate, L)
+    return fx.TimedTest.constant_rate(mode, rate, L, P * (1 + noise * np.random.default_rng(4).normal(size=len(P))))
+
+
+P1 = fx.Viscoelastic(fx.NeoHookean(c10=0.05), [(0.3, 0.5), (0.4, 5.0)])
+
+
+@pytest.mark.parametrize("law", [fx.Viscoelastic, fx.TransientNetwork])
+@pytest.mark.parametrize("unit", [(1.0, 1.0), (1e6, 1 / 3600)], ids=["MPa s", "Pa h"])
+def test_constants_are_recovered(law, unit):
+    """From relaxation and three rates in two modes, whatever the units; as many branches as there are."""
+    stress, time = unit
+    material = law(fx.NeoHookean(c10=0.05 * stress), [(0.3 * stress, 0.5 * time), (0.4 * stress, 5.0 * time)])
+    data = [relaxation(material, "uniaxial", 2.0, T * time)]
+    data += [rates(material, mode, rate / time) for mode in ("uniaxial", "equibiaxial") for rate in (0.1, 1, 10)]
+    found = fx.fit(law, data)
+    assert found.material.parameters == pytest.approx(material.parameters, rel=1e-4)
+    assert found.rms_total < 1e-5 * stress and found.undetermined == () and len(found.rms) == 7
+    assert isinstance(found.material, law)
+
+
+def test_other_equilibrium_and_no_equilibrium():
+    material = fx.Viscoelastic(fx.Gent(mu=0.1, Jm=30.0), [(0.5, 2.0)])
+    data = [rates(material, "uniaxial", rate) for rate in (0.01, 1)] + [relaxation(material, "equibiaxial", 2.5)]
+    guess = fx.Viscoelastic(fx.Gent(mu=1.0, Jm=100.0), [(1.0, 1.0)])
+    assert fx.fit(guess, data).material.parameters == pytest.approx(material.parameters, rel=1e-3)
+    melt = fx.Viscoelastic(None, [(0.5, 2.0)])
+    found = fx.fit(fx.Viscoelastic(None, [(1.0, 1.0)]), [rates(melt, "uniaxial", 1.0), rates(melt, "uniaxial", 0.1)])
+    assert found.material.parameters == pytest.approx(melt.parameters, rel=1e-4)
+
+
+def test_noise():
+    """2 % noise: constants within 10 %, the misfit is the noise, and a third branch is not made up."""
+    data = [relaxation(P1, "uniaxial", 2.0, noise=0.02)] + [rates(P1, "uniaxial", r, 0.02) for r in (0.1, 1, 10)]
+    found = fx.fit(fx.Viscoelastic, data)
+    assert len(found.material.branches) == 2
+    assert found.material.parameters == pytest.approx(P1.parameters, rel=0.25)
+    measured = np.concatenate([t.stress[1:] for t in data])
+    assert 0.01 < found.rms_total / np.sqrt(np.mean(measured**2)) < 0.025
+
+
+def test_what_the_data_leave_open_is_named():
+    """A fast pull alone knows nothing of the slow branch's time, nor where its modulus ends and the rubber's begins."""
+    fast = fx.fit(P1, [rates(P1, "uniaxial", 100.0)])
+    assert {"tau_2", "c10"} <= set(fast.undetermined) and "do not determine" in str(fast)
+    assert fx.fit(P1, [relaxation(P1, "uniaxial", 2.0), rates(P1, "uniaxial", 1.0)]).undetermined == ()
+    three = fx.fit(fx.Viscoelastic, [relaxation(P1, "uniaxial", 2.0), rates(P1, "uniaxial", 1.0)], terms=4)
+    assert three.undetermined
+
+
+def test_result_is_admissible():
+    """Data that soften more than any such material: moduli and times stay above 0."""
+    data = fx.TimedTest.relaxation("uniaxial", 2.0, T, 1 / (1 + T) - 0.05)
+    found = fx.fit(fx.Viscoelastic, [data], terms=3)
+    assert all(mu > 0 and tau > 0 for mu, tau in found.material.branches)
+    assert found.material.equilibrium.parameters["c10"] >= 0
+
+
+@pytest.mark.parametrize("material, data, words", [
+    (fx.Viscoelastic, {"uniaxial": (L, L)}, "needs the time"),
+    (fx.Viscoelastic, [(L, L)], "number 1 is .*must be a TimedTest"),
+    (fx.Viscoelastic, [fx.TimedTest("uniaxial", [0, 1], [1, 2], [0])], "stress has the shape"),
+    (fx.Viscoelastic, [fx.TimedTest("uniaxial", [0, 0], [1, 2], [0, 1])], "no test takes time"),
+    (fx.Viscoelastic, [fx.TimedTest("uniaxial", [0, 1], [1, 2], [0, 0])], "no stress was measured"),
+    (fx.Viscoelastic, [fx.TimedTest("uniaxial", [0, 1], [1, 2], [0, 1])], "2 points cannot fix the 3 constants"),
+    (fx.Viscoelastic, [fx.TimedTest("shear", [0, 1], [1, 2], [0, 1])], "'shear' is not known"),
+])
+def test_bad_input(material, data, words):
+    with pytest.raises(fx.InputError, match=words):
+        fx.fit(material, data)
+
+
+def test_rate_must_be_positive():
+    with pytest.raises(fx.InputError, match="rate = 0"):
+        fx.TimedTest.constant_rate("uniaxial", 0, L, L)
