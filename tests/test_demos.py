@@ -175,3 +175,12 @@ def test_throne_plug_quick(tmp_path):
     assert found["comparison"]["largest_difference_of_rims"] < 0.03                        # thesis: small
     for picture in ("forces", "profiles"):
         assert (tmp_path / f"{picture}.png").stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_pot_study_quick(tmp_path):
+    found = summary("pot_study", tmp_path, "--quick")
+    assert found["runs"] == 4 and found["failed"] == 0
+    assert found["best"]["travel"] == 48 and found["best"]["evenness"] == pytest.approx(0.3387, rel=1e-3)
+    for file in ("best.gif", "best.html", "effects.png", "pareto.png", "study.html"):
+        assert (tmp_path / file).stat().st_size > 10_000

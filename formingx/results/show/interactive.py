@@ -74,7 +74,7 @@ def _sheet(record: Record, units: Units) -> dict[str, Any]:
         values = {units.label("wall"): wall, "wall / original": wall / profile.original_thickness}
         values |= {units.label(key.replace(" ", "_"), key): v for key, v in more.items()}
         for key, v in values.items():
-            fields.setdefault(key, []).append(_rounded(v[some]))
+            fields.setdefault(key, []).append(_rounded(v[some], each=True))
     last = record.profiles[-1]
     return {"material": _rounded(last.reference_radius[some]), "bottom": [_rounded(p.bottom[some].T) for p in
             record.profiles], "top": [_rounded(p.top[some].T) for p in record.profiles], "fields": fields}
@@ -176,11 +176,10 @@ def _chart(title: str, x: str, y: str, traces: list[dict], zero: str = "") -> di
             "traces": [{"type": "scatter", **trace} for trace in traces]}
 
 
-def _rounded(values: Any) -> Any:
-    """Numbers with `DIGITS` digits (relative to the largest), as lists; null where there is none."""
+def _rounded(values: Any, each: bool = False) -> list:
+    """Numbers with `DIGITS` digits, `each` or those of the largest of them, as lists."""
     values = np.asarray(values, dtype=float)
-    size = np.nanmax(np.abs(values), initial=0.0)
-    if size == 0 or not np.isfinite(size):
-        return np.zeros(values.shape).tolist()
-    decimals = DIGITS - 1 - int(np.floor(np.log10(size)))
-    return json.loads(json.dumps(np.round(values, decimals).tolist()).replace("NaN", "null"))
+    size = np.abs(values) if each else np.abs(values).max(initial=0.0)
+    unit = 10.0 ** (np.floor(np.log10(np.where(size > 0, size, 1.0))) + 1 - DIGITS)
+    return [float(f"{v:.{DIGITS + 1}g}") for v in (np.round(values / unit) * unit).tolist()] if values.ndim == 1 else [
+        _rounded(row, each) for row in values]

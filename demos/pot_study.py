@@ -1,0 +1,87 @@
+"""The most even yoghurt pot: travel, radius and friction of the plug in 60 runs side by side, and a search on top.
+
+A sheet of 40 mm radius and 1.2 mm (Mooney, 0.35 and 0.05 MPa: a soft sheet, as an example) is clamped; a plug stretches
+it into a cup mould 60 mm deep, vacuum lifts it off the plug and lays it on the mould, where it stays. An elastic sheet
+remembers the plug only through what the friction of the plug held back and what the mould holds. Evenness is the least
+wall over the mean wall of the part, trimmed at 38 mm. Lengths in mm, stresses in MPa.
+"""
+
+import time
+
+from common import parser, save, say, summarise
+from mpi4py import MPI
+
+import formingx as fx
+from formingx.results import files
+
+SHEET, THICKNESS, DEPTH, TRIM = 40.0, 1.2, 60.0, 38.0
+PRESSURE = 0.4
+DESIGN = {"travel": [30.0, 36.0, 42.0, 48.0, 54.0], "radius": [16.0, 19.0, 22.0, 25.0], "friction": [0.1, 0.3, 0.6]}
+QUICK = {"travel": [30.0, 48.0], "radius": [16.0, 22.0], "friction": [0.3]}
+UNITS = fx.Units("mm", "MPa")
+
+
+def pot(travel, radius, friction, elements=(30, 1)):
+    """The path of one pot, on this process alone."""
+    mesh = fx.mesh.disc(radius=SHEET, thickness=THICKNESS, elements=elements, comm=MPI.COMM_SELF)
+    mould = fx.tools.cup(radius=38.0, depth=DEPTH, mouth=THICKNESS, draft=6.0, fillet=5.0, lip=2.0)
+    plug = fx.tools.male(radius=radius, height=120.0, base=-120.0, draft=3.0, fillet=6.0)
+    scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=0.35, c01=0.05),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="vacuum")],
+                     contacts=[fx.Contact("top", mould, "stick", separates=False, name="mould"),
+                               fx.Contact("bottom", plug, friction, moves=(0, 1), name="plug")])
+    stages = [fx.Stage("plug", drive="plug", until=fx.travel(travel)),
+              fx.Stage("vacuum", drive="vacuum", until=fx.pressure(PRESSURE))]
+    return fx.Process(scene).run(stages, step=fx.StepControl(target=8), max_steps=600, progress=False)
+
+
+def evenness(path):
+    """Least wall over mean wall of the trimmed part."""
+    return path.part(trim=TRIM).evenness
+
+
+def least_wall(path):
+    """Of the trimmed part, mm."""
+    return path.part(trim=TRIM).least_wall
+
+
+def plug_force(path):
+    """The largest force that the plug takes, N."""
+    return path.tool_forces()["plug"].max()
+
+
+MEASURES = {"evenness": evenness, "least_wall": least_wall, "plug_force": plug_force}
+
+
+def main():
+    options = parser("pot_study", __doc__.splitlines()[0])
+    options.add_argument("--workers", type=int, help="processes at a time; default one for each core")
+    options.add_argument("--search", type=int, default=15, help="runs of the search on top")
+    args = options.parse_args()
+    began = time.perf_counter()
+    found = fx.study(pot, QUICK if args.quick else DESIGN, MEASURES, goal={"evenness": "max", "plug_force": "min"},
+                     folder=args.out / "runs", workers=args.workers)
+    seconds = time.perf_counter() - began
+    say(str(found), f"in {seconds:.1f} s")
+    design = found.best
+    found.plot_effects("evenness").savefig(args.out / "effects.png", dpi=150)
+    save(found.plot_pareto("evenness", "plug_force"), args.out / "pareto.png")
+    if not args.quick:
+        found.refine(evaluations=args.search)
+        say(f"after a search: evenness {found.best.measures['evenness']:.4f} at {found.best.values}")
+    found.to_csv(args.out / "runs.csv")
+    found.report(args.out / "study.html", "Yoghurt pot: what makes it even")
+    path = pot(**found.best.values)
+    path.report(args.out / "best.html", "The most even pot", units=UNITS, density=1.05, trim=TRIM)
+    path.animate(args.out / "best.gif", frames=12 if args.quick else 60)
+    summarise(args.out, {"runs": len(found.runs), "failed": len(found.runs) - len(found.good), "seconds": seconds,
+                         "best_of_the_design": {**design.values, **design.measures},
+                         "best": {**found.best.values, **found.best.measures},
+                         "effects_on_evenness": found.effects("evenness") if args.quick else {
+                             name: {str(k): v for k, v in levels.items() if k in DESIGN[name]}
+                             for name, levels in found.effects("evenness").items()},
+                         "versions": files.versions()})
+
+
+if __name__ == "__main__":
+    main()
