@@ -133,16 +133,67 @@ remove() {
     [ ! -e "$1" ] || unshare $ns rm -rf --one-file-system "$1" 2>/dev/null || rm -rf --one-file-system "$1"
 }
 
-run_mounted() {      # own mount namespace: nothing to unmount; exec all the way: one process
-    exec unshare $ns sh -c '
-        root=$1 here=$2 also=$3; shift 3
-        for d in proc sys dev; do mount --rbind /$d "$root/$d" || exit 125; done
-        mount -t tmpfs -o mode=1777 tmp "$root/tmp" || exit 125
-        for d in "$here" "$also"; do
-            [ -d "$root$d" ] || mkdir -p "$root$d"
-            mount --rbind "$d" "$root$d" || exit 125
+is_system() {        # a folder at the top that belongs to the system: inside, the root's own is there, read-only
+    case $1 in /bin|/boot|/dev|/etc|/lib|/lib32|/lib64|/libx32|/lost+found|/proc|/run|/sbin|/sys|/usr|/var) ;;
+        *) return 1 ;;
+    esac
+}
+
+# What the user may write, to be at the same paths inside, one a line: the folders at the top but the system's; of the
+# system's (/usr, /var) the one on the way to a place that matters which the root does not have, so that it hides nothing.
+places() {
+    for d in /*; do
+        is_system "$d" || [ ! -d "$d" ] || printf '%s\n' "$d"
+    done
+    for d in "$here" "$PWD" "${HOME:-/}" "${TMPDIR:-/tmp}" /var/tmp; do
+        part=
+        while [ "$part" != "${d%/}" ]; do
+            rest=${d#"$part"/} part=$part/${rest%%/*}
+            is_system "$part" || [ "${part%/*}" ] || break          # at the top: it is there already
+            [ -z "$(ls -A "$root$part" 2>/dev/null)" ] || continue
+            [ ! -d "$part" ] || printf '%s\n' "$part"
+            break
         done
-        exec chroot "$root" "$@"' fx "$root" "$here" "$also" /usr/bin/env -C "$PWD" "$@"
+    done | sort -u
+}
+
+# the same for a container: an engine may not see all of this machine, so only the folders at the top of what matters
+seen() {
+    for d in "$here" "$PWD" "${HOME:-/tmp}" "${TMPDIR:-/tmp}" /tmp; do
+        rest=${d#/} top=/${rest%%/*}
+        if [ "$top" = / ]; then continue; fi
+        is_system "$top" || { printf '%s\n' "$top"; continue; }
+        case $d/ in "$here"/|/var/?*/?*) [ ! -d "$d" ] || printf '%s\n' "${d%/}" ;; esac
+    done | sort -u
+}
+
+# own mount namespace: nothing to unmount; exec all the way: one process. What holds the root is mounted first, while
+# nothing is mounted in there that it would show a second time. Then the root is read-only: what would be lost fails.
+run_mounted() {
+    exec unshare $ns sh -c '
+        root=$1 here=$2 places=$3; shift 3
+        mount --bind "$root" "$root" || exit 125
+        for pass in 1 2; do
+            printf "%s\n" "$places" | while read -r d; do
+                case $root/ in "$d"/*) [ $pass = 1 ] ;; *) [ $pass = 2 ] ;; esac || continue
+                mkdir -p "$root$d" && mount --rbind "$d" "$root$d" || echo "fx: $d is not to be seen inside" >&2
+            done
+        done
+        [ -e "$root$here/fx" ] || exit 125
+        for d in proc sys dev; do mount --rbind /$d "$root/$d" || exit 125; done
+        for f in /etc/resolv.conf /etc/hosts /etc/ssl/certs /etc/pip.conf; do         # for pip
+            if [ -d "$f" ]; then mkdir -p "$root$f"
+            elif [ ! -f "$f" ]; then continue
+            elif [ ! -e "$root$f" ]; then : >"$root$f"; fi
+            mount --bind "$f" "$root$f"
+        done
+        for d in "$root"/tmp/ompi.*.0; do       # a session folder of MPI that is not ours: it gets one of its own
+            [ ! -d "$d" ] || [ -O "$d" ] || mount -t tmpfs mpi "$d"
+        done
+        for more in "" ,nosuid ,nodev ,nosuid,nodev; do
+            mount -o "remount,bind,ro$more" "$root" 2>/dev/null && break
+        done || echo "fx: files written to /etc, /usr and /var inside are not seen outside" >&2
+        exec chroot "$root" "$@"' fx "$root" "$here" "$(places)" /usr/bin/env -C "$PWD" "$@"
 }
 
 device() { [ -c "$root/dev/$1" ] || { rm -f "$root/dev/$1"; mknod -m 666 "$root/dev/$1" c "$2" "$3"; }; }
@@ -161,13 +212,14 @@ run_copied() {       # plain chroot: the checkout goes in, what changed comes ba
     cwd=$(pwd -P)
     case $cwd/ in "$here"/*) ;; *) say "$cwd is not in the checkout, so not copied: using $here"; cwd=$here ;; esac
     on_signals pass
-    mkdir -p "$root/dev/shm" "$root/tmp"
+    mkdir -p "$root/dev/shm" "$root/tmp" "$root${HOME:-/root}"
     device null 1 3; device zero 1 5; device random 1 8; device urandom 1 9
     empty "$root/dev/shm" "$root/tmp"
     mkdir -p "$root$here"
     empty "$root$here"
     tar -C "$here" --exclude=./.git -cf - . | tar -C "$root$here" -xf -
     list "$root.before"
+    : >"$root.began"
     sleep 0.02       # the clock of file times is coarse
     exec 7<&0
     export UCX_LOG_LEVEL=fatal HWLOC_HIDE_ERRORS=2       # they would complain that /proc and /sys are empty
@@ -185,8 +237,23 @@ run_copied() {       # plain chroot: the checkout goes in, what changed comes ba
         tar -C "$root$here" --no-recursion --null -T - -cf - | tar -C "$here" -xf - ||
         die "could not copy the new files back; they are in $root$here"
     empty "$root$here"
-    rm -f "$root.before" "$root.after"
+    beside || rc=125
+    rm -f "$root.before" "$root.after" "$root.began"
     exit "$rc"
+}
+
+# files that the copy's command wrote beside the checkout go to the same paths; none that is there is replaced
+beside() {
+    (cd "$root" && find . -xdev \( -path "./${here#/}" -o -path './tmp/ompi.*' -o -path './tmp/prterun.*' \
+        -o -path ./dev -o -path ./proc -o -path ./run -o -path ./sys -o -path ./usr -o -path ./var \) -prune \
+        -o -type f -newer "$root.began" -print0) | root=$root xargs -0r sh -c '
+        rc=0
+        for f; do
+            to=${f#.}
+            if [ ! -e "$to" ] && mkdir -p "${to%/*}" && cp -p "$root/$f" "$to"; then rm -f "$root/$f"
+            else echo "fx: $to could not be written (nothing there is replaced); it is in $root$to" >&2; rc=1; fi
+        done
+        exit $rc' sh
 }
 
 pass() {
@@ -195,11 +262,6 @@ pass() {
 }
 
 case $way in ''|native|docker|podman|root|copy) ;; *) die "FX=$way: use native, docker, podman, root or copy" ;; esac
-also=$PWD            # the working folder is mounted too, unless it would hide what the root has there
-case $PWD/ in
-    "$here"/*|//|/bin/*|/dev/*|/etc/*|/lib*|/proc/*|/run/*|/sbin/*|/sys/*|/usr/*|/var/|/var/cache/*|/var/lib/*)
-        also=$here ;;
-esac
 if [ -z "$way" ]; then
     if [ -d "$root" ]; then way=root
     elif [ -z "${FX_SUITE:-}" ] && bin=$(native_python); then way=native
@@ -218,9 +280,13 @@ case $way in
         [ -t 0 ] && [ -t 1 ] && tty=-t
         [ "$way" = podman ] && [ "$(id -u)" != 0 ] && keep=--userns=keep-id || keep=
         set -- "formingx:$key" "$@"
-        [ "$also" = "$here" ] || set -- -v "$also:$also" "$@"
+        IFS='
+'
+        for d in $(seen); do set -- -v "$d:$d" "$@"; done
+        unset IFS
+        # read-only: what would be lost with the container fails
         exec "$way" run --rm -i $tty $keep --init --shm-size=1g --user "$user" --security-opt label=disable \
-            -v "$here:$here" -w "$PWD" -e HOME=/tmp -e PYTHONPATH -e XDG_CACHE_HOME -e MPLCONFIGDIR \
+            --read-only --tmpfs /run -w "$PWD" -e HOME="${HOME:-/tmp}" -e PYTHONNOUSERSITE=1 -e TMPDIR -e PYTHONPATH -e XDG_CACHE_HOME -e MPLCONFIGDIR \
             -e OMP_NUM_THREADS -e PETSC_OPTIONS -e OMPI_MCA_btl -e OMPI_MCA_topo -e OMPI_ALLOW_RUN_AS_ROOT -e OMPI_ALLOW_RUN_AS_ROOT_CONFIRM \
             -e PRTE_MCA_rmaps_default_mapping_policy "$@" ;;
 esac
@@ -233,6 +299,6 @@ if [ ! -d "$root" ]; then      # under a lock, beside its place, then renamed: n
     [ -d "$root" ] || build_root
     exec 9>&-
 fi
-# this machine's libraries and temporary folder are not those in there
-set -- -u LD_LIBRARY_PATH -u LD_PRELOAD -u PYTHONHOME HOME=/tmp TMPDIR=/tmp FX_INSIDE=1 PATH="$clean_path" "$@"
+# this machine's libraries and the user's own Python packages are not for the Python in there
+set -- -u LD_LIBRARY_PATH -u LD_PRELOAD -u PYTHONHOME PYTHONNOUSERSITE=1 FX_INSIDE=1 PATH="$clean_path" "$@"
 if [ "$way" = copy ]; then run_copied "$@"; else run_mounted "$@"; fi

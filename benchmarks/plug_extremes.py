@@ -107,9 +107,8 @@ def ended(error) -> str:
 
 def smallest_J(path, state) -> float:
     """det F where it is smallest."""
-    path.go_to(state)
-    path.problem.x.array_w[:] = state.x
-    return float(body(path.problem, path.problem.x, state.control).J.min())
+    with path.problem.at(state) as problem:
+        return float(body(problem, problem.x, state.control).J.min())
 
 
 def main():

@@ -260,6 +260,7 @@ def _try(call: Call, arguments: dict, also: type = fx.InputError) -> tuple[str, 
 
 _RANKS = """
 import json, sys
+from mpi4py import MPI
 sys.path.insert(0, "tests")
 from conftest import treloar
 import formingx as fx
@@ -267,7 +268,7 @@ free = fx.trace(treloar(elements=(12, 2)), until=fx.pole_stretch(3.0), progress=
 tool = fx.tools.cup(radius=1.25, depth=0.4, mouth=0.082, fillet=0.15)
 made = treloar(elements=(16, 1), support=fx.Clamped("rim"), contacts=[fx.Contact("top", tool, 0.3)])
 formed = fx.trace(made, until=fx.pressure(2.0), progress=False)
-if fx.mesh.MPI.COMM_WORLD.rank == 0:
+if MPI.COMM_WORLD.rank == 0:
     print(json.dumps([{c: list(map(float, p[c])) for c in p.columns} for p in (free, formed)]))
 """
 

@@ -24,7 +24,8 @@ def plate_stress(path, state):
     """(r, normal stress on the plate) of both faces that touch it, sorted by r."""
     found = []
     for contact in path.problem.contacts:
-        points, traction = contact.traction(state.x, state.control)
+        with path.problem.at(state):
+            points, traction = contact.traction(state.x, state.control)
         moved = where(path, state, points)
         order = np.argsort(points @ (1, -1))                 # along the top outwards, then down the side
         moved, traction, points = moved[order], traction[order, 0], points[order]

@@ -34,7 +34,8 @@ def key_numbers(path, mould):
     angles = corner.start + corner.sweep * np.linspace(0, 1, 41)
     fillet = corner.centre + corner.radius * np.column_stack([np.cos(angles), np.sin(angles)])
     touch = first_touch(path)
-    points, traction = path.problem.contacts[0].traction(touch.x, touch.control)
+    with path.problem.at(touch) as problem:
+        points, traction = problem.contacts[0].traction(touch.x, touch.control)
     touching = np.flatnonzero(traction[:-1, 0] > 0)
     return {
         **at_pressures(path, PRESSURES, "psi"),

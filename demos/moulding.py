@@ -110,7 +110,8 @@ def draw_forming(path, states, tool, name: str, unit: str = "psi", side: str = "
 
 def contact_pressure(path, state, profile, side: str = "top") -> tuple[np.ndarray, np.ndarray]:
     """(reference arc length, contact pressure per current area) at the nodes of the facing side at a state."""
-    points, traction = path.problem.contacts[0].traction(state.x, state.control)
+    with path.problem.at(state) as problem:
+        points, traction = problem.contacts[0].traction(state.x, state.control)
     rest, now = getattr(profile, f"rest_{side}"), getattr(profile, side)
     nearest = np.hypot(*np.moveaxis(points[:, None] - rest, -1, 0)).argmin(1)
     order = np.argsort(nearest)

@@ -65,7 +65,8 @@ def key_numbers(path, mould, room):
 
 def touching(path, state):
     """Reference Z of the nodes that touch."""
-    points, traction = path.problem.contacts[0].traction(state.x, state.control)
+    with path.problem.at(state) as problem:
+        points, traction = problem.contacts[0].traction(state.x, state.control)
     found = points[traction[:, 0] > 0, 1]
     return found if len(found) else [None]
 

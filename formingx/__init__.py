@@ -2,26 +2,40 @@
 
 from . import mesh
 from .doctor import doctor
-from .errors import ConvergenceError, InputError
+from .errors import ConvergenceError, InputError, Interrupted
+from .heat.boundaries import Absorption, Convection, FixedTemperature, HeatFlux, Radiation, ThermalProperties
+from .heat.contact import ConductingTool, ContactWithTool
+from .heat.result import HeatRun
+from .heat.run import heat
 from .materials.data import treloar1944
 from .materials.fit import Fit, fit
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
+from .materials.material import Material
+from .materials.viscoelastic import TransientNetwork, Viscoelastic
 from .physics import tools
 from .physics.contact import Contact
 from .physics.kinematics import Axisymmetric, PlaneStrain
-from .physics.loads import Pressure
+from .physics.loads import Load, Pressure
 from .physics.models import DisplacementPenalty, Membrane, MixedPressure
-from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Symmetry
+from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Support, Symmetry
 from .physics.tools import Tool
 from .results.compare import Comparison, compare
 from .results.compare_nodes import NodalComparison, compare_nodes, write_nodes
 from .results.evaluate.profile import Profile
 from .results.evaluate.stress import Stress, StressField
 from .results.path import Path
+from .results.show.report import report
 from .runs import Process, load, solve, trace
 from .scene.scene import Scene
+from .solve.forces import force
 from .solve.newton import Tolerances
 from .solve.stage import Stage
 from .solve.state import State
 from .solve.stepping import StepControl
 from .solve.targets import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel
+from .study import Study, StudyRun, study
+from .tables import table
+from .time_temperature import WLF, Arrhenius
+from .units import Units
+
+__version__ = "0.1.0"

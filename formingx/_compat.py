@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import dolfinx
+import ufl
 
 from .errors import InputError
 
@@ -15,16 +16,25 @@ if tuple(int(n) for n in dolfinx.__version__.split(".")[:2]) < (0, 9):
 JIT_OPTIONS = {"timeout": 120}
 
 
-def gmsh_to_mesh(model: Any, comm: Any, rank: int = 0) -> tuple[Any, Any, Any]:
-    """(mesh, cell tags, facet tags) of a gmsh model that lives on `rank` (0.9: tuple; later: MeshData)."""
-    try:
-        from dolfinx.io import gmsh as reader
-    except ImportError:
-        from dolfinx.io import gmshio as reader
-    data = reader.model_to_mesh(model, comm, rank, gdim=2)
-    if hasattr(data, "cell_tags"):
-        return data.mesh, data.cell_tags, data.facet_tags
-    return data[0], data[1], data[2]
+def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges: Any, edge_tags: Any) -> tuple:
+    """(mesh, cell tags, facet tags), distributed, of arrays on rank 0 (elsewhere: of length 0).
+
+    Args:
+        cells, edges: indices of points, shapes (m, 3 or 6) and (k, 2 or 3), as DOLFINx orders them; a tag for each.
+        points: shape (n, 2).
+    """
+    import basix.ufl
+    from dolfinx import graph, mesh
+    from dolfinx.io import distribute_entity_data
+    element = basix.ufl.element("Lagrange", "triangle", 1 if cells.shape[1] == 3 else 2, shape=(2,))
+    domain = mesh.create_mesh(comm, cells=cells, x=points, e=ufl.Mesh(element))
+    marks = []
+    for dim, entities, tags in ((2, cells, cell_tags), (1, edges, edge_tags)):
+        found, values = distribute_entity_data(domain, dim, entities, tags)
+        domain.topology.create_connectivity(dim, 0)
+        domain.topology.create_connectivity(dim, 2)
+        marks.append(mesh.meshtags_from_entities(domain, dim, graph.adjacencylist(found), values.astype("int32")))
+    return domain, marks[0], marks[1]
 
 
 def coordinate_map(mesh: Any) -> Any:

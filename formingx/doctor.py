@@ -11,12 +11,13 @@ from mpi4py import MPI
 from . import _compat
 from .discrete.elements import place, shape_quality
 from .errors import instance, several
-from .physics.models import DisplacementPenalty, Membrane
+from .physics.models import DisplacementPenalty
 from .physics.tools import Arc
 from .scene.scene import Scene
 from .solve.targets import Target
 
 _FLATTEST = 110.0          # longest edge over height: discs of aspect 100 end right in benchmarks/extremes.py
+_SLIM, _TOO_STIFF, _WRONG = 3.0, 0.003, 0.02      # height over width; expected error that is worth a word, or not a run
 _PER_FILLET = 2.0          # elements along a fillet
 _PENETRATION = 0.01        # of the thickness
 
@@ -68,7 +69,7 @@ def doctor(scene: Scene, *, targets: Sequence[Target] = ()) -> Report:
     for target in several("doctor: targets", targets, "targets, such as [pole_stretch(3)]"):
         instance("doctor: targets: target", target, Target, "a target, such as pole_stretch(3)")
     sheet = _Sheet(scene)
-    checks = (_driven, _elements, _layers, _fillets, _contact_penalties, _volume_penalty, _units)
+    checks = (_driven, _elements, _locking, _layers, _fillets, _contact_penalties, _volume_penalty, _units)
     findings = [finding for check in checks for finding in check(scene, sheet, targets)]
     return Report([*findings, *_targets(scene, sheet, targets)])
 
@@ -99,7 +100,7 @@ class _Sheet:
         self.area = self.quality * (self.edges**2).sum(1) / (4 * np.sqrt(3))
         self.length = float(max(scene.extent))
         self.thickness = float(self.area.sum()) / self.length
-        self.moduli = {name: material.shear_modulus for name, material in scene.materials.items()}
+        self.moduli = {name: scene.shear_modulus(name) for name in scene.materials}
 
 
 def _folded(nodes: np.ndarray) -> np.ndarray:
@@ -128,7 +129,7 @@ def _elements(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
         at = place(scene.mesh, sheet.corners[np.argmax(sheet.folded)].mean(0))
         yield Finding("error", "mesh", f"{int(sheet.folded.sum())} elements are turned inside out at rest, one of them"
                                        f" at {at}: a curved edge is bent too much for them; use smaller elements there")
-    if isinstance(scene.model, Membrane):
+    if not scene.model.solid:
         return
     slender = sheet.edges.max(1) ** 2 / (2 * np.maximum(sheet.area, 1e-300))
     worst = int(np.argmax(slender))
@@ -139,9 +140,34 @@ def _elements(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
                                          f" for one so thin")
 
 
+def _locking(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+    """Triangles that are slim across a thick sheet, for whose element its bending is too stiff.
+
+    Its inf-sup constant falls as 2 width/height. Hinged sheets 2 to 15 times wider than thick came out wrong by up to
+    0.3 (height/width) (height/length of the body)^2.5, at most (benchmarks/thickness.py); along a thin sheet slim
+    triangles do no harm, and where one of them spans the sheet every pressure space is as wrong (see `_layers`).
+    """
+    pressure = getattr(scene.model, "pressure", None)
+    if pressure is None or not pressure.bubble:
+        return
+    height = sheet.edges.max(1)
+    slim = height**2 / (2 * np.maximum(sheet.area, 1e-300))
+    error = np.where((height < sheet.thickness) & (slim > _SLIM), 0.3 * slim * (height / sheet.length) ** 2.5, 0.0)
+    mean = float((error * sheet.area).sum() / sheet.area.sum())
+    if mean > _TOO_STIFF:
+        worst = int(np.argmax(error))
+        at = place(scene.mesh, sheet.corners[worst].mean(0), str(sheet.layer[worst]))
+        severity, by = ("error", "several") if mean > _WRONG else ("warning", "about one")
+        yield Finding(severity, "mesh",
+                      f"triangles are up to {slim[worst]:.3g} times taller than wide across the thickness (at {at}):"
+                      f" the default element locks in them, and bending comes out too stiff, by {by} per cent: use"
+                      f" more elements through the thickness (at most 1.5 times taller than wide), fewer"
+                      f" along the sheet, or MixedPressure(space='P1')")
+
+
 def _layers(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
     """A thick layer that one element spans cannot show how strain varies through it."""
-    if isinstance(scene.model, Membrane):
+    if not scene.model.solid:
         return
     for name in scene.mesh.layers:
         mine = sheet.layer == name
@@ -186,7 +212,8 @@ def _own(scene: Scene, facets: np.ndarray) -> int:
 def _contact_penalties(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
     """Penetration over thickness is traction / (penalty mu); the tangent's condition grows with the penalty."""
     stress = max(sheet.moduli.values())
-    presses = [abs(t.value) for t in targets if t.name == "pressure"] if hasattr(scene.driven, "virtual_work") else []
+    pressed = scene.driven is not None and scene.driven.quantity == "pressure"
+    presses = [abs(t.value) for t in targets if t.name == "pressure"] if pressed else []
     for contact in scene.contacts:
         traction = max([stress * sheet.thickness / sheet.length, *presses])
         depth = traction / (contact.penalty * stress)
@@ -206,7 +233,7 @@ def _contact_penalties(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Fi
 def _volume_penalty(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
     """The volume changes by about eps stretch^2 / 8: pressure near mu stretch^2 over a bulk modulus 8 mu/eps."""
     model = scene.model
-    if isinstance(model, Membrane):
+    if not model.solid:
         return
     stretch = max([t.value for t in targets if t.name == "pole_stretch"], default=1.0)
     change = model.eps * stretch**2 / 8
@@ -226,7 +253,7 @@ def _volume_penalty(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Findi
 def _units(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
     """Sizes that belong together and differ by orders of magnitude."""
     natural = max(sheet.moduli.values()) * sheet.thickness / sheet.length
-    fixed = [(repr(load), load.value) for load in scene.loads if not load.driven]
+    fixed = [(repr(load), load.value) for load in scene.loads if load.quantity == "pressure" and not load.driven]
     aimed = [(str(t), t.value) for t in targets if t.name == "pressure"] if not scene.contacts else []
     for name, value in (*fixed, *aimed):
         if abs(value) > 1e3 * natural or 0 < abs(value) < 1e-6 * natural:
@@ -248,7 +275,7 @@ def _units(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
 
 def _targets(scene: Scene, sheet: _Sheet, targets: Sequence[Target]) -> Iterator[Finding]:
     for target in targets:
-        if target.name == "pole_stretch" and scene.kinematics.dimension_of_volume == 3:
+        if target.name == "pole_stretch" and scene.kinematics.axisymmetric:
             largest = max(m.largest_stretch("equibiaxial") for m in scene.materials.values())
             if target.value >= largest:
                 yield Finding("error", str(target), f"no material of the scene can be stretched that far: the limit is"
@@ -257,8 +284,8 @@ def _targets(scene: Scene, sheet: _Sheet, targets: Sequence[Target]) -> Iterator
         if is_length and abs(target.value) > 20 * sheet.length:
             yield Finding("warning", str(target), f"that is {abs(target.value) / sheet.length:.3g} times the length of"
                                                   f" the body, {sheet.length:.4g}: are the units of length the same?")
-        moved = not hasattr(scene.driven, "virtual_work")
-        if scene.driven is not None and target.name == ("pressure" if moved else "travel"):
+        driven = scene.driven
+        if driven is not None and target.name in ("pressure", "travel") and target.name != driven.quantity:
             yield Finding("error", str(target), f"the run drives {scene.driven!r}, which has no {target.name}")
         inside = [c for c in scene.contacts if target.name == "pole_height" and _beyond(c, sheet, target.value, scene)]
         for contact in inside:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 from collections.abc import Hashable, Iterable
+from numbers import Complex, Real
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +34,31 @@ class ConvergenceError(RuntimeError):
         self.path, self.diagnosis = path, diagnosis
 
 
+class Interrupted(KeyboardInterrupt):
+    """A run was ended by Ctrl-C; one that no script catches prints one line.
+
+    Attributes:
+        path: what was computed up to there (`formingx.Path`), or None.
+    """
+
+    def __init__(self, message: str, path: Any = None):
+        super().__init__(message)
+        self.path = path
+        if sys.excepthook is not _one_line:
+            _usual.append(sys.excepthook)
+            sys.excepthook = _one_line
+
+
+_usual: list[Any] = []
+
+
+def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
+    if isinstance(error, Interrupted):
+        print(error, file=sys.stderr)
+    else:
+        _usual[-1](kind, error, trace)
+
+
 def positive(name: str, value: Any) -> float:
     """`value` as a float, or an InputError unless it is finite and greater than 0."""
     number = finite(name, value)
@@ -51,6 +78,9 @@ def non_negative(name: str, value: Any) -> float:
 def finite(name: str, value: Any) -> float:
     """`value` as a float, or an InputError unless it is a finite number."""
     try:
+        not_a_number = isinstance(value, str | bytes | bytearray) or getattr(value, "ndim", 0) > 0
+        if not_a_number or isinstance(value, Complex) and not isinstance(value, Real):
+            raise TypeError
         number = float(value)
     except (TypeError, ValueError):
         raise InputError(f"{name} = {value!r}: must be a number") from None
@@ -79,7 +109,7 @@ def instance(name: str, value: Any, kind: Any, what: str) -> Any:
 def several(name: str, values: Any, what: str) -> list[Any]:
     """`values` as a list, or an InputError unless it is a list, a tuple or the like."""
     alone = isinstance(values, str | bytes | dict) or hasattr(values, "_fields")         # a NamedTuple is one thing
-    if not isinstance(values, Iterable) or alone:
+    if not isinstance(values, Iterable) or alone or getattr(values, "ndim", 1) == 0:
         raise InputError(f"{name} = {values!r}: must be a list of {what}")
     return list(values)
 

@@ -10,10 +10,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from .discrete.problem import Problem
-from .errors import ConvergenceError, InputError, count, finite, instance, known, several
+from .errors import ConvergenceError, InputError, Interrupted, count, finite, instance, known, several
 from .physics.contact import Contact
 from .results.columns import Measure
-from .results.files.checkpoint import Checkpoint, read
+from .results.files.checkpoint import Checkpoint, holds_states, read
 from .results.path import Path
 from .scene import clearance
 from .scene.scene import Scene
@@ -26,11 +26,13 @@ from .solve.stage import AT_FOLD, Stage, plan
 from .solve.state import Record, State
 from .solve.stepping import StepControl
 from .solve.targets import Amplitude, Target
+from .solve.time_error import allowed as allowed_error
 
 
 def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: StepControl | None = None,
-          tolerances: Tolerances | None = None, max_steps: int = 200, progress: bool = True, start: Path | None = None,
-          checkpoint: Any = None, record: Mapping[str, Measure] | None = None, at_fold: str | None = None) -> Path:
+          tolerances: Tolerances | None = None, max_steps: int | None = None, progress: bool = True,
+          start: Path | None = None, checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
+          at_fold: str | None = None, resume: bool = False) -> Path:
     """Follow the equilibrium path from the unloaded body until a target is reached, through limit points.
 
     Args:
@@ -39,7 +41,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
         through: more targets to hit exactly on the way; those that are not met are left out.
         step: step control; default `StepControl()`.
         tolerances: when a state counts as converged; default `Tolerances()`.
-        max_steps: accepted states before the run gives up.
+        max_steps: accepted states before the run gives up; None: it gives up when it comes no nearer to its target.
         progress: show a progress bar on runs of more than two seconds (rank 0).
         start: a path of this scene to go on from, also one that `formingx.load` read; it stays as it is. Its steps go
             on as they were, unless `step` is given; targets that it has met count as met.
@@ -50,6 +52,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
             "jump": it goes on, and the body snaps to its next equilibrium, see `Path.jumps`; also where no other state
             is near. "stop": end there. None: "jump" where it can go one way only: it is time, or there is a history
             (friction); but a pressure is followed, for what an air supply makes grow is the volume.
+        resume: go on from what the checkpoint holds, which must be of this scene; if it holds nothing, begin.
 
     Raises:
         InputError: nothing is driven, a target needs something that the scene does not have, `start` is of another
@@ -65,17 +68,18 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
             scene.check_travel(scene.driven, target.value)
     instance("trace: step", step, StepControl | None, "a StepControl or None")
     instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
-    max_steps = count("trace: max_steps", max_steps)
+    max_steps = None if max_steps is None else count("trace: max_steps", max_steps)
     known("trace: at_fold =", at_fold, AT_FOLD)
     scene.only_driven("trace")
     if start is not None and (not isinstance(start, Path) or start.problem.scene is not scene or not start.states):
         raise InputError("trace: start: must be a path of this very scene: fx.load(folder, scene), or what trace gave"
                          " back")
+    start = _from_checkpoint("trace", resume, checkpoint, scene, start)
     problem = Problem(scene) if start is None else start.problem
     path = _path(Curve(problem, tolerances or Tolerances()), start, record)
     targets = [(target, target.bind(problem)) for target in (*through, until)]
     _keep(path, checkpoint)
-    with _carried(path):
+    with _carried(path, checkpoint):
         run = Run(path.record, targets, step, at_fold)
         run.follow(max_steps, progress, None if path.states else begin(path.record.curve))
     return path
@@ -112,11 +116,9 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     name = scene.driven.quantity
     targets = [(Target(name, to * k / increments, None), Amplitude(problem, driven)) for k in range(1, increments + 1)]
     with _carried(path):
-        first = begin(curve)
-        whole = abs(to / problem.forms.control_scale / first.slope)      # arc length, were the path straight
-        step = StepControl(length=1.01 * whole / increments, largest=1.01 * whole / increments,
-                           smallest=1e-5 * whole / increments)
-        Run(path.record, targets, step).follow(count("solve: max_steps", max_steps), False, first)
+        increment = abs(to / problem.forms.control_scale) / increments
+        step = StepControl(length=1.01 * increment, largest=1.01 * increment, smallest=1e-5 * increment)
+        Run(path.record, targets, step).follow(count("solve: max_steps", max_steps), False, begin(curve))
     return path
 
 
@@ -134,19 +136,24 @@ class Process:
         self.scene = instance("Process: scene", scene, Scene, "a formingx.Scene")
 
     def run(self, stages: Sequence[Stage], *, step: StepControl | None = None, tolerances: Tolerances | None = None,
-            max_steps: int = 200, progress: bool = True, start: Path | State | None = None,
-            checkpoint: Any = None, record: Mapping[str, Measure] | None = None) -> Path:
+            max_steps: int | None = None, progress: bool = True, start: Path | State | None = None,
+            checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
+            accuracy: str | float = "standard", resume: bool = False) -> Path:
         """Run the stages; one path holds the states of all of them, every stage from a state of kind "start" on.
 
         Args:
             stages: in order.
             step: step control of the stages that have none of their own, at their start; default `StepControl()`.
             tolerances: when a state counts as converged; default `Tolerances()`.
-            max_steps: accepted states of a stage (of a straight piece of its tables) before the run gives up.
+            max_steps: accepted states of a stage (of a straight piece of its tables) before the run gives up; None: it
+                gives up when it comes no nearer to its target.
             progress: show a progress bar on what takes more than two seconds (rank 0).
             start: a path of these stages to go on from, also one that `formingx.load` read, or a state of one.
             checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
             record: {name: measure} of columns of your own, see `trace`.
+            accuracy: of the steps in time of a material that relaxes, "draft", "standard" or "fine" (1, 0.2, 0.03 % of
+                stress and thickness), or such an error as a number.
+            resume: go on from what the checkpoint holds, which must be of this process; if it holds nothing, begin.
 
         Raises:
             InputError: a stage drives or leaves out something that the scene does not have, leaves the body free to
@@ -159,20 +166,22 @@ class Process:
         instance("Process: step", step, StepControl | None, "a StepControl or None")
         instance("Process: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
         instance("Process: start", start, Path | State | None, "a path, a state or None")
+        allowed = allowed_error("Process", accuracy)
         plans = [plan(self.scene, stage) for stage in stages]
         unsure = clearance.check(self.scene, plans)
         if isinstance(start, Path) and start.problem.scene is not self.scene:
             raise InputError("Process: start: must be a path of this very scene: fx.load(folder, scene), or what run"
                              " gave back")
+        start = _from_checkpoint("Process", resume, checkpoint, self.scene, start)
         problem = start.problem if isinstance(start, Path) else Problem(self.scene)
         for state in [start] if isinstance(start, State) else start.states[-1:] if start else []:
             _check_start(state, stages, problem)
         tolerances = tolerances or Tolerances()
-        path = _path(Curve(problem, tolerances), start, record, any(p.tables for p in plans))
+        path = _path(Curve(problem, tolerances), start, record, any(stage.timed for stage in stages))
         _keep(path, checkpoint)
-        with _carried(path):
-            execution = Execution(path.record, plans, unsure, step, tolerances.residual)
-            execution.run(count("Process: max_steps", max_steps), progress)
+        with _carried(path, checkpoint):
+            execution = Execution(path.record, plans, unsure, step, tolerances.residual, allowed)
+            execution.run(None if max_steps is None else count("Process: max_steps", max_steps), progress)
         return path
 
     def _checked(self, stages: Any) -> list[Stage]:
@@ -229,11 +238,25 @@ def _keep(path: Path, checkpoint: Any) -> None:
         path.record.on_step.append(Checkpoint(checkpoint, path).write)
 
 
+def _from_checkpoint(who: str, resume: bool, checkpoint: Any, scene: Scene, start: Any) -> Any:
+    """What a run starts from: `start`, or with `resume` what its checkpoint holds."""
+    if not resume:
+        return start
+    if checkpoint is None or start is not None:
+        raise InputError(f"{who}: resume=True: give a checkpoint to go on from, and no start")
+    return load(checkpoint, scene) if holds_states(checkpoint, scene.mesh.comm) else None
+
+
 @contextlib.contextmanager
-def _carried(path: Path) -> Iterator[None]:
+def _carried(path: Path, checkpoint: Any = None) -> Iterator[None]:
     """Errors carry the path as far as it has come."""
     try:
         yield
     except (ConvergenceError, InputError) as error:
         error.path = path if path.states else None
         raise
+    except KeyboardInterrupt:
+        stands = f"at {path.describe(path.last)}, after {len(path)} states" if path.states else "before its first state"
+        how = (f"checkpoint={str(checkpoint)!r} holds it: the same script goes on with resume=True" if checkpoint else
+               "it is lost; with checkpoint='folder', resume=True the same script would go on from there")
+        raise Interrupted(f"interrupted {stands}; {how}", path if path.states else None) from None

@@ -1,7 +1,7 @@
 """Writes the coarse grids of the thesis' examples (Song 1993), for comparison with other solvers.
 
 ./fx python3 meshes/make.py    six-node triangles, coordinates (R, Z) in the thesis' units, parts named: as gmsh files
-(MSH 2.2, text) and in the text format of formingx.grid, corners first
+(MSH 2.2, text) and in the text format of formingx.mesh.text, corners first
 """
 
 from pathlib import Path

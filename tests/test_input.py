@@ -125,3 +125,13 @@ def test_column_and_value_that_a_path_does_not_have():
         fx.trace(treloar(), until=fx.pressure(0.1), through=fx.pressure(0.05))
     with pytest.raises(fx.InputError, match="does not pass pressure = 0.3"):
         path.at(fx.pressure(0.3))
+
+
+def test_a_body_does_not_pass_the_axis():
+    """A ring whose inner edge is driven beyond it: J > 0 there, for two factors change their sign."""
+    mesh = fx.mesh.disc(radius=10.0, inner_radius=2.0, thickness=1.0, elements=(16, 2))
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0),
+                     supports=[fx.Displaced("inner", "r"), fx.Clamped("rim")])
+    with pytest.raises(fx.ConvergenceError, match="turned inside out") as error:
+        fx.trace(scene, until=fx.travel(-3.0), progress=False)
+    assert -2.0 < error.value.path["travel"][-1] < -1.9

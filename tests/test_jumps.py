@@ -142,8 +142,8 @@ def test_what_comes_to_rest_nowhere_is_said_in_bounded_time():
     with pytest.raises(fx.ConvergenceError, match="comes to rest nowhere") as error:
         fx.trace(scene, until=fx.pressure(1.0), at_fold="jump")
     assert error.value.path.last.kind == "limit point"
-    with pytest.raises(fx.ConvergenceError, match="the pressure has a limit point"):
-        fx.trace(scene, until=fx.pressure(1.0), at_fold="stop")
+    stopped = fx.trace(scene, until=fx.pressure(1.0), at_fold="stop")
+    assert "the pressure has a limit point" in stopped.ended and stopped.last.kind == "limit point"
 
 
 def test_at_fold_is_one_of_three():

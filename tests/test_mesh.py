@@ -1,5 +1,7 @@
 """Meshes: names, layers, grading, files."""
 
+import math
+
 import numpy as np
 import pytest
 from conftest import ROOT, run_json, treloar
@@ -197,10 +199,14 @@ def test_parts_refuse(wrong, words):
         mesh.with_part(**{"name": "plug", "of": "top", "within": (0, 0.5), **wrong})
 
 
-def test_a_part_is_not_written(tmp_path):
+@pytest.mark.parametrize("suffix", ["msh", "txt"])
+def test_a_part_is_written_and_read(tmp_path, suffix):
     mesh = fx.mesh.disc(radius=1.0, thickness=0.1, elements=(10, 1)).with_part("plug", "top", (0, 0.5))
-    with pytest.raises(fx.InputError, match="boundary 'top' has a part with a name of its own"):
-        fx.mesh.write(mesh, tmp_path / "part.msh")
+    fx.mesh.write(mesh, tmp_path / f"part.{suffix}")
+    again = fx.mesh.read(tmp_path / f"part.{suffix}")
+    for name in ("plug", "top", "rim"):
+        np.testing.assert_array_equal(again.nodes_of(name), mesh.nodes_of(name))
+    assert set(again.facets_of("plug")) < set(again.facets_of("top"))
 
 
 @pytest.mark.parametrize("wrong, words", [
@@ -221,3 +227,59 @@ def test_opposite_points_of_a_wall():
     assert profile.original_thickness == pytest.approx(0.3, rel=1e-6)
     np.testing.assert_allclose(profile.rest_top, mesh.line_of("outer"), atol=2e-4)
     assert profile.reference_length[-1] == pytest.approx(4.0 + np.pi / 2 * 1.15, rel=1e-3)
+
+
+@pytest.mark.parametrize("make, words", [
+    (lambda **a: fx.mesh.parison(inner_radius=1.0, length=2.0, **{"thickness": 0.1} | a), "parison"),
+    (lambda **a: fx.mesh.disc(radius=1.0, **{"thickness": 0.1} | a), "disc"),
+    (lambda **a: fx.mesh.sphere(inner_radius=1.0, **{"thickness": 0.1} | a), "sphere")])
+@pytest.mark.parametrize("wrong", [
+    {"grading": 5e-324}, {"grading": 1e300}, {"thickness": 1e300}, {"thickness": 1e-300}, {"thickness": "0.1"},
+    {"elements": (10**9, 1)}, {"elements": (10, 10**300)}, {"elements": ("4", 2)}, {"elements": np.array(4)},
+    {"elements": "42"}, {"elements": {4: 1, 2: 2}}, {"thickness": np.array([0.1])}, {"thickness": 1j},
+    {"thickness": {"a": 0.1, 3: 0.2}}])
+def test_extreme_sizes_are_refused(make, words, wrong):
+    with pytest.raises(fx.InputError, match=words):
+        make(**wrong)
+
+
+def test_numbers_of_numpy_are_numbers():
+    mesh = fx.mesh.disc(radius=np.array(1.0), thickness=np.float32(0.5), elements=np.array([2, 1]))
+    assert mesh.nodes_of("rim")[-1].tolist() == [1.0, 0.5]
+
+
+@pytest.mark.parametrize("thickness", [
+    lambda R: 0.2 - 0.1 * R, {0: 0.2, 0.5: 0.15, 1.0: 0.1}, {"a": lambda R: 0.1 - 0.05 * R, "b": {0: 0.1, 1: 0.05}}])
+def test_disc_of_varying_thickness(thickness):
+    """All nodes of the top lie on the profile, those on edges too; layers vary each for itself."""
+    mesh = fx.mesh.disc(radius=1.0, thickness=thickness, elements=(5, 2))
+    mesh.check()
+    R, Z = mesh.nodes_of("top").T
+    assert pytest.approx(0.2 - 0.1 * R, rel=1e-14) == Z and len(R) == 11
+    assert np.all(mesh.nodes_of("bottom")[:, 1] == 0)
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
+    assert Solid(scene).volume == pytest.approx(2 * np.pi * (0.2 / 2 - 0.1 / 3), rel=1e-13)
+
+
+def test_parison_of_programmed_wall():
+    """Thickness is measured along the normal of the inner face, at the height of that face."""
+    mesh = fx.mesh.parison(inner_radius=1.0, thickness={-1: 0.1, 0.0: 0.3, 2.0: 0.2}, length=2.0, elements=(12, 2))
+    mesh.check()
+    inner, outer = mesh.line_of("inner"), mesh.line_of("outer")
+    centre = np.column_stack([np.zeros(len(inner)), np.maximum(inner[:, 1], 0)])
+    assert np.hypot(*(inner - centre).T) == pytest.approx(1, rel=1e-14)
+    assert np.hypot(*(outer - centre).T) == pytest.approx(1 + np.interp(inner[:, 1], [-1, 0, 2], [0.1, 0.3, 0.2]))
+    np.testing.assert_array_equal(mesh.line_of("neck")[[0, -1]], [[1.0, 2.0], [1.2, 2.0]])
+
+
+@pytest.mark.parametrize("thickness, words", [
+    ({0: 0.1, 0.9: 0.2}, "must hold R from 0 to 1"), ({0: 0.1}, "must hold R from 0 to 1"),
+    (lambda R: 0.5 - R, r"thickness of 'sheet' at R = 0.5 = 0.0: must be greater than 0"),
+    (lambda R: "thick", "must be a number"),
+    (lambda R: R.x, "R = 0: the function raised AttributeError: 'float'"),
+    ({0: 0.1, 1: -1}, "at R = 1 = -1: must be greater"),
+    ({"a": {0: 0.1, 2: math.nan}}, "'a' at R = 2 = nan")])
+def test_varying_thickness_refuses(thickness, words):
+    with pytest.raises(fx.InputError, match=words):
+        fx.mesh.disc(radius=1.0, thickness=thickness, elements=(4, 1))

@@ -8,9 +8,9 @@ from conftest import run_json
 from test_contact import support_force
 
 import formingx as fx
+from formingx.discrete.formulation import Formulation
 from formingx.discrete.problem import Problem
 from formingx.discrete.schedule import Setting
-from formingx.discrete.solid import Formulation
 from formingx.solve.state import State
 
 Stage, tools = fx.Stage, fx.tools
@@ -196,7 +196,6 @@ def test_forces_balance(friction):
                tolerances=fx.Tolerances(residual=1e-10))
     pressure = 0.02 * np.pi * 10.0**2                       # of a follower pressure inside a clamped rim, along Z
     force = path.last.measures["tool_force"]
-    path.go_to(path.last)
     assert force > 0.5
     assert support_force(path.problem, path.last, 1) + pressure == pytest.approx(force, rel=1e-6)
 
@@ -206,7 +205,6 @@ def test_tools_on_both_faces_with_their_own_friction():
     last = path.last.measures
     assert last["floor_force"] < -0.1 and last["plug_force"] > 0.1
     assert last["tool_force"] == pytest.approx(last["floor_force"] + last["plug_force"])
-    path.go_to(path.last)
     assert support_force(path.problem, path.last, 1) - 0.02 * np.pi * 100 == pytest.approx(last["tool_force"], rel=1e-5)
     assert end(path, "down").measures["floor_force"] < 0
 
@@ -404,7 +402,7 @@ def test_a_state_of_the_path_that_meets_a_target_is_found(there_and_back):
     path = there_and_back
     assert path.at(fx.travel(2.0, of="plug")) is end(path, "down")
     assert path.at(fx.travel(1.5)).stage == "down"             # whatever was looked at before
-    path.go_to(path.last)
+    path.value("tool_force", path.last)
     assert path.at(fx.travel(1.5)).stage == "down"
     with pytest.raises(fx.InputError, match="after: must be a state of this path"):
         path.at(fx.travel(1.5), after=State(np.zeros(1), 0.0, np.zeros(1), 0.0))

@@ -340,3 +340,63 @@ def test_contents_need_no_scene(whole):
     assert about["summary"]["material of sheet"] == "NeoHookean(c10=2.0)" and len(states) == len(path)
     assert states[-1]["measures"] == path.last.measures
     np.testing.assert_allclose(states[-1]["profile"]["top"], path.profile().top, atol=1e-12)
+
+
+INTERRUPTED = """
+import sys
+sys.path.insert(0, "tests")
+import os, signal
+import formingx as fx
+from test_restart import SCENES
+make, until = SCENES["stick"]
+def stop(problem):
+    stop.calls += 1
+    if stop.calls == 6:
+        os.kill(os.getpid(), signal.SIGINT)
+    return float(stop.calls)
+stop.calls = 0
+fx.trace(make(), until=until, progress=False, checkpoint=sys.argv[1], record={"calls": stop})
+"""
+
+
+def test_ctrl_c_ends_in_one_line_and_the_run_goes_on(tmp_path):
+    done = subprocess.run([sys.executable, "-c", INTERRUPTED, str(tmp_path / "run")], cwd=ROOT, capture_output=True,
+                          text=True, timeout=300)
+    assert done.returncode != 0 and len(done.stderr.strip().splitlines()) == 1, done.stderr
+    assert "interrupted at pressure" in done.stderr and "resume=True" in done.stderr
+    make, until = SCENES["stick"]
+    scene = make()
+    path = fx.trace(scene, until=until, progress=False, checkpoint=tmp_path / "run", resume=True)
+    plain = fx.trace(scene, until=until, progress=False)
+    assert len(path) == len(plain) and np.abs(path.last.x - plain.last.x).max() < 1e-9 * np.abs(plain.last.x).max()
+    with pytest.raises(fx.InputError, match="of another scene"):
+        fx.trace(treloar(), until=fx.pole_stretch(1.2), progress=False, checkpoint=tmp_path / "run", resume=True)
+    begun = fx.trace(scene, until=until, progress=False, checkpoint=tmp_path / "new", resume=True)
+    assert len(begun) == len(plain)
+
+
+@pytest.mark.parametrize("damage", ["swapped", "superscript", "truncated", "deep", "step", "checksums"])
+def test_a_damaged_checkpoint_is_refused(tmp_path, damage):
+    from formingx.results.files.checkpoint import contents
+    scene, folder = treloar(), tmp_path / "run"
+    fx.trace(scene, until=fx.pole_stretch(1.3), progress=False, checkpoint=folder)
+    state = folder / "0001" / "state.json"
+    data = json.loads(state.read_text())
+    if damage == "swapped":
+        for a, b in (("0001", "x"), ("0002", "0001"), ("x", "0002")):
+            (folder / a).rename(folder / b)
+    elif damage == "superscript":
+        (folder / "0001").rename(folder / "\u00b9")
+    elif damage == "truncated":
+        (folder / "scene.json").write_text((folder / "scene.json").read_text()[:200])
+    elif damage == "deep":
+        state.write_text("[" * 100_000 + "]" * 100_000)
+    elif damage == "step":
+        del data["stepping"]
+        state.write_text(json.dumps(data))
+    else:
+        data["measures"]["pressure"] = 7.0
+        state.write_text(json.dumps(data))
+    for look in (lambda: fx.load(folder, scene), lambda: contents(folder)):
+        with pytest.raises(fx.InputError, match="damaged|missing"):
+            look()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import formingx as fx
-from formingx.physics.tools import Line
+from formingx.physics.tools import Arc, Line
 
 tools = fx.tools
 SHAPES = {
@@ -109,9 +109,65 @@ def test_gmsh_curves(tmp_path):
     np.testing.assert_allclose(tool.signed_distance(points), same.signed_distance(points), atol=1e-12)
     with pytest.raises(fx.InputError, match="no curve 7"):
         tools.read(file, [7])
-    (tmp_path / "bad.geo").write_text("Point(1) = {0,")
-    with pytest.raises(fx.InputError, match="cannot be read"):
+
+
+def hostile(marker):
+    """Scripts that would leave a file behind if gmsh had them."""
+    order = f'SystemCall "touch {marker}";'
+    return {"geo": order, "geo 2": f"Point(1) = {{0, 0, 0}}; {order}", "geo 3": f'Mesh.X = StrCat("a"); {order}',
+            "geo 4": f'x = 1; If (x) {order} EndIf', "geo 5": f'Physical Curve("a") = {{1}}; {order}',
+            "geo 6": 'Merge "other.geo";', "geo 7": f"x = __import__('os').system('touch {marker}');",
+            "geo 8": f"Mesh.Algorithm = 6 {order}", "geo 9": f'Macro a {order} Return Call a;',
+            "step": order, "stp": f"// {order}\n" + order, "brep": order, "msh": order, "gz": order,
+            "msh 2": f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n{order}"}
+
+
+@pytest.mark.parametrize("kind", hostile(""))
+def test_no_file_runs_anything(tmp_path, kind):
+    marker, file = tmp_path / "it ran", tmp_path / f"tool.{kind.split()[0]}"
+    (tmp_path / "other.geo").write_text(hostile(marker)["geo"])
+    file.write_text(hostile(str(marker).replace(" ", r"\ "))[kind])
+    with pytest.raises(fx.InputError, match="file '.*tool"):
+        tools.read(file, [1])
+    assert not marker.exists()
+
+
+@pytest.mark.parametrize("text, words", [
+    ("Point(1) = {0,", "line 1: 'Point.1. = .0,': is not allowed: a tool's .geo file may hold points"),
+    ("\n\nx = y + 1;", "line 3.*'y' is not a number, nor a name"), ("x = 9^9^9^9^9;", "line 1.*out of range"),
+    ("x = " + "(" * 400 + "1" + ")" * 400 + ";", "line 1"), ("Point(1) = {0, 0, 2};", "must be .x, y, 0."),
+    ("Point(1) = {1/0, 0, 0};", "zero"), ("Line(1) = {1, 2};", "there is no point 1"),
+    ("Point(1) = {0, 0, 0}; Point(2) = {1, 0, 0}; Point(3) = {3, 0, 0}; Circle(1) = {1, 2, 3};",
+     "the ends are 1 and 2 away from the centre"),
+    ("Point(0.5) = {0, 0, 0};", "no number of a point"), ("x = (-1)^0.5;", "root of a negative")])
+def test_bad_drawings(tmp_path, text, words):
+    (tmp_path / "bad.geo").write_text(text)
+    with pytest.raises(fx.InputError, match=words):
         tools.read(tmp_path / "bad.geo", [1])
+
+
+def test_drawing_with_names_and_loops(tmp_path):
+    """What gmsh users write around the curves is passed over; numbers have names."""
+    (tmp_path / "plug.geo").write_text("""
+        SetFactory("OpenCASCADE"); /* a plug;
+        in mm */ r = 2*Sqrt(4) - 1; h = r^2/3;   // r = 3, h = 3
+        Point(1) = {0, h, 0, 0.1}; Point(2) = {r, h, 0, 0.1}; Line(1) = {1, 2}; Circle(7) = {0, r, 0, 1.5, 0, Pi};
+        Curve Loop(1) = {1}; Plane Surface(1) = {1}; Physical Curve("face", 3) = {1}; Mesh.MeshSizeMax = 0.1;
+        MeshSize {1, 2} = 0.1;""")
+    assert repr(tools.read(tmp_path / "plug.geo", [-1])) == "Tool(1 line from (3, 3) to (0, 3))"
+    arc = tools.read(tmp_path / "plug.geo", [-7]).pieces[0]
+    assert arc.radius == 1.5 and arc.sweep == pytest.approx(-np.pi) and arc.ends[0] == pytest.approx([-1.5, 3])
+
+
+@pytest.mark.parametrize("arguments, words", [
+    (("no.geo", [1]), "not there"), ((3, [1]), "must be the name"), (("a.dwg", [1]), "not there|ending"),
+    (("a.geo", 1), "must be a list"), (("a.geo", []), "at least one curve"), (("a.geo", ["1"]), "must be a number"),
+    (("a.geo", [0]), "at least 1"), (("a.geo", [1.5]), "whole number")])
+def test_read_refuses(tmp_path, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.geo").write_text("x = 1;")
+    with pytest.raises(fx.InputError, match=words):
+        tools.read(*arguments)
 
 
 @pytest.mark.parametrize("kind", ["brep", "step", "msh"])
@@ -157,6 +213,22 @@ def test_gmsh_models(tmp_path, kind):
     (lambda: tools.Tool([(0, 0), (1, 0), (2, 0), (2, 1)], fillets=[0, 0.1, 0.2, 0]), "point 1 = 0.1: .* straight on"),
     (lambda: tools.Tool.of_pieces([Line(np.zeros(2), np.ones(2)), Line(np.zeros(2), np.ones(2))]),
      "follow one another"),
+    (lambda: tools.Tool.of_pieces([]), "at least one piece"),
+    (lambda: tools.Tool.of_pieces(["line"]), "piece 0 = 'line': must be a Line or an Arc"),
+    (lambda: tools.Tool.of_pieces(3), "must be a list of Line"),
+    (lambda: tools.Tool.of_pieces([Line(np.zeros(2), np.array([np.nan, 1]))]), "piece 0: an end.*nan.*finite"),
+    (lambda: tools.Tool.of_pieces([Line(np.ones(2), np.ones(2))]), "has no length"),
+    (lambda: tools.Tool.of_pieces([Arc(np.zeros(2), 0.0, 0.0, 1.0)]), "piece 0: radius = 0.0.*greater than 0"),
+    (lambda: tools.Tool.of_pieces([Arc(np.zeros(2), -1, 0.0, 1.0)]), "piece 0: radius = -1.*greater than 0"),
+    (lambda: tools.Tool.of_pieces([Arc(np.zeros(2), 1.0, 0.0, 0.0)]), "sweep = 0.0"),
+    (lambda: tools.Tool.of_pieces([Arc(np.zeros(2), 1.0, 0.0, 7.0)]), "at most a full turn"),
+    (lambda: tools.Tool.of_pieces([Arc(np.zeros(2), 1.0, np.inf, 1.0)]), "start = inf"),
+    (lambda: tools.Tool([(0, 0), (2, 0), (1, 0)]), "doubles back"),
+    (lambda: tools.Tool([(0, 0), (2, 0), (2, 1), (0.5, 1), (0.5, 0), (1.5, 0)]), "crosses itself|doubles back"),
+    (lambda: tools.Tool([(0, 0), (2, 0), (2, 1), (3, 1), (3, 0), (1, 0)]), "crosses itself|doubles back"),
+    (lambda: tools.Tool([(0, 0), ("1.0", 0)]), "'1.0': must be a number"),
+    (lambda: tools.plane("1.0"), "z = '1.0': must be a number"),
+    (lambda: tools.Tool(np.array(1.0)), "must be a list of points"),
     (lambda: tools.cup(radius=1, depth=5, draft=20), "leaves no floor"),
     (lambda: tools.cone(half_angle=90), "below 90"),
     (lambda: tools.bottle(radius=1, height=1, neck=2, shoulder=1, neck_height=1), "below radius"),

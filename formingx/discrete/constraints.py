@@ -59,8 +59,6 @@ class Constraints:
         self.entries: list[Entry] = []
         self.means: list[tuple[int, np.ndarray]] = []
         for i, support in enumerate(forms.scene.things):
-            if getattr(support, "constraints", None) is None:
-                continue
             for item in forms.constraints(support):
                 if isinstance(item, Held):
                     sub = forms.space.sub(0).sub(item.component)

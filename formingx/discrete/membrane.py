@@ -21,7 +21,8 @@ from .. import _compat
 from ..errors import InputError
 from ..mesh.mesh import Mesh
 from ..physics.supports import Held
-from .solid import Formulation
+from .formulation import Formulation
+from .probes import MidSurfaceProbe
 
 _FIRST_STRETCH = 1e-6
 """Stretch at which the first direction of a path is taken (a direction only: no state is solved for there)."""
@@ -68,6 +69,22 @@ class MidSurface(Formulation):
         R = np.asarray(points, dtype=float)[:, 0]
         return np.column_stack([R, np.interp(R, self._R, (self._low + self._high) / 2)])
 
+    def mid(self, layer, R, Z):
+        """Halfway between the faces of the layer."""
+        low, high = self._ends[layer]
+        return np.interp(R, self._R, (low + high) / 2)
+
+    def weighted(self, density, layers, metadata=None):
+        dx = self.dx(metadata=metadata) if metadata else self.dx
+        return sum(density * self._thicknesses[name] * self._area() * dx for name in layers)
+
+    def cells_of(self, layers):
+        topology = self.domain.topology
+        return np.arange(topology.index_map(1).size_local + topology.index_map(1).num_ghosts, dtype=np.int32)
+
+    def probe(self, problem, points):
+        return MidSurfaceProbe(problem, points)
+
     def set_stiff(self):
         """A small stretch in all directions."""
         self.w.sub(0).interpolate(lambda X: _FIRST_STRETCH / self.length * X[:2])
@@ -80,10 +97,10 @@ class MidSurface(Formulation):
             raise InputError(f"Membrane: the mesh needs a boundary named 'bottom'; it has {list(mesh.boundaries)}")
         R = self._R = mesh.nodes_of("bottom")[:, 0]
         near = 1e-9 * self.length
-        faces = {name: _faces(mesh, name, R, near) for name in mesh.layers}
-        self._low = np.min([low for low, _ in faces.values()], axis=0)
-        self._high = np.max([high for _, high in faces.values()], axis=0)
-        self._layers = {name: np.maximum(high - low, 0.0) for name, (low, high) in faces.items()}
+        self._ends = {name: _faces(mesh, name, R, near) for name in mesh.layers}
+        self._low = np.min([low for low, _ in self._ends.values()], axis=0)
+        self._high = np.max([high for _, high in self._ends.values()], axis=0)
+        self._layers = {name: np.maximum(high - low, 0.0) for name, (low, high) in self._ends.items()}
         if np.any(np.diff(R) < near) or not np.all(self._high - self._low > near):
             raise InputError("Membrane: the sheet must have a single lower and upper point at each R")
         degree = _compat.coordinate_map(mesh.domain).degree
@@ -136,12 +153,11 @@ class MidSurface(Formulation):
         l1, l2 = ufl.sqrt(ufl.inner(t, t)), F[2, 2]
         return ufl.diag(ufl.as_vector([l1, 1 / (l1 * l2), l2]))
 
-    def _energy(self) -> Any:
-        energy, dx = 0, self.dx
-        for name, material in self.scene.materials.items():
-            W = material.strain_energy(self.F, **{k: self.constant(c) for k, c in material.parameters.items()})
-            energy += self._scale * W * self._thicknesses[name] * self._area() * dx
-        return energy
+    def _groups(self) -> list[tuple[Any, list[str]]]:
+        return [(material, [name]) for name, material in self.scene.materials.items()]
+
+    def _energy(self, of: Any) -> Any:
+        return sum(self.weighted(self._scale * of(terms, self.F), terms.names) for terms in self._terms.values())
 
 
 def _faces(mesh: Mesh, layer: str, R: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,6 @@ from mpi4py import MPI
 
 from .. import _compat
 from ..errors import InputError
-from ..physics.kinematics import Axisymmetric
 from .locate import locate
 
 
@@ -100,7 +99,7 @@ class MidSurfaceProbe(Probe):
 
     def across(self):
         """See `Probe.across`: at the pole the membrane stays normal to the axis, and both stretches are 1 + du_r/dR."""
-        axisymmetric = isinstance(self._problem.scene.kinematics, Axisymmetric)
+        axisymmetric = self._problem.scene.kinematics.axisymmetric
         row = self._row(np.array([[1.0, 0.0], [0.0, 0.0]]), self._slopes[:, 0] * self._problem.forms.length)
         return row, 1.0 if axisymmetric else 0.5
 
@@ -120,7 +119,7 @@ class MidSurfaceProbe(Probe):
         t = self._tangent + forms.length * du
         l1 = np.hypot(*t.T)
         l2 = np.ones_like(l1)
-        if isinstance(self._problem.scene.kinematics, Axisymmetric):
+        if self._problem.scene.kinematics.axisymmetric:
             R, u_r = self._middle[:, 0], forms.length * u[:, 0]
             l2 = np.where(self._on_axis, 1 + forms.length * du[:, 0], 1 + u_r / np.where(self._on_axis, 1.0, R))
         offset = self.points[self._mine] - self._middle
@@ -142,9 +141,6 @@ def _basis(element: Any, derivative: int, reference: np.ndarray) -> np.ndarray:
     return element.tabulate(derivative, reference)[derivative].reshape(len(reference), element.dim)
 
 
-_PROBES = {"solid": Probe, "membrane": MidSurfaceProbe}
-
-
 def probe(problem: Any, points: Any) -> Probe:
     """Displacement at fixed reference points (see `Probe`), whatever the body is modelled as."""
-    return _PROBES[problem.scene.model.body](problem, points)
+    return problem.forms.probe(problem, points)

@@ -17,14 +17,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..scene.scene import Scene
+from .admissible import Admissible
 from .constraints import Active, Constraints
 from .contact_nodes import ContactNodes
+from .formulations import formulate
 from .matrix import ExtendedMatrix
-from .membrane import MidSurface
 from .schedule import Setting
-from .solid import Solid
-
-_FORMULATIONS = {"solid": Solid, "membrane": MidSurface}
 
 
 class _Stage(NamedTuple):
@@ -59,7 +57,7 @@ class Problem:
     """
 
     def __init__(self, scene: Scene):
-        self.scene, self.forms = scene, _FORMULATIONS[scene.model.body](scene)
+        self.scene, self.forms = scene, formulate(scene)
         self.comm = self.forms.comm
         forms = self.forms
         index_map = forms.space.dofmap.index_map
@@ -69,9 +67,8 @@ class Problem:
         self._residual = forms.compile(forms.residual)
         self._by_control = forms.control_derivative and forms.compile(forms.control_derivative)
         self.contacts = [ContactNodes(forms, contact, self.assemble) for contact in scene.contacts]
-        self.histories = [contact for contact in self.contacts if contact.law.remembers]
-        folded = ufl.conditional(ufl.gt(forms.J, forms.constant(0.0)), forms.constant(0.0), forms.constant(1.0))
-        self._folded = forms.compile(folded * forms.dx)
+        self.histories = [*(contact for contact in self.contacts if contact.law.remembers), *forms.histories]
+        self._admissible = Admissible(forms)
         self._constraints = Constraints(forms, self.assemble)
         self._by_motion = self._lift = None
         if self._constraints.can_move:
@@ -92,14 +89,24 @@ class Problem:
         return int(self.x.getSize())
 
     @property
+    def n_owned(self) -> int:
+        """Number of fields' unknowns that this rank owns."""
+        return int(self._n)
+
+    @property
     def symmetric(self) -> bool:
         """True if the tangent is symmetric: no follower load in the scene."""
-        return all(getattr(x, "symmetric", False) for x in (*self.scene.loads, *self.scene.contacts))
+        return all(x.symmetric for x in (*self.scene.loads, *self.scene.contacts))
 
     @property
     def setting(self) -> Setting:
         """What the stage that the problem stands in has set."""
         return self._stage.setting
+
+    @property
+    def control(self) -> float:
+        """The control that the forms see now; inside `at` that of the state."""
+        return float(self.forms.control.value)
 
     @property
     def held(self) -> np.ndarray:
@@ -125,6 +132,16 @@ class Problem:
     def has_history(self) -> bool:
         """True if F depends on more than x and control."""
         return bool(self.histories)
+
+    @property
+    def relaxes(self) -> bool:
+        """True if F depends on time."""
+        return bool(self.forms.histories)
+
+    @property
+    def time(self) -> float:
+        """Process time at the control that the forms see now."""
+        return self.forms.time_at(self.control)
 
     @property
     def memory(self) -> list[Any]:
@@ -157,7 +174,7 @@ class Problem:
 
         state: anything with x (own part), control, setting (a `Setting` as plain data, or empty) and memory.
         """
-        fields, control = self.forms.w.x.array.copy(), float(self.forms.control.value)
+        fields, control, clock = self.forms.w.x.array.copy(), self.control, self.forms.clock
         stage, memory, x = self._stage, self.memory, self.x.array_r.copy()
         try:
             self.stand(state)
@@ -167,6 +184,7 @@ class Problem:
         finally:
             self.memory = memory
             self._take(stage)
+            self.forms.clock = clock
             self.x.array_w[:] = x
             self.forms.w.x.array[:] = fields
             self.forms.control.value = control
@@ -177,6 +195,8 @@ class Problem:
             self.memory = state.memory
         if state.setting:
             self.enter(Setting(**state.setting), state.x, state.control)
+        if not self.setting.rate[-1]:
+            self.forms.clock = state.time
 
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         """out = F(x, control); sets `force_scale`."""
@@ -198,9 +218,13 @@ class Problem:
 
         Stress length^2 (per depth: length): of the forces that are left over at the unknowns that it holds.
         """
-        left = self.forces(x, control)[self._constraints.driven_by(number)].sum()
+        left = self.forces(x, control)[self.driven_unknowns(number)].sum()
         forms = self.forms
         return -float(self.comm.allreduce(left, MPI.SUM)) * forms.stress * forms.volume / forms.length
+
+    def driven_unknowns(self, number: int) -> np.ndarray:
+        """Local numbers of the owned unknowns that a support (its number in the scene) drives."""
+        return self._constraints.driven_by(number)
 
     def forces(self, x: PETSc.Vec, control: float) -> np.ndarray:
         """Internal less external forces at (x, control), which supports carry; owned part of the fields, shape (n,)."""
@@ -215,9 +239,9 @@ class Problem:
         return values
 
     def folded(self, x: PETSc.Vec, control: float) -> bool:
-        """True if an element is turned inside out: J is not positive at some quadrature point."""
+        """True if the body has no shape: a hoop stretch or an in-plane determinant is not positive (`Admissible`)."""
         self.set_state(x, control)
-        return self.assemble_scalar(self._folded) > 0
+        return not self._admissible.holds()
 
     def begin(self, old: Any = None) -> None:
         """Newton's method begins at a guess ahead of a state (None: of none)."""
@@ -257,8 +281,25 @@ class Problem:
 
     def advance(self, x: np.ndarray, control: float) -> None:
         """A state is accepted: what has a history takes it up. x: own part, shape (n,)."""
+        if self.forms.histories:
+            self.forms.control.value = control
+            self._set_own(x)
         for history in self.histories:
             history.advance(x[: self._n], control)
+
+    def foretell(self, x: np.ndarray, control: float) -> dict[int, Any]:
+        """{number of a history: what it would remember, were a state accepted} of those that change with time."""
+        found, timed = {}, self.forms.histories
+        if timed:
+            self.forms.control.value = control
+            self._set_own(x)
+        for k, history in enumerate(self.histories):
+            if any(history is one for one in timed):
+                kept = history.get()
+                history.advance(x[: self._n], control)
+                found[k] = history.get()
+                history.put(kept)
+        return found
 
     def reach(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step of at most `length` from x along (direction, slope) may be. Arrays: own part."""
@@ -301,8 +342,11 @@ class Problem:
 
     def set_fields(self, x: PETSc.Vec) -> None:
         """Put the fields of x where the forms see them."""
+        self._set_own(x.array_r)
+
+    def _set_own(self, x: np.ndarray) -> None:
         w = self.forms.w.x
-        w.array[: self._n] = x.array_r[: self._n]
+        w.array[: self._n] = x[: self._n]
         w.scatter_forward()
 
     def stiff_state(self, out: PETSc.Vec) -> None:

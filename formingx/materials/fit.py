@@ -46,7 +46,8 @@ def fit(material: type[Material] | Material, data: dict[str, Any], terms: int | 
 
     Raises:
         InputError: data that are not finite, not positive stretches, of different length, fewer than the constants,
-            all at stretch 1, or beyond every admissible limit.
+            all at stretch 1, stresses or stretches that are no test's, or beyond every
+            admissible limit.
     """
     from scipy.optimize import least_squares
 
@@ -122,12 +123,17 @@ def _checked(data: Any) -> tuple[np.ndarray, np.ndarray, dict[str, slice]]:
         for i in np.flatnonzero(~(np.isfinite(l) & np.isfinite(P) & (l > 0)))[:1]:
             raise InputError(f"fit: data[{mode!r}], point {i}: stretch = {l[i]}, stress = {P[i]}: must be finite,"
                              f" and the stretch greater than 0")
+        for i in np.flatnonzero((l < 1e-3) | (l > 1e3))[:1]:
+            raise InputError(f"fit: data[{mode!r}], point {i}: stretch = {l[i]}: must be from 0.001 to 1000")
         stretches.append(homogeneous.along(mode, l))
         stresses.append(P)
         parts[mode] = slice(n, n := n + len(l))
     l = np.concatenate(stretches, axis=1)
     if np.all(l[0] == 1):
         raise InputError("fit: data: every stretch is 1: nothing is strained")
+    largest = max(np.abs(P).max() for P in stresses)
+    if not 1e-50 <= largest <= 1e50:
+        raise InputError(f"fit: data: the largest stress is {largest:g}: must be from 1e-50 to 1e50: use another unit")
     return l, np.concatenate(stresses), parts
 
 

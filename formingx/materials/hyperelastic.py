@@ -12,6 +12,7 @@ import ufl
 
 from ..errors import InputError, count, finite, positive
 from ..physics import kinematics
+from .constants import varying
 from .material import Material
 
 
@@ -49,12 +50,11 @@ class MooneyRivlin(Material):
         self.parameters = {"c10": c10, "c01": c01}
         self.check()
 
-    def check(self):
-        for name, value in self.parameters.items():
+    def check_constants(self, **constants):
+        for name, value in constants.items():
             if finite(f"{self}: {name}", value) < 0:
                 raise InputError(f"{self} is not stable: with {name} < 0 the energy falls without bound at large"
                                  f" stretch; {name} must be at least 0")
-        super().check()
 
     def strain_energy(self, F, c10, c01):
         I1, I2 = kinematics.invariants(F)
@@ -81,15 +81,13 @@ class Yeoh(Material):
         self.parameters = {"c10": c10, "c20": c20, "c30": c30}
         self.check()
 
-    def check(self):
-        for name, value in self.parameters.items():
-            finite(f"{self}: {name}", value)
-        c10, c20, c30 = self.parameters.values()
+    def check_constants(self, **constants):
+        super().check_constants(**constants)
+        c10, c20, c30 = constants.values()
         positive(f"{self}: c10", c10)
         if c30 < 0 or c20 < 0 and c20**2 >= 3 * c10 * c30:
             raise InputError(f"{self} is not stable: its energy does not grow with I1 everywhere; c30 must be at least"
                              f" 0 and c20 greater than -sqrt(3 c10 c30) = {-math.sqrt(max(3 * c10 * c30, 0)):.6g}")
-        super().check()
 
     def strain_energy(self, F, c10, c20, c30):
         x = ufl.inner(F, F) - 3
@@ -121,14 +119,13 @@ class Gent(Material):
         self.parameters = {"mu": mu, "Jm": Jm}
         self.check()
 
-    def check(self):
-        for name, value in self.parameters.items():
+    def check_constants(self, **constants):
+        for name, value in constants.items():
             positive(f"{self}: {name}", value)
-        super().check()
 
     @property
     def largest_I1(self):
-        return self.parameters["Jm"] + 3
+        return math.inf if self.varies else self.parameters["Jm"] + 3
 
     def strain_energy(self, F, mu, Jm):
         return -mu * Jm / 2 * _ln(1 - (ufl.inner(F, F) - 3) / Jm)
@@ -158,16 +155,15 @@ class ArrudaBoyce(Material):
         self.parameters = {"mu": mu, "N": N}
         self.check()
 
-    def check(self):
-        mu, N = self.parameters.values()
+    def check_constants(self, **constants):
+        mu, N = constants.values()
         positive(f"{self}: mu", mu)
         if finite(f"{self}: N", N) <= 1:
             raise InputError(f"{self}: N = {N!r}: must be greater than 1, or the chains are fully stretched at rest")
-        super().check()
 
     @property
     def largest_I1(self):
-        return 3 * self.parameters["N"]
+        return math.inf if self.varies else 3 * self.parameters["N"]
 
     def strain_energy(self, F, mu, N):
         def w(s):
@@ -199,15 +195,17 @@ class Ogden(Material):
         mu, alpha = _as_tuple(mu), _as_tuple(alpha)
         if len(mu) != len(alpha) or not mu:
             raise InputError(f"Ogden: mu = {mu!r} and alpha = {alpha!r} must be as many, and at least one each")
+        for exponent in alpha:
+            if varying(exponent) is not None:
+                raise InputError(f"Ogden: alpha = {alpha!r}: exponents must be numbers; the mu may vary")
         self.parameters = {f"mu{k}": m for k, m in enumerate(mu, 1)} | {f"alpha{k}": a for k, a in enumerate(alpha, 1)}
         self.check()
 
-    def check(self):
-        for m, a in self._pairs(self.parameters):
+    def check_constants(self, **constants):
+        for m, a in self._pairs(constants):
             if not finite(f"{self}: mu", m) * finite(f"{self}: alpha", a) > 0:
                 raise InputError(f"{self} is not stable: the pair mu = {m!r}, alpha = {a!r} has mu alpha <= 0;"
                                  f" every pair must have mu alpha > 0")
-        super().check()
 
     def strain_energy(self, F, **constants):
         energy, J = 0, kinematics.volume_ratio(F)
@@ -270,4 +268,4 @@ def _ln(x: Any) -> Any:
 
 
 def _as_tuple(values: Any) -> tuple:
-    return tuple(values) if hasattr(values, "__iter__") else (values,)
+    return (values,) if varying(values) is not None or not hasattr(values, "__iter__") else tuple(values)

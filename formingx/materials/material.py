@@ -1,6 +1,7 @@
-"""What every incompressible, isotropic, hyperelastic material can do; the materials are in `materials`.
+"""What every incompressible, isotropic material can do; the materials are in `hyperelastic`.
 
-A material has named constants and one energy. What an energy of F leaves as stress at rest, an isotropic pressure,
+A material has named constants and one energy, and may have a history: internal variables at every quadrature point,
+which advance from one accepted state to the next. What an energy of F leaves as stress at rest, an isotropic pressure,
 is removed where it is used: W(F) - rest_stress ln J. (On a thin sheet Newton's method takes half as many iterations
 with that form than with the isochoric part of F: see the notes on incompressibility.)
 """
@@ -13,24 +14,87 @@ import math
 from typing import Any
 
 import numpy as np
+import ufl
 
 from ..errors import InputError, finite, known, positive
 from . import homogeneous
+from .constants import Sample, Varying, varying
 from .homogeneous import MODES, Response, Stability
 
 
 class Material:
     """A strain energy with named constants.
 
-    Subclasses set `self.parameters` (name to value) and give `strain_energy`. The constants' unit of stress is
-    the user's own and fixes that of all pressures and stresses.
+    Subclasses set `self.parameters` (name to number, or to what varies: see `constants`) and give `strain_energy`. The
+    constants' unit of stress is the user's own and fixes that of all pressures and stresses.
+
+    A material with a history sets `self.internal` too, and gives `step_energy` and `updated`. In what they take and
+    return, `internal` is {name: UFL expression} with the values at the beginning of the step, and `time_step` the
+    process time since then (UFL scalar; 0 where no time passes, then nothing may change).
+
+    Attributes:
+        parameters: {name: constant}.
+        internal: {name: value at rest}, a number or nested tuples, whose shape is that of the variable; of a quantity
+            per quadrature point. Empty: no history.
     """
 
-    parameters: dict[str, float]
+    parameters: dict[str, Any]
+    internal: dict[str, Any] = {}
 
     def strain_energy(self, F: Any, *args: Any, **constants: Any) -> Any:
-        """Energy per reference volume of F, shape (3, 3); a UFL scalar, zero at F = I."""
-        raise NotImplementedError
+        """Energy per reference volume of F, shape (3, 3); a UFL scalar, zero at F = I.
+
+        Of a material with a history: that of a body at rest until now which is strained in no time.
+        """
+        if not self.internal:
+            raise NotImplementedError
+        rest = {name: ufl.as_ufl(value) if np.ndim(value) == 0 else ufl.as_tensor(value)
+                for name, value in self.internal.items()}
+        return self.step_energy(F, rest, ufl.as_ufl(0.0), **constants)
+
+    @property
+    def error_weights(self) -> dict[str, float]:
+        """{internal variable: what its relative error counts when steps in time are chosen}; default 1."""
+        return {}
+
+    def step_energy(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
+        """The potential of a step, per reference volume: its derivative by F is the stress at the end of the step."""
+        return self.strain_energy(F, **constants)
+
+    def updated(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> dict[str, Any]:
+        """{name: UFL expression}: the internal variables at the end of a step that ends at F."""
+        return {}
+
+    def stored_energy(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
+        """The energy per reference volume that is stored at F, with the internal variables as they are then."""
+        return self.strain_energy(F, **constants)
+
+    def dissipation(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
+        """The power per reference volume that is dissipated there, stress over time; 0 without a history."""
+        return ufl.as_ufl(0.0)
+
+    @property
+    def varies(self) -> bool:
+        """True if a constant varies over the body."""
+        return any(varying(value) is not None for value in self.parameters.values())
+
+    def constants(self) -> dict[str, float | Varying]:
+        """{name: number, or what varies}."""
+        return {name: value if (found := varying(value)) is None else found for name, value in self.parameters.items()}
+
+    def _numbers(self) -> list[float]:
+        """The constants' values, in order; an InputError if they vary."""
+        if self.varies:
+            raise InputError(f"{self}: its constants vary over the body: use with_constants([...]) for the material at"
+                             f" one point of it")
+        return list(self.parameters.values())
+
+    def _sampled(self, sample: Sample) -> np.ndarray:
+        """The different sets of values that the constants have over a sample, shape (constants, n)."""
+        found = [value.values(sample) if isinstance(value, Varying) else float(value)
+                 for value in self.constants().values()]
+        columns = np.stack(np.broadcast_arrays(np.zeros(len(sample.points)), *found)[1:])
+        return np.unique(columns, axis=1) if columns.size else columns
 
     @property
     def largest_I1(self) -> float:
@@ -43,12 +107,20 @@ class Material:
 
         For any isotropic energy W = mu (e1^2 + e2^2 + e3^2) of small strains e = ln l with zero sum: W,11 = 4 mu.
         """
-        return float(self.response.logarithmic(np.ones((2, 1)), self.parameters.values())[1][0, 0, 0] / 4)
+        return float(self._moduli(self._numbers(), 1)[0])
+
+    def shear_modulus_at(self, sample: Sample) -> np.ndarray:
+        """`shear_modulus` for the values that the constants have over a sample, shape (n,)."""
+        values = self._sampled(sample)
+        return self._moduli(values, values.shape[1])
+
+    def _moduli(self, constants: Any, n: int) -> np.ndarray:
+        return self.response.logarithmic(np.ones((2, n)), constants)[1][0, 0] / 4
 
     @property
     def rest_stress(self) -> float:
         """dW/dF11 at F = I, stress: for the invariants, 2 (W,1 + 2 W,2)."""
-        return float(self.response.derivatives(np.ones((3, 1)), self.parameters.values())[0][0, 0])
+        return float(self.response.derivatives(np.ones((3, 1)), self._numbers())[0][0, 0])
 
     @functools.cached_property
     def response(self) -> Response:
@@ -77,7 +149,7 @@ class Material:
         for bad in flat[~((flat > 0) & np.isfinite(flat))][:1]:
             raise InputError(f"{self}: a stretch of {bad:.6g}: must be finite and greater than 0")
         self._check_isotropic()
-        P = self.response.stress(homogeneous.along(mode, flat), self.parameters.values())[0]
+        P = self.response.stress(homogeneous.along(mode, flat), self._numbers())[0]
         for bad in flat[~np.isfinite(P)][:1]:
             raise InputError(self._beyond(mode, bad))
         return P.reshape(l.shape)[()]
@@ -107,7 +179,7 @@ class Material:
         except (TypeError, ValueError) as error:
             raise error if isinstance(error, InputError) else InputError(
                 f"{self}: check_stability: stretches = {stretches!r}: must be a range such as (0.5, 6)") from None
-        return homogeneous.stability(self.response, self.parameters.values(), min(low, 1.0), max(high, 1.0))
+        return homogeneous.stability(self.response, self._numbers(), min(low, 1.0), max(high, 1.0))
 
     def plot(self, axes: Any = None, stretches: Any = None, unit: str = "") -> Any:
         """Draw nominal stress against stretch of the three tests; returns the matplotlib axes.
@@ -128,13 +200,30 @@ class Material:
         axes.legend()
         return axes
 
-    def check(self) -> None:
-        """Raise an InputError unless the constants are admissible: finite, with a positive stiffness at rest."""
-        for name, value in self.parameters.items():
-            finite(f"{self}: {name}", value)
-        mu = self.shear_modulus
-        if not mu > 0 or not math.isfinite(mu):
+    def check(self, sample: Sample | None = None) -> None:
+        """Raise an InputError unless the constants are admissible: finite, with a positive stiffness at rest.
+
+        sample: where to look at constants that vary; None: only those that do not vary are checked.
+        """
+        if self.varies and sample is None:
+            for name, value in self.parameters.items():
+                if varying(value) is None:
+                    finite(f"{self}: {name}", value)
+            return
+        if sample is None:
+            self.check_constants(**self.parameters)
+            moduli = np.array([self.shear_modulus])
+        else:
+            for values in self._sampled(sample).T.tolist():
+                self.check_constants(**dict(zip(self.parameters, values, strict=True)))
+            moduli = self.shear_modulus_at(sample)
+        for mu in moduli[~((moduli > 0) & np.isfinite(moduli))][:1]:
             raise InputError(f"{self} has no stiffness: its shear modulus at rest is {mu:.6g}, must be positive")
+
+    def check_constants(self, **constants: Any) -> None:
+        """Raise an InputError unless these values of the constants are admissible."""
+        for name, value in constants.items():
+            finite(f"{self}: {name}", value)
 
     @classmethod
     def guesses(cls, modulus: float, I1: float, terms: int | None) -> list[Material]:
@@ -144,7 +233,7 @@ class Material:
 
     def coordinates(self) -> list[tuple[float, float, float]]:
         """[(value, lowest, highest)]: what a fit varies. All constants within are admissible."""
-        return [(float(value), -math.inf, math.inf) for value in self.parameters.values()]
+        return [(float(value), -math.inf, math.inf) for value in self._numbers()]
 
     def constants_at(self, coordinates: Any) -> list[float]:
         """The constants at coordinates."""
@@ -160,7 +249,7 @@ class Material:
     def _check_isotropic(self) -> None:
         """Turning the stretches round must turn the stresses round."""
         l = np.array([1.02, 0.99, 1 / 1.02 / 0.99])
-        g = self.response.derivatives(np.stack([l, np.roll(l, 1)], axis=1), self.parameters.values())[0]
+        g = self.response.derivatives(np.stack([l, np.roll(l, 1)], axis=1), self._numbers())[0]
         if np.any(np.abs(np.roll(g[:, 0], 1) - g[:, 1]) > 1e-8 * np.abs(g).max()):
             raise InputError(f"{self} is not isotropic: its stresses depend on the direction that is pulled")
 

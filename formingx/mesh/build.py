@@ -2,57 +2,81 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError, count, finite, known, non_negative, positive
-from .gmsh import from_gmsh
+from .grid import Grid, to_mesh
 from .mesh import Mesh
 
 ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
-"""Elements (along the radius, through each layer) of a disc: see the README for the error that each promises."""
+"""Elements of a disc (along the radius, least number through each layer): see the README for what each promises."""
+_TALLEST = 1.5
+"""Height over width of such elements at most: the inf-sup constant of P2 + bubble / P1dg falls as triangles get slim,
+and across a thick sheet, which bends, they lock (benchmarks/thickness.py)."""
+_MOST = 250_000            # rectangles of a mesh
+
+Thickness = float | Callable[[float], float] | Mapping[float, float]
+"""Of a layer: a length; or, where it varies along the sheet, a function of the coordinate, or a table {coordinate:
+length}, linear between its points."""
 
 
-def disc(*, radius: float, thickness: float | Mapping[str, float], accuracy: str = "standard",
+def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accuracy: str = "standard",
          elements: tuple | None = None, grading: float = 1.0, concentrate: Mapping[float, float] | None = None,
          inner_radius: float = 0.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """A flat disc (or ring) in the (R, Z) plane, bottom face on Z = 0.
+    """A disc (or ring) in the (R, Z) plane, bottom face on Z = 0.
 
     Boundaries: `axis` (R = inner_radius; called `inner` if that is above 0), `rim`, `bottom`, `top`.
 
     Args:
         radius, inner_radius: lengths.
-        thickness: a length (one layer, called `sheet`), or {layer name: its thickness} from bottom to top.
-        accuracy: "draft", "standard" or "fine": how many elements.
+        thickness: a length (one layer, called `sheet`), or {layer name: its thickness} from bottom to top. Each may
+            vary with the radius: a function of R, or a table {R: thickness}, linear between its radii (all nodes lie
+            on it, those on edges too).
+        accuracy: "draft", "standard" or "fine": how many elements; more of them through layers so thick that they would
+            be more than 1.5 times taller than wide (as for `thickness` = `radius` in thicker ones).
         elements: (along the radius, through each layer), in place of `accuracy`; the latter may be a tuple, one count
             per layer. Each rectangle is two triangles.
-        grading: size of the last element at the rim over that of the first at the axis.
+        grading: size of the last element at the rim over that of the first at the axis, 1e-6 to 1e6.
         concentrate: in place of `grading`, {reference radius: size of the elements there over that of the largest}, for
             example around a plug's edge. Sizes grow linearly with the distance from these radii; nodes lie on them.
 
     Raises:
         InputError: a size that is not positive, a count that is not a whole number of at least 1, a radius to
-            concentrate at that is not on the disc, or fewer elements than there are parts between such radii.
+            concentrate at that is not on the disc, fewer elements than there are parts between such radii, or a
+            thickness that is not given all over the disc.
     """
     radius = positive("disc: radius", radius)
-    grading = positive("disc: grading", grading)
+    grading = _grading("disc", grading)
     inner_radius = non_negative("disc: inner_radius", inner_radius)
     if inner_radius >= radius:
         raise InputError(f"disc: inner_radius = {inner_radius!r}: must be at least 0 and below radius = {radius!r}")
     sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
     known("disc: accuracy", accuracy, ACCURACY)
-    elements = ACCURACY[accuracy] if elements is None else elements
+    layers = _layers("disc", thickness, "sheet", "R")
+    if elements is None:
+        elements = _preset(accuracy, inner_radius, radius, layers)
+    along, through = _counts("disc", "radius", elements, len(layers))
     sizes = None if concentrate is None else _sizes(concentrate, inner_radius, radius)
     if sizes and grading != 1:
         raise InputError(f"disc: grading = {grading!r} and concentrate = {concentrate!r}: give one of them")
-    mesh = _layered("disc", (inner_radius, radius), 0.0, thickness, elements, grading, sides, comm)
-    if sizes:
-        x, along = mesh.domain.geometry.x, int(elements[0])
-        half = np.rint(2 * along * (x[:, 0] - inner_radius) / (radius - inner_radius))      # gmsh has some 12 digits
-        x[:, 0] = np.interp(half / 2, np.arange(along + 1), _concentrated(inner_radius, radius, along, sizes))
-    return mesh
+    joints = (_concentrated(inner_radius, radius, along, sizes) if sizes
+              else inner_radius + (radius - inner_radius) * _graded(along, grading))
+    R = _with_middles(joints)
+    Z = _levels(layers, through, R)
+    return _mesh("disc", np.stack([np.broadcast_to(R, Z.shape), Z], axis=-1), list(layers), through, sides, comm)
+
+
+def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[int, list[int]]:
+    """(elements along, through each layer) of a disc: near squares in thick layers."""
+    along, least = ACCURACY[accuracy]
+    length, R = high - low, np.linspace(low, high, along + 1)
+    tallest = _TALLEST * length / along
+    return along, [max(least, int(np.ceil(min(float(thickness_at(R).max()), length) / tallest - 1e-9)))
+                   for thickness_at in layers.values()]
 
 
 def _sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
@@ -108,16 +132,16 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
         InputError: as in `disc`.
     """
     inner_radius = positive("sphere: inner_radius", inner_radius)
-    mesh = _layered("sphere", (0.0, np.pi / 2), inner_radius, thickness, elements, positive("sphere: grading", grading),
-                    ("axis", "equator", "inner", "outer"), comm, layer="wall")
-    x = mesh.domain.geometry.x
-    angle, radius = x[:, 0].copy(), x[:, 1].copy()
-    x[:, 0], x[:, 1] = radius * np.sin(angle), radius * np.sin(np.pi / 2 - angle)
-    return mesh
+    layers = _layers("sphere", thickness, "wall", "")
+    along, through = _counts("sphere", "meridian", elements, len(layers))
+    angle = _with_middles(np.pi / 2 * _graded(along, _grading("sphere", grading)))
+    radius = inner_radius + _levels(layers, through, angle)
+    points = np.stack([radius * np.sin(angle), radius * np.sin(np.pi / 2 - angle)], axis=-1)
+    return _mesh("sphere", points, list(layers), through, ("axis", "equator", "inner", "outer"), comm)
 
 
-def parison(*, inner_radius: float, thickness: float | Mapping[str, float], length: float, elements: tuple = (60, 2),
-            grading: float = 1.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
+def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thickness], length: float,
+            elements: tuple = (60, 2), grading: float = 1.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     """A closed tube, open at the top: the lower half of a hollow sphere about the origin, and a tube from Z = 0 up.
 
     Boundaries: `axis` (R = 0), `inner`, `outer`, `neck` (Z = length). All nodes of the bottom, those on edges too, lie
@@ -125,7 +149,9 @@ def parison(*, inner_radius: float, thickness: float | Mapping[str, float], leng
 
     Args:
         inner_radius, length: of the tube, lengths.
-        thickness: a length (one layer, called `wall`), or {layer name: its thickness} from the inside out.
+        thickness: a length (one layer, called `wall`), or {layer name: its thickness} from the inside out. Each may
+            vary (a programmed wall): a function of Z, or a table {Z: thickness}, linear between its heights. Z is that
+            of the inner face, from -inner_radius at the bottom to `length`; thickness is measured along its normal.
         elements: (from the axis to the neck, through each layer), as in `disc`.
         grading: size of the last element at the neck over that of the first at the axis.
 
@@ -133,69 +159,125 @@ def parison(*, inner_radius: float, thickness: float | Mapping[str, float], leng
         InputError: as in `disc`; fewer than two elements along the meridian.
     """
     inner_radius, length = positive("parison: inner_radius", inner_radius), positive("parison: length", length)
-    grading = positive("parison: grading", grading)
-    mesh = _layered("parison", (0.0, 1.0), inner_radius, thickness, elements, 1 / grading,
-                    ("neck", "axis", "inner", "outer"), comm, layer="wall")
-    along = int(elements[0])
+    grading = _grading("parison", grading)
+    layers = _layers("parison", thickness, "wall", "Z")
+    along, through = _counts("parison", "meridian", elements, len(layers))
     if along < 2:
         raise InputError(f"parison: elements along the meridian = {along}: must be at least 2, one in the bottom and"
                          f" one in the tube")
-    x = mesh.domain.geometry.x
-    from_neck, radius = x[:, 0].copy(), x[:, 1].copy()
-    # the mesh has its elements along [0, 1] from the neck; the joint of tube and bottom becomes a node
-    joints = np.concatenate([[0.0], np.cumsum(grading ** (-np.arange(along) / max(along - 1, 1)))])
-    joints /= joints[-1]
-    wall = thickness if not isinstance(thickness, Mapping) else sum(thickness.values())
+    # elements lie along [0, 1] from the neck; the joint of tube and bottom is a node
+    joints = _graded(along, 1 / grading)
+    wall = float(sum(thickness_at(np.zeros(1))[0] for thickness_at in layers.values()))
     joint = length / (length + np.pi / 2 * (inner_radius + wall / 2))
     node = joints[1 + np.argmin(np.abs(joints[1:-1] - joint))]
-    for place in (node, 1.0):                              # gmsh places nodes to some ten digits
-        from_neck[np.abs(from_neck - place) < 1e-6] = place
+    from_neck = _with_middles(joints)
     z = length * np.maximum(1 - from_neck / node, 0.0)
     angle = np.pi / 2 * np.maximum((from_neck - node) / (1 - node), 0.0)
-    x[:, 0], x[:, 1] = radius * np.sin(np.pi / 2 - angle), z - radius * np.sin(angle)
-    return mesh
+    radius = inner_radius + _levels(layers, through, z - inner_radius * np.sin(angle))
+    points = np.stack([radius * np.sin(np.pi / 2 - angle), z - radius * np.sin(angle)], axis=-1)
+    return _mesh("parison", points, list(layers), through, ("neck", "axis", "inner", "outer"), comm)
 
 
-def _layered(kind: str, ends: tuple, bottom: float, thickness: float | Mapping[str, float], elements: tuple,
-             grading: float, sides: tuple, comm: MPI.Comm, layer: str = "sheet") -> Mesh:
-    """Layers of triangles over the interval `ends`, from `bottom` up; `sides` names left, right, bottom and top."""
-    layers = dict(thickness) if isinstance(thickness, Mapping) else {layer: thickness}
+def _layers(kind: str, thickness: Any, alone: str, coordinate: str) -> dict[str, Callable]:
+    """{name of a layer: its thickness at coordinates, shape (n,)}; `coordinate` is "" where it cannot vary."""
+    named = isinstance(thickness, Mapping) and all(isinstance(name, str) for name in thickness)
+    layers = dict(thickness) if named else {alone: thickness}
     if not layers:
         raise InputError(f"{kind}: thickness = {{}}: must name at least one layer")
-    heights = [positive(f"{kind}: thickness of {name!r}", h) for name, h in layers.items()]
-    if not (hasattr(elements, "__len__") and len(elements) == 2):
-        raise InputError(f"{kind}: elements = {elements!r}: must be (along the {_ALONG[kind]}, through each layer)")
-    along = count(f"{kind}: elements along the {_ALONG[kind]}", elements[0])
-    through = elements[1] if hasattr(elements[1], "__len__") else [elements[1]] * len(layers)
-    if len(through) != len(layers):
-        raise InputError(f"{kind}: elements through the layers = {through!r}: {len(layers)} layers need as many counts")
+    return {name: _thickness(f"{kind}: thickness of {name!r}", given, coordinate) for name, given in layers.items()}
+
+
+def _thickness(who: str, given: Any, coordinate: str) -> Callable[[np.ndarray], np.ndarray]:
+    if not coordinate or not (callable(given) or isinstance(given, Mapping)):
+        value = positive(who, given)
+        return lambda x: np.full(len(x), value)
+    if callable(given):
+        return lambda x: np.array([positive(f"{who} at {coordinate} = {v:.6g}", _called(given, v, who, coordinate))
+                                   for v in x.tolist()])
+    points = sorted((finite(f"{who}: {coordinate}", at), positive(f"{who} at {coordinate} = {at!r}", h))
+                    for at, h in given.items())
+    at, value = np.array(points).reshape(-1, 2).T
+
+    def between(x):
+        near = 1e-9 * max(np.abs(x).max(), 1e-300)
+        if len(at) < 2 or x.min() < at[0] - near or x.max() > at[-1] + near:
+            raise InputError(f"{who} = {given!r}: must hold {coordinate} from {x.min():.6g} to {x.max():.6g}")
+        return np.interp(x, at, value)
+    return between
+
+
+def _called(function: Callable, v: float, who: str, coordinate: str) -> Any:
+    try:
+        return function(v)
+    except Exception as error:
+        raise InputError(f"{who} at {coordinate} = {v:.6g}: the function raised {type(error).__name__}:"
+                         f" {error}") from error
+
+
+def _grading(kind: str, grading: Any) -> float:
+    grading = positive(f"{kind}: grading", grading)
+    if not 1e-6 <= grading <= 1e6:
+        raise InputError(f"{kind}: grading = {grading!r}: must be from 1e-6 to 1e6")
+    return grading
+
+
+def _counts(kind: str, along_what: str, elements: Any, layers: int) -> tuple[int, list[int]]:
+    """Numbers of elements along the sheet and through each layer."""
+    if not _is_row(elements) or len(elements) != 2:
+        raise InputError(f"{kind}: elements = {elements!r}: must be (along the {along_what}, through each layer)")
+    along = count(f"{kind}: elements along the {along_what}", elements[0])
+    through = list(elements[1]) if _is_row(elements[1]) else [elements[1]] * layers
+    if len(through) != layers:
+        raise InputError(f"{kind}: elements through the layers = {through!r}: {layers} layers need as many counts")
     through = [count(f"{kind}: elements through a layer", n) for n in through]
-    ratio = grading ** (1 / (along - 1)) if along > 1 else 1.0
-
-    def build(model):
-        geo = model.geo
-        levels = np.concatenate([[bottom], bottom + np.cumsum(heights)])
-        points = [[geo.addPoint(r, z, 0) for r in ends] for z in levels]
-        across = [geo.addLine(*p) for p in points]
-        left = [geo.addLine(a[0], b[0]) for a, b in zip(points, points[1:])]
-        right = [geo.addLine(a[1], b[1]) for a, b in zip(points, points[1:])]
-        for line in across:
-            geo.mesh.setTransfiniteCurve(line, along + 1, "Progression", ratio)
-        faces = []
-        for k, n in enumerate(through):
-            for line in (left[k], right[k]):
-                geo.mesh.setTransfiniteCurve(line, n + 1)
-            faces.append(geo.addPlaneSurface([geo.addCurveLoop([across[k], right[k], -across[k + 1], -left[k]])]))
-            geo.mesh.setTransfiniteSurface(faces[-1], "AlternateLeft")
-        geo.synchronize()
-        for name, face in zip(layers, faces):
-            model.addPhysicalGroup(2, [face], name=name)
-        for name, lines in zip(sides, (left, right, across[:1], across[-1:])):
-            model.addPhysicalGroup(1, lines, name=name)
-        model.mesh.generate(2)
-        model.mesh.setOrder(2)
-
-    return from_gmsh(build, comm)
+    if along * sum(through) > _MOST:
+        raise InputError(f"{kind}: elements = {elements!r}: {along * sum(through)} rectangles: at most {_MOST}")
+    return along, through
 
 
-_ALONG = {"disc": "radius", "sphere": "meridian", "parison": "meridian"}
+def _is_row(values: Any) -> bool:
+    return isinstance(values, tuple | list) or isinstance(values, np.ndarray) and values.ndim == 1
+
+
+def _graded(along: int, grading: float) -> np.ndarray:
+    """Ends of `along` elements on [0, 1] whose sizes grow by one ratio, the last `grading` times the first."""
+    sizes = grading ** (np.arange(along) / max(along - 1, 1))
+    ends = np.concatenate([[0.0], np.cumsum(sizes)])
+    return ends / ends[-1]
+
+
+def _with_middles(joints: np.ndarray) -> np.ndarray:
+    """Ends of elements and the middles between them, shape (2 n + 1,)."""
+    both = np.empty(2 * len(joints) - 1)
+    both[::2], both[1::2] = joints, (joints[1:] + joints[:-1]) / 2
+    return both
+
+
+def _levels(layers: Mapping[str, Callable], through: list[int], coordinates: np.ndarray) -> np.ndarray:
+    """Distance of all rows of nodes from the first face, shape (2 sum(through) + 1, number of coordinates)."""
+    rows = [np.zeros(len(coordinates))]
+    for thickness_at, n in zip(layers.values(), through):
+        h, base = thickness_at(coordinates), rows[-1]
+        rows += [base + h * (k / (2 * n)) for k in range(1, 2 * n + 1)]
+    return np.array(rows)
+
+
+def _mesh(kind: str, points: np.ndarray, layers: list[str], through: list[int], sides: tuple, comm: MPI.Comm) -> Mesh:
+    """Triangles on rows and columns of nodes, shape (rows, columns, 2); `sides`: names of left, right, bottom, top.
+
+    Diagonals alternate, as a chessboard's fields in each layer.
+    """
+    number = np.arange(points.shape[0] * points.shape[1]).reshape(points.shape[:2])
+    triangles, first = {}, 0
+    halves = np.array([[[(0, 0), (1, 0), (1, 1)], [(1, 1), (0, 1), (0, 0)]],          # (column, row) of corners
+                       [[(0, 0), (1, 0), (0, 1)], [(0, 1), (1, 0), (1, 1)]]])
+    for name, n in zip(layers, through):
+        i, j = np.meshgrid(np.arange(points.shape[1] // 2), np.arange(n), indexing="ij")
+        corners = 2 * (halves[(i + j) % 2] + np.stack([i, j], axis=-1)[..., None, None, :]).reshape(-1, 3, 2)
+        nodes = np.concatenate([corners, (corners + np.roll(corners, -1, axis=1)) // 2], axis=1)
+        triangles[name] = number[first + nodes[..., 1], nodes[..., 0]]
+        first += 2 * n
+    lines = (number[:, 0][::-1], number[:, -1], number[0], number[-1][::-1])
+    boundaries = {name: np.stack([line[:-2:2], line[2::2], line[1::2]], axis=1) for name, line in zip(sides, lines)}
+    flat = points.reshape(-1, 2)
+    return to_mesh(lambda: Grid(flat, np.arange(1, len(flat) + 1), triangles, boundaries), comm, kind)

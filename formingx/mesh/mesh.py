@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from .. import _compat
 from ..errors import InputError, known, pair
+from .check import check_elements
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,23 @@ class Mesh:
     layers: dict[str, int]
     boundaries: dict[str, tuple[int, ...]]
     comm: MPI.Comm
+
+    def check(self) -> None:
+        """Look the elements over, as reading a mesh does: for meshes whose nodes were moved; collective.
+
+        Raises:
+            InputError: a coordinate that is not finite, an element that is flat or inside out, two that lie over each
+                other or meet without sharing their nodes; the message says where.
+        """
+        geometry, n = self.domain.geometry, self.domain.topology.index_map(2).size_local
+        nodes = np.asarray(_compat.cell_nodes(self.domain))[:n]
+        numbers = geometry.index_map().local_to_global(nodes.ravel().astype(np.int32)).reshape(nodes.shape)
+        parts = self.comm.allgather((numbers, geometry.x[nodes, :2]))
+        triangles = np.concatenate([part for part, _ in parts])[:, [0, 1, 2, 5, 3, 4][: nodes.shape[1]]]
+        points = np.zeros((triangles.max() + 1, 2))
+        for part, x in parts:
+            points[part] = x
+        check_elements(points, triangles, "the mesh")
 
     def facets_of(self, boundary: str) -> np.ndarray:
         """Local facet indices of a boundary, sorted, shape (n,), ghosts included."""

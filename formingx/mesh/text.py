@@ -1,4 +1,4 @@
-"""A mesh as plain arrays, and its text file: nodes and six-node triangles, for other solvers.
+"""The text file of a mesh: nodes and six-node triangles, for other solvers.
 
 The file, line by line (blank lines count for nothing, nor does what follows a #; node numbers are any whole numbers):
 
@@ -21,41 +21,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
+from .grid import Grid, counter_clockwise
 
 _FORMAT = "six-node triangles 1"
 # position of our node (corners first) in a line of the file
 _NUMBERINGS = {"corners": [0, 1, 2, 3, 4, 5], "around": [0, 2, 4, 1, 3, 5]}
-
-
-class Grid(NamedTuple):
-    """A mesh on one rank; rows of `layers` and `boundaries` hold indices of `points`.
-
-    Attributes:
-        points: (R, Z) of the nodes, shape (n, 2), unit of length of the mesh.
-        numbers: their numbers in a file, shape (n,).
-        layers: {name: triangles, shape (m, 6)}: corners counter-clockwise, then middles of edges 01, 12, 20 (of a
-            first-order mesh: shape (m, 3)).
-        boundaries: {name: edges, shape (k, 3)}: first, last, middle, the body on the left (first order: shape (k, 2)).
-    """
-
-    points: np.ndarray
-    numbers: np.ndarray
-    layers: dict[str, np.ndarray]
-    boundaries: dict[str, np.ndarray]
-
-
-def counter_clockwise(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """The triangles, shape (m, 3 or 6), each turned if it runs clockwise."""
-    triangles = np.array(triangles)
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    wrong = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
-    triangles[wrong] = triangles[wrong][:, [0, 2, 1, 5, 4, 3][: triangles.shape[1]]]
-    return triangles
 
 
 def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> None:

@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError, count, instance, non_negative, pair, positive
+from .part import Part
 from .tools import Nearest, Tool
 
 SOFTER = 0.01
@@ -38,7 +39,7 @@ _AT_FOOT = 1e-7
 """Distances from the foot of the ramp, over theta, that are as good as none."""
 
 
-class Contact:
+class Contact(Part):
     """A face of the body that a rigid tool stops.
 
     Args:
@@ -58,6 +59,9 @@ class Contact:
     Raises:
         InputError: an argument that is not allowed.
     """
+
+    quantity = "travel"
+    on: str
 
     def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float = 2e4,
                  ramp: float = 1e-5, separates: bool = True, nodes_per_step: int = 1,
@@ -79,8 +83,6 @@ class Contact:
         self.moves = None if moves is None else pair(f"{name}: moves", moves)
         if self.moves == (0.0, 0.0):
             raise InputError(f"{name}: moves = (0, 0): must name a direction, or be None")
-
-    quantity = "travel"
 
     @property
     def driven(self) -> bool:

@@ -5,50 +5,86 @@ Coordinates X = (R, Z), displacement u = (u_r, u_z), in the mesh's unit of lengt
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
 import ufl
 
 
-class Axisymmetric:
+class Kinematics:
+    """What the motion of a section of the body means in space.
+
+    Attributes:
+        axisymmetric: True if the section turns about R = 0.
+        dimension_of_volume: 3; of a volume per unit depth 2.
+    """
+
+    axisymmetric = False
+    dimension_of_volume = 3
+
+    def deformation_gradient(self, u: Any, X: Any) -> Any:
+        """F, shape (3, 3), of the displacement u at the reference point X, both shape (2,)."""
+        raise NotImplementedError
+
+    def weight(self, X: Any) -> Any:
+        """Reference volume per unit area of the plane, and reference area per unit length of a line."""
+        raise NotImplementedError
+
+    def area_vector(self, u: Any, X: Any, N: Any) -> Any:
+        """Nanson: J F^-T N with its weight, the current area vector per unit reference length, shape (2,)."""
+        raise NotImplementedError
+
+    def rigid_motions(self) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
+        """{name: displacements, shape (n, 2), of points, shape (n, 2)} of the motions that strain nothing."""
+        raise NotImplementedError
+
+
+class Axisymmetric(Kinematics):
     """Rotational symmetry about R = 0 without twist.
 
     F = [[1 + u_r,R, u_r,Z, 0], [u_z,R, 1 + u_z,Z, 0], [0, 0, 1 + u_r/R]]; quadrature points never lie on the
     axis, so u_r/R needs no guard.
     """
 
-    dimension_of_volume = 3
+    axisymmetric = True
 
     def deformation_gradient(self, u, X):
-        """F, shape (3, 3), of the displacement u, shape (2,), at the reference point X, shape (2,)."""
         return _block(ufl.Identity(2) + ufl.grad(u), 1 + u[0] / X[0])
 
     def weight(self, X):
-        """Reference volume per unit area of the plane, and reference area per unit length of a line."""
         return 2 * ufl.pi * X[0]
 
     def area_vector(self, u, X, N):
-        """Nanson: J F^-T N with its weight, the current area vector per unit reference length, shape (2,).
-
-        A polynomial of degree 3 in P2 displacements: no division by R.
-        """
+        """See `Kinematics`; a polynomial of degree 3 in P2 displacements: no division by R."""
         return 2 * ufl.pi * (X[0] + u[0]) * _cofactor(ufl.Identity(2) + ufl.grad(u)) * N
 
+    def rigid_motions(self):
+        return {"translation along Z": _along_z}
 
-class PlaneStrain:
+
+class PlaneStrain(Kinematics):
     """A long body, unit depth: F33 = 1, forces and volumes per unit depth."""
 
     dimension_of_volume = 2
 
     def deformation_gradient(self, u, X):
-        """F, shape (3, 3), of the displacement u, shape (2,)."""
         return _block(ufl.Identity(2) + ufl.grad(u), 1)
 
     def weight(self, X):
-        """1: everything is per unit depth."""
         return 1
 
     def area_vector(self, u, X, N):
-        """Nanson: J F^-T N, the current area vector per unit reference length and depth, shape (2,)."""
         return _cofactor(ufl.Identity(2) + ufl.grad(u)) * N
+
+    def rigid_motions(self):
+        return {"translation along R": lambda X: np.stack([1 + 0 * X[:, 0], 0 * X[:, 0]], 1),
+                "translation along Z": _along_z,
+                "rotation": lambda X: np.stack([-X[:, 1], X[:, 0]], 1)}
+
+
+def _along_z(X):
+    return np.stack([0 * X[:, 0], 1 + 0 * X[:, 0]], 1)
 
 
 def volume_ratio(F):

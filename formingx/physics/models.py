@@ -8,28 +8,39 @@ the linearised constraint carries no wrong stress k (J - 1).
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import InputError, finite, known, non_negative, positive
 
 
-class Membrane:
+class Model:
+    """How a scene is modelled. Attributes: solid: True if the body has bending and a stress through its thickness."""
+
+    solid = True
+
+    def check(self, scene: Any) -> None:
+        """Raise an InputError if the scene has what this model cannot have."""
+
+
+class Membrane(Model):
     """A membrane: the sheet's mid-surface, its thickness as data, for thin sheets (Adkins and Rivlin 1952).
 
     The stretch through the thickness is 1/(l1 l2), so the volume is kept exactly; layers are bonded and their energies
     add up. It has no bending, so a rim cannot be clamped, and knows no stress through the thickness.
     """
 
-    body = "membrane"
+    solid = False
 
     def check(self, scene):
-        """Raise an InputError if the scene has what a membrane cannot have."""
         for support in scene.supports:
-            if getattr(support, "holds_rotation", False):
+            if support.holds_rotation:
                 raise InputError(f"Scene: {support!r} with model=Membrane(): a membrane has no bending stiffness, its"
                                  f" rim cannot be clamped; use SimplySupported({support.on!r}), or a solid model")
+        if scene.contacts:
+            raise InputError(f"Scene: {scene.contacts[0]!r}: a membrane has no contact yet: use a solid model,"
+                             f" MixedPressure() for one")
 
 
 class PressureSpace(NamedTuple):
@@ -52,7 +63,7 @@ _SPACES = {
 }
 
 
-class MixedPressure:
+class MixedPressure(Model):
     """A solid with the pressure as an unknown: P2 displacement and one of three pressure spaces.
 
     The pressure jumps across the interface of two materials, in each of them.
@@ -64,7 +75,6 @@ class MixedPressure:
             bubble (Crouzeix and Raviart 1973). Both of these keep the volume of each element.
     """
 
-    body = "solid"
     stress_free = True
 
     def __init__(self, *, eps: float = 0.0, space: str = "P1dg"):
@@ -82,7 +92,7 @@ class MixedPressure:
         return [(density, {})]
 
 
-class DisplacementPenalty:
+class DisplacementPenalty(Model):
     """A solid the thesis' own way: displacements only, the penalty integrated by a reduced rule (section 3.4).
 
     Args:
@@ -93,7 +103,6 @@ class DisplacementPenalty:
             then swells or shrinks to I3 - 1 of the order of eps.
     """
 
-    body = "solid"
     pressure = None
 
     def __init__(self, *, eps: float = 1e-3, points: int = 3, stress_free: bool = True):
@@ -103,6 +112,12 @@ class DisplacementPenalty:
         if points not in _RULES:
             raise InputError(f"DisplacementPenalty: points = {points!r}: must be one of {sorted(_RULES)}")
         self.points = points
+
+    def check(self, scene):
+        for layer, material in scene.materials.items():
+            if material.varies or material.internal:
+                raise InputError(f"Scene: layer {layer!r}: {material} with model={type(self).__name__}(): its reduced"
+                                 f" rule knows no constants that vary and no history; use MixedPressure()")
 
     def terms(self, J, p, modulus, eps):
         """[(energy density, quadrature metadata)] for J = det F and the layer's shear modulus; p is not used."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..errors import InputError, finite
+from .part import Part
 
 R, Z = 0, 1
 
@@ -30,19 +31,25 @@ class MeanHeld(NamedTuple):
     component: int
     on: str
     by_stiffness: bool = False
+    point: None = None
+    driven: bool = False
 
 
-class _On:
-    name: str | None = None
+class Support(Part):
+    """The base of all supports, also of a user's own: `constraints` is all that it must give.
 
-    def __init__(self, on: str):
+    Args:
+        on: name of the boundary that it holds.
+    """
+
+    def __init__(self, on: str | None = None):
         self.on = on
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.on!r})"
 
 
-class Symmetry(_On):
+class Symmetry(Support):
     """No displacement across a symmetry line that lies along Z (an axis, `normal="r"`) or R (`normal="z"`)."""
 
     def __init__(self, on: str, normal: str = "r"):
@@ -50,11 +57,10 @@ class Symmetry(_On):
         self.component = _component(f"Symmetry({on!r}): normal", normal)
 
     def constraints(self):
-        """What is held: a list of Held or MeanHeld."""
         return [Held(self.component, on=self.on)]
 
 
-class Clamped(_On):
+class Clamped(Support):
     """All displacements of a boundary are 0.
 
     The corner of a clamped rim is singular: see the README for the band that this leaves in a limit pressure.
@@ -63,11 +69,10 @@ class Clamped(_On):
     holds_rotation = True
 
     def constraints(self):
-        """What is held: a list of Held or MeanHeld."""
         return [Held(R, on=self.on), Held(Z, on=self.on)]
 
 
-class SimplySupported(_On):
+class SimplySupported(Support):
     """A hinge: the mean displacement of a rim face is 0, its rotation and its thinning are free.
 
     (Holding one node instead is a point support, which has no limit under mesh refinement.)
@@ -78,6 +83,8 @@ class SimplySupported(_On):
             by their shear modulus, for layers so different that the soft one could not carry that traction.
     """
 
+    on: str
+
     def __init__(self, on: str, weight: str = "area"):
         super().__init__(on)
         if weight not in ("area", "stiffness"):
@@ -85,11 +92,10 @@ class SimplySupported(_On):
         self.weight = weight
 
     def constraints(self):
-        """What is held: a list of Held or MeanHeld."""
         return [MeanHeld(component, self.on, self.weight == "stiffness") for component in (R, Z)]
 
 
-class PinnedNode:
+class PinnedNode(Support):
     """The displacement of one mesh node is 0: the hinge of the thesis' coarse grids.
 
     A point support in a solid: results drift with mesh refinement. Prefer `SimplySupported`.
@@ -99,17 +105,17 @@ class PinnedNode:
     """
 
     def __init__(self, r: float, z: float):
+        super().__init__()
         self.point = (finite("PinnedNode: r", r), finite("PinnedNode: z", z))
 
     def constraints(self):
-        """What is held: a list of Held or MeanHeld."""
         return [Held(R, point=self.point), Held(Z, point=self.point)]
 
     def __repr__(self) -> str:
         return f"PinnedNode({self.point[0]!r}, {self.point[1]!r})"
 
 
-class Displaced(_On):
+class Displaced(Support):
     """One displacement component of a boundary follows the run's control (a length).
 
     Args:
@@ -127,7 +133,6 @@ class Displaced(_On):
         self.component = _component(f"Displaced({on!r}): component", component)
 
     def constraints(self):
-        """What is held: a list of Held or MeanHeld."""
         return [Held(self.component, on=self.on, driven=True)]
 
 

@@ -97,14 +97,15 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     (reference length in touch), penetration (of the deepest node, length), tool_force (along Z, of the body on all
     tools). With a driven support: support_force (of the body on it, along its component). Where several things can be
     driven each has its column, plug_travel for one named "plug" (`Scene.column`), a support plug_force; and where there
-    are several contacts those with a name have a force, plug_force. `timed`: process_time too.
+    are several contacts those with a name have a force, plug_force. `timed`: process_time too. With materials that
+    relax: dissipated_power (stress length^3 over time), and from it, in a run, dissipated_energy (stress length^3).
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
     found: dict[str, Bound] = {"process_time": Amplitude(problem, -1)} if timed else {}
     for i, thing in enumerate(scene.things):
         if any(thing is t for t in scene.drivable):
             found[column := scene.column(thing)] = Amplitude(problem, i)
-            if hasattr(thing, "constraints"):
+            if thing in scene.supports:
                 found["support_force" if column == thing.quantity else f"{thing.name}_force"] = _Reaction(problem, i)
     if "axis" in scene.mesh.boundaries:
         found["pole_height"] = bind_pole_height(problem)
@@ -116,6 +117,8 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     found["mass_error"] = _Scalar(problem, change * forms.weight * forms.dx, lambda v: v / volume)
     found["volume_error"] = _Scalar(problem, change**2 * forms.weight * forms.dx,
                                     lambda v: (v / volume) ** 0.5)
+    if problem.relaxes:
+        found["dissipated_power"] = _Scalar(problem, forms.dissipation, lambda v: v * forms.stress * volume)
     if problem.contacts:
         found["contact_length"] = _Nodal(problem, lambda c, *at: c.contact_length(*at), sum)
         found["penetration"] = _Nodal(problem, lambda c, *at: c.largest_penetration(*at), max)

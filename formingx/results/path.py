@@ -39,6 +39,7 @@ class Path:
     def __init__(self, record: Record, timed: bool = False, columns: Mapping[str, Any] | None = None):
         self.record, self._timed, self._own = record, timed, {} if columns is None else columns
         self._views: dict[int, _View] = {}
+        self._walls: Any = None
         self._view(record.segments[-1])                      # so that nothing is compiled on the way
         record.on_state.append(self._measure)
 
@@ -72,8 +73,8 @@ class Path:
 
     @property
     def columns(self) -> list[str]:
-        """Names of the recorded measures."""
-        return list(self.states[0].measures) if self.states else []
+        """Names of the measures that every state has (a run that went on may record others)."""
+        return [name for name in self.states[0].measures if name in self.last.measures] if self.states else []
 
     @property
     def limit_points(self) -> list[State]:
@@ -84,6 +85,11 @@ class Path:
     def jumps(self) -> list[State]:
         """States that the body snapped to; see `State.jump`."""
         return [state for state in self.states if state.kind == "jump"]
+
+    @property
+    def ended(self) -> str:
+        """Why the run ended before its targets, as a result: the body snaps, and no state follows; "" if it did not."""
+        return self.record.ended
 
     @property
     def last(self) -> State:
@@ -235,6 +241,13 @@ class Path:
     def _measure(self, state: State) -> None:
         """Fill the columns of an accepted state."""
         state.measures = self._measures(self.segments[-1], state)
+        if self.problem.relaxes:                             # by the trapezoidal rule
+            states, lost = self.segments[-1].states, 0.0
+            if len(states) > 1:
+                before = states[-2]
+                power = before.measures["dissipated_power"] + state.measures["dissipated_power"]
+                lost = before.measures["dissipated_energy"] + (state.time - before.time) * power / 2
+            state.measures["dissipated_energy"] = lost
 
     def _measures(self, segment: Segment, state: State) -> dict[str, float]:
         columns = self._view(segment).columns
@@ -284,28 +297,34 @@ class Path:
         fields.to_xdmf(self, file, states)
 
     def animate(self, file: Any, frames: int = 60, seconds: float = 5.0) -> None:
-        """Draw the forming as a moving picture, a GIF: the section of the sheet and the loading curve (rank 0 draws).
+        """Draw the forming as a moving picture, a GIF or an MP4: the sheet's section and the loading curve (rank 0).
 
-        The frames are evenly spread over the (cubic) path through the states; the last one stands for a second more.
+        The frames are evenly spread over the process (`formingx.results.show.record.progress`), on the (cubic) path
+        through the states; the last one stands for a second more.
 
         Raises:
-            InputError: the name does not end in .gif, a number is not allowed, or the mesh is no sheet.
+            InputError: the name ends neither in .gif nor in .mp4, there is no ffmpeg to make an MP4, a number is not
+                allowed, or the mesh is no sheet.
         """
         from .show import animation
         animation.animate(self, file, frames, seconds)
 
-    def report(self, file: Any, title: str = "", failure: Any = None) -> None:
-        """Write one HTML file that shows the run: inputs, curves, thickness, warnings, convergence (rank 0 writes).
+    def report(self, file: Any, title: str = "", failure: Any = None, *, units: Any = None,
+               density: float | None = None, trim: Any = None) -> None:
+        """Write one HTML file that shows the run: the part, the process, curves, inputs, warnings (rank 0 writes).
 
         Args:
             title: its heading.
             failure: the `ConvergenceError` that ended the run, if one did.
+            units: a `formingx.Units`, for the labels; density, trim: see `Path.part`.
 
         Raises:
+            InputError: plotly is not installed.
             OSError: the file cannot be written.
         """
+        from ..units import NONE
         from .show import report
-        report.write(report.of_path(self), file, title, failure, self.problem.comm)
+        report.write(report.of_path(self), file, title, failure, self.problem.comm, units or NONE, density, trim)
 
     def plot(self, y: str, x: str, axes: Any = None, **style: Any) -> Any:
         """Draw column `y` over column `x`; returns the matplotlib axes."""
@@ -323,8 +342,72 @@ class Path:
         It is revolved about the axis, or, in plane strain, extruded.
         """
         from .show import views
-        axisymmetric = self.problem.scene.kinematics.dimension_of_volume == 3
+        axisymmetric = self.problem.scene.kinematics.axisymmetric
         (views.revolved if axisymmetric else views.extruded)(self.profile(state), file, self.problem.comm)
+
+    def wall(self, state: State | None = None) -> Any:
+        """The wall of the part at a state (default: the last), place by place (`Wall`): to_csv, to_excel."""
+        from .evaluate.wall import Walls
+        self._walls = self._walls or Walls(self)
+        return self._walls.of(state or self.last)
+
+    def part(self, state: State | None = None, *, density: float | None = None, trim: Any = None, heights: Any = (),
+             units: Any = None) -> Any:
+        """The formed part in numbers (`Part`): volume, weight, area, least wall and where, evenness; print it.
+
+        Args:
+            state: default the last.
+            density: in g/cm3, for the weight in grams; say the unit of length with `units` (without, it is cm).
+            trim: the radius at which the part is cut off, or ("height", h), lengths: the last place from the axis where
+                the middle line goes beyond it.
+            heights: give the wall at these heights too (`Wall.height`).
+            units: a `formingx.Units`.
+
+        Raises:
+            InputError: the mesh is no sheet, or the part does not reach the trim or a height.
+        """
+        from ..units import NONE
+        from .evaluate.part import part
+        axisymmetric = self.problem.scene.kinematics.axisymmetric
+        return part(self.wall(state), axisymmetric, density, trim, heights, units or NONE)
+
+    def filling(self, tool: Any = None) -> Any:
+        """The gap that is left in each corner of a tool, state by state (`Filling`), and the pressure to fill it.
+
+        Args:
+            tool: its name, the `Tool` or the `Contact`; may be left out where there is one.
+
+        Raises:
+            InputError: there is no such tool, or it has no corner that the body must fill.
+        """
+        from .evaluate.contact_face import contact_of
+        from .evaluate.filling import filling
+        return filling(self, contact_of(self, tool, "filling")[0])
+
+    def contact(self, tool: Any = None, state: State | None = None) -> Any:
+        """Contact pressure, friction and gap along the face that meets a tool (`ContactTable`): to_csv, to_excel."""
+        from .evaluate.contact_face import ContactFace, contact_of
+        return ContactFace(self, contact_of(self, tool, "contact")[0]).of(state or self.last)
+
+    def tool_forces(self) -> dict[str, np.ndarray]:
+        """{tool: its force at all states}: positive when it resists its travel; of a tool that stays, along Z."""
+        from .evaluate.contact_face import tool_forces
+        return tool_forces(self)
+
+    def work(self) -> dict[str, np.ndarray]:
+        """{what: work done on the body up to each state}: by the pressure, by tools; and the energy that it holds."""
+        from .evaluate.work import work
+        return work(self)
+
+    def to_stl(self, file: Any, state: State | None = None) -> None:
+        """Write the part at a state (default: the last) as a solid of triangles, STL (rank 0 writes)."""
+        from .files.solid import to_stl
+        to_stl(self.profile(state), self.problem.scene.kinematics.axisymmetric, file, self.problem.comm)
+
+    def to_gltf(self, file: Any, state: State | None = None) -> None:
+        """Write the part at a state (default: the last) as binary glTF (.glb), coloured by its wall (rank 0 writes)."""
+        from .files.solid import to_gltf
+        to_gltf(self.profile(state), self.problem.scene.kinematics.axisymmetric, file, self.problem.comm)
 
 
 def _pieces(states: list[State]) -> list[list[State]]:

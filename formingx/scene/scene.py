@@ -12,9 +12,12 @@ from ..errors import InputError, count, known, several
 from ..materials.hyperelastic import Material
 from ..mesh.mesh import Mesh
 from ..physics.contact import Contact
-from ..physics.kinematics import Axisymmetric
-from ..physics.models import DisplacementPenalty, Membrane, MixedPressure
-from ..physics.supports import Held
+from ..physics.kinematics import Axisymmetric, Kinematics
+from ..physics.loads import Load
+from ..physics.models import MixedPressure, Model
+from ..physics.part import Part
+from ..physics.supports import Held, Support
+from .sampling import sample
 
 
 class Scene:
@@ -48,32 +51,28 @@ class Scene:
             raise InputError(f"Scene: materials = {materials!r}: must be a formingx material, or {{layer: material}}")
         self.mesh = mesh
         self.materials = dict(materials)
-        self.supports = _all_with("constraints", "supports", supports, "supports, such as Clamped('rim')")
-        self.loads = _all_with("virtual_work", "loads", loads, "loads, such as Pressure('bottom')")
-        self.contacts = _all_with("law", "contacts", contacts, "Contact(...)")
+        self.supports = _all_of(Support, "supports", supports, "supports, such as Clamped('rim')")
+        self.loads = _all_of(Load, "loads", loads, "loads, such as Pressure('bottom')")
+        self.contacts = _all_of(Contact, "contacts", contacts, "Contact(...)")
         self.model = model if model is not None else MixedPressure()
-        if not isinstance(self.model, MixedPressure | DisplacementPenalty | Membrane):
+        if not isinstance(self.model, Model):
             raise InputError(f"Scene: model = {model!r}: must be a MixedPressure, a DisplacementPenalty or a Membrane")
         self.kinematics = kinematics if kinematics is not None else Axisymmetric()
-        if not hasattr(self.kinematics, "dimension_of_volume") or isinstance(self.kinematics, type):
+        if not isinstance(self.kinematics, Kinematics):
             raise InputError(f"Scene: kinematics = {kinematics!r}: must be Axisymmetric() or PlaneStrain()")
         self.quadrature_degree = count("Scene: quadrature_degree", quadrature_degree)
         self._check_names()
         self._check_materials()
         self._check_boundaries()
         self.check_held(self.supports)
-        if isinstance(self.model, Membrane):
-            self.model.check(self)
-        else:
+        self.model.check(self)
+        if self.model.solid:
             self._check_hinges()
-        if self.contacts and isinstance(self.model, Membrane):
-            raise InputError(f"Scene: {self.contacts[0]!r}: a membrane has no contact yet: use a solid model,"
-                             f" MixedPressure() for one")
         for contact in self.contacts:
             self._check_contact(contact)
 
     @property
-    def things(self) -> list[Any]:
+    def things(self) -> list[Part]:
         """Loads, supports and contacts, in order."""
         return [*self.loads, *self.supports, *self.contacts]
 
@@ -81,15 +80,14 @@ class Scene:
     def drivable(self) -> list[Any]:
         """What can be driven; of a tool that meets several faces its first contact."""
         return [thing for i, thing in enumerate(self.things)
-                if getattr(thing, "driven", False) and self.together(i)[0] == i]
+                if thing.driven and self.together(i)[0] == i]
 
     def together(self, number: int) -> list[int]:
         """Numbers of the things that move as this one does: contacts with the same `moves` and name are of one tool."""
         thing = self.things[number]
-        if getattr(thing, "moves", None) is None:
+        if thing.moves is None:
             return [number]
-        return [i for i, other in enumerate(self.things)
-                if (getattr(other, "moves", None), getattr(other, "name", None)) == (thing.moves, thing.name)]
+        return [i for i, other in enumerate(self.things) if (other.moves, other.name) == (thing.moves, thing.name)]
 
     @property
     def driven(self) -> Any:
@@ -111,9 +109,9 @@ class Scene:
     def number(self, who: str, thing: Any) -> int:
         """The place in `things` of a thing, given as itself or by its name; an InputError if it is not there."""
         for i, known_thing in enumerate(self.things):
-            if thing is known_thing or isinstance(thing, str) and thing == getattr(known_thing, "name", None):
+            if thing is known_thing or isinstance(thing, str) and thing == known_thing.name:
                 return i
-        names = [t.name for t in self.things if getattr(t, "name", None)]
+        names = [t.name for t in self.things if t.name]
         raise InputError(f"{who}: {thing!r} is not in the scene; it has {', '.join(map(repr, self.things))}"
                          + (f", of which some are called {', '.join(map(repr, names))}" if names else ""))
 
@@ -132,16 +130,16 @@ class Scene:
         """An InputError if what one of these supports drives is held by another."""
         held = [(support, h) for support in supports for h in support.constraints()]
         for mine, driven in held:
-            for other, h in held if getattr(driven, "driven", False) else ():
+            for other, h in held if driven.driven else ():
                 if other is not mine and (h.on, h.component) == (driven.on, driven.component):
                     raise InputError(f"{mine!r}: {other!r} holds the same component of the same boundary")
 
     def _check_names(self) -> None:
-        names = [thing.name for thing in self.things if getattr(thing, "name", None) is not None]
+        names = [thing.name for thing in self.things if thing.name is not None]
         for name in names:
             if not isinstance(name, str) or not name:
                 raise InputError(f"Scene: name = {name!r}: must be a word")
-            called = [i for i, thing in enumerate(self.things) if getattr(thing, "name", None) == name]
+            called = [i for i, thing in enumerate(self.things) if thing.name == name]
             if called != self.together(called[0]) and len(called) > 1:
                 raise InputError(f"Scene: two things are called {name!r}: names must differ")
         columns = [self.column(thing) for thing in self.drivable]
@@ -157,17 +155,38 @@ class Scene:
             known("Scene: materials: layer", name, layers)
             if not isinstance(material, Material):
                 raise InputError(f"Scene: materials[{name!r}] = {material!r}: must be a formingx material")
-            material.check()
         missing = [name for name in layers if name not in self.materials]
         if missing:
             raise InputError(f"Scene: layer {', '.join(map(repr, missing))} has no material;"
                              f" materials are given for {', '.join(map(repr, self.materials)) or 'none'}")
+        self._moduli = {name: self._checked_modulus(name, self.materials[name]) for name in layers}
+
+    def _checked_modulus(self, layer: str, material: Material) -> float:
+        """`shear_modulus` of a layer, whose material is checked at every quadrature point of the energy."""
+        if not material.varies:
+            material.check()
+            return material.shear_modulus
+        looked_at = sample(self.mesh, layer, self.quadrature_degree)
+        refused, mine = None, -np.inf
+        try:
+            material.check(looked_at)
+            mine = float(material.shear_modulus_at(looked_at).max(initial=-np.inf))
+        except InputError as error:
+            refused = str(error)
+        found = self.mesh.comm.allgather((refused, mine))                   # all ranks refuse, with one message
+        for message in (text for text, _ in found if text is not None):
+            raise InputError(f"Scene: layer {layer!r}: {message}")
+        return max(modulus for _, modulus in found)
+
+    def shear_modulus(self, layer: str) -> float:
+        """Modulus of small shear of a layer, stress; of constants that vary the largest in it, all ranks."""
+        return self._moduli[layer]
 
     def _check_boundaries(self) -> None:
-        for thing in (*self.loads, *self.supports, *self.contacts):
-            if not hasattr(thing, "on"):
-                continue
+        for thing in self.things:
             on = thing.on
+            if on is None:
+                continue
             known(f"{thing!r}: boundary", on, self.mesh.boundaries)
             if self.mesh.comm.allreduce(len(self.mesh.facets_of(on)), MPI.SUM) == 0:
                 raise InputError(f"{thing!r}: boundary {on!r} is empty: no facet of the mesh carries it")
@@ -204,7 +223,7 @@ class Scene:
                                      f" {travel - depth.max() / np.hypot(*moves):.6g}")
 
     def _check_axis(self, supports: Sequence[Any]) -> None:
-        if not isinstance(self.kinematics, Axisymmetric):
+        if not self.kinematics.axisymmetric:
             return
         geometry = self.mesh.domain.geometry
         comm = self.mesh.comm
@@ -224,19 +243,12 @@ class Scene:
 
     def _check_rigid_body(self, supports: Sequence[Any]) -> None:
         """The supports must hold every rigid motion that the kinematics allows."""
-        if isinstance(self.kinematics, Axisymmetric):
-            names, modes = ["translation along Z"], [lambda X: np.stack([0 * X[:, 0], 1 + 0 * X[:, 0]], 1)]
-        else:
-            names = ["translation along R", "translation along Z", "rotation"]
-            modes = [lambda X: np.stack([1 + 0 * X[:, 0], 0 * X[:, 0]], 1),
-                     lambda X: np.stack([0 * X[:, 0], 1 + 0 * X[:, 0]], 1),
-                     lambda X: np.stack([-X[:, 1], X[:, 0]], 1)]
+        names, modes = zip(*self.kinematics.rigid_motions().items())
         gram = np.zeros((len(modes), len(modes)))
         size = max(self.extent)
         for support in supports:
             for held in support.constraints():
-                point = getattr(held, "point", None)
-                X = (np.array([point]) if point is not None else self.mesh.nodes_of(held.on)) / size
+                X = (np.array([held.point]) if held.point is not None else self.mesh.nodes_of(held.on)) / size
                 rows = np.stack([mode(X)[:, held.component] for mode in modes], 1)
                 if not isinstance(held, Held):
                     rows = rows.mean(0, keepdims=True)
@@ -254,7 +266,7 @@ class Scene:
         A plain mean pulls all layers with one traction; and a hinged rim face is free, so a pressure on a soft layer
         squeezes it out there.
         """
-        moduli = {name: material.shear_modulus for name, material in self.materials.items()}
+        moduli = {name: self.shear_modulus(name) for name in self.materials}
         for held in (held for support in self.supports for held in support.constraints()):
             if isinstance(held, Held):
                 continue
@@ -265,7 +277,8 @@ class Scene:
                 raise InputError(f"Scene: SimplySupported({held.on!r}) pulls all layers with the same traction, but"
                                  f" layer {soft!r} is {moduli[hard] / moduli[soft]:.3g} times softer than {hard!r}: use"
                                  f" SimplySupported({held.on!r}, weight='stiffness')")
-            pressed = {name for load in self.loads for name in self._layers_at(load.on)} & at_rim
+            pressed = {name for load in self.loads if load.on is not None
+                       for name in self._layers_at(load.on)} & at_rim
             for name in pressed:
                 if moduli[hard] > 50 * moduli[name]:
                     raise InputError(f"Scene: the pressure that bends layer {hard!r} would squeeze layer {name!r},"
@@ -290,10 +303,10 @@ class Scene:
         return high - low
 
 
-def _all_with(method: str, name: str, things: Any, what: str) -> list[Any]:
-    """A list of things that all have a method, or an InputError."""
+def _all_of(kind: type, name: str, things: Any, what: str) -> list[Any]:
+    """A list of things of one kind, or an InputError."""
     things = several(f"Scene: {name}", things, what)
     for thing in things:
-        if not hasattr(thing, method) or isinstance(thing, type):
+        if not isinstance(thing, kind):
             raise InputError(f"Scene: {name}: {thing!r} is not allowed here: must be a list of {what}")
     return things

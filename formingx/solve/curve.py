@@ -111,7 +111,7 @@ class Curve:
         """The tangent of an accepted state once more: the problem remembers the state now."""
         self._x.array_w[:] = state.x
         if self.newton.tangent(self._x, state.control, ahead=True):
-            size = self.norm(self.newton.b, 1.0)
+            size = self._length_of(self.newton.b)
             direction, slope = self.newton.b.array_r / size, 1 / size
             sense = np.sign(self._inner(direction, slope, state.direction, state.slope)) or 1.0
             state.direction, state.slope = sense * direction, sense * slope
@@ -146,6 +146,10 @@ class Curve:
     def step_to(self, old: State, length: float, equation: Callable) -> State:
         """Predict along the tangent, correct to where an equation such as "measure = target" holds."""
         return self.solve(old.x + length * old.direction, old.control + length * old.slope, equation, "target", old)
+
+    def unit_slope(self, state: State) -> float:
+        """dcontrol by arc length at a state."""
+        return state.slope
 
     def progress(self, old: State, new: State) -> float:
         """Distance from old to new along the tangent of old."""
@@ -213,12 +217,16 @@ class Curve:
     def _state(self, control: float, history: list, kind: str, before: State | None) -> State:
         """The state at (self._x, control); its tangent, from the last factorisation, points away from `before`."""
         b = self.newton.b
-        size = self.norm(b, 1.0)
+        size = self._length_of(b)
         state = State(self._x.array_r.copy(), control, b.array_r / size, 1 / size, history=history, kind=kind)
         if before is not None and self._inner(state.direction, state.slope, state.x - before.x,
                                               control - before.control) < 0:
             state.direction, state.slope = -state.direction, -state.slope
         return state
+
+    def _length_of(self, b: Any) -> float:
+        """Arc length per control along a tangent dx/dcontrol."""
+        return self.norm(b, 1.0)
 
     def _inner(self, x: np.ndarray, control: float, y: np.ndarray, other: float) -> float:
         self._a.array_w[:] = x

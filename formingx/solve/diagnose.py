@@ -189,10 +189,10 @@ def _tangents(curve: Any, states: list) -> dict[str, Any]:
     solver.destroy()
     if len(states) > 2:
         a, b = states[-2:]
-        drop = a.slope**2 - b.slope**2                    # slope^2 falls in proportion to the control left
-        most = max(abs(s.slope) for s in states)
-        if drop > 0 and a.slope * b.slope > 0 and abs(b.slope) < 0.3 * most:
-            ahead = b.control + (b.control - a.control) * b.slope**2 / drop
+        slopes = [curve.unit_slope(s) for s in states]
+        drop = slopes[-2]**2 - slopes[-1]**2              # slope^2 falls in proportion to the control left
+        if drop > 0 and slopes[-2] * slopes[-1] > 0 and abs(slopes[-1]) < 0.3 * max(map(abs, slopes)):
+            ahead = b.control + (b.control - a.control) * slopes[-1]**2 / drop
             facts["limit_ahead"] = problem.shown(ahead)[1]
     return facts
 

@@ -76,7 +76,10 @@ class FixedControl:
 
 
 class FixedControlCurve(Curve):
-    """States at given values of the control, by PETSc SNES: for curves without limit point."""
+    """States at given values of the control, by PETSc SNES: for curves without limit point.
+
+    Its steps and the tangents of its states are measured by the control.
+    """
 
     fixed_control = True
 
@@ -96,6 +99,17 @@ class FixedControlCurve(Curve):
         """Free the PETSc objects (collective)."""
         super().destroy()
         self._fixed.destroy()
+
+    def unit_slope(self, state: State) -> float:
+        """See `Curve`."""
+        self._a.array_w[:] = state.direction
+        return state.slope / self.norm(self._a, state.slope)
+
+    def _length_of(self, b: Any) -> float:
+        return 1.0
+
+    def _inner(self, x: np.ndarray, control: float, y: np.ndarray, other: float) -> float:
+        return control * other
 
     def _correct(self, old: State, length: float, kind: str) -> State:
         control = old.control + length * old.slope

@@ -24,11 +24,18 @@ from .newton import Failure
 from .state import Record, State
 from .stepping import StepControl
 from .targets import Amplitude, Bound, Target, is_met
+from .time_error import TimeError
 
 log = logging.getLogger("formingx")
 
 _JUMPS = 1e-2, 1e-4, 1e-6, 0.0
 """Lengths of steps below which a failure makes the body try to jump, once each."""
+
+_PATIENCE = 500
+"""States that gain less than a thousandth of the way to the target, after which a run gives up."""
+
+_TOO_MUCH = 2.0
+"""Errors in time, over what is allowed, at which a step is taken again."""
 
 _TRY = (" Try a target within what was met, a smaller first step (step=StepControl(length=...)), more elements where"
         " the body deforms most, or more max_steps.")
@@ -43,19 +50,24 @@ class Run:
         step: step control; default that of the record's last states, or `StepControl()`.
         at_fold: what to do where the control has a limit point: "follow" the path back, "jump" to the next state, or
             "stop"; None: jump where the process drives one way, see `_at_fold`.
+        accuracy: the error in time that is allowed, relative.
+        label: what is said before the target beside a progress bar.
     """
 
     def __init__(self, record: Record, targets: Sequence[tuple[Target, Bound]], step: StepControl | None = None,
-                 at_fold: str | None = None):
-        self.record, self.curve, self.problem = record, record.curve, record.problem
+                 at_fold: str | None = None, accuracy: float = 2e-3, label: str = ""):
+        self.record, self._label, self.curve, self.problem = record, label, record.curve, record.problem
         self._at_fold = at_fold or _usual(self.problem)
+        self._time_error = TimeError(self.problem, accuracy) if self.problem.relaxes else None
         self.open = list(targets)
         self.until, self._aim = self.open[-1]
         self._step, self._best, self._began = step, 0.0, time.perf_counter()
         self._values: list[float] = []                      # what is aimed at, in the states of this run
 
-    def follow(self, max_steps: int, progress: bool, start: State | None) -> None:
+    def follow(self, max_steps: int | None, progress: bool, start: State | None) -> None:
         """Follow the path from a state, or on from the last one, until the last target is met.
+
+        max_steps: states before the run gives up; None: it does when `_PATIENCE` states have come no nearer.
 
         Raises:
             ConvergenceError: it cannot be reached; without the path, which the record holds.
@@ -63,7 +75,7 @@ class Run:
         record, before = self.record, self.record.counts.steps
         kept: dict[str, Any] = {}
         self._first = len(record.states)
-        bar = _progress_bar(self.problem.comm, self.until, progress)
+        bar = _progress_bar(self.problem.comm, f"{self._label}to {self.until}", progress)
         try:
             if start is None:
                 kept = self._go_on()
@@ -73,17 +85,20 @@ class Run:
             self._close_met(record.last)
             self._settle()
             while self._is_open(self.until):
-                if record.counts.steps - before >= max_steps:
+                if max_steps is not None and record.counts.steps - before >= max_steps:
                     self._give_up(f"{max_steps} states were accepted before it", pace=self._pace(max_steps))
+                self._check_progress()
                 for state in self._next(record.last):
                     self._accept(state)
                     if state.kind == "limit point" and self._at_fold == "stop":
-                        self._give_up(f"the {self._driven} has a limit point here")
+                        record.ended = f"the {self._driven} has a limit point at {record.describe(state)}"
                     if self.problem.has_history or self._at_fold == "jump":
                         break                           # the rest of the step starts from here
                     if not self._is_open(self.until) and state.met is self.until:
                         break
                 self._settle()
+                if record.ended:
+                    break
                 self._check_direction()
                 _show(bar, self._gained(self._values[-1]), len(self.states))
         except BaseException:
@@ -108,7 +123,9 @@ class Run:
         self._first -= sum(1 for _ in itertools.takewhile(lambda s: s.setting == record.last.setting,
                                                           reversed(record.states)))
         self.problem.stand(record.last)
-        self._values = [self.curve.value(self._aim, s.x, s.control) for s in self.states]
+        for state in self.states:
+            with self.problem.at(state):
+                self._values.append(self.curve.value(self._aim, state.x, state.control))
         self._best = max(map(self._gained, self._values))
         met = [s.met[:2] for s in self.states if s.met]
         self.open = [(target, bound) for target, bound in self.open if target[:2] not in met]
@@ -151,10 +168,7 @@ class Run:
         """
         problem, first, jumps, failed = self.problem, self.step.length, list(_JUMPS), 0
         if old.kind == "limit point" and self._at_fold == "jump":
-            try:
-                return [self._jump(old, 0.0)]
-            except Failure as failure:
-                self._give_up(f"the {self._driven} has a limit point here, and {failure.reason}", failure.attempt)
+            return self._snap(old)
         while True:
             length = problem.reach(old.x, old.control, old.direction, old.slope, self.step.length)
             limited = length < self.step.length
@@ -172,10 +186,14 @@ class Run:
                     raise _Astray("too much came into contact in one step", [])
                 if was_passed(self.curve, self.states[:-1], old, new):
                     raise _Astray("the iteration fell back to a part of the path that was passed", [])
+                error = self._error_in_time(new)
                 states = self._sorted_into(old, new)
                 if target is None and not limited:
-                    self.step.accepted(len(new.history) - 1)
+                    self.step.accepted(len(new.history) - 1, error)
                 return states
+            except Inaccurate as found:
+                self.record.counts.failures += 1
+                self.step.length = found.share * reach
             except Failure as failure:
                 self.record.counts.failures += 1
                 self.step.length = length
@@ -189,6 +207,25 @@ class Run:
                 if not good:
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
                                   failure.attempt)
+
+    def _error_in_time(self, new: State) -> float:
+        """Of the step to a state, over what is allowed; raises `Inaccurate` if it is much more."""
+        if self._time_error is None:
+            return 0.0
+        error = self._time_error.of(self.states, new.x, new.control)
+        if error > _TOO_MUCH:
+            raise Inaccurate(error)
+        return error
+
+    def _snap(self, old: State) -> list[State]:
+        """The state that the body jumps to from a limit point; none if there is none: a body left alone has snapped."""
+        try:
+            return [self._jump(old, 0.0)]
+        except Failure as failure:
+            if not self.problem.setting.rests:              # what is driven was to go on
+                self._give_up(f"the {self._driven} has a limit point here, and {failure.reason}", failure.attempt)
+            self.record.ended = f"the body snaps at {self.record.describe(old)}: no state follows"
+            return []
 
     def _jump(self, old: State, length: float, step: float = 0.0) -> State:
         """The state that the body snaps to, the control going on as in a step of this length; raises `Failure`.
@@ -221,6 +258,13 @@ class Run:
         if self._best > 0.05 and gained < kept * self._best or gained < -0.05:
             self._give_up("the path turned back, which a crease at a singular corner (a clamped rim on a fine mesh) can"
                           " cause")
+
+    def _check_progress(self) -> None:
+        """Stop if many states have come no nearer to the target."""
+        if len(self._values) > _PATIENCE:
+            now, then = (self._gained(self._values[k]) for k in (-1, -1 - _PATIENCE))
+            if abs(now - then) < 1e-3:
+                self._give_up(f"the last {_PATIENCE} states came no nearer to it")
 
     def _gained(self, value: float) -> float:
         """How far a value of what is aimed at has come, from that of the first state (0) to the target (1)."""
@@ -308,6 +352,14 @@ class Run:
             + ("" if diagnosis.advice else _TRY), diagnosis=diagnosis)
 
 
+class Inaccurate(Exception):
+    """A step is too long for the accuracy in time; share: of its length, that will do."""
+
+    def __init__(self, error: float):
+        super().__init__(error)
+        self.share = max(0.8 * error ** (-1 / 3), 0.1)
+
+
 class _Astray(Failure):
     """A state was found, but not one that a step should come to: a shorter one will do better."""
 
@@ -364,9 +416,9 @@ def begin(curve: Curve) -> State:
         return curve.resume(record.last.x, 0.0)
 
 
-def _progress_bar(comm: Any, until: Target, progress: bool) -> Any:
+def _progress_bar(comm: Any, words: str, progress: bool) -> Any:
     from tqdm import tqdm
-    return tqdm(total=1.0, desc=f"to {until}", delay=2, disable=not progress or comm.rank != 0, leave=False,
+    return tqdm(total=1.0, desc=words, delay=2, disable=not progress or comm.rank != 0, leave=False,
                 bar_format="{desc}: {percentage:3.0f}% |{bar}| {elapsed}{postfix}")
 
 

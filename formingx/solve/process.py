@@ -16,12 +16,16 @@ import numpy as np
 from ..discrete.schedule import Setting
 from ..errors import ConvergenceError, InputError
 from ..scene import clearance
+from .flow import Flow
 from .follow import Run, begin
 from .newton import UNLOADED, Failure
 from .stage import Plan
 from .state import Record, State
 from .stepping import StepControl
 from .targets import Amplitude, Bound, Target, changed, process_time
+
+_IN_TIME = StepControl(length=1e-3, smallest=1e-13)
+"""Step control of a material that relaxes: the error in time soon takes over."""
 
 _SAME = 1e-12          # relative: times that are the same
 
@@ -35,18 +39,20 @@ class Execution:
         record: where the states go. plans: of the stages. unsure: those whose tools are to be looked at again when
             their turn comes (`clearance.check`). step: step control of stages that have none of their own.
         balanced: forces left over, relative to the support forces, that count as none.
+        accuracy: the error in time that is allowed, relative.
     """
 
     def __init__(self, record: Record, plans: list[Plan], unsure: list[Plan], step: StepControl | None,
-                 balanced: float):
+                 balanced: float, accuracy: float = 2e-3):
         problem = record.problem
         self.record, self.curve, self.problem, self.scene = record, record.curve, problem, problem.scene
         self.plans, self._unsure, self._step, self._balanced = plans, unsure, step, balanced
+        self._accuracy = accuracy
         self._rest = np.zeros(problem.x.getLocalSize())
         self._targets = [self._bind(plan) for plan in plans]    # so that nothing is compiled between stages
         problem.enter(Setting.first(self.scene), self._rest, 0.0)
 
-    def run(self, max_steps: int, progress: bool) -> None:
+    def run(self, max_steps: int | None, progress: bool) -> None:
         """All stages that are left."""
         self._max_steps, self._progress = max_steps, progress
         last = self.record.last.setting if self.record.states else {"stage": 0, "piece": -1}
@@ -59,21 +65,26 @@ class Execution:
                 self._change(piece == 0)
                 if any(plan is p for p in self._unsure):     # now its travels are known
                     clearance.check(self.scene, [plan], self._travels())
-            if plan.tables:
+            stage = plan.stage
+            if stage.flow or stage.hold:
+                self._flow(plan.numbers, piece > 0)
+            elif plan.tables or stage.duration and not plan.numbers:
                 self._follow(plan.tables, max(piece, 0))
             elif plan.numbers:
                 self._drive(plan.numbers, piece > 0)
             elif not self.record.states or self.record.last.setting["stage"] < k:
                 self._take_up(self._resumed(self._standing()[2]))
+            if self.record.ended:
+                break
 
     def _bind(self, plan: Plan) -> list[tuple[Target, Bound]]:
         """The targets of a stage and their measures; where it drives one thing the last is `until`."""
         stage, n = plan.stage, len(self.scene.things)
         moving = {*plan.numbers, *(i for i, _ in plan.tables)}
-        rate = [float(i in moving) for i in range(n)] + [float(bool(plan.tables))]
+        rate = [float(i in moving) for i in range(n)] + [float(stage.timed)]
         self.problem.enter(Setting([0.0] * (n + 1), rate, plan.off), self._rest, 0.0)
         found = []
-        for target in (*stage.through, *([stage.until] if plan.numbers else [])):
+        for target in (*stage.through, *([stage.until] if plan.numbers and stage.until else [])):
             try:
                 bound = target.bind(self.problem)
             except InputError as error:
@@ -90,7 +101,7 @@ class Execution:
 
     def _travels(self) -> dict[int, float]:
         """How far each tool of the scene has come, {number: length}."""
-        return {i: self._stands(i) for i, thing in enumerate(self.scene.things) if hasattr(thing, "moves")}
+        return {i: self._stands(i) for i, thing in enumerate(self.scene.things) if thing in self.scene.contacts}
 
     def _stands(self, number: int) -> float:
         """Value of a thing now, in the user's units."""
@@ -117,7 +128,10 @@ class Execution:
 
     def _trace(self, targets: list, control: float | None) -> list:
         """Follow the path from a control (None: on from the last state); returns the targets that are still open."""
-        run = Run(self.record, targets, self._stage.step or self._step, self._stage.at_fold)
+        step = self._stage.step or self._step
+        if self.problem.setting.rate[-1] and self.problem.relaxes:
+            step = step or _IN_TIME
+        run = Run(self.record, targets, step, self._stage.at_fold, self._accuracy, self._label)
         start = None if control is None else self._resumed(control)
         run.follow(self._max_steps, self._progress, start)
         return run.open
@@ -131,7 +145,7 @@ class Execution:
                 self._bring_in(self.scene.things[i], x, control)
             still, fading = [0.0] * len(before.base), bool(self.record.states) and before.off != self._off
             start = 0.0 if fading else control
-            self._enter(before.standing(control), still, 0, start, fading)
+            self._enter(self._amplitudes(), still, 0, start, fading)
         if self.problem.setting.fading and (begun or self._out_of_balance(x)):
             target = changed()
             self._trace([(target, target.bind(self.problem))], start)
@@ -155,19 +169,59 @@ class Execution:
         """Piece 1: one thing is the control."""
         before, _, control = self._standing()
         if not begun:
-            base, rate = before.standing(control), [0.0] * len(before.base)
-            control = base[numbers[0]]
-            for number in numbers:
-                base[number], rate[number] = 0.0, 1.0
-            self._enter(base, rate, 1, control)
+            control = self._enter_driving(numbers)
         self._trace(self._targets[self._k], None if begun else control)
+
+    def _enter_driving(self, numbers: list[int], clocked: bool = True) -> float:
+        """Make the amplitude of one thing the control; `clocked`: time goes by as it moves. The control now."""
+        base = self._amplitudes()
+        rate, control, scale = [0.0] * len(base), base[numbers[0]], self.problem.forms.scales[numbers[0]]
+        for number in numbers:
+            base[number], rate[number] = 0.0, 1.0
+        stage, way = self._stage, 0.0
+        if clocked and (stage.speed or stage.duration):
+            there = stage.until.value / scale if stage.until.name.endswith(("pressure", "travel")) else np.inf
+            way = there - control
+            if way:
+                rate[-1] = np.sign(way) * scale / stage.speed if stage.speed else stage.duration / way
+                base[-1] -= rate[-1] * control
+        self._enter(base, rate, 1, control)
+        return control
+
+    @property
+    def _label(self) -> str:
+        return f"stage {self._stage.name!r} ({self._k + 1} of {len(self.plans)}), "
+
+    def _amplitudes(self) -> list[float]:
+        """Of all things, and the time, as they stand now."""
+        setting, _, control = self._standing()
+        return [*setting.standing(control)[:-1], self.problem.forms.time_at(control)]
+
+    def _flow(self, numbers: list[int], begun: bool) -> None:
+        """Piece 1: one thing is what makes a measure follow a table in time."""
+        stage = self._stage
+        control = None if begun else self._enter_driving(numbers, clocked=False)
+        now = self.problem.setting.base[-1]
+        if stage.hold:
+            target, table = stage.hold, np.array([[now, stage.hold.value], [now + stage.duration, stage.hold.value]])
+        else:
+            target, table = stage.flow[0](0.5), stage.flow[1]
+            if table[0, 0] > now:
+                raise InputError(f"{stage.who}: the table begins at time {table[0, 0]:g}, but the process time is"
+                                 f" {now:g}: time would stand still between")
+            table = np.vstack([[now, np.interp(now, *table.T)], table[table[:, 0] > now]])
+        step = stage.step or _IN_TIME
+        run = Flow(self.record, target.bind(self.problem), table, self._targets[self._k], step, self._accuracy,
+                   self._label)
+        run.follow(self._max_steps, self._progress, None if control is None else self._resumed(control))
 
     def _follow(self, tables: list[tuple[int, np.ndarray]], piece: int) -> None:
         """Pieces 1, 2, ...: from knot to knot of the tables, the time being the control."""
         before, _, control = self._standing()
         stage, through = self._stage, self._targets[self._k]
-        end = stage.until.value if stage.until else max(table[-1, 0] for _, table in tables)
-        now = before.base[-1] if piece else before.amplitude(-1, control)
+        now = before.base[-1] if piece else self.problem.forms.time_at(control)
+        end = now + stage.duration if stage.duration else stage.until.value if stage.until else max(
+            table[-1, 0] for _, table in tables)
         if not piece:
             self._check_beginning(tables, now, end)
         begun = piece > 0
@@ -182,7 +236,7 @@ class Execution:
     def _enter_line(self, tables: list, now: float, then: float, piece: int) -> None:
         """All tables are straight between these times; the control is the time, scaled: no amplitude is faster."""
         before, _, control = self._standing()
-        base, scales = before.standing(control), self.problem.forms.scales
+        base, scales = self._amplitudes(), self.problem.forms.scales
         change = [0.0] * len(base)
         for i, table in tables:
             first, value = table[0]
@@ -196,7 +250,7 @@ class Execution:
 
     def _line(self, then: float, through: list, begun: bool) -> list:
         """Go to the end of a piece of the tables; returns the targets that are still open."""
-        if self.problem.setting.rests:                      # only time goes by
+        if self.problem.setting.rests and not self.problem.relaxes:     # only time goes by, and nothing cares
             if not begun:
                 self._take_up(self._resumed(0.0))
             if self.record.last.control < 1.0:

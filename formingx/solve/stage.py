@@ -7,10 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, finite, instance, known, several
+from ..errors import InputError, finite, instance, known, positive, several
 from ..scene.scene import Scene
 from .stepping import StepControl
 from .targets import Target
+
+_OF_CONTROL = ("pressure", "travel")
 
 AT_FOLD = (None, "follow", "jump", "stop")
 """What a run may do where its control has a limit point."""
@@ -29,7 +31,13 @@ class Stage:
             load that is off. A support takes hold of the body where it is when it comes back.
         follow: instead of `drive`: {thing: [(time, value), ...]}, piecewise linear in time, values in the user's units
             (the last one stays). A table that begins later than the stage is reached in a straight line from
-            where the thing stands. Process time is 0 at first and runs in such stages only.
+            where the thing stands. With `drive`, instead of a thing a function that makes targets, such as
+            `enclosed_volume`: what is driven is what makes that measure follow the table: a flow.
+        speed: of what is driven (its unit per time), greater than 0: time goes by while it moves.
+        duration: time that the stage takes: on the way to a target of what is driven, or while it stands still.
+        hold: with `drive` and `duration`: a target, such as `force(2.0)`: what is driven gives way so that it stays
+            met. Process time is 0 at first; it runs in stages with a table, a speed or a duration; others are
+            instantaneous.
         step: step control of this stage; default that of the run.
         at_fold: see `formingx.trace`.
 
@@ -40,7 +48,8 @@ class Stage:
     def __init__(self, name: str, drive: Any = None, until: Target | None = None,
                  through: Sequence[Target] = (), without: Sequence[Any] = (), *,
                  follow: Mapping[Any, Sequence] | None = None, step: StepControl | None = None,
-                 at_fold: str | None = None):
+                 at_fold: str | None = None, speed: float | None = None, duration: float | None = None,
+                 hold: Target | None = None):
         if not isinstance(name, str) or not name:
             raise InputError(f"Stage: name = {name!r}: must be a word")
         who = self.who = f"Stage {name!r}"
@@ -52,15 +61,51 @@ class Stage:
         self.step = instance(f"{who}: step", step, StepControl | None, "a StepControl or None")
         for target in (*([] if until is None else [until]), *self.through):
             instance(f"{who}: target", target, Target, "a target, such as pole_stretch(3)")
+        self.speed = None if speed is None else positive(f"{who}: speed", speed)
+        self.duration = None if duration is None else positive(f"{who}: duration", duration)
+        self.hold = instance(f"{who}: hold", hold, Target | None, "a target, such as force(2.0), or None")
+        self.flow: tuple[Any, np.ndarray] | None = None
         if drive is not None and follow is not None:
-            raise InputError(f"{who}: both drive and follow are given: a stage has one control")
-        if drive is not None and until is None:
-            raise InputError(f"{who}: drives {drive!r} without a target: give it until=..., such as travel(3)")
-        if drive is None and follow is None and (until is not None or self.through):
+            self.flow = self._flow(follow)
+        self.tables = [] if follow is None or self.flow else self._tables(follow)
+        self._check(follow)
+
+    @property
+    def timed(self) -> bool:
+        """True if time goes by."""
+        return bool(self.tables or self.flow or self.speed or self.duration)
+
+    def _check(self, follow: Any) -> None:
+        who, until = self.who, self.until
+        if self.hold is not None and (self.drive is None or self.duration is None or until or follow is not None):
+            raise InputError(f"{who}: hold = {self.hold}: give it drive=..., what gives way, and duration=..., and"
+                             f" neither until nor follow")
+        if follow is not None and (self.speed or self.duration):
+            raise InputError(f"{who}: follow has times of its own: give no speed or duration")
+        if self.speed and (self.drive is None or self.duration):
+            raise InputError(f"{who}: speed = {self.speed:g}: of what? give it drive=... and until=..., no duration")
+        if self.drive is not None and until is None and self.hold is None and self.flow is None:
+            raise InputError(f"{who}: drives {self.drive!r} without a target: give it until=..., such as travel(3)")
+        if self.drive is not None and self.duration and until and until.name.split("_")[-1] not in _OF_CONTROL:
+            raise InputError(f"{who}: until = {until} with a duration: must be a target of what is driven; give a speed"
+                             f" instead")
+        if self.drive is None and follow is None and until is not None:
             raise InputError(f"{who}: has a target but drives nothing: give it drive=... or follow=...")
+        if self.drive is None and follow is None and self.duration is None and self.through:
+            raise InputError(f"{who}: has targets but drives nothing: give it drive=..., follow=... or duration=...")
         if follow is not None and until is not None and until.name != "process_time":
             raise InputError(f"{who}: until = {until}: tables are followed until a process_time, or to their end")
-        self.tables = [] if follow is None else self._tables(follow)
+
+    def _flow(self, follow: Any) -> tuple[Any, np.ndarray]:
+        """(what makes targets, knots, shape (n, 2)) of a measure that follows a table."""
+        if not isinstance(follow, Mapping) or len(follow) != 1 or not callable(next(iter(follow))):
+            raise InputError(f"{self.who}: both drive and follow are given: then follow must be {{measure: [(time,"
+                             f" value), ...]}} with a function that makes targets, such as enclosed_volume")
+        ((measure, table),) = self._tables(follow)
+        if len(table) < 2:
+            raise InputError(f"{self.who}: the table of {measure!r} must have two points at least")
+        instance(f"{self.who}: follow", measure(float(table[0, 1])), Target, "made by its measure")
+        return measure, table
 
     def _tables(self, follow: Any) -> list[tuple[Any, np.ndarray]]:
         """[(thing, knots, shape (n, 2))]."""
@@ -105,16 +150,16 @@ def plan(scene: Scene, stage: Stage) -> Plan:
     numbers = [scene.number(who, thing) for thing in driven]
     for number in numbers:
         thing = scene.things[number]
-        if not getattr(thing, "driven", False):
+        if not thing.driven:
             raise InputError(f"{who}: {thing!r} cannot be driven: a Pressure without value, a Displaced support, or"
                              f" a Contact that moves can")
-        if number in off and not hasattr(thing, "moves"):                  # a tool may go home while it is away
+        if number in off and thing.moves is None:                  # a tool may go home while it is away
             raise InputError(f"{who}: {thing!r} is both driven and left out")
     if len({scene.together(number)[0] for number in numbers}) < len(numbers):
         raise InputError(f"{who}: one thing has two tables")
     there = [thing for i, thing in enumerate(scene.things) if i not in off]
     try:
-        supports = [t for t in there if hasattr(t, "constraints")]
+        supports = [t for t in there if t in scene.supports]
         scene.check_held(supports, any(t in there for t in scene.contacts))
         scene.check_driven(supports)
     except InputError as error:

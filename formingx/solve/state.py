@@ -28,6 +28,7 @@ class State:
         memory: what each history of the problem remembers from here on (`Problem.histories`).
         stage: name of the stage of a process; setting: what the stage had set, as plain data (`Setting`).
         stepping: what a run goes on with: its next step, its counts and its target; empty inside a step.
+        time: process time.
     """
 
     x: np.ndarray
@@ -38,11 +39,12 @@ class State:
     history: list = field(default_factory=list)
     kind: str = "step"
     met: Target | None = None
-    jump: dict = field(default_factory=dict)
     memory: list = field(default_factory=list)
     stage: str = ""
     setting: dict = field(default_factory=dict)
     stepping: dict = field(default_factory=dict)
+    time: float = 0.0
+    jump: dict = field(default_factory=dict)
 
     def __repr__(self) -> str:
         numbers = ", ".join(f"{name}={value:.6g}" for name, value in self.measures.items())
@@ -79,13 +81,14 @@ class Record:
         segments: list of `Segment`, the last of which grows.
         counts: what the run cost (`Counts`).
         stage: name of the stage of a process that is going on.
+        ended: why the run ended before its targets, as a result and not as an error; "" if it did not.
         on_state: functions called with every accepted state, while the problem stands there (they fill `measures`).
         on_step: functions called whenever a step is complete.
     """
 
     def __init__(self, problem: Any, curve: Any):
         self.segments = [Segment(problem, curve)]
-        self.counts, self.stage = Counts(), ""
+        self.counts, self.stage, self.ended = Counts(), "", ""
         self.on_state: list[Callable[[State], None]] = []
         self.on_step: list[Callable[[], None]] = []
 
@@ -123,10 +126,15 @@ class Record:
         problem = self.problem
         problem.advance(state.x, state.control)
         state.memory, state.stage, state.setting = problem.memory, self.stage, asdict(problem.setting)
+        state.time = problem.forms.time_at(state.control)
         self.segments[-1].states.append(state)
+        try:
+            for told in self.on_state:
+                told(state)
+        except BaseException:
+            self.segments[-1].states.pop()
+            raise
         self.counts.steps += state.kind != "start"
-        for told in self.on_state:
-            told(state)
 
     def settle(self, step: Any, until: Target) -> None:
         """A step is complete: note in the last state how the run goes on from it."""

@@ -34,9 +34,10 @@ class StepControl:
         if self.largest != float("inf") and finite("StepControl: largest", self.largest) <= 0:
             raise InputError(f"StepControl: largest = {self.largest!r}: must be greater than 0")
 
-    def accepted(self, iterations: int) -> None:
-        """A full step converged in so many iterations."""
+    def accepted(self, iterations: int, error: float = 0.0) -> None:
+        """A full step converged in so many iterations; error: in time, over what is allowed."""
         factor = min(max(self.target / max(iterations, 1), 0.5), self.growth)
+        factor = min(factor, 0.9 * max(error, 1e-9) ** (-1 / 3))
         self.length = min(self.length * factor, self.largest)
 
     def failed(self) -> bool:

@@ -44,6 +44,8 @@ class Amplitude(Bound):
         return self._number is None or self._problem.setting.rate[self._number] != 0
 
     def _amplitude(self, control: float) -> float:
+        if self._number == -1:
+            return self._problem.forms.time_at(control)
         return control if self._number is None else self._problem.setting.amplitude(self._number, control)
 
     def value(self, x, control):

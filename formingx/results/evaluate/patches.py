@@ -13,6 +13,7 @@ import numpy as np
 _POWERS = np.array([(i, n - i) for n in range(4) for i in range(n, -1, -1)])
 """Exponents of (R, Z) in a cubic, shape (10, 2)."""
 _CHUNK = 2048                  # cells at a time: some 30 MB
+_KEPT = 2**25                  # numbers: operators of the fits are kept for the next state if they take less (256 MB)
 
 
 class Patches:
@@ -41,18 +42,29 @@ class Patches:
         for some in self._chunks():
             away = np.abs(points[self._patch[some]] - self._origin[some, None, None])
             self._size[some] = np.where(self._patch[some, :, None, None] < 0, 0.0, away).max((1, 2))
+        self._keeps = self._patch.size * points.shape[1] * len(_POWERS) < _KEPT
+        self._kept: dict[int, np.ndarray] = {}
 
     def fit(self, values: np.ndarray) -> np.ndarray:
         """Coefficients of the cubics, shape (m, 10, k), of values at the points of all cells, shape (n, q, k)."""
         found = np.zeros((len(self._patch), len(_POWERS), values.shape[-1]))
         for some in self._chunks():
             patch = self._patch[some]
-            basis = self._basis(some, self._points[patch]) * (patch >= 0)[..., None, None]
-            basis = basis.reshape(len(patch), -1, len(_POWERS))
-            # too few cells for a cubic: the smallest coefficients that fit
-            inverse = np.linalg.pinv(basis.transpose(0, 2, 1) @ basis, rcond=1e-12, hermitian=True)
-            found[some] = inverse @ (basis.transpose(0, 2, 1) @ values[patch].reshape(*basis.shape[:2], -1))
+            found[some] = self._operator(some) @ values[patch].reshape(len(patch), -1, values.shape[-1])
         return found
+
+    def _operator(self, some: slice) -> np.ndarray:
+        """What makes coefficients of values at the points of the patches of some cells, shape (cells, 10, points)."""
+        if some.start in self._kept:
+            return self._kept[some.start]
+        patch = self._patch[some]
+        basis = self._basis(some, self._points[patch]) * (patch >= 0)[..., None, None]
+        basis = basis.reshape(len(patch), -1, len(_POWERS)).transpose(0, 2, 1)
+        # too few cells for a cubic: the smallest coefficients that fit
+        operator = np.linalg.pinv(basis @ basis.transpose(0, 2, 1), rcond=1e-12, hermitian=True) @ basis
+        if self._keeps:
+            self._kept[some.start] = operator
+        return operator
 
     def at(self, coefficients: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Values of the cubics at points of each cell, shape (m, p, 2): shape (m, p, k)."""
@@ -62,7 +74,8 @@ class Patches:
         """The monomials at points (cells, ..., 2), shape (cells, ..., 10)."""
         between = (slice(None), *[None] * (points.ndim - 2))
         x = (points - self._origin[some][between]) / self._size[some][between]
-        return np.prod(x[..., None, :] ** _POWERS, axis=-1)
+        powers = np.stack([np.ones_like(x), x, x * x, x * x * x], axis=-1)        # (..., coordinate, power)
+        return powers[..., 0, _POWERS[:, 0]] * powers[..., 1, _POWERS[:, 1]]
 
     def _chunks(self) -> list[slice]:
         return [slice(k, k + _CHUNK) for k in range(0, len(self._patch), _CHUNK)]

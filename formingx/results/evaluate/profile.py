@@ -63,7 +63,7 @@ class Profile:
     @property
     def wall_thickness(self) -> np.ndarray:
         """Shortest distance from the points of the bottom face to the top face now, shape (n,), length."""
-        return distance_to_line(self.bottom, _fine(self.top))
+        return distance_to_line(self.bottom, fine(self.top))
 
     @property
     def middle(self) -> np.ndarray:
@@ -113,7 +113,7 @@ class Profiles:
         return probe(self._problem, np.vstack([bottom, _opposite(bottom, top)]))
 
 
-def _fine(line: np.ndarray, parts: int = 6) -> np.ndarray:
+def fine(line: np.ndarray, parts: int = 6) -> np.ndarray:
     """Points along the parabolas through the nodes of a line's edges (end, middle, end, ...)."""
     a, m, b = line[:-1:2, None], line[1::2, None], line[2::2, None]
     xi = np.linspace(0, 1, parts, endpoint=False)[:, None]

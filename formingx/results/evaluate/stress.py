@@ -72,7 +72,7 @@ class Stress:
     def cauchy(self) -> np.ndarray:
         """sigma = P F^T / J, tension positive, shape (n, 3, 3), stress."""
         F = self.deformation_gradient
-        return self.first_piola @ F.transpose(0, 2, 1) / np.linalg.det(F)[:, None, None]
+        return self.first_piola @ F.transpose(0, 2, 1) / (_det(F) * F[:, 2, 2])[:, None, None]
 
     @property
     def hydrostatic_pressure(self) -> np.ndarray:
@@ -83,12 +83,16 @@ class Stress:
     def principal_stretches(self) -> np.ndarray:
         """The larger and the smaller stretch in the plane, and the hoop stretch, shape (n, 3)."""
         F = self.deformation_gradient
-        return np.column_stack([np.linalg.svd(F[:, :2, :2], compute_uv=False), F[:, 2, 2]])
+        larger = (np.hypot(F[:, 0, 0] + F[:, 1, 1], F[:, 0, 1] - F[:, 1, 0])
+                  + np.hypot(F[:, 0, 0] - F[:, 1, 1], F[:, 0, 1] + F[:, 1, 0])) / 2
+        return np.column_stack([larger, np.abs(_det(F)) / larger, F[:, 2, 2]])
 
     @property
     def principal_stresses(self) -> np.ndarray:
         """The principal Cauchy stresses from the largest to the smallest, shape (n, 3), stress."""
-        return np.linalg.eigvalsh(self.cauchy)[:, ::-1]
+        s = self.cauchy
+        mean, radius = (s[:, 0, 0] + s[:, 1, 1]) / 2, np.hypot((s[:, 0, 0] - s[:, 1, 1]) / 2, s[:, 0, 1])
+        return np.sort(np.column_stack([mean + radius, mean - radius, s[:, 2, 2]]))[:, ::-1]
 
     def on_face(self, normal: Any) -> FaceStress:
         """What acts on the deformed faces whose reference normals are `normal`, shape (2,) or (n, 2)."""
@@ -378,6 +382,11 @@ class Stresses:
         used.scatter_forward()
         return [fem.dirichletbc(PETSc.ScalarType(0), (np.flatnonzero(touched[:, k] == 0) * n + k).astype(np.int32),
                                 self.space.sub(k)) for k in range(n)]
+
+
+def _det(F: np.ndarray) -> np.ndarray:
+    """Determinant in the plane, of gradients (n, 3, 3), shape (n,)."""
+    return F[:, 0, 0] * F[:, 1, 1] - F[:, 0, 1] * F[:, 1, 0]
 
 
 def _unpack(points: np.ndarray, values: np.ndarray) -> Stress:

@@ -1,3 +1,3 @@
 """Files that people and programs open."""
 
-from .tabular import on_root, replace, reserve, versions, write_path, write_profile, write_rows, write_summary
+from .tabular import named, on_root, replace, reserve, versions, write_path, write_profile, write_rows, write_summary

@@ -81,7 +81,7 @@ class Checkpoint:
                 return 0
             _check_scene(folder, _read_json(folder / "scene.json"), scene)
             there = _states(folder)
-            held = [_read_json(state / "state.json") for state in there]
+            held = [_read_data(folder, k, checksums=False) for k in range(len(there))]
             settled = max((k + 1 for k, data in enumerate(held) if data["stepping"]), default=len(held))
             whole = held[:max(settled, len(path))]          # what is beyond is of a step that was not finished
             if len(whole) > len(path) or any((h["control"], h["slope"]) != (s.control, s.slope)
@@ -99,7 +99,7 @@ class Checkpoint:
         part = final.with_name(final.name + ".part")
         n = problem.forms.space.dofmap.index_map.size_local
         memory = [history.save(kept) for history, kept in zip(problem.histories, state.memory, strict=True)]
-        data = _plain_state(state) | {"memory": memory, "profile": profile}
+        data = _plain_state(state) | {"number": number, "memory": memory, "profile": profile}
         for name in _FIELDS:
             tails = comm.allgather(getattr(state, name)[n:].tolist())
             data[f"{name}_tail"] = tails[-1]
@@ -139,15 +139,9 @@ def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
             raise InputError(f"checkpoint {str(folder)!r} holds no state")
         if state is not None and not (isinstance(state, int) and 0 <= state < len(there)):
             raise InputError(f"load: state = {state!r}: the checkpoint holds states 0 to {len(there) - 1}")
-        found = [_read_json(one / "state.json") for one in there[:None if state is None else state + 1]]
-        settled = [k for k, data in enumerate(found) if data.get("stepping")]
-        if state is None and settled:
-            found = found[:settled[-1] + 1]
-        for one, data in zip(there, found):
-            if _checksums(one, data) != data.get("checksums"):
-                raise InputError(f"checkpoint {str(one)!r} is damaged: its files are not those that were written"
-                                 f" (load's state= picks an earlier one)")
-        return found
+        found = [_read_data(folder, k) for k in range(len(there) if state is None else state + 1)]
+        settled = [k for k, data in enumerate(found) if data["stepping"]]
+        return found[:settled[-1] + 1] if state is None and settled else found
     found = files.on_root(problem.comm, look)
     record = Record(problem, Curve(problem, Tolerances()))
     states = [_read_state(folder / _name(k), data, problem) for k, data in enumerate(found)]
@@ -159,6 +153,12 @@ def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
     return record
 
 
+def holds_states(folder: Any, comm: Any) -> bool:
+    """True if a folder is a checkpoint with a state in it; collective."""
+    folder = place("checkpoint", folder)
+    return files.on_root(comm, lambda: (folder / "scene.json").exists() and bool(_states(folder)))
+
+
 def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """(what scene.json says, what each state.json says) of a checkpoint; no scene is needed.
 
@@ -168,7 +168,7 @@ def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     folder = place("checkpoint", folder)
     about = _read_json(folder / "scene.json")
     _check_format(folder, about)
-    states = [_read_json(one / "state.json") for one in _states(folder)]
+    states = [_read_data(folder, k) for k in range(len(_states(folder)))]
     if not states:
         raise InputError(f"checkpoint {str(folder)!r} holds no state")
     return about, states
@@ -182,6 +182,8 @@ def _check_format(folder: FilePath, about: dict) -> None:
 
 def _check_scene(folder: FilePath, about: dict, scene: dict) -> None:
     _check_format(folder, about)
+    if not isinstance(about.get("scene"), dict):
+        raise InputError(f"checkpoint {str(folder)!r} is damaged: scene.json does not say what the scene is")
     found = list(differences(about["scene"], json.loads(json.dumps(scene))))
     if found:
         shown = "; ".join(f"{where}: {a!r} there, {b!r} here" for where, a, b in found[:4])
@@ -233,11 +235,23 @@ def _name(number: int) -> str:
 
 def _states(folder: FilePath) -> list[FilePath]:
     """The complete states in order."""
-    found = sorted((one for one in folder.iterdir() if one.name.isdigit()), key=lambda one: int(one.name))
+    names = (one for one in folder.iterdir() if one.name.isascii() and one.name.isdigit())
+    found = sorted(names, key=lambda one: int(one.name))
     for k, one in enumerate(found):
         if int(one.name) != k:
             raise InputError(f"checkpoint {str(folder)!r} is damaged: state {k} is missing")
     return found
+
+
+def _read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
+    """What a state's state.json says; an InputError unless it is that of the state, whole and as it was written."""
+    one = folder / _name(number)
+    data = _read_json(one / "state.json")
+    missing = [f.name for f in fields(State) if f.name not in (*_FIELDS, "memory") and f.name not in data]
+    if missing or data.get("number") != number or checksums and _checksums(one, data) != data.get("checksums"):
+        raise InputError(f"checkpoint {str(one)!r} is damaged: its files are not those that were written"
+                         f" (load's state= picks an earlier one)")
+    return data
 
 
 def _read_json(file: FilePath) -> Any:
@@ -251,7 +265,7 @@ def _read_json(file: FilePath) -> Any:
         raise InputError(f"checkpoint: {str(file)!r} is not there") from None
     except NotADirectoryError:
         raise InputError(f"checkpoint: {str(file.parent)!r} is not a folder") from None
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, RecursionError) as error:
         raise InputError(f"checkpoint: {str(file)!r} is damaged or cannot be read: {error}") from None
 
 

@@ -11,6 +11,9 @@ import numpy as np
 from mpi4py import MPI
 
 from ... import _compat
+from ...materials.constants import Varying
+from ...materials.material import Material
+from ...scene.sampling import sample
 
 _PARTS = ("materials", "supports", "loads", "contacts", "model", "kinematics", "quadrature_degree")
 
@@ -24,8 +27,13 @@ def describe(problem: Any) -> dict[str, Any]:
     scene = problem.scene
     known = set(_PARTS) | {"mesh"}
     extra = sorted(name for name in vars(scene) if name not in known and not name.startswith("_"))
-    return {"mesh": _mesh(problem), "unknowns": problem.n_unknowns,
-            **{name: plain(getattr(scene, name)) for name in (*_PARTS, *extra)}}
+    found = {"mesh": _mesh(problem), "unknowns": problem.n_unknowns,
+             **{name: plain(getattr(scene, name)) for name in (*_PARTS, *extra)}}
+    for layer, material in scene.materials.items():
+        if material.varies:
+            found["materials"][layer] |= {"shear_modulus": scene.shear_modulus(layer),
+                                          "sums": _sums_of_constants(scene, layer)}
+    return found
 
 
 def summary(scene: Any) -> dict[str, str]:
@@ -42,7 +50,7 @@ def summary(scene: Any) -> dict[str, str]:
         for k, thing in enumerate(getattr(scene, kind), 1):
             numbers = "".join(f", {name.replace('_', ' ')} {value!r}" for name, value in vars(thing).items()
                               if isinstance(value, int | float) and repr(value) not in text(thing))
-            lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if getattr(thing, "driven", False) else "")
+            lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if thing.driven else "")
     return lines | {"model": text(scene.model), "kinematics": text(scene.kinematics),
                     "quadrature degree": str(scene.quadrature_degree)}
 
@@ -65,8 +73,8 @@ def plain(value: Any, depth: int = 8) -> Any:
         return {str(k): plain(v, depth - 1) for k, v in value.items()}
     if isinstance(value, list | tuple):
         return [plain(v, depth - 1) for v in value]
-    if hasattr(value, "strain_energy"):
-        return {"kind": text(value), "shear_modulus": value.shear_modulus}
+    if isinstance(value, Material):
+        return {"kind": text(value)} | ({} if value.varies else {"shear_modulus": value.shear_modulus})
     if callable(value) or depth == 0 or not hasattr(value, "__dict__"):
         return getattr(value, "__qualname__", text(value))
     return {"kind": type(value).__name__,
@@ -86,6 +94,18 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
             yield where, a, b
     elif a != b:
         yield where, a, b
+
+
+def _sums_of_constants(scene: Any, layer: str) -> dict[str, float]:
+    """{constant that varies: sum over the layer that changes with the value at any of its points}."""
+    at = sample(scene.mesh, layer, scene.quadrature_degree)
+    q, sums = len(at.places), {}
+    numbers = np.sin(1.0 + scene.mesh.domain.topology.original_cell_index[at.cells])
+    weights = (numbers[:, None] * np.sin(1.0 + np.arange(q))).ravel()
+    for name, constant in scene.materials[layer].constants().items():
+        if isinstance(constant, Varying):
+            sums[name] = float(scene.mesh.comm.allreduce(float(weights @ constant.values(at)), MPI.SUM))
+    return sums
 
 
 def _mesh(problem: Any) -> dict[str, Any]:

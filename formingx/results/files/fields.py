@@ -32,6 +32,7 @@ from mpi4py import MPI
 
 from ...errors import InputError, place
 from .. import files
+from ..evaluate.contact_face import ContactFace
 
 _NODES = {1: np.array([[0.0], [1.0], [0.5]]), 2: np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])}
 """Places of the nodes in the reference cell, in DOLFINx order, by dimension."""
@@ -52,13 +53,14 @@ class Fields:
         self._where, self._u = (fem.Expression(ufl.as_vector([v[0], v[1]]), _NODES[self.dimension])
                                 for v in (forms.X, forms.u))
         self.points = self._eval(self._where)
+        self._between: tuple[np.ndarray, np.ndarray] | None = None
+        self._faces: dict[int, tuple[ContactFace, np.ndarray, np.ndarray]] = {}
 
     def of(self, state: Any) -> dict[str, np.ndarray]:
         """{name: values, shape (cells, nodes, components)} of a state; collective."""
         problem, shape = self._problem, self.points.shape[:2]
         with problem.at(state):
             found = {"displacement": self._eval(self._u)}
-        moved = self.points + found["displacement"]
         if self.dimension == 2:
             field = self._path.stress(state)
             stress = field.in_cells(_NODES[2])
@@ -68,15 +70,17 @@ class Fields:
                       "cauchy_hoop": sigma[:, 2, 2], "hydrostatic_pressure": stress.hydrostatic_pressure,
                       "stress_error": np.repeat(field.error_in_cells(), len(_NODES[2]))}
             if problem.contacts:
-                found["contact_pressure"] = self._contact_pressure(state, moved)
+                found["contact_pressure"] = self._contact_pressure(state)
         try:
             profile = self._path.profile(state)
         except InputError:
             profile = None                                  # not a sheet
         if profile is not None:
-            columns = np.column_stack([profile.thickness, profile.thickness_ratio])
-            values = _across(moved.reshape(-1, 2), profile.bottom, profile.top, columns)
-            found |= {"thickness": values[:, 0], "thickness_ratio": values[:, 1]}
+            if self._between is None:                           # a point stays on the line across that it is on at rest
+                self._between = _across(self.points.reshape(-1, 2), profile.rest_bottom, profile.rest_top)
+            k, part = self._between
+            for name, values in (("thickness", profile.thickness), ("thickness_ratio", profile.thickness_ratio)):
+                found[name] = (1 - part) * values[k] + part * values[k + 1]
         return {name: np.asarray(values).reshape(*shape, -1) for name, values in found.items()}
 
     def _eval(self, expression: Any) -> np.ndarray:
@@ -84,43 +88,18 @@ class Fields:
             return np.zeros((0, len(_NODES[self.dimension]), 2))
         return expression.eval(self._problem.forms.domain, self._cells).reshape(len(self._cells), -1, 2)
 
-    def _contact_pressure(self, state: Any, moved: np.ndarray) -> np.ndarray:
-        """Normal traction over the change of area along the face, zero elsewhere, shape (cells, nodes)."""
+    def _contact_pressure(self, state: Any) -> np.ndarray:
+        """Normal traction per deformed area at the faces that tools meet, zero elsewhere, shape (cells, nodes)."""
         from scipy.spatial import cKDTree
-        problem, pressure = self._problem, np.zeros(self.points.shape[:2])
-        forms = problem.forms
-        fields, near = state.x[: forms.space.dofmap.index_map.size_local], 1e-9 * forms.length
-        with problem.at(state):
-            tractions = [(contact, contact.traction(fields, state.control)) for contact in problem.touching]
-        for contact, (points, values) in tractions:
-            tree = cKDTree(points)
-            total = np.zeros((len(points), 2))               # sum of area ratios, and of how many facets
-            for cell, facet in self._facets(contact.contact.on):
-                nodes = [*(k for k in range(3) if k != facet), 3 + facet]
-                X, x = self.points[cell, nodes], moved[cell, nodes]
-                ratio = np.hypot(*_tangents(x).T) / np.hypot(*_tangents(X).T)
-                if problem.scene.kinematics.dimension_of_volume == 3:
-                    axis = X[:, 0] < near
-                    ratio = ratio * np.where(axis, ratio, x[:, 0] / np.where(axis, 1.0, X[:, 0]))
-                np.add.at(total, tree.query(X)[1], np.column_stack([ratio, np.ones(3)]))
-            total = problem.comm.allreduce(total)
-            away, at = tree.query(self.points.reshape(-1, 2))
-            found = (values[:, 0] * total[:, 1] / total[:, 0])[at]
-            pressure += np.where(away < near, found, 0.0).reshape(pressure.shape)
+        pressure = np.zeros(self.points.shape[:2])
+        for k, contact in enumerate(self._problem.contacts):
+            if k not in self._faces:
+                face = ContactFace(self._path, contact)
+                away, at = cKDTree(face.rest).query(self.points.reshape(-1, 2))
+                self._faces[k] = face, at, away < 1e-9 * self._problem.forms.length
+            face, at, there = self._faces[k]
+            pressure += np.where(there, face.of(state).pressure[at], 0.0).reshape(pressure.shape)
         return pressure
-
-    def _facets(self, boundary: str) -> list[tuple[int, int]]:
-        """(own cell, number of the facet in it) of a boundary."""
-        mesh = self._problem.scene.mesh
-        topology = mesh.domain.topology
-        topology.create_connectivity(1, 2)
-        topology.create_connectivity(2, 1)
-        pairs = []
-        for facet in mesh.facets_of(boundary):
-            cell = int(topology.connectivity(1, 2).links(facet)[0])
-            if cell < len(self._cells):
-                pairs.append((cell, int(np.flatnonzero(topology.connectivity(2, 1).links(cell) == facet)[0])))
-        return pairs
 
 
 def to_vtx(path: Any, folder: Any, states: Any = None) -> None:
@@ -257,25 +236,19 @@ def _gather(values: np.ndarray, comm: Any) -> Any:
     return np.concatenate(parts) if parts else None
 
 
-def _tangents(points: np.ndarray) -> np.ndarray:
-    """dx/ds at the two ends and the middle of a three-node edge, shape (3, 2)."""
-    a, b, m = points
-    return np.array([4 * m - 3 * a - b, a - 4 * m + 3 * b, b - a])
-
-
-def _across(points: np.ndarray, bottom: np.ndarray, top: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Values (n, k) that belong to the n segments from bottom to top, linear between two of them, at points (m, 2)."""
-    found = np.zeros((len(points), values.shape[1]))
+def _across(points: np.ndarray, bottom: np.ndarray, top: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Between which lines from bottom to top, k and k + 1, points (m, 2) are, and how far, 0 to 1: shape (m,) each."""
+    k, part = np.zeros(len(points), dtype=int), np.zeros(len(points))
     along = top - bottom
     for i, x in enumerate(points):
         side = along[:, 0] * (x - bottom)[:, 1] - along[:, 1] * (x - bottom)[:, 0]
         s = np.clip(((x - bottom) * along).sum(1) / (along**2).sum(1), 0, 1)
         away = np.hypot(*(bottom + s[:, None] * along - x).T)
         between = np.flatnonzero(side[:-1] * side[1:] <= 0)
-        if not len(between):
-            found[i] = values[np.argmin(away)]
+        if not len(between):                                    # beyond the first line, or the last
+            k[i], part[i] = (0, 0.0) if np.argmin(away) == 0 else (max(np.argmin(away) - 1, 0), 1.0)
             continue
-        k = between[np.argmin(away[between] + away[between + 1])]
-        a, b = away[k], away[k + 1]
-        found[i] = (b * values[k] + a * values[k + 1]) / (a + b) if a + b > 0 else values[k]
-    return found
+        k[i] = between[np.argmin(away[between] + away[between + 1])]
+        a, b = away[k[i]], away[k[i] + 1]
+        part[i] = a / (a + b) if a + b > 0 else 0.0
+    return k, part

@@ -11,13 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import InputError, known, positive
+from ...units import LENGTHS, STRESSES
 
-# in m, and in Pa; kg/cm2 is the technical atmosphere of the older literature (kgf/cm2)
-_LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
-_STRESSES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6, "bar": 1e5, "atm": 101325.0,
-             "psi": 6894.757293168, "kg/cm2": 98066.5, "kgf/cm2": 98066.5}
-_VOLUMES = {f"{name}3": size**3 for name, size in _LENGTHS.items()} | {"l": 1e-3, "ml": 1e-6}
-UNITS = {"length": _LENGTHS, "stress": _STRESSES, "volume": _VOLUMES}
+_VOLUMES = {f"{name}3": size**3 for name, size in LENGTHS.items()} | {"l": 1e-3, "ml": 1e-6}
+UNITS = {"length": LENGTHS, "stress": STRESSES, "volume": _VOLUMES}
 
 
 class Table(NamedTuple):

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import place
+from ...errors import InputError, place
 
 
 def write_path(path: Any, file: Any) -> None:
@@ -34,7 +34,9 @@ def write_profile(profile: Any, file: Any, comm: Any) -> None:
 
 
 def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], comm: Any) -> None:
-    """A CSV file with a header; numbers with all their digits."""
+    """A CSV file with a header; numbers with all their digits; an InputError unless its name ends in .csv."""
+    file = named("to_csv", file, ".csv")
+
     def write(stream):
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(header)
@@ -89,6 +91,16 @@ def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:
         with contextlib.suppress(OSError):
             part.unlink()
         raise OSError(error.errno, f"{os.fspath(file)!r} could not be written: {error.strerror}") from None
+
+
+def named(who: str, file: Any, *endings: str) -> Any:
+    """A file's name as a path, or an InputError unless it ends in one of these."""
+    file = place(f"{who}: file", file)
+    if file.suffix.lower() not in endings:
+        other = {".xlsx": "to_excel", ".csv": "to_csv"}.get(file.suffix.lower())
+        raise InputError(f"{who}: file {str(file)!r}: its name must end in {' or '.join(endings)}"
+                         + (f"; {other} writes that" if other else ""))
+    return file
 
 
 def reserve(file: Any, size: int) -> None:

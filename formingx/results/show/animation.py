@@ -1,23 +1,27 @@
-"""The forming as a moving picture: section and loading curve, frame by frame."""
+"""The forming as a moving picture: section and loading curve, frame by frame, evenly spread over the process."""
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from typing import Any
 
 import numpy as np
 
 from ... import figures
 from ...discrete.tooling import Tooling
-from ...errors import InputError, count, place, positive
+from ...errors import InputError, count, positive
 from .. import files
 from . import plots
+from .record import progress
 
 
 def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
     """See `Path.animate`."""
-    file = place("animate: file", file)
-    if file.suffix.lower() != ".gif":
-        raise InputError(f"animate: file {str(file)!r}: its name must end in .gif")
+    file = files.named("animate", file, ".gif", ".mp4")
+    if file.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
+        raise InputError(f"animate: file {str(file)!r}: an MP4 needs the program ffmpeg, which is not there; a .gif"
+                         f" needs nothing")
     frames, seconds = count("animate: frames", frames), positive("animate: seconds", seconds)
     if len(path) < 2:
         raise InputError(f"animate: the path has {len(path)} states: nothing moves")
@@ -31,24 +35,26 @@ def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
     curve = path.curve(x, y)
     axisymmetric = path.problem.scene.kinematics.dimension_of_volume == 3
 
-    def draw(stream):
-        _draw(shapes, tools, np.array(now), curve, (x, y), axisymmetric, seconds, stream)
-    files.on_root(path.problem.comm, lambda: files.replace(file, draw, "wb"))
+    def draw():
+        pictures = _draw(shapes, tools, np.array(now), curve, (x, y), axisymmetric)
+        save = _save_gif if file.suffix.lower() == ".gif" else _save_mp4
+        files.replace(file, lambda stream: save(pictures, seconds, stream), "wb")
+    files.on_root(path.problem.comm, draw)
 
 
 def _spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
-    """(state, next state, fraction between them) of frames evenly spread over the arc length."""
-    lengths = [path.distance(a, b) for a, b in zip(path.states, path.states[1:])]
-    at = np.concatenate([[0.0], np.cumsum(lengths)])
+    """(state, next state, fraction between them) of frames evenly spread over the progress of the process."""
+    profiles = [path.profile(state) for state in path.states]
+    at = progress({c: path[c] for c in path.columns}, profiles)
     found = []
     for s in np.linspace(0, at[-1], frames) if frames > 1 else at[-1:]:
-        k = int(np.clip(np.searchsorted(at, s, side="right") - 1, 0, len(lengths) - 1))
-        found.append((path.states[k], path.states[k + 1], float((s - at[k]) / (lengths[k] or 1.0))))
+        k = int(np.clip(np.searchsorted(at, s, side="right") - 1, 0, len(at) - 2))
+        found.append((path.states[k], path.states[k + 1], float((s - at[k]) / ((at[k + 1] - at[k]) or 1.0))))
     return found
 
 
-def _draw(shapes: list, tools: list, now: np.ndarray, curve: list, names: tuple, axisymmetric: bool, seconds: float,
-          stream: Any) -> None:
+def _draw(shapes: list, tools: list, now: np.ndarray, curve: list, names: tuple, axisymmetric: bool) -> list[Any]:
+    """The frames, each a picture."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -78,8 +84,29 @@ def _draw(shapes: list, tools: list, now: np.ndarray, curve: list, names: tuple,
         figure.canvas.draw()
         if not pictures:
             figure.set_layout_engine("none")                # or the axes would shift from frame to frame
-        pictures.append(Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
-                        .quantize(256, dither=Image.Dither.NONE))
+        pictures.append(Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB"))
+    return pictures
+
+
+def _save_gif(pictures: list[Any], seconds: float, stream: Any) -> None:
+    """The last frame stands for a second more."""
+    from PIL import Image
+    pictures = [picture.quantize(256, dither=Image.Dither.NONE) for picture in pictures]
     each = max(int(1000 * seconds / len(pictures)), 20)
     pictures[0].save(stream, format="GIF", save_all=True, append_images=pictures[1:], loop=0, optimize=False,
                      duration=[each] * (len(pictures) - 1) + [each + 1000])
+
+
+def _save_mp4(pictures: list[Any], seconds: float, stream: Any) -> None:
+    """As H.264, which every player knows; the last frame stands for a second more."""
+    width, height = (2 * (n // 2) for n in pictures[0].size)              # H.264 wants even numbers
+    rate = len(pictures) / seconds
+    stream.close()                                           # ffmpeg writes the file by its name
+    command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
+               "-r", f"{rate:.6f}", "-i", "-", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4",
+               stream.name]
+    frames = [picture.crop((0, 0, width, height)).tobytes() for picture in pictures]
+    frames += frames[-1:] * max(int(rate), 1)
+    done = subprocess.run(command, input=b"".join(frames), capture_output=True, check=False)
+    if done.returncode:
+        raise OSError(None, f"ffmpeg: {done.stderr.decode().strip()[-200:]}")

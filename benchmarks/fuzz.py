@@ -1,0 +1,391 @@
+"""Calls of everything public with random arguments and damaged files: each must end, and end well.
+
+    python3 benchmarks/fuzz.py [CALLS] [SEED] [KIND ...]
+
+A call ends well in a result, an InputError, a ConvergenceError or an OSError, within 10 s. Call k of a seed is always
+the same one, so that one that ended badly can be repeated: `python3 benchmarks/fuzz.py --only K SEED`. The calls run in
+a process of their own, which is started again where one ends it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import random
+import selectors
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+LIMIT = 10.0                                   # seconds of a processor's time for one call
+LONGEST = 6 * LIMIT                            # and of any, until the first call too: the machine may be busy
+
+
+class Ending(NamedTuple):
+    """How a call ended: "result", "InputError", ..., or what went wrong; `bad` if it must not end so."""
+
+    number: int
+    call: str
+    how: str
+    bad: bool
+    text: str = ""
+
+
+def run(calls: int, seed: int = 0, kinds: tuple[str, ...] = ()) -> list[Ending]:
+    """The endings of so many calls, each watched from outside."""
+    endings: list[Ending] = []
+    while len(endings) < calls:
+        endings += _watched(len(endings), calls, seed, kinds)
+    return endings
+
+
+def _watched(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> Iterator[Ending]:
+    """The calls of one process, up to the one that ends it or takes too long."""
+    child = subprocess.Popen([sys.executable, __file__, "--child", str(first), str(last), str(seed), *kinds],
+                             stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=Path(__file__).parents[1])
+    assert child.stdout is not None
+    number, began = first, ""
+    with child, selectors.DefaultSelector() as ready:
+        ready.register(child.stdout, selectors.EVENT_READ)
+        buffer = b""
+        while True:
+            spent, until = _processor_time(child.pid), time.monotonic() + LONGEST
+            while not ready.select(1.0):
+                if time.monotonic() > until or began and _processor_time(child.pid) > spent + LIMIT:
+                    child.kill()
+                    yield Ending(number, began, f"no end within {LIMIT:g} s", True)
+                    return
+            part = os.read(child.stdout.fileno(), 65536)
+            if not part:
+                break
+            *lines, buffer = (buffer + part).split(b"\n")
+            for line in lines:
+                found = json.loads(line)
+                if isinstance(found, str):
+                    began = found
+                else:
+                    yield Ending(*found)
+                    number = found[0] + 1
+        if number < last:
+            yield Ending(number, began, f"the process died ({child.wait()})", True)
+
+
+def _processor_time(process: int) -> float:
+    """Seconds that a process has used."""
+    words = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def child(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> None:
+    """Make the calls, and say before and after each what it is and how it ended."""
+    out = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)                              # what the libraries print goes nowhere
+    warnings.simplefilter("ignore")
+    import formingx as fx
+    with tempfile.TemporaryDirectory() as folder:
+        makers = _itself() if kinds == ("itself",) else cases(Path(folder))
+        names = [name for name in makers if not kinds or name.split()[0] in kinds]
+        for number in range(first, last):
+            rng = random.Random(f"{seed} {number}")
+            name = rng.choice(names)
+            out.write(json.dumps(name) + "\n")
+            how, bad, text = "result", False, ""
+            try:
+                makers[name](rng)
+            except (fx.InputError, fx.ConvergenceError, OSError) as error:
+                how = type(error).__name__
+                if not str(error):
+                    how, bad = f"{how} without words", True
+            except Exception as error:  # noqa: BLE001  whatever else comes is what is looked for
+                how, bad = type(error).__name__, True
+                text = f"{error}"[:200] + " | " + " < ".join(
+                    f"{Path(f.filename).name}:{f.lineno}" for f in traceback.extract_tb(error.__traceback__)[:-7:-1])
+            out.write(json.dumps([number, name, how, bad, text]) + "\n")
+
+
+# What a user may put in the place of a number or a word.
+
+_EXTREMES: list[Any] = [
+    0, -0.0, 1, -1, 0.5, 5e-324, 1e-300, 1e300, -1e300, math.inf, -math.inf, math.nan, 10**400, 10**18, True, False,
+    None, "", "1.0", "x", "bottom", "\0", "a" * 10_000, b"1", 1j, [], [1], (), (1.0, 2.0), (1, 2, 3), [[]],
+    {}, {"a": 1}, {1: 2.0, 2: 3.0}, {0.5: 0.1}, set(), object(), len, lambda x: x, lambda x: None, int, range(3),
+    Decimal("0.5"), Fraction(1, 3), np.float32(0.5), np.int64(3), np.array(1.0), np.array([1.0]), np.array([]),
+    np.zeros((2, 2)), np.array("x"), np.complex128(1j), np.nan, Path("x"), Ellipsis, NotImplemented]
+
+
+def anything(rng: random.Random) -> Any:
+    """A value that is hardly ever right."""
+    return rng.choice(_EXTREMES)
+
+
+def near(good: Any, rng: random.Random) -> Any:
+    """A value of the kind of a good one: often allowed, now and then far out."""
+    if isinstance(good, bool) or good is None or isinstance(good, str):
+        return good
+    if isinstance(good, int):
+        return rng.choice([good, 1, 2, 3, rng.randint(1, 30)])
+    if isinstance(good, float):
+        return rng.choice([good, good * 10 ** rng.uniform(-1, 1), good * 10 ** rng.uniform(-8, 8),
+                           10 ** rng.uniform(-320, 300), rng.uniform(-2, 2)])
+    if isinstance(good, tuple | list) and good:
+        return type(good)(near(g, rng) for g in good) if type(good) in (tuple, list) else good
+    if isinstance(good, dict) and good:
+        return {k: near(v, rng) for k, v in good.items()}
+    return good
+
+
+def varied(good: dict[str, Any], rng: random.Random) -> dict[str, Any]:
+    """Arguments, some of them near to good ones, some anything, some left out."""
+    given = {}
+    for name, value in good.items():
+        chance = rng.random()
+        if chance < 0.9:
+            given[name] = value if chance < 0.35 else near(value, rng) if chance < 0.75 else anything(rng)
+    return given
+
+
+def damaged(data: bytes, rng: random.Random) -> bytes:
+    """A file with some bytes, words or lines lost, doubled, swapped or replaced."""
+    for _ in range(rng.randint(1, 4)):
+        at = rng.randrange(len(data) + 1)
+        to = min(len(data), at + rng.choice([1, 4, 30, 1000]))
+        lines = data.split(b"\n")
+        k = rng.randrange(len(lines))
+        words = lines[k].split(b" ")
+        w = rng.randrange(len(words))
+        what = rng.randrange(8)
+        if what == 0:
+            data = data[:at]
+        elif what == 1:
+            data = data[:at] + data[to:]
+        elif what == 2:
+            data = data[:at] + rng.randbytes(to - at) + data[to:]
+        elif what == 3:
+            data = b"\n".join(lines[:k] + lines[k + 1:])
+        elif what == 4:
+            data = b"\n".join(lines[:k] + [lines[k]] * rng.choice([2, 3, 1000]) + lines[k + 1:])
+        elif what == 5:
+            m = rng.randrange(len(lines))
+            lines[k], lines[m] = lines[m], lines[k]
+            data = b"\n".join(lines)
+        else:
+            words[w] = rng.choice([b"-1", b"0", b"1", b"2", b"3", b"99999999999999999999", b"nan", b"inf", b"1e300",
+                                   b"1e-320", b"", b"0.5", b'"', b"{", b"}", b"$End", b"#", b"\0", b"\xff",
+                                   b"[" * 9000])
+            data = b"\n".join(lines[:k] + [b" ".join(words)] + lines[k + 1:])
+    return data
+
+
+# What is called.
+
+def _itself() -> dict[str, Callable[[random.Random], Any]]:
+    """Calls that end badly, to test what watches them."""
+    return {"itself dies": lambda rng: os.abort(), "itself raises": lambda rng: 1 / 0}
+
+
+def cases(folder: Path) -> dict[str, Callable[[random.Random], Any]]:
+    """{kind and name: a call}; the first word is the kind."""
+    import formingx as fx
+    sys.path.insert(0, str(Path(__file__).parent))
+    import reliability
+    mesh = fx.mesh.disc(radius=1.0, thickness={"a": 0.05, "b": 0.05}, elements=(4, 1))
+    made = reliability._scene()
+    fx.trace(made, until=fx.pole_height(0.05), progress=False).save(folder / "run")
+    for suffix in ("msh", "txt"):
+        fx.mesh.write(mesh, folder / f"mesh.{suffix}")
+    found = {}
+    for call in reliability.calls(made, str(folder / "run")):
+        good = {k: v for k, (_, v) in call.arguments.items()}
+        if call.name in ("trace", "Process.run", "solve", "doctor", "load"):
+            found[f"runs {call.name}"] = lambda rng, c=call, g=good: c.make(**_required(c, g, rng))
+        elif call.name != "mesh.read":
+            found[f"{_kind(call.name)} {call.name}"] = lambda rng, c=call, g=good: c.make(**_required(c, g, rng))
+    found |= _of_files(folder) | _of_fits() | _of_tools() | _of_meshes() | _of_runs(folder, made)
+    return found
+
+
+def _kind(name: str) -> str:
+    return name.split(".")[0] if name.startswith(("mesh.", "tools.", "Mesh.")) else "constructors"
+
+
+def _required(call: Any, good: dict[str, Any], rng: random.Random) -> dict[str, Any]:
+    """Varied arguments; those without a default are there: to leave one out is a TypeError, as of any function."""
+    import inspect
+    needed = {name for name, p in inspect.signature(call.make).parameters.items()
+              if p.default is p.empty and p.kind is not p.VAR_KEYWORD}
+    given = varied(good, rng)
+    return {k: v for k, v in good.items() if k in needed and k not in given} | given
+
+
+def _of_files(folder: Path) -> dict[str, Callable]:
+    import formingx as fx
+    from formingx.physics import tools
+    (folder / "tool.geo").write_text("""r = 3; Point(1) = {0, 5, 0}; Point(2) = {r^2, 5, 0}; Point(3) = {9, 4, 0};
+Point(4) = {10, 4, 0}; Point(5) = {10, 0, 0};\nLine(1) = {1, 2};\nCircle(2) = {2, 3, 4};\nLine(3) = {4, 5};
+Physical Curve("mould") = {1, 2, 3};\n""")
+    _cad(folder)
+
+    def read(name: str, reader: Callable) -> Callable:
+        data = (folder / name).read_bytes()
+
+        def call(rng):
+            file = folder / f"damaged{Path(name).suffix}"
+            file.write_bytes(damaged(data, rng))
+            return reader(file)
+        return call
+    meshes = ("mesh.msh", "mesh.txt", "mesh4.msh", "mesh4b.msh", "mesh2b.msh")
+    return {f"files {n}": read(n, fx.mesh.read) for n in meshes} | {
+        f"files tool {n}": read(n, lambda file: tools.read(file, [1, 2, 3])) for n in ("tool.geo", "mesh4.msh")}
+
+
+def _cad(folder: Path) -> None:
+    """Files of gmsh's own: a square of six-node triangles, in its formats."""
+    import gmsh
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.occ.addRectangle(0, 0, 0, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(2, [1], name="sheet")
+        gmsh.model.addPhysicalGroup(1, [1, 2], name="edge")
+        gmsh.model.mesh.setSize(gmsh.model.getEntities(0), 0.4)
+        gmsh.model.mesh.generate(2)
+        gmsh.model.mesh.setOrder(2)
+        for name, version, binary in (("mesh4", 4.1, 0), ("mesh4b", 4.1, 1), ("mesh2b", 2.2, 1)):
+            gmsh.option.setNumber("Mesh.MshFileVersion", version)
+            gmsh.option.setNumber("Mesh.Binary", binary)
+            gmsh.write(str(folder / f"{name}.msh"))
+    finally:
+        gmsh.finalize()
+
+
+def _of_fits() -> dict[str, Callable]:
+    import formingx as fx
+    data = fx.treloar1944()
+
+    def call(rng):
+        material = rng.choice([fx.NeoHookean, fx.MooneyRivlin, fx.Yeoh, fx.Gent, fx.ArrudaBoyce, fx.Ogden,
+                               fx.Gent(mu=1.0, Jm=100.0), anything(rng)])
+        modes = rng.sample(list(data), rng.randint(1, 3))
+        tests = {mode: tuple(rng.choice([c, c[:rng.randint(0, 9)], c * 10 ** rng.uniform(-320, 300), -c, c.tolist(),
+                                         np.full(len(c), rng.choice([1.0, 0.0, math.nan, 5.0])), anything(rng)])
+                             if rng.random() < 0.4 else c for c in data[mode]) for mode in modes}
+        return str(fx.fit(material, rng.choice([tests, tests, tests, anything(rng)]),
+                          rng.choice([None, None, 1, 2, anything(rng)])))
+    return {"fits fit": call}
+
+
+def _of_tools() -> dict[str, Callable]:
+    from formingx.physics.tools import Arc, Line, Tool
+
+    def number(rng):
+        return rng.choice([rng.uniform(-2, 2), rng.randint(-2, 2), rng.randint(-2, 2), anything(rng)])
+
+    def point(rng):
+        return rng.choice([np.array([rng.randint(-2, 2), rng.randint(-2, 2)], float), (number(rng), number(rng))])
+
+    def pieces(rng):
+        parts = [Line(point(rng), point(rng)) if rng.random() < 0.6 else
+                 Arc(point(rng), number(rng), number(rng), number(rng)) for _ in range(rng.randint(0, 4))]
+        return Tool.of_pieces(parts, rng.random() < 0.3).signed_distance(np.ones((3, 2)))
+
+    def points(rng):
+        n = rng.randint(0, 6)
+        fillets = rng.choice([0.0, 0.1, [rng.choice([0, 0.1, 1]) for _ in range(n)], number(rng)])
+        tool = Tool([point(rng) for _ in range(n)], fillets, rng.random() < 0.3)
+        tool = rng.choice([tool, tool.mirrored(), tool.moved(r=0.3), tool.turned(20)])
+        repr(tool), tool.outline()
+        near = tool.nearest(np.random.default_rng(0).uniform(-2, 2, (20, 2)))
+        assert np.all(np.isfinite(near.distance)) and np.allclose(np.hypot(*near.normal.T), 1)
+    return {"tools Tool.of_pieces": pieces, "tools Tool": points}
+
+
+def _of_meshes() -> dict[str, Callable]:
+    import formingx as fx
+
+    def thickness(rng):
+        one = rng.choice([0.1, lambda x: 0.1 + 0.05 * x, {0: 0.1, 1: 0.2}, {-1: 0.1, 0: 0.2, 2: 0.1}, anything(rng)])
+        return rng.choice([one, {"a": one, "b": 0.1}])
+
+    def made(make: Callable, **good: Any) -> Callable:
+        def call(rng):
+            mesh = make(**{k: v for k, v in good.items()} | varied({"thickness": 0.1, **good}, rng)
+                        | {"thickness": thickness(rng)})
+            mesh.check()
+        return call
+
+    def moved(rng):
+        mesh = fx.mesh.disc(radius=1.0, thickness=0.3, elements=(4, 2))
+        x = mesh.domain.geometry.x
+        for _ in range(rng.randint(1, 3)):
+            x[rng.randrange(len(x)), rng.randint(0, 1)] += rng.choice([1e-3, 0.1, -0.1, 0.5, 1e300, math.nan])
+        mesh.check()
+    return {"mesh disc": made(fx.mesh.disc, radius=1.0, elements=(4, 1), grading=1.0),
+            "mesh parison": made(fx.mesh.parison, inner_radius=1.0, length=2.0, elements=(6, 1)),
+            "mesh sphere": made(fx.mesh.sphere, inner_radius=1.0, elements=(4, 1)), "mesh moved": moved}
+
+
+def _of_runs(folder: Path, made: Any) -> dict[str, Callable]:
+    """Checkpoints with damaged files, and processes that follow random tables."""
+    import reliability
+
+    import formingx as fx
+
+    def load(rng):
+        copy = folder / "copy"
+        shutil.rmtree(copy, ignore_errors=True)
+        shutil.copytree(folder / "run", copy)
+        files = sorted(p for p in copy.rglob("*") if p.is_file())
+        for file in rng.sample(files, min(len(files), rng.randint(1, 2))):
+            what = rng.randrange(4)
+            if what == 0:
+                file.unlink()
+            elif what == 1:
+                file.rename(file.with_name(rng.choice(["0", "²", "x", "00000000000000000001"])))
+            else:
+                file.write_bytes(damaged(file.read_bytes(), rng))
+        fx.load(copy, made)
+
+    def table(rng):
+        rows = [(near(0.1 * k, rng) if rng.random() < 0.3 else 0.1 * k, near(0.02 * k, rng) if rng.random() < 0.3
+                 else 0.02 * k) for k in range(rng.randint(0, 4))]
+        if rng.random() < 0.3:
+            rows.append(anything(rng))
+        stage = fx.Stage("on", follow=rng.choice([{"air": rows}, {"plug": rows}, {"air": rows, "plug": rows}]))
+        fx.Process(reliability._named()).run([stage], progress=False, max_steps=20)
+    return {"runs damaged checkpoint": load, "runs table": table}
+
+
+def main(words: list[str]) -> int:
+    """Print how the calls ended; 1 if one ended badly."""
+    if words[:1] == ["--child"]:
+        child(int(words[1]), int(words[2]), int(words[3]), tuple(words[4:]))
+        return 0
+    if words[:1] == ["--only"]:
+        child(int(words[1]), int(words[1]) + 1, int(words[2]), tuple(words[3:]))
+        return 0
+    calls, seed = (int(w) for w in (*words[:2], *("10000", "0")[len(words[:2]):]))
+    endings = run(calls, seed, tuple(words[2:]))
+    for how, n in Counter(e.how for e in endings).most_common():
+        print(f"{n:6} {how}")
+    for e in endings:
+        if e.bad:
+            print(f"call {e.number} of seed {seed}: {e.call}: {e.how} {e.text}")
+    return int(any(e.bad for e in endings))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,65 @@
+"""What the demos of heat share: a flat sheet that conducts through its thickness only, and its table of errors."""
+
+import numpy as np
+from common import save, say
+
+import formingx as fx
+from formingx.figures import figure
+from formingx.heat.reference import Slab
+
+SHEET = fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=1800.0)      # W/(m K), kg/m3, J/(kg K)
+
+
+def slab(thickness, elements):
+    """A narrow disc, its rim insulated: one column of elements, finer towards both faces; m."""
+    mesh = fx.mesh.disc(radius=0.03 * thickness, thickness=thickness, elements=(1, elements))
+    z = mesh.domain.geometry.x[:, 1]
+    levels = thickness * (1 - np.cos(np.pi * np.arange(elements + 1) / elements)) / 2
+    z[:] = np.interp(np.rint(2 * elements * z / thickness) / 2, np.arange(elements + 1), levels)
+    return mesh
+
+
+def same_slab(thickness):
+    """The same sheet for the reference solutions."""
+    return Slab(thickness, SHEET.conductivity, SHEET.density * SHEET.heat_capacity)
+
+
+def at_times(names, times, values):
+    """{"NAME_C_at_s": {time: value}} of values, shape (times, names)."""
+    return {f"{name}_C_at_s": {f"{t:g}": float(v) for t, v in zip(times, column)}
+            for name, column in zip(names, np.transpose(values))}
+
+
+def cost(run):
+    """Steps, estimated errors, heat balance, in words."""
+    return (f"{len(run.times) - 1} steps, estimated error of one at most {run.errors.max():.1e} C, heat balance of each"
+            f" within {np.abs(run.balance).max():.0e}")
+
+
+def print_errors(name, names, times, values, exact, span, run):
+    """The table of a run and how far it is off; returns the largest error over the span of temperatures."""
+    off = (values - exact) / span
+    say(f"{name}: {cost(run)}", f"  {'s':>6}" + "".join(f"{n:>12}" for n in names) + "    largest error / span")
+    for t, row, e in zip(times, values, off):
+        say(f"  {t:6g}" + "".join(f"{v:12.4f}" for v in row) + f"    {np.abs(e).max():.1e}")
+    return float(np.abs(off).max())
+
+
+def draw(runs, file, columns, between):
+    """Temperature through the thickness of every run, {title: run}, and its extremes over time.
+
+    between(axes, title, run) adds to a plot.
+    """
+    drawing, axes = figure(columns, width=4.4, height=4.0, rows=-(-(len(runs) + 1) // columns))
+    for a, (title, run) in zip(axes, runs.items()):
+        run.plot_through(scale=1e3, axes=a)
+        a.set(title=title, xlabel="above the bottom face, mm")
+        between(a, title, run)
+        a.legend(frameon=False, fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.14))
+    for k, (title, run) in enumerate(runs.items()):
+        extremes = [[run.coldest(t).temperature for t in run.times], [run.hottest(t).temperature for t in run.times]]
+        axes[-1].plot(run.times, extremes[0], color=f"C{k}", label=title)
+        axes[-1].plot(run.times, extremes[1], color=f"C{k}", linestyle="--")
+    axes[-1].set(title="coldest and hottest (dashed) place", xlabel="time, s", ylabel="temperature, °C")
+    axes[-1].legend(frameon=False, fontsize=8, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.14))
+    save(drawing, file)

@@ -1,0 +1,95 @@
+"""Whether a body has a shape: lengths along the hoop and areas in the plane are positive wherever they are looked at.
+
+det F > 0 at the quadrature points is not enough: beyond the axis the hoop stretch and the in-plane determinant are both
+negative, and between those points a strongly bent edge may turn an element inside out.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import basix
+import basix.ufl
+import numpy as np
+
+from .. import _compat
+
+_MIDDLES = {basix.CellType.triangle: [[0.5, 0.5], [0, 0.5], [0.5, 0]], basix.CellType.interval: [[0.5]]}
+"""Of the edges. (Corners are left out: where a free side turns onto a plate a corner is singular, and the determinant
+there has no limit.)"""
+
+
+class Least(NamedTuple):
+    """The smallest value found: which quantity ("hoop stretch" or "in-plane determinant"), its value, and the reference
+    point (R, Z) where it is, length."""
+
+    quantity: str
+    value: float
+    point: tuple[float, float]
+
+
+class Admissible:
+    """Hoop stretch and in-plane determinant of a formulation at two sets of quadrature points and at edge midpoints.
+
+    The in-plane determinant is det(1 + grad u) of the two in-plane components; on the axis the hoop stretch is its
+    limit, dr/dR. Membranes have a hoop stretch only. All that does not depend on the state is computed once; a
+    state then costs some products of arrays.
+
+    Args:
+        forms: a `Formulation`; its `w` is what is looked at.
+    """
+
+    def __init__(self, forms: Any):
+        self._forms, domain = forms, forms.domain
+        self._solid = domain.topology.dim == 2
+        self._has_hoop = forms.scene.kinematics.axisymmetric
+        cell = basix.CellType[domain.topology.cell_name()]
+        scene = forms.scene
+        inside = basix.make_quadrature(cell, scene.quadrature_degree)[0]
+        beside = basix.make_quadrature(cell, scene.quadrature_degree + 1)[0]
+        points = np.concatenate([inside, beside, np.array(_MIDDLES[cell], dtype=float)])
+        n = domain.topology.index_map(domain.topology.dim).size_local
+        self._dofs = [forms.space.sub(0).sub(i).dofmap.list[:n] for i in (0, 1)]
+        shapes = forms.displacement_element.tabulate(1, points)                    # (1 + dim, points, dofs)
+        geometry = basix.ufl.element("Lagrange", domain.basix_cell(), _compat.coordinate_map(domain).degree)
+        map_shapes = geometry.tabulate(1, points)
+        nodes = domain.geometry.x[_compat.cell_nodes(domain)[:n], :2]
+        self._X = np.einsum("pk,ckx->cpx", map_shapes[0], nodes)
+        self._values, self._on_axis = shapes[0], np.abs(self._X[..., 0]) <= 1e-12 * forms.length
+        self._R = np.where(self._on_axis, 1.0, self._X[..., 0])
+        if self._solid:
+            jacobian = np.einsum("dpk,ckx->cpxd", map_shapes[1:], nodes)
+            gradients = np.einsum("dpa,cpdx->cpxa", shapes[1:], np.linalg.inv(jacobian))
+            self._gradients = gradients.reshape(n, -1, shapes.shape[2])            # (cells, points x 2, dofs)
+
+    def least(self) -> Least:
+        """The smallest hoop stretch or in-plane determinant at the state last set; collective.
+
+        Of values that are not finite, the first.
+        """
+        found = [Least("in-plane determinant", np.inf, (0.0, 0.0))]
+        for quantity, values in self._quantities().items():
+            if values.size:
+                k = np.unravel_index(np.argmin(np.where(np.isfinite(values), values, -np.inf)), values.shape)
+                found.append(Least(quantity, float(values[k]), tuple(self._X[k].tolist())))
+        parts = [part for parts in self._forms.comm.allgather(found) for part in parts]
+        return min(parts, key=lambda part: part.value if np.isfinite(part.value) or part.value > 0 else -np.inf)
+
+    def holds(self) -> bool:
+        """True if all of them are positive, all ranks, at the state last set; collective."""
+        mine = all(bool(np.all(values > 0)) for values in self._quantities().values())
+        return all(self._forms.comm.allgather(mine))
+
+    def _quantities(self) -> dict[str, np.ndarray]:
+        """{quantity: its values at the points of this rank's own cells, shape (cells, points)}."""
+        w, size = self._forms.w.x.array, self._forms.length
+        u = np.stack([w[dofs] for dofs in self._dofs], -1) * size                  # (cells, dofs, 2)
+        found, along = {}, np.ones(())
+        if self._solid:
+            by_R, by_Z = np.moveaxis((self._gradients @ u).reshape(*self._X.shape, 2), 2, 0)
+            along = 1 + by_R[..., 0]
+            found["in-plane determinant"] = along * (1 + by_Z[..., 1]) - by_Z[..., 0] * by_R[..., 1]
+        if self._has_hoop:
+            hoop = 1 + (u[..., 0] @ self._values.T) / self._R
+            found["hoop stretch"] = np.where(self._on_axis, along, hoop)
+        return found

@@ -1,0 +1,128 @@
+"""Histories: what a problem depends on besides unknowns, control and time, and what only accepted states change."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from .. import _compat
+from ..errors import InputError
+
+
+class History(Protocol):
+    """What one part of a scene remembers of the states that were accepted.
+
+    A memory (`get`) is never changed, and fits only the ranks that it was made on; what `save` gives fits any.
+    """
+
+    def start(self) -> None:
+        """Nothing has happened yet."""
+
+    def advance(self, x: np.ndarray, control: float) -> None:
+        """The state that the forms hold now is accepted; x: its owned unknowns. It becomes the beginning of a step."""
+
+    def get(self) -> Any:
+        """The memory now."""
+
+    def put(self, memory: Any) -> None:
+        """Go back, or on, to a memory."""
+
+    def save(self, memory: Any) -> dict[str, Any]:
+        """A memory as JSON can hold it, independent of ranks and the same on all of them; collective."""
+
+    def load(self, data: dict[str, Any]) -> Any:
+        """The memory, own part, of what `save` gave; an InputError if it does not fit this scene."""
+
+
+class Memory(NamedTuple):
+    """Of a material: the process time of the last accepted state, and {name: values in the owned cells of the layers,
+    shape (cells, points, components)}."""
+
+    time: float
+    values: dict[str, np.ndarray]
+
+
+class MaterialHistory:
+    """Internal variables of one material at the quadrature points of the energy.
+
+    Args:
+        forms: the `Formulation`; terms: the `MaterialTerms`.
+    """
+
+    def __init__(self, forms: Any, terms: Any):
+        self._forms, self._terms = forms, terms
+        self._cells = terms.cells                                   # a ghost is computed as its owner computes it
+        topology = forms.domain.topology
+        self._own = self._cells[self._cells < topology.index_map(topology.dim).size_local]
+        self._numbers = topology.original_cell_index[self._own]     # in the script's mesh, whatever the ranks
+        updated = terms.updated(forms.F)
+        self._sizes = {name: int(np.prod(f.ufl_shape, dtype=int)) for name, f in terms.internal.items()}
+        flat = [ufl.as_ufl(updated[name])[i] if i else ufl.as_ufl(updated[name])
+                for name, f in terms.internal.items() for i in np.ndindex(f.ufl_shape)]
+        self._updated = fem.Expression(ufl.as_vector(flat), terms.places, jit_options=_compat.JIT_OPTIONS)
+        weights = terms.material.error_weights
+        self.weights = {name: weights.get(name, 1.0) for name in terms.internal}     # of errors in time
+        self.start()
+
+    def start(self) -> None:
+        """See `History`."""
+        for name, rest in self._terms.material.internal.items():
+            self._set(name, self._cells, np.asarray(rest, dtype=float).ravel())
+        self._terms.start.value = 0.0
+
+    def advance(self, x: np.ndarray, control: float) -> None:
+        """See `History`."""
+        if len(self._cells):
+            values = self._updated.eval(self._forms.domain, self._cells)
+            values = values.reshape(len(self._cells), len(self._terms.places), -1)
+            parts = np.split(values, np.cumsum(list(self._sizes.values()))[:-1], axis=2)
+            for name, part in zip(self._sizes, parts, strict=True):
+                self._set(name, self._cells, part)
+        self._terms.start.value = self._forms.time_at(control)
+
+    def get(self) -> Memory:
+        """See `History`."""
+        values = {name: self._array(name)[self._points(name, self._own)] for name in self._sizes}
+        for array in values.values():
+            array.setflags(write=False)
+        return Memory(float(self._terms.start.value), values)
+
+    def put(self, memory: Memory) -> None:
+        """See `History`."""
+        for name, values in memory.values.items():
+            self._set(name, self._own, values)
+            self._terms.internal[name].x.scatter_forward()
+        self._terms.start.value = memory.time
+
+    def save(self, memory: Memory) -> dict[str, Any]:
+        """See `History`."""
+        gather = self._forms.comm.allgather
+        numbers = np.concatenate(gather(self._numbers))
+        order = np.argsort(numbers)
+        return {"time": memory.time, "cells": numbers[order].tolist(),
+                "values": {name: np.concatenate(gather(v))[order].tolist() for name, v in memory.values.items()}}
+
+    def load(self, data: dict[str, Any]) -> Memory:
+        """See `History`."""
+        numbers, values = np.array(data.get("cells", []), dtype=np.int64), data.get("values", {})
+        rows = np.minimum(np.searchsorted(numbers, self._numbers), len(numbers) - 1)
+        found = {name: np.array(v, dtype=float) for name, v in values.items()}
+        q = len(self._terms.places)
+        if list(found) != list(self._sizes) or not np.array_equal(numbers[rows], self._numbers) \
+                or any(v.shape != (len(numbers), q, self._sizes[name]) for name, v in found.items()):
+            raise InputError(f"what {self._terms.material} remembers is of another mesh, or another material")
+        return Memory(float(data["time"]), {name: v[rows] for name, v in found.items()})
+
+    def _array(self, name: str) -> np.ndarray:
+        """All values of a variable, a row for each point."""
+        return self._terms.internal[name].x.array.reshape(-1, self._sizes[name])
+
+    def _points(self, name: str, cells: np.ndarray) -> np.ndarray:
+        """Rows of the points of some cells, shape (cells, points)."""
+        return self._terms.internal[name].function_space.dofmap.list[cells]
+
+    def _set(self, name: str, cells: np.ndarray, values: np.ndarray) -> None:
+        self._array(name)[self._points(name, cells)] = values

@@ -1,0 +1,81 @@
+"""What a load sees of the body: the fields of its virtual work, and the integrals that it may take."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import ufl
+from dolfinx import fem, la
+
+from ..errors import InputError, known
+
+
+class Face(NamedTuple):
+    """A boundary of the body. normal: outward, at rest (UFL); measure: reference length; weight: area per length."""
+
+    normal: Any
+    measure: Any
+    weight: Any
+
+    def integral(self, integrand: Any) -> Any:
+        """The integral (UFL) over the reference area."""
+        return integrand * self.weight * self.measure
+
+
+class LoadedBody:
+    """The body of a scene as `Load.virtual_work` sees it, a solid or a membrane.
+
+    Attributes:
+        u, du, X: displacement, virtual displacement and reference position (UFL, length, shape (2,): components r, z).
+        F: deformation gradient (UFL, shape (3, 3)).
+        kinematics: of the scene.
+        stress, length, volume: largest shear modulus, largest extent and reference volume, in the user's units.
+    """
+
+    def __init__(self, forms: Any):
+        self._forms = forms
+        self.u, self.du, self.X, self.F = forms.u, forms.test_displacement(), forms.X, forms.F
+        self.kinematics = forms.scene.kinematics
+        self.stress, self.length, self.volume = forms.stress, forms.length, forms.volume
+
+    def integral(self, integrand: Any, layer: str | None = None) -> Any:
+        """The integral (UFL) over the reference volume, of all layers or of one; per unit depth in plane strain."""
+        layers = self._forms.mesh.layers
+        if layer is not None:
+            known("body.integral: layer", layer, layers)
+        return self._forms.weighted(integrand, list(layers) if layer is None else [layer])
+
+    def face(self, on: str, quadrature_degree: int = 5) -> Face:
+        """A boundary by its name (of a membrane its lower or its upper face)."""
+        normal, measure = self._forms.face(on, quadrature_degree)
+        return Face(normal, measure, self.kinematics.weight(self.X))
+
+    def constant(self, value: float) -> fem.Constant:
+        """A number for a form, which is not compiled again when it changes."""
+        return self._forms.constant(value)
+
+    def thickness(self, boundary: str) -> float:
+        """Volume of the body over the area of a boundary, length."""
+        return self._forms.thickness(boundary)
+
+    def work(self, load: Any, value: Any) -> Any:
+        """The virtual work of a load, or an InputError unless it is a form that is linear in `du`."""
+        form = load.virtual_work(self, value)
+        if not isinstance(form, ufl.Form) or [v.number() for v in form.arguments()] != [0]:
+            raise InputError(f"{load!r}: virtual_work must return a UFL form linear in body.du, such as"
+                             f" body.integral(b * body.du[1]); this is {str(form)[:60]}")
+        return form
+
+    def unit(self, load: Any) -> float:
+        """The value at which the nodal forces of a load at rest add up to stress times volume over length."""
+        form = self._forms.compile(self.work(load, self.constant(1.0)))
+        index_map = self._forms.space.dofmap.index_map
+        vector = la.vector(index_map, 1)
+        fem.assemble_vector(vector.array, form)
+        vector.scatter_reverse(la.InsertMode.add)
+        total = self._forms.comm.allreduce(float(np.abs(vector.array[:index_map.size_local]).sum()))
+        if not 0 < total < np.inf:
+            raise InputError(f"{load!r}: the sum of its forces at rest is {total:g} per unit: give it a"
+                             f" unit(body) of its own")
+        return self.stress * self.volume / total

@@ -1,0 +1,112 @@
+"""A material in the forms: its constants as coefficients, its internal variables, its energies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import basix
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from ..errors import InputError
+from ..materials.constants import Varying
+
+
+class MaterialTerms:
+    """One material of some layers.
+
+    Args:
+        forms: the `Formulation`.
+
+    Attributes:
+        constants: {name: coefficient}: a `Constant` for a number; for what varies a `Function` or another UFL scalar.
+        rest_stress: stress that the energy leaves at F = I (UFL scalar).
+        internal: {name: `Function` of a quadrature element} of the internal variables at the beginning of the step.
+        start: the process time there (`Constant`).
+        places: of the quadrature points of the energy in the reference cell, shape (q, dimension).
+    """
+
+    def __init__(self, forms: Any, material: Any, names: list[str]):
+        self.forms, self.material, self.names = forms, material, names
+        self.cells = forms.cells_of(names)
+        self.X = forms.X
+        cell, degree = forms.domain.basix_cell(), forms.scene.quadrature_degree
+        self.places = basix.make_quadrature(cell, degree)[0]
+        self.constants = {name: value.expression(self) if isinstance(value, Varying) else forms.constant(value)
+                          for name, value in material.constants().items()}
+        self.rest_stress = self._rest_stress(self.constants) if material.varies else forms.constant(
+            material.rest_stress)
+        self.internal = {name: self.quadrature_function(np.shape(value)) for name, value in material.internal.items()}
+        self.start = forms.constant(0.0)
+
+    def quadrature_function(self, shape: tuple[int, ...] = ()) -> fem.Function:
+        """A `Function` with a value of a shape at every quadrature point of the energy."""
+        element = basix.ufl.quadrature_element(self.forms.domain.basix_cell(), value_shape=shape, scheme="default",
+                                               degree=self.forms.scene.quadrature_degree)
+        return fem.Function(fem.functionspace(self.forms.domain, element))
+
+    def of_position(self, function: Any) -> fem.Function:
+        """f(R, Z) at the quadrature points of the energy, exactly."""
+        found, layer = self.quadrature_function(), self.names[0]
+        found.interpolate(lambda X: function(X[0], self.forms.mid(layer, X[0], X[1])), self.cells)
+        return found
+
+    def of_mesh(self, expression: Any) -> Any:
+        """A UFL scalar of the scene's mesh, where the fields live on it."""
+        if self.forms.domain is not self.forms.scene.mesh.domain:
+            raise InputError(f"{self.material}: a membrane has a mesh of its own: give the constant as a function of"
+                             f" (R, Z)")
+        return expression
+
+    def step_energy(self, F: Any) -> Any:
+        """The potential of the step, per reference volume (UFL, stress)."""
+        if not self.internal:
+            return self.material.strain_energy(F, **self.constants)
+        return self.material.step_energy(F, self.internal, self._time_step, **self.constants)
+
+    def stored_energy(self, F: Any) -> Any:
+        """The energy that is stored, per reference volume (UFL, stress)."""
+        if not self.internal:
+            return self.material.strain_energy(F, **self.constants)
+        return self.material.stored_energy(F, self.internal, **self.constants)
+
+    def dissipation(self, F: Any) -> Any:
+        """The power that is dissipated, per reference volume (UFL, stress over time)."""
+        return self.material.dissipation(F, self.internal, **self.constants)
+
+    def updated(self, F: Any) -> dict[str, Any]:
+        """{name: internal variable at the end of the step (UFL)}."""
+        found = self.material.updated(F, self.internal, self._time_step, **self.constants)
+        shapes = {name: ufl.as_ufl(value).ufl_shape for name, value in found.items()}
+        wanted = {name: np.shape(value) for name, value in self.material.internal.items()}
+        if shapes != wanted:
+            raise InputError(f"{self.material}: updated must return the internal variables {wanted}, by shape; it"
+                             f" returns {shapes}")
+        return found
+
+    @property
+    def _time_step(self) -> Any:
+        return self.forms.time - self.start
+
+    def set(self, name: str, value: float) -> None:
+        """Give a constant that is a number another value; the rest stress follows."""
+        if self.material.varies:
+            raise InputError(f"{self.material}: has constants that vary: make another scene for other values")
+        values = {n: float(c.value) for n, c in self.constants.items()} | {name: value}
+        self.rest_stress.value = self.material.with_constants(values.values()).rest_stress
+        self.constants[name].value = value
+
+    def as_variable(self, name: str) -> tuple[Any, dict[Any, Any]]:
+        """(a constant as a UFL variable v, {what is in the forms: what is there instead as a function of v})."""
+        v = ufl.variable(self.constants[name])
+        instead = {self.constants[name]: v}
+        if not self.material.varies:
+            instead[self.rest_stress] = self._rest_stress(self.constants | {name: v})
+        return v, instead
+
+    def _rest_stress(self, constants: dict[str, Any]) -> Any:
+        """dW/dF11 at F = I (UFL scalar)."""
+        F = ufl.variable(ufl.Identity(3))
+        return ufl.diff(self.material.strain_energy(F, **constants), F)[0, 0]

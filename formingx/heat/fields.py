@@ -1,0 +1,107 @@
+"""A temperature all over a body: a number, a function, a table, a file, or the end of an earlier run."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from ..discrete.locate import locate
+from ..errors import InputError, finite
+from ..mesh import Mesh
+from ..results.files import tables
+from ..tables import Table
+
+
+def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperature") -> np.ndarray:
+    """A field at points of a mesh, shape (n, 2), length; each rank may have points of its own. Collective.
+
+    Args:
+        field: a number; a `Table` over R; a function of arrays (R, Z), shape (n,) each; the name of a CSV file with the
+            columns R, Z, T (points of a plane, or of a line along R or Z); what `fx.heat` returned (its last state); a
+            scalar DOLFINx Function on this mesh.
+        name: what it is called in an error.
+
+    Raises:
+        InputError: something else, a value that is not finite, a point outside a table or a file.
+    """
+    parts = mesh.comm.allgather(points)
+    first = sum(len(part) for part in parts[: mesh.comm.rank])
+    # all ranks look at all points, so that they raise the same errors
+    return _values(field, np.concatenate(parts), name)[first: first + len(points)]
+
+
+def _values(field: Any, points: np.ndarray, name: str) -> np.ndarray:
+    """`values_at` points that are the same on all ranks."""
+    R, Z = points.T
+    if isinstance(field, Table):
+        field.check(R, "R")
+        found = field(R)
+    elif isinstance(field, str | os.PathLike):
+        found = _from_file(field, points)
+    elif isinstance(field, fem.Function):
+        found = PointReader(field.function_space, points).read(field.x.array)
+    elif hasattr(field, "temperature"):
+        return _values(field.temperature(), points, name)
+    elif callable(field):
+        found = np.broadcast_to(np.asarray(field(R, Z), dtype=float), len(points))
+    else:
+        found = np.full(len(points), finite(name, field))
+    if not np.all(np.isfinite(found)):
+        r, z = points[np.argmin(np.isfinite(found))]
+        raise InputError(f"{name} = {field!r}: is not a finite number at (R, Z) = ({r:.6g}, {z:.6g})")
+    return found
+
+
+class PointReader:
+    """Reads functions of a space at fixed points, shape (n, 2), the same on all ranks.
+
+    Raises:
+        InputError: a point outside the mesh.
+    """
+
+    def __init__(self, space: Any, points: np.ndarray):
+        domain, element = space.mesh, space.element.basix_element
+        X = domain.geometry.x
+        self._comm, self._n = domain.comm, len(points)
+        size = float(self._comm.allreduce(np.abs(X).max(initial=0.0), MPI.MAX))
+        self._mine, cells, reference = locate(domain, points, size)
+        self._dofs = space.dofmap.list[cells]
+        self._weights = (element.tabulate(0, reference)[0, :, :, 0] if len(cells)
+                         else np.zeros((0, element.dim)))
+
+    def read(self, array: np.ndarray) -> np.ndarray:
+        """The values of a function with these coefficients (ghosts included), shape (n,), all ranks; collective."""
+        values = np.zeros(self._n)
+        values[self._mine] = (self._weights * array[self._dofs]).sum(1)
+        return self._comm.allreduce(values)
+
+
+def _from_file(file: Any, points: np.ndarray) -> np.ndarray:
+    """Linear between the points of a CSV file."""
+    from scipy.interpolate import LinearNDInterpolator
+    table = tables.read(file)
+    R, Z, T = (table.take(column) for column in ("R", "Z", "T"))
+    spans = np.ptp(R), np.ptp(Z)
+    for axis, x, other in ((0, R, spans[1]), (1, Z, spans[0])):
+        if other <= 1e-9 * max(spans):
+            order = np.argsort(x)
+            low, high, near = x[order[0]], x[order[-1]], 1e-9 * np.ptp(x)
+            at = points[:, axis]
+            _inside(table.name, points, (at >= low - near) & (at <= high + near))
+            return np.interp(at, x[order], T[order])
+    scale = np.array(spans)
+    centre = np.array([R.mean(), Z.mean()])
+    inner = centre + (points - centre) * (1 - 1e-9)         # a point on the outline is inside
+    found = LinearNDInterpolator(np.column_stack([R, Z]) / scale, T)(inner / scale)
+    _inside(table.name, points, np.isfinite(found))
+    return found
+
+
+def _inside(name: str, points: np.ndarray, inside: np.ndarray) -> None:
+    if not np.all(inside):
+        r, z = points[np.argmin(inside)]
+        raise InputError(f"{name}: point (R, Z) = ({r:.6g}, {z:.6g}) of the body lies outside the points of the file")

@@ -1,0 +1,141 @@
+"""One-dimensional conduction through a slab, solved without finite elements, to compare with.
+
+Series: eigenfunctions of a slab whose faces lose heat by convection (Carslaw and Jaeger, Conduction of Heat in Solids,
+1959, section 3.11), about the steady state, which holds the source. Transform: sheet and tool in contact, by Laplace
+transform and Talbot's inversion (Abate and Valko, Int. J. Numer. Methods Eng. 60 (2004) 979-993). Lines: finite volumes
+and a stiff solver, for faces that radiate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Slab:
+    """A slab from x = 0 to `thickness`; numbers in consistent units."""
+
+    thickness: float
+    conductivity: float
+    capacity: float
+    """Heat per volume and degree."""
+
+    @property
+    def diffusivity(self) -> float:
+        """k/capacity."""
+        return self.conductivity / self.capacity
+
+
+def series(slab: Slab, start: float, h: tuple[float, float], air: tuple[float, float], x: Any, times: Any,
+           source: Callable | None = None, terms: int = 200) -> np.ndarray:
+    """Temperatures, shape (len(times), len(x)); faces x = 0 and x = d lose h (T - air), `source`(x) heats the inside.
+
+    The first root must belong to a decaying mode: at least one h above 0.
+    """
+    from scipy.optimize import brentq
+    d, k = slab.thickness, slab.conductivity
+    b0, b1 = h[0] * d / k, h[1] * d / k
+    # tan(m) = m (b0 + b1)/(m^2 - b0 b1), one root in each interval of length pi
+    roots = np.array([brentq(lambda m: (m * m - b0 * b1) * np.sin(m) - m * (b0 + b1) * np.cos(m),
+                             n * np.pi + 1e-9, (n + 1) * np.pi - 1e-12, xtol=1e-14) for n in range(terms)])
+    nodes, weights = np.polynomial.legendre.leggauss(4 * terms)
+    s, weights = (nodes + 1) / 2, weights / 2
+
+    def shapes(at):
+        m = roots[:, None]
+        return np.cos(m * at) + b0 / m * np.sin(m * at)
+
+    steady = _steady(slab, h, air, source)
+    modes = shapes(s)
+    amplitudes = (modes @ (weights * (start - steady(d * s)))) / (modes**2 @ weights)
+    x, times = np.asarray(x, dtype=float), np.asarray(times, dtype=float)
+    decay = np.exp(-np.outer(times, roots**2) * slab.diffusivity / d**2)
+    return steady(x) + (decay * amplitudes) @ shapes(x / d)
+
+
+def _steady(slab: Slab, h: tuple, air: tuple, source: Callable | None) -> Callable:
+    """-k T'' = source with both faces, by Gauss quadrature."""
+    d, k = slab.thickness, slab.conductivity
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+
+    def twice(x):                                           # -T''/k integrated twice from 0, and once
+        if source is None:
+            return 0.0 * x, 0.0 * x
+        y = x[..., None] * (nodes + 1) / 2
+        S = source(y) * weights * x[..., None] / 2
+        return -((x[..., None] - y) * S).sum(-1) / k, -S.sum(-1) / k
+    P, dP = (float(v) for v in twice(np.array(d)))
+    # T = a + b x + P(x): k b = h0 (a - air0); -k (b + dP(d)) = h1 (a + b d + P(d) - air1)
+    a, b = np.linalg.solve([[-h[0], k], [h[1], k + h[1] * d]], [-h[0] * air[0], h[1] * (air[1] - P) - k * dP])
+    return lambda x: a + b * np.asarray(x) + twice(np.asarray(x, dtype=float))[0]
+
+
+def on_tool(sheet: Slab, tool: Slab, conductance: float, start: float, tool_start: float, h: float, air: float,
+            x: Any, depths: Any, times: Any) -> tuple[np.ndarray, np.ndarray]:
+    """A sheet laid on a tool at t = 0: temperatures of the sheet and of the tool, (len(times), len(x or depths)).
+
+    x counts from the touching face, where the sheet loses `conductance` (T - tool), to the other, which loses
+    h (T - air); depths count into the tool, whose back is held at `tool_start`.
+    """
+    x, depths = (np.asarray(v, dtype=float) for v in (x, depths))
+
+    def transformed(s):
+        p, q = (np.sqrt(s / slab.diffusivity) for slab in (sheet, tool))
+        kp, kq = sheet.conductivity * p, tool.conductivity * q
+        near, far = np.exp(-p * sheet.thickness), np.exp(-q * tool.thickness)
+        # sheet: start/s + A exp(-p x) + B exp(-p (d - x)); tool: tool_start/s + C exp(-q y) + D exp(-q (L - y))
+        matrix = np.array([[kp + conductance, (conductance - kp) * near, -conductance, -conductance * far],
+                           [(h - kp) * near, kp + h, 0, 0],
+                           [-conductance, -conductance * near, kq + conductance, (conductance - kq) * far],
+                           [0, 0, far, 1]])
+        gap = conductance * (tool_start - start) / s
+        A, B, C, D = np.linalg.solve(matrix, [gap, h * (air - start) / s, -gap, 0])
+        return np.concatenate([start / s + A * np.exp(-p * x) + B * np.exp(-p * (sheet.thickness - x)),
+                               tool_start / s + C * np.exp(-q * depths) + D * np.exp(-q * (tool.thickness - depths))])
+    values = np.array([_talbot(transformed, t) for t in times])
+    return values[:, : len(x)], values[:, len(x):]
+
+
+def _talbot(transformed: Callable, t: float, n: int = 20) -> np.ndarray:
+    """The inverse Laplace transform at a time, on Talbot's contour with n points; good to about 1e-9."""
+    theta = np.arange(1, n) * np.pi / n
+    r = 2 * n / (5 * t)
+    cot = 1 / np.tan(theta)
+    points = r * theta * (cot + 1j)
+    weights = np.exp(points * t) * (1 + 1j * theta * (1 + cot**2) - 1j * cot)
+    total = 0.5 * np.exp(r * t) * transformed(complex(r)).real
+    return r / n * (total + sum((w * transformed(s)).real for s, w in zip(points, weights)))
+
+
+def lines(slab: Slab, start: float, fluxes: tuple[Callable, Callable], times: Any, cells: int = 400,
+          source: Callable | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """(x, temperatures, shape (len(times), len(x))) by finite volumes; fluxes(T) go into the faces x = 0 and x = d.
+
+    Nodes at both faces and between equal cells; the error falls with the square of the cells (Richardson's
+    extrapolation from half as many takes it away).
+    """
+    coarse, fine = (_lines(slab, start, fluxes, times, n, source) for n in (cells // 2, cells))
+    x = np.linspace(0, slab.thickness, cells // 2 + 1)
+    return x, (4 * fine[:, ::2] - coarse) / 3
+
+
+def _lines(slab: Slab, start: float, fluxes: tuple, times: Any, cells: int, source: Callable | None) -> np.ndarray:
+    from scipy.integrate import solve_ivp
+    from scipy.sparse import diags
+    n, dx = cells + 1, slab.thickness / cells
+    heated = np.zeros(n) if source is None else source(np.linspace(0, slab.thickness, n))
+    width = np.full(n, dx)
+    width[[0, -1]] /= 2
+
+    def rate(_, T):
+        through = -slab.conductivity * np.diff(T) / dx
+        into = np.concatenate([[fluxes[0](T[0])], through]) - np.concatenate([through, [-fluxes[1](T[-1])]])
+        return (into + heated * width) / (slab.capacity * width)
+    pattern = diags([1, 1, 1], [-1, 0, 1], shape=(n, n))
+    solved = solve_ivp(rate, (0, max(times)), np.full(n, start), "Radau", t_eval=times, rtol=1e-9, atol=1e-9,
+                       jac_sparsity=pattern)
+    return solved.y.T

@@ -1,0 +1,99 @@
+"""Relaxing branches in homogeneous tests: their elastic strains, integrated in time.
+
+In principal direction i a branch has the elastic logarithmic strain w_i, part of the strain e_i = ln l_i, and the
+Kirchhoff stress mu exp(2 w_i). It flows by dw_i/dt = de_i/dt - f_i(w)/(2 tau), where f is its material's law.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from ..errors import ConvergenceError, InputError, known
+from .homogeneous import MODES
+
+_ACCURACY = 1e-10
+"""Relative error of a step in time; a test of some hundred steps keeps 1e-8."""
+
+BETWEEN = ("stretch", "strain")
+"""What grows at a constant rate between two times: the stretch, or the logarithmic strain (a constant Hencky rate)."""
+
+
+def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stretches: np.ndarray,
+                    between: str = "stretch") -> np.ndarray:
+    """w_i of every branch at every time, shape (n, branches, 3).
+
+    Args:
+        flow: f, called with w of shape (branches, 3).
+        tau: relaxation times, shape (branches,).
+        mode: a test of `homogeneous.MODES`.
+        times, stretches: shape (n,). At rest before; a change of the stretch without one of the time is a jump.
+        between: one of `BETWEEN`.
+    """
+    direction = np.array([1, MODES[mode], -1 - MODES[mode]])
+    strain, tau = np.log(stretches), np.asarray(tau, float)[:, None]
+    w = np.empty((len(times), len(tau), 3))
+    w[0] = strain[0] * direction
+    for first, last in _pieces(times, stretches if between == "stretch" else strain):
+        duration = times[last] - times[first]
+        if duration == 0:
+            w[last] = w[first] + (strain[last] - strain[first]) * direction
+            continue
+        start, speed = stretches[first], (stretches[last] - stretches[first]) / duration
+
+        def rate(t, x, start=start, speed=speed, constant=(strain[last] - strain[first]) / duration):
+            r = speed / (start + speed * t) if between == "stretch" else constant
+            x = x.reshape(-1, 3)
+            return (r * direction - flow(x) / (2 * tau)).ravel()
+
+        w[first + 1:last + 1] = integrate(rate, w[first].ravel(), times[first + 1:last + 1] - times[first],
+                                          band=2).reshape(last - first, -1, 3)
+    return w
+
+
+def integrate(rate: Callable, start: np.ndarray, times: np.ndarray, band: int | None = None) -> np.ndarray:
+    """The solution of dy/dt = rate(t, y), y(0) = start, at ascending times above 0; shape (n, unknowns).
+
+    Args:
+        band: the unknowns that depend on each other are at most so far apart; None: all may.
+
+    Raises:
+        ConvergenceError: the integration came to an end before.
+    """
+    from scipy.integrate import solve_ivp
+    found = solve_ivp(rate, (0, times[-1]), start, method="LSODA", t_eval=times, rtol=_ACCURACY, atol=_ACCURACY / 10,
+                      lband=band, uband=band)
+    if not found.success or not np.all(np.isfinite(found.y)):
+        raise ConvergenceError(f"the branches cannot be integrated in time: {found.message}")
+    return found.y.T
+
+
+def checked(name: str, mode: Any, times: Any, stretches: Any, between: Any) -> tuple[np.ndarray, np.ndarray]:
+    """(times, stretches) of a test as arrays of shape (n,), or an InputError that begins with `name`."""
+    known(f"{name}: mode", mode, MODES)
+    known(f"{name}: between", between, BETWEEN)
+    try:
+        t, l = np.asarray(times, float), np.asarray(stretches, float)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: times and stretches must be numbers") from None
+    if t.ndim != 1 or t.shape != l.shape or not len(t):
+        raise InputError(f"{name}: stretches have the shape {l.shape}, times {t.shape}: must be (n,), a time for each")
+    for i in np.flatnonzero(~(np.isfinite(t) & np.isfinite(l) & (l > 0)))[:1]:
+        raise InputError(f"{name}, point {i}: time = {t[i]:.6g}, stretch = {l[i]:.6g}: must be finite, and the stretch"
+                         f" greater than 0")
+    for i in np.flatnonzero(np.diff(t) < 0)[:1]:
+        raise InputError(f"{name}: time {t[i + 1]:.6g} comes after {t[i]:.6g}: times must not fall")
+    return t, l
+
+
+def _pieces(times: np.ndarray, values: np.ndarray) -> Iterator[tuple[int, int]]:
+    """(first, last) of the parts of a history in which the values grow at one rate."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rates = np.diff(values) / np.diff(times)
+    scale = 1e-9 * np.abs(rates[np.isfinite(rates)]).max(initial=0)
+    whole = np.where(np.isfinite(rates), np.abs(np.diff(rates, prepend=np.nan)), np.inf) <= scale
+    begins = [*np.flatnonzero(~whole), len(rates)]
+    yield from itertools.pairwise(begins)

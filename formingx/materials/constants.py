@@ -1,0 +1,108 @@
+"""Constants of a material that vary over the body.
+
+A constant may be a number, a function of the reference position, called as f(R, Z) with arrays of shape (n,), a UFL
+expression of the scene's mesh (a DOLFINx `Function` is one), or an object of a class made from `Varying`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from ..errors import InputError
+
+
+class Sample(NamedTuple):
+    """Where constants are looked at before anything is solved: points of this rank's own cells of a layer.
+
+    points: reference (R, Z), shape (m q, 2), length; cells: their numbers, shape (m,); places: of the q points in the
+    reference cell, shape (q, 2); domain: the `dolfinx.mesh.Mesh`.
+    """
+
+    points: np.ndarray
+    cells: np.ndarray
+    places: np.ndarray
+    domain: Any
+
+
+class Varying(ABC):
+    """A constant that varies."""
+
+    @abstractmethod
+    def values(self, sample: Sample) -> np.ndarray:
+        """The values at the points of a sample, shape (n,): for checks, moduli and scales.
+
+        Raises:
+            InputError: it cannot be evaluated there.
+        """
+
+    @abstractmethod
+    def expression(self, fields: Any) -> Any:
+        """The constant in a form (UFL scalar).
+
+        Args:
+            fields: what it may depend on: `fields.X`, the reference position (UFL, shape (2,)), and
+                `fields.of_position(f)`, a coefficient that holds f(R, Z) at the quadrature points of the energy.
+        """
+
+
+class OfPosition(Varying):
+    """f(R, Z) of the reference position; arrays of shape (n,) go in and come out."""
+
+    def __init__(self, function: Callable):
+        self.function = function
+
+    def __call__(self, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
+        """Values, shape (n,), all finite."""
+        try:
+            found = np.broadcast_to(np.asarray(self.function(R, Z), dtype=float), np.shape(R))
+        except (TypeError, ValueError) as error:
+            raise InputError(f"the constant {self!r} must be a function of arrays (R, Z), shape (n,):"
+                             f" {error}") from None
+        for i in np.flatnonzero(~np.isfinite(found))[:1]:
+            raise InputError(f"the constant {self!r} is {found[i]} at (R, Z) = ({R[i]:.6g}, {Z[i]:.6g})")
+        return found
+
+    def values(self, sample):
+        return self(*sample.points.T)
+
+    def expression(self, fields):
+        return fields.of_position(self)
+
+    def __repr__(self) -> str:
+        return getattr(self.function, "__qualname__", repr(self.function))
+
+
+class OfMesh(Varying):
+    """A UFL scalar of the scene's own mesh."""
+
+    def __init__(self, expression: Any):
+        self._expression = expression
+
+    def values(self, sample):
+        domain = ufl.domain.extract_unique_domain(self._expression)
+        if self._expression.ufl_shape != () or domain is not None and domain is not sample.domain.ufl_domain():
+            raise InputError(f"the constant {self!r} must be a scalar of the scene's own mesh")
+        if not len(sample.cells):
+            return np.zeros(0)
+        return fem.Expression(self._expression, sample.places).eval(sample.domain, sample.cells).ravel()
+
+    def expression(self, fields):
+        return fields.of_mesh(self._expression)
+
+    def __repr__(self) -> str:
+        return str(self._expression)
+
+
+def varying(value: Any) -> Varying | None:
+    """A constant as `Varying`, or None if it does not vary."""
+    if isinstance(value, Varying):
+        return value
+    if isinstance(value, ufl.core.expr.Expr):
+        return OfMesh(value)
+    return OfPosition(value) if callable(value) else None

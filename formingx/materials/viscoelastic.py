@@ -1,0 +1,429 @@
+"""Materials that relax: an equilibrium energy and branches, each a spring that flows.
+
+Every branch has a modulus mu and a relaxation time tau, and the energy (mu/2) [tr(Cbar A) - 3] of its elastic strain;
+Cbar = J^(-2/3) C keeps the branches free of a stress at rest. The state of a branch is the tensor Cv, or A, of its law.
+A step of length dt from a known state has a potential whose derivative by F is the stress at its end, so its tangent
+is symmetric and consistent, and nothing is iterated at a point. With x = dt/tau it is regular at dt = 0, where it is
+the elastic energy, and for dt without bound it has no branch.
+
+A symmetric tensor with the block structure of F (`physics.kinematics`) is kept as its entries (11, 22, 12, 33).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import ufl
+
+from ..errors import InputError, instance, known, positive, several
+from ..physics import kinematics
+from . import branches as tests
+from .homogeneous import MODES
+from .material import Material
+
+Entries = tuple[Any, Any, Any, Any]
+_IDENTITY = (1.0, 1.0, 0.0, 1.0)
+
+
+class RelaxingMaterial(Material):
+    """An equilibrium energy and relaxing branches, whatever the law of the branches.
+
+    The constants are those of the equilibrium energy, then mu_1, tau_1, mu_2, ... As a material without time
+    (`strain_energy`, `shear_modulus`, `stress` without times) it is the instantaneous response: nothing has flowed.
+
+    Args:
+        equilibrium: the material that is left when all has relaxed, or None.
+        branches: [(mu, tau), ...], at least one: shear modulus, stress, and relaxation time, time; each above 0.
+    """
+
+    _tensor = ""                    # name of the branches' state
+    _remembers = True               # the last state's C is needed, too
+
+    def __init__(self, equilibrium: Material | None, branches: Any):
+        name = type(self).__name__
+        if equilibrium is not None:
+            instance(f"{name}: equilibrium", equilibrium, Material, "a material, or None")
+            if isinstance(equilibrium, RelaxingMaterial):
+                raise InputError(f"{name}: equilibrium = {equilibrium}: must not relax itself; give all branches here")
+        pairs = several(f"{name}: branches", branches, "(mu, tau)")
+        if not pairs:
+            raise InputError(f"{name}: branches = {branches!r}: must be at least one (mu, tau)")
+        self._equilibrium = equilibrium
+        self.parameters = {} if equilibrium is None else dict(equilibrium.parameters)
+        for k, pair in enumerate(pairs, 1):
+            if len(values := several(f"{name}: branches: number {k}", pair, "mu and tau")) != 2:
+                raise InputError(f"{name}: branches: number {k} is {pair!r}: must be (mu, tau)")
+            for constant, value in zip((f"mu_{k}", f"tau_{k}"), values):
+                if constant in self.parameters:
+                    raise InputError(f"{name}: the equilibrium energy has a constant {constant!r}: that is the name of"
+                                     f" a branch's; give it another")
+                self.parameters[constant] = value
+        self.check()
+
+    def check(self):
+        for k, mu, tau in self._branches(self.parameters):
+            positive(f"{type(self).__name__}: mu_{k}", mu)
+            positive(f"{type(self).__name__}: tau_{k}", tau)
+        if (rest := self.equilibrium) is not None:
+            rest.check()
+        super().check()
+
+    @property
+    def equilibrium(self) -> Material | None:
+        """The material that is left when all branches have relaxed, or None."""
+        if self._equilibrium is None:
+            return None
+        return self._equilibrium.with_constants([self.parameters[k] for k in self._equilibrium.parameters])
+
+    @property
+    def branches(self) -> list[tuple[float, float]]:
+        """[(mu, tau), ...]."""
+        return [(mu, tau) for _, mu, tau in self._branches(self.parameters)]
+
+    @property
+    def largest_I1(self):
+        return math.inf if (rest := self.equilibrium) is None else rest.largest_I1
+
+    @property
+    def shear_modulus(self):
+        """That of the instantaneous response; stress."""
+        return float(self.relaxation_modulus(0.0))
+
+    @property
+    def rest_stress(self):
+        """That of the equilibrium energy: the branches have none; stress."""
+        return 0.0 if (rest := self.equilibrium) is None else rest.rest_stress
+
+    @property
+    def internal(self) -> dict[str, tuple]:
+        """{name: value at rest} of what the material remembers: entries (11, 22, 12, 33) of tensors."""
+        names = ["C"] * self._remembers + [f"{self._tensor}_{k}" for k, *_ in self._branches(self.parameters)]
+        return dict.fromkeys(names, _IDENTITY)
+
+    @property
+    def error_weights(self) -> dict[str, float]:
+        """Of each branch its share of the instantaneous modulus; C is no unknown in time."""
+        total = self.shear_modulus
+        return {"C": 0.0} | {f"{self._tensor}_{k}": mu / total for k, mu, _ in self._branches(self.parameters)}
+
+    def strain_energy(self, F, **constants):
+        """The energy of F before anything has flowed."""
+        mu = sum(mu for _, mu, _ in self._branches(constants))
+        return self._relaxed_energy(F, constants) + mu / 2 * (_inner(_isochoric(F), _IDENTITY) - 3)
+
+    def stored_energy(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
+        """Energy per reference volume of F in the state `internal`; a UFL scalar, stress."""
+        C = _isochoric(F)
+        return self._relaxed_energy(F, constants) + sum(
+            mu / 2 * self._stored(C, _entries(internal[f"{self._tensor}_{k}"]))
+            for k, mu, _ in self._branches(constants))
+
+    def dissipation(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
+        """Energy dissipated per reference volume and time, at least 0; a UFL scalar, stress over time."""
+        C = _isochoric(F)
+        return sum(mu / (2 * tau) * ufl.max_value(self._dissipated(C, _entries(internal[f"{self._tensor}_{k}"])), 0)
+                   for k, mu, tau in self._branches(constants))
+
+    def step_energy(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
+        """A UFL scalar whose derivative by F is the stress at the end of a step that began with `internal`.
+
+        Args:
+            F: deformation gradient at the end, shape (3, 3).
+            internal: {name: its entries, shape (4,)}, names as in `internal`.
+            time_step: of the user's unit of time, at least 0.
+        """
+        C = _isochoric(F)
+        before = _entries(internal["C"]) if self._remembers else None
+        return self._relaxed_energy(F, constants) + sum(
+            mu / 2 * self._step(C, before, _entries(internal[f"{self._tensor}_{k}"]), time_step / tau)
+            for k, mu, tau in self._branches(constants))
+
+    def updated(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> dict[str, Any]:
+        """{name: its entries, shape (4,)} at the end of a step; arguments as of `step_energy`.
+
+        To be called after steps of length 0, too: the next step begins with the C that is remembered.
+        """
+        C = _isochoric(F)
+        before = _entries(internal["C"]) if self._remembers else None
+        after = {"C": C} if self._remembers else {}
+        for k, _, tau in self._branches(constants):
+            name = f"{self._tensor}_{k}"
+            after[name] = self._advanced(C, before, _entries(internal[name]), time_step / tau)
+        return {name: ufl.as_vector(entries) for name, entries in after.items()}
+
+    def relaxation_modulus(self, times: Any) -> np.ndarray:
+        """G(t) = G_equilibrium + sum mu exp(-t/tau) of small shear, at times of any shape; stress."""
+        t = np.asarray(times, float)
+        modulus = 0.0 if (rest := self.equilibrium) is None else rest.shear_modulus
+        return modulus + sum(mu * np.exp(-t / tau) for mu, tau in self.branches)
+
+    def stress(self, mode: str, stretches: Any, times: Any = None, between: str = "stretch") -> np.ndarray:
+        """Nominal stress, force over reference area, of a test; stress.
+
+        Args:
+            mode: "uniaxial", "pure_shear" or "equibiaxial".
+            stretches: of any shape without times, (n,) with them.
+            times: when the stretches are met, shape (n,), not falling; a step from one stretch to another at the same
+                time is put on at once, and so is the first stretch, to a body at rest. None: every stretch is put on
+                at once.
+            between: what grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
+
+        Raises:
+            InputError: as without times; times that fall or are not as many as the stretches.
+        """
+        if times is None:
+            return super().stress(mode, stretches)
+        t, l = tests.checked(f"{self}: stress", mode, times, stretches, between)
+        P = np.zeros(len(l)) if (rest := self.equilibrium) is None else rest.stress(mode, l)
+        mu, tau = np.array(self.branches).T
+        return P + self.unit_stress(mode, tau, t, l, between) @ mu
+
+    @classmethod
+    def unit_stress(cls, mode: str, tau: Any, times: np.ndarray, stretches: np.ndarray,
+                    between: str = "stretch") -> np.ndarray:
+        """Nominal stress over mu, shape (n, branches), of branches with these tau; arguments as of `stress`."""
+        w = tests.elastic_strains(cls._flow, tau, mode, times, stretches, between)
+        return (np.exp(2 * w[..., 0]) - np.exp(2 * w[..., 2])) / stretches[:, None]
+
+    def relaxation(self, mode: str, stretch: float, times: Any) -> np.ndarray:
+        """Nominal stress at times (any shape, at least 0) after a stretch was put on at once, and held; stress."""
+        t = np.asarray(times, float)
+        if not np.all(t >= 0):
+            raise InputError(f"{self}: relaxation: times = {times!r}: must not be negative")
+        ordered, back = np.unique(np.append(0.0, t.ravel()), return_inverse=True)
+        held = np.full(len(ordered), positive(f"{self}: relaxation: stretch", stretch))
+        return self.stress(mode, held, times=ordered)[back[1:]].reshape(t.shape)[()]
+
+    def constant_rate(self, mode: str, rate: float, stretches: Any) -> np.ndarray:
+        """Nominal stress at stretches, shape (n,), all above or all below 1, met at a constant Hencky rate; stress.
+
+        Args:
+            rate: of the logarithmic strain in the direction pulled, 1/time, above 0 (pushed: of its size).
+        """
+        t = np.abs(np.log(np.asarray(stretches, float))) / positive(f"{self}: constant_rate: rate", rate)
+        ordered, back = np.unique(np.append(0.0, t), return_inverse=True)
+        l = np.exp(ordered * rate * np.sign(np.log(np.sum(stretches) / np.size(stretches))))
+        if not np.allclose(l[back[1:]], stretches, rtol=1e-12):
+            raise InputError(f"{self}: constant_rate: stretches = {stretches!r}: must be all above or all below 1")
+        return self.stress(mode, l, times=ordered, between="strain")[back[1:]]
+
+    def plot(self, axes: Any = None, stretches: Any = None, unit: str = "", mode: str = "uniaxial",
+             rates: Any = None, unit_of_time: str = "s") -> Any:
+        """Draw nominal stress against stretch at constant Hencky rates, at once and relaxed; returns the axes.
+
+        Args:
+            axes, stretches, unit: as of any material; the stretches all above 1.
+            mode: the test.
+            rates: 1/time; default from 0.1 over the longest tau to 10 over the shortest, by decades.
+        """
+        import matplotlib.pyplot as plt
+        known(f"{self}: plot: mode", mode, MODES)
+        axes = plt.subplots(layout="constrained")[1] if axes is None else axes
+        l = np.linspace(1, min(6.0, 0.95 * self.largest_stretch(mode)), 200) if stretches is None else stretches
+        if rates is None:
+            tau = [tau for _, tau in self.branches]
+            rates = 10.0 ** np.arange(math.floor(-math.log10(max(tau))) - 1, math.ceil(-math.log10(min(tau))) + 2)
+        axes.plot(l, self.stress(mode, l), "k", label="at once")
+        for rate in sorted(rates, reverse=True):
+            axes.plot(l, self.constant_rate(mode, rate, l), label=f"{rate:g}/{unit_of_time}")
+        if (rest := self.equilibrium) is not None:
+            axes.plot(l, rest.stress(mode, l), "k--", label="relaxed")
+        axes.set(xlabel="stretch", ylabel="nominal stress" + f" ({unit})" * bool(unit),
+                 title=f"{mode.replace('_', ' ')} tension at constant Hencky rates")
+        axes.grid(alpha=0.3)
+        axes.legend()
+        return axes
+
+    def coordinates(self):
+        """Those of the equilibrium energy, then the logarithms of mu and tau."""
+        first = [] if (rest := self.equilibrium) is None else rest.coordinates()
+        return first + [(math.log(value), -math.inf, math.inf) for pair in self.branches for value in pair]
+
+    def constants_at(self, coordinates):
+        if (rest := self.equilibrium) is None:
+            return list(np.exp(coordinates))
+        n = len(rest.parameters)
+        return [*rest.constants_at(coordinates[:n]), *np.exp(coordinates[n:])]
+
+    def _relaxed_energy(self, F: Any, constants: dict[str, Any]) -> Any:
+        if self._equilibrium is None:
+            return 0
+        return self._equilibrium.strain_energy(F, **{k: constants[k] for k in self._equilibrium.parameters})
+
+    def _branches(self, constants: dict[str, Any]) -> Iterator[tuple[int, Any, Any]]:
+        """(number, mu, tau) of every branch."""
+        k = 0
+        while f"mu_{(k := k + 1)}" in constants and f"tau_{k}" in constants:
+            yield k, constants[f"mu_{k}"], constants[f"tau_{k}"]
+
+    # the law of a branch: energies over mu/2, times over tau, tensors as entries, C with det C = 1
+
+    def _stored(self, C: Entries, A: Entries) -> Any:
+        raise NotImplementedError
+
+    def _dissipated(self, C: Entries, A: Entries) -> Any:
+        raise NotImplementedError
+
+    def _step(self, C: Entries, before: Entries | None, A: Entries, x: Any) -> Any:
+        raise NotImplementedError
+
+    def _advanced(self, C: Entries, before: Entries | None, A: Entries, x: Any) -> Entries:
+        raise NotImplementedError
+
+    @staticmethod
+    def _flow(w: np.ndarray) -> np.ndarray:
+        """f of `branches` for elastic strains w; shapes (branches, 3)."""
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__}({self.equilibrium}, branches={self.branches!r})"
+
+    __repr__ = __str__
+
+
+class Viscoelastic(RelaxingMaterial):
+    """Finite viscoelasticity with Gaussian springs.
+
+    W = W_eq(C) + sum (mu_k/2) [tr(C Cv_k^-1) - 3], dCv_k/dt = (1/tau_k) [C - (1/3) tr(C Cv_k^-1) Cv_k],
+    det Cv_k = 1, Cv_k = I at rest: Leonov (1976), Simo and Miehe (1992), Le Tallec, Rahier and Kaiss (1993), Reese and
+    Govindjee (1998), Kumar and Lopez-Pamies (2016). In small strains G(t) = G_eq + sum mu_k exp(-t/tau_k); in steady
+    extension the stress of a branch grows in proportion to the rate, with the viscosity 3 mu tau.
+
+    A step of implicit Euler has a closed form (Shutov, Landgraf and Ihlemann 2013): with G = Cv_n, x' = dt/tau,
+    a = det G, b = det(G + x' C) it is Cv = (G + x' C)/b^(1/3), and its potential is, regular at dt = 0,
+    (3 mu/2) [cof G : C + x' cof C : G + x'^2 det C] / (b^(2/3) + (a b)^(1/3) + a^(2/3)). The same with
+    G = Cv_n + (x/2) C_n, x' = (x/2) [1 + (x/3) tr(C_n Cv_n^-1)] and x = dt/tau is of second order in time.
+
+    Args:
+        equilibrium, branches: as of `RelaxingMaterial`.
+        order: of a step in time, 2 or 1.
+    """
+
+    _tensor = "Cv"
+
+    def __init__(self, equilibrium: Material | None, branches: Any, order: int = 2):
+        known("Viscoelastic: order", order, (1, 2))
+        self._remembers = order == 2
+        super().__init__(equilibrium, branches)
+
+    def step_error(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
+        """How far a step of first order is from one of second; a UFL scalar, stress.
+
+        The norm of the deviator of the difference in Kirchhoff stress, for a choice of steps in time.
+        """
+        C, difference = _isochoric(F), (0, 0, 0, 0)
+        for k, mu, tau in self._branches(constants):
+            Cv = _entries(internal[f"Cv_{k}"])
+            second = _cofactor(self._advanced(C, _entries(internal["C"]), Cv, time_step / tau))
+            first = _cofactor(self._advanced(C, None, Cv, time_step / tau))
+            difference = _sum(difference, _sum(second, first, -1), mu)
+        return ufl.sqrt(ufl.max_value(_deviator_squared(C, difference), 0))
+
+    def _stored(self, C, Cv):
+        return _inner(C, _cofactor(Cv)) - 3
+
+    def _dissipated(self, C, Cv):
+        return _deviator_squared(C, _cofactor(Cv))
+
+    def _step(self, C, before, Cv, x):
+        G, x = self._start(before, Cv, x)
+        a, s = _determinant(G), _inner(_cofactor(G), C) + x * _inner(_cofactor(C), G) + x**2
+        p, q = a ** (1 / 3), (a + x * s) ** (1 / 3)
+        return 3 * s / (q**2 + p * q + p**2) - 3
+
+    def _advanced(self, C, before, Cv, x):
+        G, x = self._start(before, Cv, x)
+        grown = _sum(G, C, x)
+        scale = _determinant(grown) ** (-1 / 3)
+        return tuple(scale * g for g in grown)
+
+    def _start(self, before, Cv, x):
+        """G and x'."""
+        if before is None:
+            return Cv, x
+        return _sum(Cv, before, x / 2), x / 2 * (1 + x / 3 * _inner(before, _cofactor(Cv)))
+
+    @staticmethod
+    def _flow(w):
+        m = np.exp(2 * w)
+        return m - m.mean(axis=-1, keepdims=True)
+
+
+class TransientNetwork(RelaxingMaterial):
+    """Networks whose chains break and form again at rest: Green and Tobolsky (1946), the upper-convected Maxwell law.
+
+    Kirchhoff stress of a branch mu F A F^T (and a pressure), dA/dt = (C^-1 - A)/tau, A = I at rest. Linear in the
+    memory: in steady extension faster than 1/(2 tau) the stress grows without bound.
+
+    With x = dt/tau a step has the potential (mu/2) tr(C M), M = e^-x A_n + [(1 - e^-x)/x - e^-x] C_n^-1: exact where
+    C^-1 changes at a constant rate, so of second order. The stored energy is (mu/2) [tr(C A) - 3 - ln det A].
+    """
+
+    _tensor = "A"
+
+    def _stored(self, C, A):
+        return _inner(C, A) - 3 - ufl.ln(_determinant(A))
+
+    def _dissipated(self, C, A):
+        return _inner(C, A) + _inner(_cofactor(C), _cofactor(A)) / _determinant(A) - 6
+
+    def _step(self, C, before, A, x):
+        return _inner(C, self._kept(before, A, x)) - 3
+
+    def _advanced(self, C, before, A, x):
+        return _sum(self._kept(before, A, x), _cofactor(C), 1 - _mean_decay(x))
+
+    def _kept(self, before, A, x):
+        """M."""
+        decay = ufl.exp(-x)
+        return tuple(decay * a + (_mean_decay(x) - decay) * c for a, c in zip(A, _cofactor(before)))
+
+    @staticmethod
+    def _flow(w):
+        return 1 - np.exp(-2 * w)
+
+
+def _mean_decay(x: Any) -> Any:
+    """(1 - e^-x)/x, by its series where x is small."""
+    small = ufl.lt(x, 1e-2)
+    y = ufl.conditional(small, 1, x)                            # the branch not taken must be finite too
+    return ufl.conditional(small, 1 - x / 2 + x**2 / 6 - x**3 / 24 + x**4 / 120 - x**5 / 720, (1 - ufl.exp(-y)) / y)
+
+
+def _isochoric(F: Any) -> Entries:
+    """Entries of J^(-2/3) F^T F."""
+    C, scale = F.T * F, kinematics.volume_ratio(F) ** (-2 / 3)
+    return scale * C[0, 0], scale * C[1, 1], scale * C[0, 1], scale * C[2, 2]
+
+
+def _entries(vector: Any) -> Entries:
+    return vector[0], vector[1], vector[2], vector[3]
+
+
+def _sum(A: Entries, B: Entries, factor: Any) -> Entries:
+    """A + factor B."""
+    return tuple(a + factor * b for a, b in zip(A, B))              # type: ignore[return-value]
+
+
+def _inner(A: Entries, B: Entries) -> Any:
+    return A[0] * B[0] + A[1] * B[1] + 2 * A[2] * B[2] + A[3] * B[3]
+
+
+def _determinant(A: Entries) -> Any:
+    return A[3] * (A[0] * A[1] - A[2] ** 2)
+
+
+def _cofactor(A: Entries) -> Entries:
+    """The inverse, where the determinant is 1."""
+    return A[1] * A[3], A[0] * A[3], -A[2] * A[3], A[0] * A[1] - A[2] ** 2
+
+
+def _deviator_squared(C: Entries, B: Entries) -> Any:
+    """tr((C B)^2) - tr(C B)^2/3: the square of the norm of the deviator of F B F^T."""
+    t = C[0] * B[0] + C[1] * B[1] + 2 * C[2] * B[2]
+    d = (C[0] * C[1] - C[2] ** 2) * (B[0] * B[1] - B[2] ** 2)
+    third = C[3] * B[3]
+    return (t**2 - 4 * d) / 2 + (t - 2 * third) ** 2 / 6

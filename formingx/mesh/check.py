@@ -1,0 +1,114 @@
+"""Whether elements cover the body once: none flat or turned inside out, none over another, no gap where they touch."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+
+_SMALLEST, _LARGEST = 1e-50, 1e50      # lengths whose squares and products are still numbers
+_FLAT = 1e-12                          # of the square of the longest edge: an area that is nothing
+
+
+def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
+    """Look a section over at rest.
+
+    Args:
+        points: shape (n, 2), length.
+        triangles: indices of points, shape (m, 3 or 6): corners, then middles of edges 01, 12, 20.
+        what: begins the message.
+
+    Raises:
+        InputError: a coordinate that is not finite, an element that is flat or inside out, two that lie over each other
+            or meet without sharing their nodes; the message says where.
+    """
+    bad = np.flatnonzero(~np.isfinite(points).all(1))
+    if len(bad):
+        raise InputError(f"{what}: a node has the coordinates {_show(points[bad[0]])}: must be finite numbers")
+    size = float(np.ptp(points, axis=0).max())
+    if not _SMALLEST < size < _LARGEST or np.abs(points).max() > _LARGEST:
+        raise InputError(f"{what}: it is {size:.3g} large: must be between {_SMALLEST:g} and {_LARGEST:g}")
+    corners = points[triangles[:, :3]]
+    area = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    longest = np.max([((corners[:, i] - corners[:, i - 1]) ** 2).sum(1) for i in range(3)], axis=0)
+    flat = np.abs(area) <= _FLAT * longest
+    if flat.any():
+        raise InputError(f"{what}: {flat.sum()} elements are flat, one at {_show(corners[flat][0].mean(0))}")
+    inside_out = turned_inside_out(points[triangles])
+    if inside_out.any():
+        raise InputError(f"{what}: {inside_out.sum()} elements are turned inside out, one at"
+                         f" {_show(corners[inside_out][0].mean(0))}: a node is out of place, or a curved edge bent too"
+                         f" much for them: use smaller elements there")
+    outline = _outline(points, triangles[:, :3], np.sign(area), what)
+    _check_outline(points, outline, what)
+
+
+def turned_inside_out(nodes: np.ndarray) -> np.ndarray:
+    """True for triangles, shape (m, 3 or 6, 2), whose curved map changes its sign from node to node, shape (m,)."""
+    if nodes.shape[1] != 6:
+        return np.zeros(len(nodes), dtype=bool)
+    a, b, c, ab, bc, ac = (nodes[:, i] for i in range(6))
+    found = []
+    for x, y in ((0, 0), (1, 0), (0, 1), (0.5, 0.5), (0, 0.5), (0.5, 0)):
+        z = 1 - x - y
+        by_x = (1 - 4 * z) * a + (4 * x - 1) * b + 4 * y * (bc - ac) + 4 * (z - x) * ab
+        by_y = (1 - 4 * z) * a + (4 * y - 1) * c + 4 * x * (bc - ab) + 4 * (z - y) * ac
+        found.append(_cross(by_x, by_y))
+    turns = np.array(found)
+    return (turns.max(0) >= 0) & (turns.min(0) <= 0)
+
+
+def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: str) -> np.ndarray:
+    """The edges of one element only, shape (k, 2); an error if two elements lie on the same side of their edge."""
+    ends = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
+    ahead = np.where(ends[:, 0] < ends[:, 1], 1, -1) * np.tile(turn, 3)       # side of the edge that its element is on
+    edges, place, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
+    sides = np.zeros(len(edges))
+    np.add.at(sides, place.ravel(), ahead)
+    over = (times > 2) | (times == 2) & (sides != 0)
+    if over.any():
+        raise InputError(f"{what}: elements lie over each other at {_show(points[edges[over][0]].mean(0))}: each edge"
+                         f" must have one element on each side")
+    return edges[times == 1]
+
+
+def _check_outline(points: np.ndarray, edges: np.ndarray, what: str) -> None:
+    """An error if the outline touches or crosses itself other than at nodes that its edges share."""
+    low, high = points[edges].min(1), points[edges].max(1)
+    near = 1e-9 * float((high - low).max())
+    pairs = min((_overlapping(low[:, k] - near, high[:, k] + near) for k in (0, 1)), key=lambda p: len(p[0]))
+    first, second = pairs
+    both = np.all((low[first] <= high[second] + near) & (low[second] <= high[first] + near), axis=1)
+    e, f = edges[first[both]], edges[second[both]]
+    a, b, c, d = points[e[:, 0]], points[e[:, 1]], points[f[:, 0]], points[f[:, 1]]
+    apart = (e[:, :1] != f).all(1) & (e[:, 1:] != f).all(1)
+    crosses = apart & (_cross(b - a, c - a) * _cross(b - a, d - a) < 0)
+    crosses &= _cross(d - c, a - c) * _cross(d - c, b - c) < 0
+    for point, node, p, q, other in ((a, e[:, 0], c, d, f), (b, e[:, 1], c, d, f), (c, f[:, 0], a, b, e),
+                                     (d, f[:, 1], a, b, e)):
+        along = q - p
+        length = (along**2).sum(1)
+        t = np.clip(((point - p) * along).sum(1) / length, 0, 1)
+        gap = ((point - p - t[:, None] * along) ** 2).sum(1)
+        crosses |= (node[:, None] != other).all(1) & (gap <= 1e-18 * length)
+    if crosses.any():
+        k = int(np.argmax(crosses))
+        raise InputError(f"{what}: the body touches or crosses itself near {_show((a[k] + b[k]) / 2)}: elements that"
+                         f" meet must share their nodes, and none may lie over another")
+
+
+def _overlapping(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs (i, j) of intervals that overlap, each pair once."""
+    order = np.argsort(low)
+    many = np.searchsorted(low[order], high[order], side="right") - np.arange(len(low)) - 1
+    first = np.repeat(np.arange(len(low)), many)
+    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(many) - many, many)
+    return order[first], order[second]
+
+
+def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+
+
+def _show(point: np.ndarray) -> str:
+    return f"(R, Z) = ({point[0]:.6g}, {point[1]:.6g})"

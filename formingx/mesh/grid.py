@@ -1,0 +1,151 @@
+"""A mesh as plain arrays, and the way from there to a distributed mesh and back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+
+from .. import _compat
+from ..errors import InputError
+from .check import check_elements
+from .mesh import Mesh
+
+# DOLFINx numbers a mid-edge node like the opposite corner; in a grid edges are 01, 12, 20
+_TO_DOLFINX, _FROM_DOLFINX = [0, 1, 2, 4, 5, 3], [0, 1, 2, 5, 3, 4]
+
+
+class Grid(NamedTuple):
+    """A mesh on one rank; rows of `layers` and `boundaries` hold indices of `points`.
+
+    Attributes:
+        points: (R, Z) of the nodes, shape (n, 2), unit of length of the mesh.
+        numbers: their numbers in a file, shape (n,).
+        layers: {name: triangles, shape (m, 6)}: corners counter-clockwise, then middles of edges 01, 12, 20 (of a
+            first-order mesh: shape (m, 3)).
+        boundaries: {name: edges, shape (k, 3)}: first, last, middle, the body on the left (first order: shape (k, 2)).
+    """
+
+    points: np.ndarray
+    numbers: np.ndarray
+    layers: dict[str, np.ndarray]
+    boundaries: dict[str, np.ndarray]
+
+
+def counter_clockwise(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """The triangles, shape (m, 3 or 6), each turned if it runs clockwise."""
+    triangles = np.array(triangles)
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    wrong = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
+    triangles[wrong] = triangles[wrong][:, [0, 2, 1, 5, 4, 3][: triangles.shape[1]]]
+    return triangles
+
+
+def to_grid(mesh: Mesh) -> Grid:
+    """The mesh as plain arrays (serial only); node i of the mesh has the number i + 1."""
+    from dolfinx.mesh import entities_to_geometry
+    domain = mesh.domain
+    if mesh.comm.size > 1:
+        raise InputError("the nodes of a mesh are numbered and written on one rank only: run this on one")
+    domain.topology.create_connectivity(1, 2)
+    points = domain.geometry.x[:, :2].copy()
+    triangles = np.asarray(_compat.cell_nodes(domain))
+    triangles = counter_clockwise(points, triangles[:, _FROM_DOLFINX[: triangles.shape[1]]])
+    corners = ((0, 1, 3), (1, 2, 4), (2, 0, 5))
+    edges = {frozenset(row[[i, j]].tolist()): row[[n for n in (i, j, k) if n < len(row)]]
+             for row in triangles for i, j, k in corners}
+    layers = {name: triangles[mesh.cells.find(tag)] for name, tag in mesh.layers.items()}
+    boundaries = {}
+    for name in mesh.boundaries:
+        ends = entities_to_geometry(domain, 1, mesh.facets_of(name))[:, :2]
+        rows = [edges[frozenset(pair)] for pair in ends.tolist()]
+        boundaries[name] = np.array(rows, dtype=np.int64).reshape(len(rows), 3 if triangles.shape[1] == 6 else 2)
+    return Grid(points, np.arange(1, len(points) + 1), layers, boundaries)
+
+
+def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
+    """The distributed mesh of the grid that `make` returns; it is called, and checked, on rank 0.
+
+    Raises:
+        InputError: on all ranks, what `make` raised, or what is wrong with the elements of `what`.
+    """
+    error, shape = None, None
+    if comm.rank == 0:
+        try:
+            grid = make()
+            cells, points, cell_tags, edges, edge_tags, layers, boundaries = _tagged(grid, what)
+            shape = cells.shape[1], edges.shape[1], layers, boundaries
+        except InputError as e:
+            error = e
+    error, shape = comm.bcast((error, shape), root=0)
+    if error is not None:
+        raise error
+    nodes, ends, layers, boundaries = shape
+    if comm.rank != 0:
+        cells, points, cell_tags = np.empty((0, nodes), np.int64), np.empty((0, 2)), np.empty(0, np.int32)
+        edges, edge_tags = np.empty((0, ends), np.int64), np.empty(0, np.int32)
+    domain, cell_marks, facet_marks = _compat.mesh_of_triangles(comm, cells, points, cell_tags, edges, edge_tags)
+    return Mesh(domain, cell_marks, facet_marks, layers, boundaries, comm)
+
+
+def _tagged(grid: Grid, what: str) -> tuple:
+    """Cells and edges as DOLFINx numbers them, and one tag for each: cells, points, cell tags, edges, edge tags, names.
+
+    An edge of several boundaries gets a tag of its own, which belongs to all of them.
+    """
+    triangles = np.concatenate(list(grid.layers.values()))
+    used = np.unique(triangles)
+    number = np.full(len(grid.points), -1, dtype=np.int64)
+    number[used] = np.arange(len(used))
+    points, triangles = grid.points[used], number[triangles]
+    same = np.unique(np.sort(triangles[:, :3], axis=1), axis=0, return_counts=True)[1]
+    if np.any(same > 1):
+        raise InputError(f"{what}: {np.sum(same > 1)} elements belong to more than one layer, or are there twice;"
+                         f" layers are {', '.join(map(repr, grid.layers))}")
+    check_elements(points, triangles, what)
+    layers = {name: tag for tag, name in enumerate(grid.layers, 1)}
+    cell_tags = np.repeat(np.arange(1, len(layers) + 1), [len(rows) for rows in grid.layers.values()])
+    width = 3 if triangles.shape[1] == 6 else 2
+    first = len(layers) + 1
+    tags: dict[tuple[int, ...], int] = {(k,): first + k for k in range(len(grid.boundaries))}
+    owners: dict[tuple[int, int], tuple[list, list[int]]] = {}
+    known = _edges(triangles)
+    for k, (name, rows) in enumerate(grid.boundaries.items()):
+        for row in _of_elements(number[rows[:, :2]], known, f"{what}: boundary {name!r}", points):
+            key = (min(row[:2]), max(row[:2]))
+            names = owners.setdefault(key, (row, []))[1]
+            if k not in names:
+                names.append(k)
+    for _, names in owners.values():
+        tags.setdefault(tuple(names), first + len(tags))
+    boundaries = {name: tuple(tag for names, tag in tags.items() if k in names)
+                  for k, name in enumerate(grid.boundaries)}
+    edges = np.array([row for row, _ in owners.values()], dtype=np.int64).reshape(len(owners), width)
+    edge_tags = np.array([tags[tuple(names)] for _, names in owners.values()], dtype=np.int32)
+    return (triangles[:, _TO_DOLFINX[: triangles.shape[1]]], points, cell_tags.astype(np.int32), edges, edge_tags,
+            layers, boundaries)
+
+
+def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
+    """{the two ends, the lower first: the middle} of all edges; without middles: {ends: []}."""
+    found: dict[tuple[int, int], list[int]] = {}
+    for i, j, k in ((0, 1, 3), (1, 2, 4), (2, 0, 5)):
+        ends = np.sort(triangles[:, [i, j]], axis=1).tolist()
+        found |= {(a, b): middle for (a, b), middle in zip(ends, triangles[:, k:k + 1].tolist())}
+    return found
+
+
+def _of_elements(edges: np.ndarray, known: dict[tuple[int, int], list[int]], who: str,
+                 points: np.ndarray) -> list[list[int]]:
+    """The edges (ends, then the middle of the element there) if they are edges of elements; [] if none is.
+
+    A curve that is no part of the body (of a tool in the same file) leaves its boundary empty.
+    """
+    found = [[a, b, *known[min(a, b), max(a, b)]] for a, b in edges.tolist() if (min(a, b), max(a, b)) in known]
+    if found and len(found) < len(edges):
+        bad = next(row for row in edges.tolist() if (min(row), max(row)) not in known)
+        at = [f"({points[n, 0]:.6g}, {points[n, 1]:.6g})" if n >= 0 else "a node of no element" for n in bad]
+        raise InputError(f"{who}: its edge from {at[0]} to {at[1]} is not an edge of an element")
+    return found

@@ -1,0 +1,339 @@
+"""gmsh's mesh files, MSH 2.2 and 4.1, text and binary, read as data.
+
+gmsh itself takes a file for a script unless it begins as a mesh, and scripts can run commands. Here a file is numbers
+and names or it is refused: nothing in it can run.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from .grid import Grid, counter_clockwise
+
+_KINDS = {1: (1, 2), 2: (2, 3), 3: (2, 4), 4: (3, 4), 5: (3, 8), 6: (3, 6), 7: (3, 5), 8: (1, 3), 9: (2, 6),
+          10: (2, 9), 11: (3, 10), 12: (3, 27), 13: (3, 18), 14: (3, 14), 15: (0, 1), 16: (2, 8), 17: (3, 20),
+          18: (3, 15), 19: (3, 13), 20: (2, 9), 21: (2, 10), 22: (2, 12), 23: (2, 15), 24: (2, 15), 25: (2, 21),
+          26: (1, 4), 27: (1, 5), 28: (1, 6), 29: (3, 20), 36: (2, 16), 37: (2, 25)}
+"""gmsh's number of an element type: (dimension, nodes)."""
+_LINES, _TRIANGLES = {1: 2, 8: 3}, {2: 3, 9: 6}
+
+
+class Block(NamedTuple):
+    """Elements of one type on one entity: its dimension and number, gmsh's element type, the physical groups (numbers),
+    and node numbers, shape (n, nodes of one)."""
+
+    dim: int
+    entity: int
+    kind: int
+    groups: tuple[int, ...]
+    nodes: np.ndarray
+
+
+class Content(NamedTuple):
+    """What a file holds: node numbers, shape (n,); points, shape (n, 3); blocks; {(dimension, group): name}."""
+
+    numbers: np.ndarray
+    points: np.ndarray
+    blocks: list[Block]
+    names: dict[tuple[int, int], str]
+
+
+def content(file: str | os.PathLike) -> Content:
+    """Nodes, elements and names of a mesh file.
+
+    Raises:
+        InputError: the file cannot be read, or is not a mesh in one of the formats; the message names the section.
+    """
+    file = os.fspath(file)
+    try:
+        with open(file, "rb") as stream:
+            data = stream.read()
+    except OSError as error:
+        raise InputError(f"mesh file {file!r} cannot be read: {error}") from None
+    if not data.lstrip().startswith(b"$MeshFormat"):
+        raise InputError(f"mesh file {file!r} cannot be read: it does not begin with $MeshFormat, so it is no gmsh mesh"
+                         f" (only a mesh is read, no script: a .geo file is meshed in gmsh first)")
+    sections: dict[str, bytes] = {}
+    for name, body in _sections(data, file):
+        if name in sections and name in ("MeshFormat", "PhysicalNames", "Entities", "Nodes", "Elements"):
+            raise InputError(f"mesh file {file!r}: a second section ${name}")
+        sections[name] = body
+    version, binary, order, width = _format(sections["MeshFormat"], file)
+    names = _names(sections.get("PhysicalNames", b""), file)
+    for name in ("Nodes", "Elements"):
+        if name not in sections:
+            raise InputError(f"mesh file {file!r} has no section ${name}: was it meshed?")
+
+    def numbers(name: str) -> _Numbers:
+        return _Numbers(sections[name], binary, order, width, f"mesh file {file!r}, section ${name}")
+    if version == "2.2":
+        tags, points = _nodes_2(numbers("Nodes"))
+        blocks = _elements_2(numbers("Elements"))
+    else:
+        groups = _groups(numbers("Entities")) if "Entities" in sections else {}
+        tags, points = _nodes_4(numbers("Nodes"))
+        blocks = _elements_4(numbers("Elements"), groups)
+    if len(np.unique(tags)) < len(tags):
+        raise InputError(f"mesh file {file!r}: a node number stands twice")
+    return Content(tags, points, blocks, names)
+
+
+def read(file: str | os.PathLike) -> Grid:
+    """The grid in a mesh file: physical groups name the layers (2-D) and the boundaries (1-D).
+
+    Raises:
+        InputError: as `content`; no physical group of dimension 2, elements other than triangles, a body that is not
+            in a plane of constant z.
+    """
+    file = os.fspath(file)
+    found = content(file)
+    if not any(b.dim > 0 for b in found.blocks):
+        raise InputError(f"mesh file {file!r} has no elements: was it meshed?")
+    if any(b.dim == 3 for b in found.blocks):
+        raise InputError(f"mesh file {file!r} is three-dimensional: it must be a section, x for R and y for Z")
+    if not any(b.dim == 2 and b.groups for b in found.blocks):
+        raise InputError(f"mesh file {file!r} has no physical group of dimension 2: name its layers")
+    sort = np.argsort(found.numbers)
+    points = found.points[sort]
+    layers = _parts(found, 2, _TRIANGLES, found.numbers[sort], file)
+    boundaries = _parts(found, 1, _LINES, found.numbers[sort], file)
+    size = np.ptp(points[:, :2], axis=0).max(initial=0.0)
+    body = points[np.concatenate([rows.ravel() for rows in layers.values()])]
+    if np.ptp(body[:, 2]) > 1e-9 * size:
+        raise InputError(f"mesh file {file!r} is not a plane section: z goes from {body[:, 2].min():.6g} to"
+                         f" {body[:, 2].max():.6g}; x must be R, y Z, and z the same everywhere")
+    layers = {name: counter_clockwise(points[:, :2], rows) for name, rows in layers.items()}
+    orders = {rows.shape[1] for rows in layers.values()}
+    if len(orders) > 1:
+        raise InputError(f"mesh file {file!r} has triangles of three and of six nodes: all must have the same number")
+    return Grid(points[:, :2].copy(), found.numbers[sort], layers, boundaries)
+
+
+def write(grid: Grid, file: str | os.PathLike) -> None:
+    """Write a grid as MSH 2.2, text: groups numbered in order, layers first."""
+    parts = [(2, name, rows) for name, rows in grid.layers.items()]
+    parts += [(1, name, rows) for name, rows in grid.boundaries.items()]
+    named = [f'{dim} {tag} "{name}"' for tag, (dim, name, _) in enumerate(parts, 1)]
+    kinds = {(2, 6): 9, (2, 3): 2, (1, 3): 8, (1, 2): 1}
+    elements = [f"{kinds[dim, rows.shape[1]]} 2 {tag} {tag} {' '.join(map(str, row))}"
+                for tag, (dim, _, rows) in sorted(enumerate(parts, 1), key=lambda part: part[1][0])
+                for row in grid.numbers[rows].tolist()]
+    nodes = [f"{n} {float(r)!r} {float(z)!r} 0" for n, (r, z) in zip(grid.numbers.tolist(), grid.points, strict=True)]
+    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat",
+             "$PhysicalNames", str(len(named)), *sorted(named, key=lambda line: line[0]), "$EndPhysicalNames",
+             "$Nodes", str(len(nodes)), *nodes, "$EndNodes",
+             "$Elements", str(len(elements)), *(f"{k} {row}" for k, row in enumerate(elements, 1)), "$EndElements"]
+    with open(file, "w", encoding="utf-8") as stream:
+        stream.write("\n".join(lines) + "\n")
+
+
+def _parts(found: Content, dim: int, kinds: dict[int, int], numbers: np.ndarray, file: str) -> dict[str, np.ndarray]:
+    """{name: elements as indices into the sorted numbers} of the physical groups of a dimension."""
+    parts: dict[str, list[np.ndarray]] = {}
+    what = "triangles" if dim == 2 else "edges"
+    tags = {group for b in found.blocks if b.dim == dim for group in b.groups}
+    called = {tag: found.names.get((dim, tag), str(tag)) for tag in sorted(tags)}
+    if len(set(called.values())) < len(called):
+        raise InputError(f"mesh file {file!r}: two physical groups of dimension {dim} have the same name:"
+                         f" {', '.join(map(repr, called.values()))}")
+    for tag, name in called.items():
+        rows = parts.setdefault(name, [])
+        for block in (b for b in found.blocks if b.dim == dim and tag in b.groups):
+            if block.kind not in kinds:
+                raise InputError(f"mesh file {file!r}: group {name!r} has elements of {block.nodes.shape[1]} nodes"
+                                 f" (gmsh's type {block.kind}): formingx needs {what} of"
+                                 f" {' or '.join(map(str, kinds.values()))} nodes")
+            at = np.minimum(np.searchsorted(numbers, block.nodes), max(len(numbers) - 1, 0))
+            if not len(numbers) or np.any(numbers[at] != block.nodes):
+                raise InputError(f"mesh file {file!r}: an element of group {name!r} has a node that is not in $Nodes")
+            rows.append(at)
+        if len({r.shape[1] for r in rows}) > 1:
+            raise InputError(f"mesh file {file!r}: group {name!r} mixes {what} of"
+                             f" {' and '.join(map(str, kinds.values()))} nodes: all must have the same number")
+    return {name: np.concatenate(rows) for name, rows in parts.items()}
+
+
+def _sections(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
+    """Names and bodies of the sections, which must be the whole file."""
+    begin, at = re.compile(rb"\s*\$(\w{1,40})[ \t]*\r?\n"), 0
+    while match := begin.match(data, at):
+        end = data.find(b"$End" + match[1], match.end())
+        if end < 0:
+            raise InputError(f"mesh file {file!r} ends within its section ${match[1].decode()}")
+        yield match[1].decode(), data[match.end():end]
+        at = end + len(match[1]) + 4
+    rest = data[at:].strip()
+    if rest:
+        raise InputError(f"mesh file {file!r}: {rest[:40].decode('utf-8', 'replace')!r} is no section of a mesh")
+
+
+def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:
+    """(version, binary, byte order, bytes of a size) from $MeshFormat."""
+    words = body.split(b"\n")[0].decode("ascii", "replace").split()
+    if len(words) != 3 or words[0] not in ("2.2", "4.1") or words[1] not in ("0", "1") or words[2] not in ("4", "8"):
+        raise InputError(f"mesh file {file!r}: format {' '.join(words)[:40]!r}: must be MSH 2.2 or 4.1 (gmsh:"
+                         f" Mesh.MshFileVersion)")
+    order = "<"
+    if words[1] == "1":
+        one = body.partition(b"\n")[2][:4]
+        order = {b"\1\0\0\0": "<", b"\0\0\0\1": ">"}.get(one, "")
+        if not order:
+            raise InputError(f"mesh file {file!r}: a binary mesh must hold the number one after its format")
+    return words[0], words[1] == "1", order, int(words[2])
+
+
+def _names(body: bytes, file: str) -> dict[tuple[int, int], str]:
+    lines = [line for line in body.decode("utf-8", "replace").splitlines() if line.strip()]
+    names = {}
+    for line in lines[1:]:
+        match = re.fullmatch(r'\s*([0-3])\s+(\d{1,9})\s+"([^"]*)"\s*', line)
+        if not match:
+            raise InputError(f'mesh file {file!r}, section $PhysicalNames: {line[:60]!r}: must be DIMENSION NUMBER'
+                             f' "NAME"')
+        names[int(match[1]), int(match[2])] = match[3]
+    return names
+
+
+class _Numbers:
+    """The numbers of a section one after the other, text or binary."""
+
+    def __init__(self, body: bytes, binary: bool, order: str, width: int, where: str):
+        self._binary, self._order, self._width, self.where = binary, order, width, where
+        self._body, self._at = body, 0
+        if not binary:
+            try:
+                self._values = np.array(body.split(), dtype=float)
+            except ValueError as error:
+                raise InputError(f"{where}: {error}: must be numbers") from None
+
+    @property
+    def binary(self) -> bool:
+        return self._binary
+
+    def line(self) -> int:
+        """The count on a line of text, as the old binary format has it."""
+        end = self._body.find(b"\n", self._at)
+        word = self._body[self._at:end].strip()
+        if end < 0 or not word.isdigit() or len(word) > 15:
+            raise InputError(f"{self.where}: must begin with a count")
+        self._at = end + 1
+        return int(word)
+
+    def reals(self, n: int) -> np.ndarray:
+        """The next n real numbers."""
+        return self._take(n, "f8")
+
+    def ints(self, n: int) -> np.ndarray:
+        """The next n whole numbers of four bytes."""
+        return self._whole(self._take(n, "i4"))
+
+    def sizes(self, n: int) -> np.ndarray:
+        """The next n whole numbers of the file's own width (counts, and numbers of nodes and elements)."""
+        return self._whole(self._take(n, f"u{self._width}"))
+
+    def records(self, n: int, fields: list) -> np.ndarray:
+        """The next n records of a binary section."""
+        return self._bytes(n, np.dtype([(name, self._order + kind, shape) for name, kind, shape in fields]))
+
+    def _take(self, n: int, kind: str) -> np.ndarray:
+        if self._binary:
+            return self._bytes(n, np.dtype(self._order + kind))
+        if n > len(self._values) - self._at:
+            raise InputError(f"{self.where}: ends too early: {n} more numbers must follow")
+        self._at += n
+        return self._values[self._at - n:self._at]
+
+    def _bytes(self, n: int, kind: np.dtype) -> np.ndarray:
+        if n * kind.itemsize > len(self._body) - self._at:
+            raise InputError(f"{self.where}: ends too early: {n} more numbers must follow")
+        found = np.frombuffer(self._body, kind, n, self._at)
+        self._at += n * kind.itemsize
+        return found
+
+    def _whole(self, values: np.ndarray) -> np.ndarray:
+        with np.errstate(invalid="ignore"):
+            whole = np.abs(values) < 2.0**53
+            found = np.where(whole, values, 0).astype(np.int64)
+        if not np.all(whole) or np.any(found != values):
+            raise InputError(f"{self.where}: a whole number was expected")
+        return found
+
+
+def _count(found: np.ndarray, section: _Numbers) -> int:
+    n = int(found[0])
+    if n < 0:
+        raise InputError(f"{section.where}: a count is {n}")
+    return n
+
+
+def _nodes_2(section: _Numbers) -> tuple[np.ndarray, np.ndarray]:
+    if section.binary:
+        rows = section.records(section.line(), [("number", "i4", ()), ("x", "f8", (3,))])
+        return rows["number"].astype(np.int64), rows["x"].astype(float)
+    n = _count(section.ints(1), section)
+    rows = section.reals(4 * n).reshape(n, 4)
+    return rows[:, 0].astype(np.int64), rows[:, 1:].copy()
+
+
+def _elements_2(section: _Numbers) -> list[Block]:
+    """One block for each (type, group, entity), in the order of the file."""
+    found: dict[tuple[int, int, int], list] = {}
+    n, got = section.line() if section.binary else _count(section.ints(1), section), 0
+    while got < n:
+        # binary: type, number of such elements, number of tags, then elements; text: number, type, number of tags
+        head = section.ints(3).tolist()
+        kind, many, tags = head if section.binary else (head[1], 1, head[2])
+        if kind not in _KINDS or many < 1 or not 2 <= tags <= 1000:
+            raise InputError(f"{section.where}: element {got + 1}: type {kind} with {tags} tags is not known")
+        width = section.binary + tags + _KINDS[kind][1]
+        rows = section.ints(many * width).reshape(many, width)[:, int(section.binary):]
+        for row in rows:
+            found.setdefault((kind, int(row[0]), int(row[1])), []).append(row[tags:])
+        got += many
+    return [Block(_KINDS[kind][0], entity, kind, (abs(group),) if group else (), np.array(rows))
+            for (kind, group, entity), rows in found.items()]
+
+
+def _groups(section: _Numbers) -> dict[tuple[int, int], tuple[int, ...]]:
+    """{(dimension, entity): its physical groups}."""
+    found = {}
+    counts = section.sizes(4).tolist()
+    for dim, many in enumerate(counts):
+        for _ in range(many):
+            tag = int(section.ints(1)[0])
+            section.reals(3 if dim == 0 else 6)
+            groups = section.ints(_count(section.sizes(1), section))
+            if dim:
+                section.ints(_count(section.sizes(1), section))
+            found[dim, tag] = tuple(dict.fromkeys(np.abs(groups).tolist()))
+    return found
+
+
+def _nodes_4(section: _Numbers) -> tuple[np.ndarray, np.ndarray]:
+    numbers, points = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 3))]
+    for _ in range(_count(section.sizes(4), section)):
+        dim, _, parametric = section.ints(3).tolist()
+        n = _count(section.sizes(1), section)
+        numbers.append(section.sizes(n))
+        width = 3 + (dim if parametric else 0)
+        points.append(section.reals(width * n).reshape(n, width)[:, :3])
+    return np.concatenate(numbers), np.concatenate(points)
+
+
+def _elements_4(section: _Numbers, groups: dict[tuple[int, int], tuple[int, ...]]) -> list[Block]:
+    blocks = []
+    for _ in range(_count(section.sizes(4), section)):
+        dim, entity, kind = section.ints(3).tolist()
+        n = _count(section.sizes(1), section)
+        if kind not in _KINDS or _KINDS[kind][0] != dim:
+            raise InputError(f"{section.where}: elements of type {kind} and dimension {dim} are not known")
+        width = 1 + _KINDS[kind][1]
+        rows = section.sizes(n * width).reshape(n, width)[:, 1:]
+        blocks.append(Block(dim, entity, kind, groups.get((dim, entity), ()), rows))
+    return blocks

@@ -1,0 +1,159 @@
+"""The curves in a gmsh script (.geo), as far as a script is a drawing.
+
+A .geo file is a program: gmsh would run it, commands of the system included. So it is not given to gmsh. Read here are
+points, lines, circles, and numbers given a name; loops, surfaces, physical groups and mesh sizes are passed over, for a
+tool needs none of them; any other statement is refused.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+import os
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from .profile import Arc, Line
+
+_OPERATORS: dict[type, Any] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Pow: operator.pow, ast.USub: operator.neg, ast.UAdd: operator.pos}
+_FUNCTIONS: dict[str, Any] = {"Sqrt": math.sqrt, "Sin": math.sin, "Cos": math.cos, "Tan": math.tan, "Fabs": abs}
+_NUMBER = re.compile(r"[A-Za-z_]\w*")
+_ENTITY = re.compile(r"(Point|Line|Circle)\s*\(([^(){}]*)\)\s*=\s*\{([^{}]*)\}")
+_PASSED_OVER = re.compile(r"(?:(?:Curve|Line) Loop|Plane Surface|Surface|Ruled Surface"
+                          r"|Physical (?:Point|Curve|Line|Surface)|Ellipse|Spline|BSpline|Bezier)"
+                          r"\s*\([^{}]*\)\s*\+?=\s*\{[^{}]*\}"
+                          r"|(?:MeshSize|Characteristic Length)\s*\{[^{}]*\}\s*=\s*[^{}\"]*"
+                          r"|Mesh\.\w+\s*=\s*[^{}\"]*|SetFactory\s*\(\s*\"(?:Built-in|OpenCASCADE)\"\s*\)")
+_ALLOWED = ("points, lines, circles, splines, loops, surfaces, physical groups, mesh sizes and numbers with a name,"
+            " because a .geo file is a script and nothing in it is run: export anything else as .step or .brep")
+
+
+def curves(file: str | os.PathLike) -> dict[int, Line | Arc]:
+    """{number: the line or the arc} of the curves of a .geo file.
+
+    Raises:
+        InputError: it cannot be read, or holds a statement that is not a drawing's; the message names the line.
+    """
+    file = os.fspath(file)
+    try:
+        with open(file, encoding="utf-8") as stream:
+            text = stream.read()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"tool file {file!r} cannot be read: {error}") from None
+    drawing = _Drawing()
+    for line, statement in _statements(text):
+        try:
+            drawing.add(statement)
+        except (ValueError, ArithmeticError, KeyError, TypeError, RecursionError, MemoryError, SyntaxError) as error:
+            raise InputError(f"tool file {file!r} cannot be read: line {line}: {statement[:60]!r}: {error}") from None
+    return drawing.curves
+
+
+class _Drawing:
+    """What the statements have made so far."""
+
+    def __init__(self) -> None:
+        self.values: dict[str, float] = {"Pi": math.pi}
+        self.points: dict[int, np.ndarray] = {}
+        self.curves: dict[int, Line | Arc] = {}
+
+    def add(self, statement: str) -> None:
+        """Take one statement in; a ValueError that says what is wrong with it."""
+        if entity := _ENTITY.fullmatch(statement):
+            kind, tag, numbers = entity[1], self._number(entity[2]), [self._number(n) for n in entity[3].split(",")]
+            getattr(self, f"_add_{kind.lower()}")(self._tag(tag), numbers)
+        elif _PASSED_OVER.fullmatch(statement):
+            return
+        else:
+            name, equals, value = statement.partition("=")
+            if not equals or not _NUMBER.fullmatch(name.strip()):
+                raise ValueError(f"is not allowed: a tool's .geo file may hold {_ALLOWED}")
+            self.values[name.strip()] = self._number(value)
+
+    def _add_point(self, tag: int, numbers: list[float]) -> None:
+        if len(numbers) not in (3, 4) or numbers[2] != 0 or not all(map(math.isfinite, numbers)):
+            raise ValueError("a point must be {x, y, 0} or {x, y, 0, mesh size}, finite numbers")
+        self.points[tag] = np.array(numbers[:2])
+
+    def _add_line(self, tag: int, numbers: list[float]) -> None:
+        if len(numbers) != 2:
+            raise ValueError("a line must be {first point, last point}")
+        self._keep(tag, Line(*(self._point(n) for n in numbers)))
+
+    def _add_circle(self, tag: int, numbers: list[float]) -> None:
+        """{first point, centre, last point}, the shorter way round; or {x, y, 0, radius[, first angle, last angle]}."""
+        if len(numbers) == 3:
+            first, centre, last = (self._point(n) for n in numbers)
+            (a, begin), (b, end) = ((math.dist(p, centre), math.atan2(*(p - centre)[::-1])) for p in (first, last))
+            if not a > 0 or abs(a - b) > 1e-9 * a:
+                raise ValueError(f"the ends are {a:.6g} and {b:.6g} away from the centre: must be the same")
+            sweep = math.remainder(end - begin, 2 * math.pi)
+            self._keep(tag, Arc(centre, a, begin, sweep))
+        elif len(numbers) in (4, 6):
+            x, y, z, radius, begin, end = [*numbers, 0.0, 2 * math.pi][:6] if len(numbers) == 4 else numbers
+            if z != 0 or not radius > 0:
+                raise ValueError("a circle must be {x, y, 0, radius > 0, first angle, last angle}")
+            self._keep(tag, Arc(np.array([x, y]), radius, begin, end - begin))
+        else:
+            raise ValueError("a circle must be {first point, centre, last point}")
+
+    def _keep(self, tag: int, piece: Line | Arc) -> None:
+        if tag in self.curves:
+            raise ValueError(f"a second curve {tag}")
+        self.curves[tag] = piece
+
+    def _point(self, number: float) -> np.ndarray:
+        tag = self._tag(number)
+        if tag not in self.points:
+            raise ValueError(f"there is no point {tag}")
+        return self.points[tag]
+
+    @staticmethod
+    def _tag(number: float) -> int:
+        if number != int(number) or number < 1:
+            raise ValueError(f"{number:g} is no number of a point or curve")
+        return int(number)
+
+    def _number(self, text: str) -> float:
+        """The value of an expression of numbers, names and + - * / ^."""
+        if len(text) > 1000 or "**" in text or not re.fullmatch(r"[\w\s.+\-*/^()]*", text):
+            raise ValueError(f"{text.strip()[:40]!r} is not a number")
+        return float(self._value(ast.parse(text.strip().replace("^", "**"), mode="eval").body))
+
+    def _value(self, node: ast.expr) -> float:
+        if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
+            return float(node.value)
+        if isinstance(node, ast.Name) and node.id in self.values:
+            return self.values[node.id]
+        if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
+            return _real(_OPERATORS[type(node.op)](self._value(node.left), self._value(node.right)))
+        if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATORS:
+            return _OPERATORS[type(node.op)](self._value(node.operand))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _FUNCTIONS \
+                and len(node.args) == 1 and not node.keywords:
+            return _FUNCTIONS[node.func.id](self._value(node.args[0]))
+        raise ValueError(f"{ast.unparse(node)[:40]!r} is not a number, nor a name that was given one")
+
+
+def _real(value: Any) -> float:
+    if isinstance(value, complex):
+        raise ValueError("a root of a negative number")
+    return value
+
+
+def _statements(text: str) -> Iterator[tuple[int, str]]:
+    """(line, statement without its semicolon) of a script; comments are left out."""
+    text = re.sub(r"//[^\n]*|/\*.*?\*/", lambda found: re.sub(r"[^\n]", " ", found[0]), text, flags=re.DOTALL)
+    line = 1
+    for part in text.split(";"):
+        begin = line + part[: len(part) - len(part.lstrip())].count("\n")
+        line += part.count("\n")
+        if part.strip():
+            yield begin, " ".join(part.split())

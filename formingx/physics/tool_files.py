@@ -1,0 +1,213 @@
+"""Profiles of tools from files: drawings and meshes, read as data, so that nothing in a file runs."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, count, finite, pair, place, positive, several
+from ..mesh import msh
+from . import dxf, geo
+from .arcs import arcs_along
+from .profile import Arc, Line, Tool
+
+_HEADERS = {"step": (b"ISO-10303-21",), "brep": (b"DBRep_DrawableShape", b"CASCADE Topology", b"Open CASCADE Topology")}
+_KINDS = {".geo": "geo", ".msh": "msh", ".dxf": "dxf", ".step": "step", ".stp": "step", ".brep": "brep"}
+
+_Curves = dict[int, Callable[[], list[Line | Arc]]]
+"""{number of a curve: what makes its pieces, or raises the error of one that is no tool's}."""
+
+
+def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: bool = False, *,
+         tolerance: float | None = None, body: Any = None) -> Tool:
+    """A tool from curves of a file.
+
+    A curve is taken for the line or the arc that it is, exactly; the curves of a mesh (.msh) by their nodes. The ending
+    says what a file is: .step or .stp, .brep, .dxf, .msh, or .geo. A .geo file is a script, which is not run: it may
+    hold points, lines, circles, numbers with a name, and what a tool does not need (loops, surfaces, physical groups).
+
+    Args:
+        curves: numbers of the curves in order; a negative one runs a curve backwards (in a .dxf file curves are counted
+            from 1 in the order of the file). None: all curves of the file, put end to end.
+        closed: the last point is joined to the first.
+        tolerance: length; splines and ellipses (.step, .brep, .dxf) become arcs no farther away than this.
+        body: a point (R, Z) outside the tool, or the mesh of the body: the solid is then put on the other side of the
+            profile. None: it is to the left of the profile.
+
+    Raises:
+        InputError: the file is not what its ending says or cannot be read, a statement that a .geo file may not hold,
+            a curve that is neither a line nor a circular arc where no tolerance is given, curves that do not follow one
+            another, a body on both sides of the profile.
+    """
+    name = os.fspath(place("tools.read: file", file))
+    tags = None if curves is None else [_tag(t) for t in several("tools.read: curves", curves, "numbers of curves")]
+    if tags == []:
+        raise InputError("tools.read: curves = []: must name at least one curve")
+    if tolerance is not None:
+        tolerance = positive("tools.read: tolerance", tolerance)
+    if not os.path.isfile(name):
+        raise InputError(f"tool file {name!r} is not there")
+    kind = _KINDS.get(os.path.splitext(name)[1].lower())
+    if kind is None:
+        raise InputError(f"tool file {name!r}: its ending must be one of {', '.join(_KINDS)}")
+    with open(name, "rb") as stream:
+        head = stream.read(200).lstrip()
+    if kind in _HEADERS and not head.startswith(_HEADERS[kind]):
+        raise InputError(f"tool file {name!r} cannot be read: it does not begin as a {kind.upper()} file does")
+    known = {"geo": _of_geo, "msh": _of_mesh, "dxf": dxf.curves}.get(kind, _of_solid)(name, tolerance)
+    for tag in tags or []:
+        if abs(tag) not in known:
+            raise InputError(f"tool file {name!r} has no curve {abs(tag)}; it has {sorted(known)}")
+    if tags is None:
+        pieces, closed = _end_to_end([known[tag]() for tag in sorted(known)], name)
+    else:
+        pieces = [piece for tag in tags for piece in _along(known[abs(tag)](), tag)]
+    tool = Tool.of_pieces(pieces, closed)
+    return tool if body is None else _beside(tool, body, name)
+
+
+def _beside(tool: Tool, body: Any, file: str) -> Tool:
+    """The tool, or the tool reversed: the one that the body is outside of."""
+    if hasattr(body, "nodes_of"):
+        points = np.concatenate([body.nodes_of(name) for name in body.boundaries])
+    else:
+        points = np.array([pair("tools.read: body", body)])
+    depth, near = tool.signed_distance(points), 1e-6 * tool.size
+    if depth.max() > near and depth.min() < -near:
+        raise InputError(f"tool file {file!r}: the body is on both sides of the profile, up to {depth.max():.6g} and"
+                         f" {-depth.min():.6g} away from it: move the tool or the body")
+    return tool.reversed() if depth.max() > near else tool
+
+
+def _along(pieces: list[Line | Arc], tag: int) -> list[Line | Arc]:
+    return pieces if tag > 0 else [piece.backwards for piece in reversed(pieces)]
+
+
+def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | Arc], bool]:
+    """All curves one after the other, each turned as it must be, from a free end; and whether they close."""
+    curves = [pieces for pieces in curves if pieces]
+    if not curves:
+        raise InputError(f"tool file {file!r} has no curves")
+    ends = np.array([[pieces[0].ends[0], pieces[-1].ends[1]] for pieces in curves])
+    near = 1e-6 * max(float(np.ptp(ends.reshape(-1, 2), axis=0).max()), 1e-300)
+    gap = np.hypot(*(ends.reshape(-1, 1, 2) - ends.reshape(1, -1, 2)).transpose(2, 0, 1))
+    meets = gap <= near
+    number = meets.sum(1)
+    if number.max() > 2 or len(curves) > 1 and np.any(meets[0::2, 1::2].diagonal()):
+        at = ends.reshape(-1, 2)[np.argmax(number)]
+        raise InputError(f"tool file {file!r}: more than two ends of curves meet near ({at[0]:.6g}, {at[1]:.6g}), or a"
+                         f" curve closes in itself: name the curves of the profile, curves=[...]")
+    free = np.flatnonzero(number == 1)
+    if len(free) not in (0, 2):
+        raise InputError(f"tool file {file!r}: its curves have {len(free)} free ends: a profile has two, or none if it"
+                         f" is closed; name the curves of the profile, curves=[...]")
+    at, found = int(free[0]) if len(free) else 0, list[Line | Arc]()
+    for k in range(len(curves)):
+        found += _along(curves[at // 2], -1 if at % 2 else 1)
+        last = at ^ 1
+        following = np.flatnonzero(meets[last] & (np.arange(len(number)) != last))
+        if k < len(curves) - 1 and (not len(following) or len(free) == 0 and following[0] == 0):
+            raise InputError(f"tool file {file!r}: its curves are in several parts: name those of the profile,"
+                             f" curves=[...]")
+        at = int(following[0]) if len(following) else at
+    return found, not len(free)
+
+
+def _tag(tag: Any) -> int:
+    number = finite("tools.read: number of a curve", tag)
+    return int(math.copysign(count("tools.read: number of a curve", abs(number)), number))
+
+
+def _of_geo(file: str, tolerance: float | None) -> _Curves:
+    return {tag: partial(list, [piece]) for tag, piece in geo.curves(file).items()}
+
+
+def _of_mesh(file: str, tolerance: float | None) -> _Curves:
+    found = msh.content(file)
+    points = dict(zip(found.numbers.tolist(), found.points[:, :2]))
+    lines: dict[int, list[list[int]]] = {}
+    for block in found.blocks:
+        if block.kind in (1, 8):
+            lines.setdefault(block.entity, []).extend(block.nodes[:, :2].tolist())
+
+    def piece(tag: int) -> list[Line | Arc]:
+        ends = list(dict.fromkeys(map(tuple, lines[tag])))           # an element of two groups is there twice
+        nodes = [ends[0][0], *(end for _, end in ends)]
+        if any(a[1] != b[0] for a, b in zip(ends, ends[1:])) or not all(n in points for n in nodes):
+            raise InputError(f"tool file {file!r}: the elements of curve {tag} do not follow one another")
+        return [_piece_through(np.array([points[n] for n in nodes]), f"tool file {file!r}: curve {tag}")]
+    return {tag: partial(piece, tag) for tag in lines}
+
+
+def _of_solid(file: str, tolerance: float | None) -> _Curves:
+    """Of a STEP or BREP file, which Open CASCADE reads: it knows no commands."""
+    import gmsh
+    ours = not gmsh.isInitialized()
+    if ours:
+        gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.add("formingx tool")
+        kind = _KINDS[os.path.splitext(file)[1].lower()]
+        try:
+            gmsh.model.occ.importShapes(file, highestDimOnly=False, format=kind)
+            gmsh.model.occ.synchronize()
+        except Exception as error:
+            raise InputError(f"tool file {file!r} cannot be read: {error}") from None
+        return {tag: _of_curve(gmsh.model, tag, tolerance, f"tool file {file!r}: curve {tag}")
+                for _, tag in gmsh.model.getEntities(1)}
+    finally:
+        gmsh.model.remove()
+        if ours:
+            gmsh.finalize()
+
+
+def _of_curve(model: Any, tag: int, tolerance: float | None, name: str) -> Callable[[], list[Line | Arc]]:
+    """What makes the pieces of a curve of Open CASCADE, or raises the error that it has, if it is asked for."""
+    (low,), (high,) = model.getParametrizationBounds(1, tag)
+
+    def curve(t):
+        at = low + (high - low) * t
+        return (np.array(model.getValue(1, tag, at)).reshape(-1, 3)[:, :2],
+                np.array(model.getDerivative(1, tag, at)).reshape(-1, 3)[:, :2])
+    try:
+        try:
+            pieces = [_piece_through(curve(np.linspace(0, 1, 9))[0], name)]
+        except InputError:
+            if tolerance is None:
+                raise
+            pieces = arcs_along(curve, tolerance, name)
+    except InputError as error:
+        return partial(_raise, error)
+    return lambda: pieces
+
+
+def _raise(error: InputError) -> list[Line | Arc]:
+    raise error
+
+
+def _piece_through(points: np.ndarray, name: str) -> Line | Arc:
+    """The line or the arc on which all points lie, in their order, shape (n, 2)."""
+    n, near = len(points), 1e-7 * max(np.ptp(points, axis=0).max(initial=0.0), 1e-300)
+    a, b = points[[0, -1]] if n > 1 else (np.zeros(2), np.zeros(2))
+    chord = b - a
+    off = (points - a) @ (-chord[1], chord[0]) / max(math.hypot(*chord), near)
+    if n > 1 and math.hypot(*chord) > near and np.abs(off).max() <= near:
+        return Line(a, b)
+    if n > 3:                                              # three points always lie on a circle
+        p, q, r = points[[0, n // 3, 2 * n // 3]]
+        centre = p + np.linalg.lstsq(2 * np.array([q - p, r - p]), [(q - p) @ (q - p), (r - p) @ (r - p)])[0]
+        radius = math.dist(p, centre)
+        if np.abs(np.hypot(*(points - centre).T) - radius).max() <= near:
+            angles = np.unwrap([math.atan2(*(x - centre)[::-1]) for x in points])
+            if np.all(np.diff(angles) * (angles[-1] - angles[0]) > 0):
+                return Arc(centre, radius, float(angles[0]), float(angles[-1] - angles[0]))
+    raise InputError(f"{name} is neither a straight line nor a circular arc"
+                     + (f" (of a mesh, {n} nodes; four are needed to know an arc)" if n < 4 else
+                        "; give tolerance=..., a length, and one of .step, .brep or .dxf is taken for arcs that close"))
+

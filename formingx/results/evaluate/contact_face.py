@@ -1,0 +1,140 @@
+"""What a tool and a face of the body do to each other, node by node: pressure, friction, gap; and the tool's force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ..files.sheet import Sheet
+
+
+@dataclass(frozen=True)
+class ContactTable(Sheet):
+    """A face that meets a tool, at its n nodes, by R at rest.
+
+    Attributes:
+        rest: (R, Z), shape (n, 2), length.
+        points: (r, z) now, shape (n, 2), length.
+        gap: distance from the tool, negative inside it, shape (n,), length.
+        pressure: of contact, per deformed area, shape (n,), stress.
+        friction: tangential traction of the body on the tool per deformed area, along the tool's profile, (n,), stress.
+        comm: of the run.
+    """
+
+    rest: np.ndarray
+    points: np.ndarray
+    gap: np.ndarray
+    pressure: np.ndarray
+    friction: np.ndarray
+    comm: Any
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """{name: values, shape (n,)}: what the files hold."""
+        return {"reference_radius": self.rest[:, 0], "reference_height": self.rest[:, 1], "r": self.points[:, 0],
+                "z": self.points[:, 1], "gap": self.gap, "contact_pressure": self.pressure,
+                "friction_stress": self.friction}
+
+
+class ContactFace:
+    """The face of one contact of a problem (`NodalContact`), its nodes from all ranks in one order; collective.
+
+    Attributes:
+        rest: the nodes at rest, shape (n, 2), length, by R, then Z.
+    """
+
+    def __init__(self, path: Any, contact: Any):
+        self._path, self._contact = path, contact
+        self.rest, _ = self._gathered(contact.points)
+        self._edges = self._find_edges()
+        self._rest_tangents = _tangents(self.rest[self._edges])
+
+    def of(self, state: Any) -> ContactTable:
+        """The face in a state; of a tool that takes no part, without pressure."""
+        path, contact = self._path, self._contact
+        with path.problem.at(state) as problem:
+            fields = problem.x.array_r
+            moved = contact.points + path.problem.forms.length * fields[contact.dofs]
+            seen = contact.positions(fields, state.control)
+            gap = -contact.contact.tool.signed_distance(seen)
+            traction = np.zeros((len(seen), 2))
+            if contact in path.problem.touching:
+                found = contact.tractions(fields, state.control)
+                traction = np.column_stack([found.normal, found.tangential])
+        _, values = self._gathered(moved, gap[:, None], traction)
+        points = values[:, :2]
+        per_area = values[:, 3:] / self.area_ratio(points)[:, None]
+        return ContactTable(self.rest, points, values[:, 2], per_area[:, 0], per_area[:, 1], path.problem.comm)
+
+    def area_ratio(self, points: np.ndarray) -> np.ndarray:
+        """Deformed over reference area at the nodes, the mean of what the edges on both sides say, shape (n,)."""
+        n, rest, now = len(points), self.rest[self._edges], points[self._edges]
+        ratio = np.linalg.norm(_tangents(now), axis=-1) / np.linalg.norm(self._rest_tangents, axis=-1)
+        if self._path.problem.scene.kinematics.dimension_of_volume == 3:
+            axis = rest[..., 0] < 1e-9 * self._path.problem.forms.length
+            ratio = ratio * np.where(axis, ratio, now[..., 0] / np.where(axis, 1.0, rest[..., 0]))
+        edges = self._edges.ravel()
+        return np.bincount(edges, ratio.ravel(), n) / np.maximum(np.bincount(edges, minlength=n), 1)
+
+    def _gathered(self, *columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(rest positions, columns side by side) of all ranks' nodes, by R, then Z."""
+        rows = np.column_stack([self._contact.points, *columns])
+        rows = np.concatenate(self._path.problem.comm.allgather(rows))
+        rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+        return rows[:, :2], rows[:, 2:]
+
+    def _find_edges(self) -> np.ndarray:
+        """Numbers of the two ends and the middle of every edge of the face, shape (m, 3); same on all ranks."""
+        from dolfinx.mesh import entities_to_geometry
+        from scipy.spatial import cKDTree
+        mesh = self._path.problem.scene.mesh
+        mesh.domain.topology.create_connectivity(1, 2)
+        facets = mesh.facets_of(self._contact.contact.on)
+        nodes = entities_to_geometry(mesh.domain, 1, facets) if len(facets) else np.zeros((0, 2), dtype=int)
+        X = mesh.domain.geometry.x[nodes][..., :2]
+        if len(X) and X.shape[1] == 2:                           # straight edges
+            X = np.concatenate([X, X.mean(1, keepdims=True)], axis=1)
+        points = np.concatenate([part.reshape(-1, 3, 2) for part in mesh.comm.allgather(X)])
+        numbers = cKDTree(self.rest).query(points)[1]
+        return np.unique(numbers, axis=0)                        # a ghost is there twice
+
+
+def contact_of(path: Any, tool: Any, who: str) -> list[Any]:
+    """The contacts (`NodalContact`) of a tool: by its name, as the `Tool` or a `Contact`; None: the only one."""
+    contacts = path.problem.contacts
+    found = [c for c in contacts if tool is None or tool in (c.contact.name, c.contact.on)
+             or tool is c.contact.tool or tool is c.contact]
+    names = ", ".join(repr(c.contact.name or c.contact.on) for c in contacts) or "none"
+    if not found:
+        raise InputError(f"{who}: tool = {tool!r}: the scene has no such tool; it has {names}")
+    if tool is None and len({c.contact.name for c in found}) > 1:
+        raise InputError(f"{who}: which tool? The scene has {names}")
+    return found
+
+
+def tool_forces(path: Any) -> dict[str, np.ndarray]:
+    """{tool: force that it takes from the body, at all states, shape (states,)}: stress length^2 (length per depth).
+
+    Of a tool that moves along its travel, positive when it resists the travel; of one that stays along Z, positive when
+    the body pushes it up.
+    """
+    forces: dict[str, np.ndarray] = {}
+    for k, contact in enumerate(path.problem.contacts):
+        name = contact.contact.name or f"tool {k + 1}"
+        moves = contact.contact.moves
+        way = np.array([0.0, 1.0]) if moves is None else -np.array(moves) / np.hypot(*moves)
+        forces.setdefault(name, np.zeros(len(path)))
+        for n, state in enumerate(path.states):
+            with path.problem.at(state) as problem:
+                if contact in problem.touching:
+                    forces[name][n] += contact.force(problem.x.array_r, state.control) @ way
+    return forces
+
+
+def _tangents(points: np.ndarray) -> np.ndarray:
+    """dx/ds at the two ends and the middle of three-node edges, shape (m, 3, 2)."""
+    a, b, m = points[:, 0], points[:, 1], points[:, 2]
+    return np.stack([4 * m - 3 * a - b, a - 4 * m + 3 * b, b - a], axis=1)

@@ -1,0 +1,110 @@
+"""How far a mould is filled: the gap that is left in each corner, state by state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...discrete.probes import probe
+from ...errors import InputError, non_negative
+from ...physics.tools import Arc, Tool
+from ..files.sheet import Sheet
+from .profile import distance_to_line, fine
+
+_FLAT = 1e-6         # radians: a joint that turns less is no corner
+
+
+class Corner(NamedTuple):
+    """A corner of a tool that the body must fill: (r, z) of its middle, and its radius, lengths."""
+
+    at: tuple[float, float]
+    radius: float
+
+
+@dataclass(frozen=True)
+class Filling(Sheet):
+    """The gaps in the k corners of a tool, in n states.
+
+    Attributes:
+        corners: of the tool.
+        control: {name of the pressure, or of what else is driven: its values, shape (n,)}.
+        gaps: the largest distance from the points of each corner to the face, shape (n, k), length.
+        comm: of the run.
+    """
+
+    corners: list[Corner]
+    control: dict[str, np.ndarray]
+    gaps: np.ndarray
+    comm: Any
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """{name: values, shape (n,)}: what the files hold."""
+        return self.control | {f"corner_{k}_gap": gap for k, gap in enumerate(self.gaps.T, 1)}
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """Values of what is driven, shape (n,)."""
+        return next(iter(self.control.values()))
+
+    def pressure_at(self, gap: float, corner: int | None = None) -> float:
+        """The pressure beyond which no more than a gap is left, linear between states.
+
+        Args:
+            corner: its number in `corners`; None: in all of them.
+
+        Raises:
+            InputError: that gap is not reached, or there is no such corner.
+        """
+        gap = non_negative("pressure_at: gap", gap)
+        if corner is not None and corner not in range(len(self.corners)):
+            raise InputError(f"pressure_at: corner = {corner!r}: must be from 0 to {len(self.corners) - 1}")
+        left = self.gaps.max(1) if corner is None else self.gaps[:, corner]
+        if left[-1] > gap:
+            raise InputError(f"pressure_at: gap = {gap:g} is not reached: {left[-1]:.6g} is left at the end")
+        wider = np.flatnonzero(left > gap)
+        if not len(wider):
+            return float(self.pressure[0])
+        k = wider[-1]
+        part = (left[k] - gap) / (left[k] - left[k + 1])
+        return float((1 - part) * self.pressure[k] + part * self.pressure[k + 1])
+
+
+def filling(path: Any, contact: Any) -> Filling:
+    """See `Path.filling`; contact: the `ContactNodes`."""
+    from ...discrete.tooling import Tooling
+    tooling = Tooling.of_problem(path.problem)
+    number = path.problem.contacts.index(contact)
+    corners = corners_of(contact.contact.tool)
+    if not corners:
+        raise InputError(f"filling: {contact.contact.tool!r} has no corner that the body must fill")
+    face = probe(path.problem, path.problem.scene.mesh.line_of(contact.contact.on))
+    gaps = np.full((len(path), len(corners)), np.nan)
+    for n, state in enumerate(path.states):
+        travel = tooling.travels(state.setting, state.control)[number] or 0.0
+        shift = travel * np.array(contact.contact.moves or (0.0, 0.0))
+        with path.problem.at(state) as problem:
+            line = fine(face.points + face.displacement(problem.x))
+        gaps[n] = [distance_to_line(points + shift, line).max() for _, points in corners]
+    driven = [c for c in path.columns if c.endswith("pressure")] or [
+        path.problem.scene.column(thing) for thing in path.problem.scene.drivable]
+    return Filling([corner for corner, _ in corners], {c: path[c] for c in driven}, gaps, path.problem.comm)
+
+
+def corners_of(tool: Tool) -> list[tuple[Corner, np.ndarray]]:
+    """The corners of a tool that open towards the body, each with points on it, shape (m, 2): arcs and sharp turns."""
+    found = []
+    pieces = list(tool.pieces)
+    for i, piece in enumerate(pieces):
+        if isinstance(piece, Arc) and -np.pi < piece.sweep < -_FLAT:
+            angles = piece.start + piece.sweep * np.linspace(0, 1, 17)
+            points = piece.centre + piece.radius * np.column_stack([np.cos(angles), np.sin(angles)])
+            found.append((Corner(tuple(points[8].tolist()), piece.radius), points))
+        following = pieces[i + 1] if i + 1 < len(pieces) else pieces[0] if tool.closed else None
+        if following is not None:
+            turn = np.pi - (np.pi - (following.angles[0] - piece.angles[1])) % (2 * np.pi)
+            if turn < -_FLAT:
+                found.append((Corner(tuple(piece.ends[1].tolist()), 0.0), piece.ends[1][None]))
+    return found

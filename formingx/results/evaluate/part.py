@@ -1,0 +1,130 @@
+"""The formed part in numbers: volume, weight, area, least wall, evenness."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...errors import InputError, finite, known, positive, several
+from ...units import NONE, Units
+from .profile import fine
+from .wall import Wall
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part, from the axis to the rim or to where it is trimmed; in plane strain per unit of depth, as modelled.
+
+    Attributes:
+        volume: between the two faces, length^3 (a rim that bulges is left out).
+        area: of the middle surface, length^2.
+        draw_ratio: area over the area that it had at rest (areal draw ratio).
+        mean_wall: volume over area, length.
+        least_wall: length; and where: reference radius, (r, z) of the middle line, height (as in `Wall`).
+        evenness: least wall over mean wall, 1 for an even part.
+        variation: standard deviation of the wall over the middle surface, over its mean: coefficient of variation.
+        weight: grams if a density in g/cm3 was given; else None.
+        walls: {height: wall there}, lengths.
+        scrap: volume beyond the trim over the volume of the whole sheet.
+        units: of the labels.
+    """
+
+    volume: float
+    area: float
+    draw_ratio: float
+    mean_wall: float
+    least_wall: float
+    least_at_radius: float
+    least_at: tuple[float, float]
+    least_at_height: float
+    evenness: float
+    variation: float
+    weight: float | None
+    walls: dict[float, float]
+    scrap: float
+    units: Units = field(repr=False, default=NONE)
+
+    @property
+    def rows(self) -> list[tuple[str, str]]:
+        """(what, its value with its unit), for people."""
+        u = self.units
+
+        def said(value, unit):
+            return f"{value:.5g} {unit}".rstrip()
+        rows = [("weight", said(self.weight, "g"))] if self.weight is not None else []
+        where = f"{said(self.least_wall, u.length or '')} at height {said(self.least_at_height, u.length or '')}," \
+                f" r = {said(self.least_at[0], u.length or '')}, from R = {said(self.least_at_radius, u.length or '')}"
+        rows += [("least wall", where), ("mean wall", said(self.mean_wall, u.length or "")),
+                 ("evenness (least over mean wall)", f"{self.evenness:.4g}"),
+                 ("coefficient of variation of the wall", f"{self.variation:.4g}"),
+                 ("areal draw ratio", f"{self.draw_ratio:.4g}"), ("volume", said(self.volume, u.volume)),
+                 ("area of the middle surface", said(self.area, u.area))]
+        rows += [(f"wall at height {said(h, u.length or '')}", said(w, u.length or "")) for h, w in self.walls.items()]
+        return rows + ([("scrap, of the sheet's volume", f"{100 * self.scrap:.3g} %")] if self.scrap else [])
+
+    def __str__(self) -> str:
+        width = max(len(what) for what, _ in self.rows)
+        return "\n".join(f"{what:{width}}  {value}" for what, value in self.rows)
+
+
+def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: float | tuple[str, float] | None = None,
+         heights: Sequence[float] = (), units: Units = NONE) -> Part:
+    """See `Path.part`."""
+    profile = wall.profile
+    strips = _strips(fine(profile.bottom), fine(profile.top), axisymmetric)
+    middle = _surface(fine(profile.middle), axisymmetric)
+    rest = _surface(fine((profile.rest_bottom + profile.rest_top) / 2), axisymmetric)
+    inside = _inside(wall, trim)
+    volume, area, area_at_rest = (_sums(v, len(wall.r)) for v in (strips, middle, rest))
+    kept = [float((v * inside).sum()) for v in (volume, area, area_at_rest)]
+    reached = np.append(inside > 0, False) | np.append(False, inside == 1)
+    reached[0] = True
+    k = int(np.argmin(np.where(reached, wall.wall, np.inf)))
+    mean = kept[0] / kept[1]
+    of_strip = (wall.wall[1:] + wall.wall[:-1]) / 2
+    average = (of_strip * area * inside).sum() / kept[1]
+    spread = ((of_strip - average) ** 2 * area * inside).sum() / kept[1]
+    weight = None if density is None else units.mass(kept[0], positive("part: density", density))
+    at = {finite("part: heights", h): wall.at_height(h) for h in several("part: heights", heights, "numbers")}
+    return Part(kept[0], kept[1], kept[1] / kept[2], mean, float(wall.wall[k]), float(wall.reference_radius[k]),
+                (float(wall.r[k]), float(wall.z[k])), float(wall.height[k]), float(wall.wall[k] / mean),
+                float(np.sqrt(spread) / average), weight, at, float(1 - kept[0] / volume.sum()), units)
+
+
+def _inside(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndarray:
+    """How much of each of the n - 1 strips between nodes belongs to the part, 0 to 1."""
+    inside = np.ones(len(wall.r) - 1)
+    if trim is None:
+        return inside
+    along, value = trim if isinstance(trim, tuple) and len(trim) == 2 else ("r", trim)
+    known("part: trim along", along, ("r", "height"))
+    value, line = finite("part: trim", value), wall.r if along == "r" else wall.height
+    crossed = np.flatnonzero((line[:-1] < value) & (line[1:] >= value))
+    if not len(crossed):
+        raise InputError(f"part: trim = {trim!r}: the part goes from {line.min():.6g} to {line.max():.6g} along"
+                         f" {along}")
+    k = crossed[-1]
+    inside[k], inside[k + 1:] = (value - line[k]) / (line[k + 1] - line[k]), 0.0
+    return inside
+
+
+def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool) -> np.ndarray:
+    """Volumes between successive pairs of points of two lines, shape (m - 1,): of polygons, turned about the axis."""
+    corners = [bottom[:-1], bottom[1:], top[1:], top[:-1]]
+    total = np.zeros(len(bottom) - 1)
+    for (r, z), (s, w) in ((a.T, b.T) for a, b in zip(corners, corners[1:] + corners[:1])):
+        total += np.pi / 3 * (r * r + r * s + s * s) * (w - z) if axisymmetric else (r + s) / 2 * (w - z)
+    return np.abs(total)
+
+
+def _surface(line: np.ndarray, axisymmetric: bool) -> np.ndarray:
+    """Areas that the straight pieces of a line sweep about the axis (lengths in plane strain), shape (m - 1,)."""
+    length = np.hypot(*np.diff(line, axis=0).T)
+    return np.pi * (line[1:, 0] + line[:-1, 0]) * length if axisymmetric else length
+
+
+def _sums(fine_values: np.ndarray, nodes: int) -> np.ndarray:
+    """What belongs to each piece between two of n nodes, of values on equal parts of it, shape (n - 1,)."""
+    return fine_values.reshape(nodes - 1, -1).sum(1)

@@ -1,0 +1,179 @@
+"""The wall of a formed part, place by place from the axis to the rim: a table to read, plot and send on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ... import _compat
+from ...discrete.probes import probe
+from ...errors import InputError, finite
+from ..files.sheet import Sheet
+from .profile import Profile, distance_to_line
+
+
+@dataclass(frozen=True)
+class Wall(Sheet):
+    """The wall at the n nodes of the bottom (inner) face of a sheet, from the axis to the rim, in one state.
+
+    Attributes:
+        profile: both faces, at rest and now.
+        layers: {name of a layer: its share of the wall, shape (n,)}, from the bottom up: of the material line across
+            the sheet there.
+        comm: of the run.
+    """
+
+    profile: Profile
+    layers: Mapping[str, np.ndarray]
+    comm: Any
+
+    @property
+    def reference_radius(self) -> np.ndarray:
+        """Where the material was: R at rest, shape (n,), length."""
+        return self.profile.reference_radius
+
+    @property
+    def arc_length(self) -> np.ndarray:
+        """Length of the deformed middle line from the axis, shape (n,), length."""
+        return self.profile.arc_length
+
+    @property
+    def r(self) -> np.ndarray:
+        """Radius of the middle line, shape (n,), length."""
+        return self.profile.middle[:, 0]
+
+    @property
+    def z(self) -> np.ndarray:
+        """Z of the middle line, shape (n,), length."""
+        return self.profile.middle[:, 1]
+
+    @property
+    def height(self) -> np.ndarray:
+        """Distance along the axis from the pole, the part's base; from its lowest point if it has no pole; (n,)."""
+        return np.abs(self.z - self.z[0]) if abs(self.r[0]) <= 1e-9 * np.ptp(self.r) else self.z - self.z.min()
+
+    @cached_property
+    def wall(self) -> np.ndarray:
+        """Shortest distance from the bottom to the top face, shape (n,), length."""
+        return self.profile.wall_thickness
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """The wall over the original thickness there, shape (n,)."""
+        return self.wall / self.profile.original_thickness
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """{name: values, shape (n,)}: what the files hold."""
+        each = {f"wall_of_{name}": share * self.wall for name, share in self.layers.items()}
+        return {"reference_radius": self.reference_radius, "arc_length": self.arc_length, "r": self.r, "z": self.z,
+                "height": self.height, "wall": self.wall, "wall_ratio": self.ratio, **(each if len(each) > 1 else {})}
+
+    def at_height(self, height: float) -> float:
+        """The wall where the part's middle line passes a height (the least, if it does more than once), length.
+
+        Raises:
+            InputError: it does not pass that height.
+        """
+        height, h = finite("at_height: height", height), self.height
+        k = np.flatnonzero((h[:-1] - height) * (h[1:] - height) <= 0)
+        if not len(k):
+            raise InputError(f"at_height: height = {height:g}: the part goes from {h.min():.6g} to {h.max():.6g}")
+        step = h[k + 1] - h[k]
+        part = np.divide(height - h[k], step, out=np.zeros(len(k)), where=step != 0)
+        return float(np.min((1 - part) * self.wall[k] + part * self.wall[k + 1]))
+
+
+class Walls:
+    """Makes the `Wall` of states of a path."""
+
+    def __init__(self, path: Any):
+        self._path = path
+        self._lines: tuple[list[str], Any] | None = None
+
+    def of(self, state: Any) -> Wall:
+        """The wall in a state (collective)."""
+        path, profile = self._path, self._path.profile(state)
+        names = list(path.problem.scene.mesh.layers)
+        shares = {names[0]: np.ones(len(profile.bottom))}
+        if len(names) > 1:
+            if self._lines is None:
+                names, between = _between_layers(path.problem.scene.mesh, profile)
+                self._lines = names, probe(path.problem, between.reshape(-1, 2))
+            names, there = self._lines
+            with path.problem.at(state) as problem:
+                deformed = there.points + there.displacement(problem.x)
+            lines = [profile.bottom, *deformed.reshape(len(names) - 1, -1, 2), profile.top]
+            lengths = np.array([np.hypot(*(b - a).T) for a, b in zip(lines, lines[1:])])
+            shares = dict(zip(names, lengths / lengths.sum(0), strict=True))
+        return Wall(profile, shares, path.problem.comm)
+
+
+def _between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
+    """(layers from the bottom up, where the material lines across cross the k interfaces at rest, shape (k, n, 2))."""
+    edges = _interfaces(mesh)
+    across = profile.rest_top - profile.rest_bottom
+    found = {pair: _crossing(profile.rest_bottom, across, lines) for pair, lines in edges.items()}
+    missing = [pair for pair, part in found.items() if not np.all(np.isfinite(part))]
+    if missing or len(found) != len(mesh.layers) - 1:
+        raise InputError(f"wall: the layers {', '.join(map(repr, mesh.layers))} do not lie one upon another from the"
+                         f" axis to the rim")
+    order = sorted(found, key=lambda pair: found[pair].mean())
+    first = next(iter(set(order[0]) - set(order[1]))) if len(order) > 1 else min(
+        order[0], key=lambda name: _middle_of(mesh, name, profile))
+    names = [first]
+    for pair in order:
+        names.append(next(name for name in pair if name != names[-1]))
+    return names, np.array([profile.rest_bottom + found[pair][:, None] * across for pair in order])
+
+
+def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
+    """{(layer, layer): straight pieces of the line between them at rest, shape (m, 2, 2)}; same on all ranks."""
+    from dolfinx.mesh import entities_to_geometry
+    domain, topology = mesh.domain, mesh.domain.topology
+    topology.create_connectivity(1, 2)
+    layer = np.full(topology.index_map(2).size_local + topology.index_map(2).num_ghosts, -1)
+    names = list(mesh.layers)
+    for k, tag in enumerate(mesh.layers.values()):
+        layer[mesh.cells.find(tag)] = k
+    of_facet = topology.connectivity(1, 2)
+    pairs: dict[tuple[int, ...], list[int]] = {}
+    for facet in range(topology.index_map(1).size_local):
+        cells = of_facet.links(facet)
+        if len(cells) == 2 and layer[cells[0]] != layer[cells[1]]:
+            pairs.setdefault(tuple(sorted(layer[cells].tolist())), []).append(facet)
+    found = {}
+    for pair in sorted(set().union(*mesh.comm.allgather(set(pairs)))):
+        facets = np.array(pairs.get(pair, []), dtype=np.int32)
+        nodes = entities_to_geometry(domain, 1, facets) if len(facets) else np.zeros((0, 2), dtype=int)
+        chain = [0, 2, 1] if nodes.shape[1] == 3 else [0, 1]
+        points = domain.geometry.x[nodes][..., :2]
+        pieces = [points[:, [a, b]] for a, b in zip(chain, chain[1:])]
+        found[tuple(names[k] for k in pair)] = np.concatenate(
+            [part.reshape(-1, 2, 2) for part in mesh.comm.allgather(np.concatenate(pieces))])
+    return found
+
+
+def _crossing(start: np.ndarray, across: np.ndarray, pieces: np.ndarray) -> np.ndarray:
+    """Where the lines start + s across, 0 <= s <= 1, meet straight pieces, shape (m, 2, 2): s, (n,), nan if nowhere."""
+    a, along = pieces[:, 0], pieces[:, 1] - pieces[:, 0]
+    from_start = a - start[:, None]
+    det = across[:, None, 0] * along[:, 1] - across[:, None, 1] * along[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s = (from_start[..., 0] * along[:, 1] - from_start[..., 1] * along[:, 0]) / det
+        t = (from_start[..., 0] * across[:, None, 1] - from_start[..., 1] * across[:, None, 0]) / det
+    near = 1e-6
+    s = np.where((t >= -near) & (t <= 1 + near) & (s >= -near) & (s <= 1 + near), s, np.inf).min(1)
+    return np.where(np.isfinite(s), s, np.nan)
+
+
+def _middle_of(mesh: Any, layer: str, profile: Profile) -> float:
+    """Mean distance of a layer's nodes from the middle of the bottom face at rest: which of two is the lower."""
+    cells = mesh.cells.find(mesh.layers[layer])
+    points = mesh.domain.geometry.x[_compat.cell_nodes(mesh.domain)[cells]].reshape(-1, 3)[:, :2]
+    points = np.concatenate(mesh.comm.allgather(points))
+    return float(distance_to_line(points, profile.rest_bottom).mean())

@@ -1,0 +1,54 @@
+"""Columns of numbers as files that other programs open: CSV, and Excel."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...units import NONE, Units
+from . import tabular
+
+
+class Sheet:
+    """A table with named columns, one row to a place; `comm`: its rank 0 writes."""
+
+    comm: Any
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """{name: values, shape (n,)}: what the files hold."""
+        raise NotImplementedError
+
+    def to_csv(self, file: Any, units: Units = NONE) -> None:
+        """Write a CSV file, its name ending in .csv; `units` go into the header, as in "wall [mm]".
+
+        Raises:
+            InputError: the name ends otherwise. OSError: it cannot be written.
+        """
+        tabular.write_rows(file, self._header(units), self._rows(), self.comm)
+
+    def to_excel(self, file: Any, units: Units = NONE) -> None:
+        """Write an Excel file, its name ending in .xlsx.
+
+        Raises:
+            InputError: the name ends otherwise, or openpyxl is not installed. OSError: it cannot be written.
+        """
+        file = tabular.named("to_excel", file, ".xlsx")
+        try:
+            from openpyxl import Workbook
+        except ImportError:
+            raise InputError("to_excel: needs openpyxl, which is not installed; to_csv needs nothing") from None
+        book = Workbook()
+        sheet = book.active
+        for row in (self._header(units), *self._rows()):
+            sheet.append([v.item() if isinstance(v, np.generic) else v for v in row])
+        sheet.freeze_panes = "A2"
+        tabular.on_root(self.comm, lambda: tabular.replace(file, book.save, "wb"))
+
+    def _header(self, units: Units) -> list[str]:
+        return [f"{name} [{unit}]" if (unit := units.of(name)) else name for name in self.columns]
+
+    def _rows(self) -> list[tuple]:
+        return list(zip(*self.columns.values(), strict=True))

@@ -1,0 +1,106 @@
+"""The part as a solid of triangles: STL, for CAD and 3-D printing, and binary glTF, coloured, for viewers and pages.
+
+STL: 3D Systems (1988), binary. glTF 2.0: Khronos, ISO/IEC 12113:2022, binary (GLB); lengths are those of the script.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from ..evaluate.profile import fine
+from . import tabular
+
+_PARTS = 4          # straight pieces for an element's edge
+
+
+def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarray, np.ndarray]:
+    """(points, shape (n, 3), triangles, shape (m, 3), seen from outside counter-clockwise) of a sheet.
+
+    It is turned about the axis in so many `parts`, or, in plane strain, extruded as far as it is wide.
+    """
+    line = np.vstack([fine(profile.bottom, _PARTS), fine(profile.top, _PARTS)[::-1]])      # its edges are curved
+    n = len(line)
+    on_axis = np.abs(line[:, 0]) < 1e-9 * np.ptp(line)
+    if axisymmetric:
+        turn = np.linspace(0, 2 * np.pi, parts, endpoint=False)
+        points = np.stack([np.outer(np.cos(turn), line[:, 0]), np.outer(np.sin(turn), line[:, 0]),
+                           np.tile(line[:, 1], (parts, 1))], axis=-1)
+    else:
+        width = np.ptp(line[:, 0])
+        points = np.stack([np.stack([line[:, 0], np.full(n, y), line[:, 1]], axis=-1) for y in (0.0, width)])
+    number = np.arange(len(points) * n).reshape(len(points), n)
+    if axisymmetric:
+        number[:, on_axis] = number[0, on_axis]              # one point, whatever the angle
+    here, there = (number, np.roll(number, -1, axis=0)) if axisymmetric else (number[:1], number[1:])
+    a, b, c, d = here, np.roll(here, -1, axis=1), np.roll(there, -1, axis=1), there
+    triangles = np.concatenate([np.stack(three, axis=-1).reshape(-1, 3) for three in ((a, b, c), (a, c, d))])
+    if not axisymmetric:
+        triangles = np.concatenate([triangles, *_ends(number)])
+    triangles = triangles[[len(set(t)) == 3 for t in triangles.tolist()]]
+    points = points.reshape(-1, 3)
+    if np.einsum("ij,ij->i", points[triangles[:, 0]], np.cross(*points[triangles[:, 1:]].transpose(1, 0, 2))).sum() < 0:
+        triangles = triangles[:, ::-1]
+    return points, triangles
+
+
+def to_stl(profile: Any, axisymmetric: bool, file: Any, comm: Any) -> None:
+    """Write a binary STL file, its name ending in .stl (rank 0 writes)."""
+    file = tabular.named("to_stl", file, ".stl")
+    points, triangles = solid(profile, axisymmetric)
+    corners = points[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    rows = np.zeros(len(triangles), dtype=[("v", "<f4", (4, 3)), ("attribute", "<u2")])
+    rows["v"] = np.concatenate([normals[:, None], corners], axis=1)
+    data = b"formingx".ljust(80) + np.uint32(len(triangles)).astype("<u4").tobytes() + rows.tobytes()
+    tabular.on_root(comm, lambda: tabular.replace(file, lambda stream: stream.write(data), "wb"))
+
+
+def to_gltf(profile: Any, axisymmetric: bool, file: Any, comm: Any) -> None:
+    """Write a binary glTF file, its name ending in .glb, coloured by the wall ratio (rank 0 writes)."""
+    from matplotlib import colormaps
+    file = tabular.named("to_gltf", file, ".glb")
+    points, triangles = solid(profile, axisymmetric)
+    n = len(profile.bottom)
+    ratio = np.interp(np.arange(0, n - 1 + 1e-9, 2 / _PARTS), np.arange(n), profile.wall_ratio)
+    ratio = np.concatenate([ratio, ratio[::-1]])
+    shade = (ratio - ratio.min()) / (np.ptp(ratio) or 1.0)
+    colours = np.tile(colormaps["viridis_r"](shade)[:, :3], (len(points) // len(ratio), 1))
+    upright = points[:, [0, 2, 1]] * (1, 1, -1)              # glTF has y up
+    arrays = [("POSITION", upright.astype("<f4"), 5126, 34962), ("COLOR_0", colours.astype("<f4"), 5126, 34962),
+              ("indices", triangles.astype("<u4").ravel(), 5125, 34963)]
+    data = b""
+    views: list[dict] = []
+    accessors: list[dict] = []
+    for _, array, kind, target in arrays:
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes, "target": target})
+        accessor = {"bufferView": len(accessors), "componentType": kind, "count": len(array),
+                    "type": "VEC3" if array.ndim == 2 else "SCALAR"}
+        accessors.append(accessor)
+        data += array.tobytes()
+    accessors[0] |= {"min": upright.min(0).astype("<f4").tolist(), "max": upright.max(0).astype("<f4").tolist()}
+    surface = {"metallicFactor": 0.0, "roughnessFactor": 0.6}
+    about = {"asset": {"version": "2.0", "generator": "formingx"}, "scene": 0, "scenes": [{"nodes": [0]}],
+             "nodes": [{"mesh": 0}], "buffers": [{"byteLength": len(data)}], "bufferViews": views,
+             "accessors": accessors, "materials": [{"doubleSided": True, "pbrMetallicRoughness": surface}],
+             "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "COLOR_0": 1}, "indices": 2, "material": 0}]}]}
+    text = json.dumps(about).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = b"".join(np.array([len(part)], "<u4").tobytes() + kind + part for kind, part in
+                      ((b"JSON", text), (b"BIN\0", data)))
+    whole = b"glTF" + np.array([2, 12 + len(chunks)], "<u4").tobytes() + chunks
+    tabular.on_root(comm, lambda: tabular.replace(file, lambda stream: stream.write(whole), "wb"))
+
+
+def _ends(number: np.ndarray) -> list[np.ndarray]:
+    """Triangles of the two cut faces of an extruded sheet, across from face to face."""
+    found = []
+    for row, sense in ((number[0], 1), (number[1], -1)):
+        half = len(row) // 2
+        low, high = row[:half], row[:half - 1:-1]            # opposite each other
+        quads = np.stack([low[:-1], high[:-1], high[1:], low[1:]], axis=-1)
+        found += [quads[:, [0, 1, 2]][:, ::sense], quads[:, [0, 2, 3]][:, ::sense]]
+    return found

@@ -1,0 +1,66 @@
+"""Pieces of an HTML page."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from importlib import resources
+from typing import Any
+
+
+def page(title: str, body: list[str], tail: str = "") -> str:
+    """A whole page: its heading is in the body; tail: what comes after it, scripts for one."""
+    style = resources.files(__package__).joinpath("report.css").read_text()
+    return (f"<!doctype html>\n<html lang=en><head><meta charset=utf-8><title>{html.escape(title)}</title>"
+            f"<meta name=viewport content='width=device-width, initial-scale=1'><style>{style}</style></head>\n<body>"
+            + "\n".join(body) + tail + "</body></html>\n")
+
+
+def table(head: list[str], rows: list[list[str]]) -> str:
+    """A table; columns of numbers stand to the right; with a head of empty words: two columns of words, without it."""
+    numbers = [any(head) and all(_is_number(row[k]) for row in rows) for k in range(len(head))]
+
+    def line(tag, row):
+        return "".join(f"<{tag}{' class=number' if number else ''}>{html.escape(text)}</{tag}>"
+                       for text, number in zip(row, numbers))
+    lines = [line("th", head)] if any(head) else []
+    lines += [line("td", row) for row in rows]
+    return "<div class=scroll><table>" + "".join(f"<tr>{line}</tr>" for line in lines) + "</table></div>"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text or 0)
+    except ValueError:
+        return False
+    return True
+
+
+def details(title: str, content: str) -> str:
+    """What is folded until it is asked for."""
+    return f"<details><summary>{html.escape(title)}</summary>{content}</details>"
+
+
+def figure(figure: Any, caption: str, kind: str = "wide") -> str:
+    """A matplotlib figure with a caption; kind "small": not over the whole width."""
+    stream = io.BytesIO()
+    figure.savefig(stream, dpi=140)
+    return picture(stream.getvalue(), caption, kind)
+
+
+def picture(png: bytes, caption: str, kind: str) -> str:
+    """A PNG with a caption."""
+    text = html.escape(caption, quote=True)
+    return (f"<figure class={kind}><img alt='{text}' src='data:image/png;base64,{base64.b64encode(png).decode()}'>"
+            f"<figcaption>{text}</figcaption></figure>")
+
+
+def lines(text: str) -> str:
+    """Text with its line breaks."""
+    return html.escape(text).replace("\n", "<br>")
+
+
+def number(value: float) -> str:
+    """A number with six digits."""
+    return f"{value:.6g}"

@@ -1,0 +1,161 @@
+// Draws the data of a report with plotly.js: see interactive.py for what is in it.
+const GREY = "#8a93a0", config = {displaylogo: false, responsive: true, displayModeBar: "hover",
+  modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"]};
+const element = id => document.getElementById(id);
+
+async function unpack(id) {
+  const bytes = Uint8Array.from(atob(element(id).textContent), c => c.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+}
+
+const mix = (a, b, f) => a.map((v, k) => v === null || b[k] === null ? v : v + f * (b[k] - v));
+const narrow = () => window.innerWidth < 700;
+const font = {family: "system-ui, Segoe UI, Roboto, sans-serif", size: 13, color: "#1d2530"};
+
+// The place in a run: between states k and k + 1, a fraction f on; stages change at once.
+function place(run, s) {
+  const p = run.progress;
+  let k = 0;
+  while (k < p.length - 2 && p[k + 1] < s) k++;
+  const gap = p[k + 1] - p[k], same = run.stage[k] === run.stage[k + 1];
+  return {k, f: !same ? 1 : gap > 0 ? Math.min(Math.max((s - p[k]) / gap, 0), 1) : 1};
+}
+
+function frame(run, s, field) {
+  const {k, f} = place(run, s), sheet = run.sheet, values = sheet.fields[field];
+  const line = of => [0, 1].map(i => mix(sheet[of][k][i], sheet[of][k + 1][i], f));
+  return {bottom: line("bottom"), top: line("top"), values: mix(values[k], values[k + 1], f),
+    all: Object.fromEntries(Object.entries(sheet.fields).map(([name, v]) => [name, mix(v[k], v[k + 1], f)])),
+    numbers: Object.fromEntries(Object.entries(run.numbers).map(([n, v]) => [n, v[k] + f * (v[k + 1] - v[k])])),
+    travel: run.tools.map(t => t.travel[f < 1 ? k : k + 1] === null ? null
+      : t.travel[k] === null ? t.travel[k + 1] : t.travel[k] + f * ((t.travel[k + 1] ?? t.travel[k]) - t.travel[k])),
+    stage: run.stage[f < 1 ? k : k + 1]};
+}
+
+function limits(run, field) {
+  const v = run.sheet.fields[field].flat().filter(x => x !== null);
+  return v.reduce(([a, b], x) => [Math.min(a, x), Math.max(b, x)], [Infinity, -Infinity]);
+}
+
+const format = x => x === null || x === undefined ? "" : Number(x.toPrecision(4)).toString();
+
+function sectionTraces(run, at, field, range) {
+  const sides = run.axisymmetric ? [1, -1] : [1], traces = [];
+  run.tools.forEach((tool, i) => sides.forEach(side => {
+    const t = at.travel[i], dr = (t ?? 0) * tool.moves[0], dz = (t ?? 0) * tool.moves[1];
+    const x = [...tool.line[0], ...[...tool.shell[0]].reverse()].map(r => side * (r + dr));
+    const y = [...tool.line[1], ...[...tool.shell[1]].reverse()].map(z => z + dz);
+    traces.push({type: "scatter", x, y, mode: "lines", fill: "toself", fillcolor: "#cfd5dd", hoverinfo: "name",
+      line: {color: GREY, width: 1}, name: tool.name, showlegend: false, visible: t !== null});
+  }));
+  sides.forEach(side => traces.push({type: "scatter", mode: "lines", fill: "toself", fillcolor: "#30405a",
+    line: {color: "#30405a", width: 0.5}, hoverinfo: "skip", showlegend: false,
+    x: [...at.bottom[0], ...[...at.top[0]].reverse()].map(r => side * r),
+    y: [...at.bottom[1], ...[...at.top[1]].reverse()]}));
+  sides.forEach((side, n) => traces.push({type: "scatter", mode: "markers", showlegend: false, hovertemplate: "%{text}<extra></extra>",
+    x: at.bottom[0].map((r, i) => side * (r + at.top[0][i]) / 2), y: at.bottom[1].map((z, i) => (z + at.top[1][i]) / 2),
+    text: at.values.map((_, i) => `from R ${format(run.sheet.material[i])}<br>` +
+      Object.entries(at.all).map(([name, v]) => `${name}: ${format(v[i])}`).join("<br>")),
+    marker: {size: 6, color: at.values, colorscale: "Viridis", reversescale: field.startsWith("wall"), cmin: range[0],
+      cmax: range[1], showscale: n === 0, colorbar: {thickness: 12, len: 0.85, outlinewidth: 0,
+      title: {text: field, side: narrow() ? "top" : "right"}, ...(narrow() ? {orientation: "h", y: -0.42, len: 1} : {})}}}));
+  return traces;
+}
+
+function surface(run, at, field, range) {
+  const r = [...at.bottom[0], ...[...at.top[0]].reverse()], z = [...at.bottom[1], ...[...at.top[1]].reverse()];
+  const v = [...at.values, ...[...at.values].reverse()];
+  const turn = Array.from({length: 49}, (_, i) => 1.5 * Math.PI * i / 48), size = Math.max(...r);
+  const x = run.axisymmetric ? turn.map(a => r.map(q => q * Math.cos(a))) : [-1, 1].map(() => r);
+  const y = run.axisymmetric ? turn.map(a => r.map(q => q * Math.sin(a))) : [-1, 1].map(s => r.map(() => s * size));
+  return [{type: "surface", x, y, z: x.map(() => z), surfacecolor: x.map(() => v), colorscale: "Viridis",
+    reversescale: field.startsWith("wall"), cmin: range[0], cmax: range[1], showscale: false, hoverinfo: "skip",
+    lighting: {ambient: 0.6, diffuse: 0.6, specular: 0.15}}];
+}
+
+function box(run) {
+  let low = [Infinity, Infinity], high = [-Infinity, -Infinity];
+  for (const of of ["bottom", "top"]) for (const points of run.sheet[of]) for (const i of [0, 1]) {
+    low[i] = Math.min(low[i], ...points[i]); high[i] = Math.max(high[i], ...points[i]);
+  }
+  if (run.axisymmetric) low[0] = -high[0];
+  const room = 0.06 * Math.max(high[0] - low[0], high[1] - low[1]);
+  return [0, 1].map(i => [low[i] - room, high[i] + room]);
+}
+
+function process(data) {
+  const runs = data.runs.filter(run => run.sheet);
+  if (!runs.length) { element("process").remove(); return; }
+  const pick = element("run"), colour = element("colour"), slider = element("slider"), play = element("play");
+  runs.forEach((run, i) => pick.add(new Option(run.name, i)));
+  pick.parentElement.hidden = runs.length < 2;
+  let run, timer = null;
+  const unit = data.length ? `, ${data.length}` : "";
+  const layout = () => ({font, margin: {l: 55, r: 10, t: 10, b: narrow() ? 110 : 45}, hovermode: "closest", showlegend: false,
+    height: narrow() ? 470 : 520, xaxis: {title: `r${unit}`, range: box(run)[0], zeroline: false, gridcolor: "#eceff3",
+    constrain: "domain"}, yaxis: {title: `z${unit}`, range: box(run)[1], scaleanchor: "x", zeroline: false,
+    gridcolor: "#eceff3", constrain: "domain"}, plot_bgcolor: "white"});
+  const scene = () => { const [r, z] = box(run); return {font, margin: {l: 0, r: 0, t: 0, b: 0},
+    height: narrow() ? 340 : 420, scene: {aspectmode: "data", camera: {eye: {x: 1.0, y: -1.25, z: 0.75}},
+    xaxis: {visible: false, range: r}, yaxis: {visible: false, range: r}, zaxis: {visible: false, range: z}}}; };
+  function show(solid) {
+    const s = slider.value / 1000, field = colour.value, range = limits(run, field), at = frame(run, s, field);
+    Plotly.react("section", sectionTraces(run, at, field, range), layout(), config);
+    element("now").textContent = [at.stage.replaceAll("_", " "), ...Object.entries(at.numbers).map(([n, v]) => `${n}: ${format(v)}`)]
+      .filter(Boolean).join(" · ");
+    if (solid) Plotly.react("solid", surface(run, at, field, range), scene(), config);
+  }
+  function choose() {
+    run = runs[pick.value || 0];
+    const before = colour.value;
+    colour.replaceChildren(...Object.keys(run.sheet.fields).map(f => new Option(f, f)));
+    if (run.sheet.fields[before]) colour.value = before;
+    element("marks").replaceChildren(...run.stages.map(stage => {
+      const mark = document.createElement("span");
+      mark.style.flexGrow = Math.max(stage.to - stage.from, 0.002);
+      mark.textContent = stage.name; mark.title = stage.name;
+      mark.onclick = () => { slider.value = 1000 * stage.to; show(true); };
+      return mark;
+    }));
+    show(true);
+  }
+  slider.oninput = () => show(false);
+  slider.onchange = () => show(true);
+  colour.onchange = () => show(true);
+  pick.onchange = choose;
+  play.onclick = () => {
+    if (timer) { clearInterval(timer); timer = null; play.textContent = "Play"; show(true); return; }
+    if (+slider.value >= 1000) slider.value = 0;
+    play.textContent = "Stop";
+    timer = setInterval(() => {
+      slider.value = +slider.value + 10; show(false);
+      if (+slider.value >= 1000) play.click();
+    }, 60);
+  };
+  choose();
+}
+
+function charts(data) {
+  data.charts.forEach((chart, i) => {
+    const figure = document.createElement("figure"), caption = document.createElement("figcaption"),
+      plot = document.createElement("div");
+    caption.textContent = chart.title; figure.append(caption, plot); element("charts").append(figure);
+    const axis = (title, zero) => ({title, gridcolor: "#eceff3", zeroline: false, ...(zero ? {rangemode: "tozero"} : {})});
+    Plotly.newPlot(plot, chart.traces, {font, height: 320, margin: {l: 60, r: 10, t: 8, b: 45}, plot_bgcolor: "white",
+      xaxis: axis(chart.x, chart.zero === "x"), yaxis: axis(chart.y, chart.zero === "y"),
+      showlegend: chart.traces.length > 1, legend: {orientation: "h", y: -0.25}}, config);
+  });
+}
+
+(async () => {
+  try {
+    const script = document.createElement("script");
+    script.textContent = await unpack("library");
+    document.head.append(script);
+    const data = JSON.parse(await unpack("data"));
+    process(data); charts(data);
+  } catch (error) {
+    element("trouble").hidden = false;
+    throw error;
+  }
+})();

@@ -1,0 +1,23 @@
+"""Quadrature points of a layer in the mesh: where constants that vary over the body are looked at."""
+
+from __future__ import annotations
+
+import basix
+import basix.ufl
+import numpy as np
+
+from .. import _compat
+from ..materials.constants import Sample
+from ..mesh.mesh import Mesh
+
+
+def sample(mesh: Mesh, layer: str, degree: int) -> Sample:
+    """The quadrature points of the energy, of a degree, in this rank's own cells of a layer, by their numbers."""
+    domain = mesh.domain
+    cells = mesh.cells.find(mesh.layers[layer])
+    cells = np.sort(cells[cells < domain.topology.index_map(2).size_local])
+    places = basix.make_quadrature(basix.CellType.triangle, degree)[0]
+    geometry = basix.ufl.element("Lagrange", "triangle", _compat.coordinate_map(domain).degree)
+    weights = geometry.tabulate(0, places)[0]
+    nodes = domain.geometry.x[_compat.cell_nodes(domain)[cells], :2]
+    return Sample(np.einsum("qk,nkd->nqd", weights, nodes).reshape(-1, 2), cells, places, domain)

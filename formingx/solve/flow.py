@@ -1,0 +1,147 @@
+"""A flow: what is driven is the unknown that makes a measure follow a table in time.
+
+A volume of air that is fed, a force that is held. Time is given, step by step, and the state solves F(x, control) = 0
+with the measure at the table's value: so a pressure passes its maximum as it does in practice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from .follow import Inaccurate, Run
+from .newton import Failure
+from .state import Record, State
+from .stepping import StepControl
+from .targets import Bound, Target, is_met, process_time
+
+_SAME = 1e-12          # relative: times that are the same
+
+
+class Flow(Run):
+    """States in time along a table of a measure.
+
+    Args:
+        record, accuracy: as of a `Run`.
+        measure: the `Bound` that follows the table.
+        table: (time, value in the user's units), shape (n, 2); the run ends with it.
+        targets: (target, its measure) to meet on the way.
+        step: step control whose lengths are parts of the table's duration.
+    """
+
+    def __init__(self, record: Record, measure: Bound, table: np.ndarray,
+                 targets: Sequence[tuple[Target, Bound]], step: StepControl, accuracy: float, label: str = ""):
+        end = process_time(float(table[-1, 0]))
+        super().__init__(record, [*targets, (end, end.bind(record.problem))], step, "follow", accuracy, label)
+        self._measure, self._table, self._duration = measure, table, float(table[-1, 0] - table[0, 0])
+
+    def _facing_target(self, start: State) -> State:
+        return start
+
+    def _accept(self, state: State) -> None:
+        self.problem.forms.clock = state.time
+        super()._accept(state)
+
+    def _next(self, old: State) -> list[State]:
+        """The next state in time, or one before it that meets a target."""
+        event = self._next_event(old.time)
+        while True:
+            left = event - old.time
+            dt = min(self.step.length * self._duration, left)
+            dt = left if left < 1.5 * dt else dt             # no last step much shorter than the others
+            try:
+                new = self._at(old, event if dt == left else old.time + dt)
+                error = self._error_in_time(new)
+                if dt < 1.5 * self.step.length * self._duration:
+                    self.step.accepted(len(new.history) - 1, error)
+                return [self._met_before(old, new)]
+            except Inaccurate as found:
+                self.record.counts.failures += 1
+                self.step.length = found.share * dt / self._duration
+            except Failure as failure:
+                self.record.counts.failures += 1
+                self.step.length = dt / self._duration
+                if not self.step.failed():
+                    self._give_up(f"the step in time became shorter than {self.step.smallest * self._duration:.3g}:"
+                                  f" {failure.reason}", failure.attempt)
+
+    def _next_event(self, time: float) -> float:
+        """The next time that must be hit: a knot of the table, or a target."""
+        times = [*self._table[:, 0], *(t.value for t, _ in self.open if t.name == "process_time")]
+        return min(t for t in times if t > time + _SAME * max(abs(time), self._duration))
+
+    def _at(self, old: State, time: float) -> State:
+        """The state at a time, one step from `old`; raises `Failure`."""
+        problem, problem.forms.clock = self.problem, time
+        value = float(np.interp(time, *self._table.T))
+        x, control = self._foretold(old, time, value)
+        by, slope = x - old.x, control - old.control
+        if problem.reach(old.x, old.control, by, slope, 1.0) < 0.5:
+            raise Failure("too much would come into contact in one step", [])
+        problem.prepare(old.x, old.control, by, slope, 1.0)
+        new = self.curve.solve(x, control, self._measure.equation(value), "step", old)
+        if problem.too_far(old.x, old.control, new.x, new.control):
+            raise Failure("too much came into contact in one step", [])
+        new.time = time
+        return new
+
+    def _foretold(self, old: State, time: float, value: float) -> tuple[np.ndarray, float]:
+        """(x, control) at a time: on the parabola through the last states, or along the tangent of the first."""
+        past = [s for k, s in enumerate(self.states[-3:]) if not k or s.time > self.states[-3:][k - 1].time]
+        if len(past) == 1:
+            return self._along(old, value)
+        t = np.array([s.time for s in past])
+        weights = [np.prod([(time - b) / (a - b) for b in t if b != a]) for a in t]
+        return sum(w * s.x for w, s in zip(weights, past)), sum(w * s.control for w, s in zip(weights, past))
+
+    def _along(self, old: State, value: float) -> tuple[np.ndarray, float]:
+        """Where the tangent of a state has a value of the measure; the state itself if it has it nowhere near."""
+        def off(s):
+            return self.curve.value(self._measure, old.x + s * old.direction, old.control + s * old.slope) - value
+        now = off(0.0)
+        for sense in (1.0, -1.0):
+            high = 1e-9 * sense
+            while now * off(high) > 0 and abs(high) < 1.0:
+                high *= 4
+            if now * off(high) <= 0:
+                s = _root(off, 0.0, high)
+                return old.x + s * old.direction, old.control + s * old.slope
+        return old.x, old.control
+
+    def _met_before(self, old: State, new: State) -> State:
+        """The state between two in time that meets a target, the first if there are several; else the second."""
+        problem, best = self.problem, new
+        for target, bound in self.open:
+            if target.name == "process_time":
+                new.met = target if abs(target.value - new.time) <= _SAME * max(abs(new.time), 1e-300) else new.met
+                continue
+            values = []
+            for state in (old, new):
+                problem.forms.clock = state.time
+                values.append(self.curve.value(bound, state.x, state.control) - target.value)
+            if values[0] * values[1] < 0:
+                found = self._meeting(old, target, bound, old.time, new.time)
+                best = found if found.time < best.time else best
+        if best.met is not None:
+            best.kind = "target"
+        return best
+
+    def _meeting(self, old: State, target: Target, bound: Bound, low: float, high: float) -> State:
+        """The state, one step from `old`, at the time between two when a measure has its target value."""
+        found: dict[float, State] = {}
+
+        def off(time):
+            found[time] = self._at(old, time) if time > low else old
+            return self.curve.value(bound, found[time].x, found[time].control) - target.value
+        time = _root(off, low, high)
+        state = found.get(time) or self._at(old, time)
+        if not is_met(target, bound, off(time) + target.value) and abs(off(time)) > 1e-8 * max(abs(target.value), 1e-8):
+            raise Failure(f"{target} was passed but could not be solved for", [])
+        state.met = target
+        return state
+
+
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    from scipy.optimize import brentq
+    return float(brentq(function, low, high, xtol=1e-14 * abs(high - low), rtol=1e-14, maxiter=100))

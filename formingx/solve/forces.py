@@ -1,0 +1,96 @@
+"""Forces as targets: of the body on what a run drives, a support or a tool."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from ..errors import InputError, finite, known
+from .targets import Bound, Target
+
+
+def force(value: float, *, of: str | None = None) -> Target:
+    """The force on what is driven, or on what is called `of`, reaches `value` (stress length^2).
+
+    Of the body: on a driven support along its component; on a tool against its travel, positive when it resists.
+    """
+    def bind(problem):
+        scene = problem.scene
+        found = {i: t for i, t in enumerate(scene.things) if t in scene.drivable and t.quantity == "travel"}
+        if of is not None:
+            known("force: of =", of, [t.name for t in found.values() if t.name])
+            found = {i: t for i, t in found.items() if t.name == of}
+        moving = {i: t for i, t in found.items() if problem.setting.rate[i]} or found
+        if len(moving) != 1:
+            raise InputError(f"force = {value:g}: the scene has {len(moving) or 'no'} supports or tools that can be"
+                             f" driven" + ", say which with of=..." * bool(moving))
+        number, thing = next(iter(moving.items()))
+        if thing in scene.contacts:
+            tools = [scene.things[i] for i in scene.together(number)]
+            return _ToolForce(problem, [c for c in problem.contacts if c.contact in tools])
+        return _SupportForce(problem, number)
+    return Target("force" if of is None else f"{of}_force", finite("force", value), bind)
+
+
+class _SupportForce(Bound):
+    """Of the body on a driven support (by its number in the scene)."""
+
+    smooth = False
+
+    def __init__(self, problem: Any, number: int):
+        forms = problem.forms
+        self._problem, self._number = problem, number
+        self._scale = forms.stress * forms.volume / forms.length
+        along = fem.Function(forms.space)
+        along.x.array[problem.driven_unknowns(number)] = 1.0
+        total = ufl.action(forms.residual, along)
+        self._derivative = forms.compile(ufl.derivative(total, forms.w, forms.test_function()))
+        self._by_control = forms.control_derivative and forms.compile(ufl.action(forms.control_derivative, along))
+        self.size = self._scale
+
+    def value(self, x, control):
+        return self._problem.reaction(self._number, x, control)
+
+    def equation(self, target):
+        problem = self._problem
+
+        def c(x, control, gradient):
+            force = self.value(x, control)
+            problem.fill(gradient, -problem.assemble(self._derivative))
+            slope = -problem.assemble_scalar(self._by_control) if self._by_control else 0.0
+            return (force - target) / self._scale, slope
+        return c
+
+
+class _ToolForce(Bound):
+    """Of the body on a tool, against its travel."""
+
+    smooth = False
+
+    def __init__(self, problem: Any, contacts: list[Any]):
+        forms, moves = problem.forms, np.array(contacts[0].contact.moves)
+        self._problem, self._contacts = problem, contacts
+        self._way = -moves / np.hypot(*moves)
+        self._scale = self.size = forms.stress * forms.volume / forms.length
+
+    def value(self, x, control):
+        there = [c for c in self._contacts if c.present]
+        return float(sum(contact.force(x.array_r, control) @ self._way for contact in there))
+
+    def equation(self, target):
+        problem = self._problem
+
+        def c(x, control, gradient):
+            values, slope = np.zeros(problem.n_owned), 0.0
+            for contact in self._contacts:
+                by_control = np.zeros(problem.n_owned)
+                blocks = contact.stiffness(x.array_r, control)
+                np.add.at(values, contact.dofs, np.einsum("i,nij->nj", self._way, blocks))
+                contact.add_control_derivative(by_control, x.array_r, control)
+                slope += float(np.sum(by_control[contact.dofs] @ self._way))
+            problem.fill(gradient, values)
+            return (self.value(x, control) - target) / self._scale, problem.comm.allreduce(slope)
+        return c

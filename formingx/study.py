@@ -1,0 +1,312 @@
+"""Many runs of one script with other numbers: tables, main effects, what is best; in parallel, and to go on with.
+
+    def pot(depth, radius):                                  # importable: a function of a script or of a module
+        ...
+        return fx.trace(...)                                 # a path
+
+    def evenness(path):
+        return path.part().evenness
+
+    if __name__ == "__main__":                               # processes read the script again
+        found = fx.study(pot, {"depth": [30, 40, 50], "radius": [18, 22]}, {"evenness": evenness},
+                         goal={"evenness": "max"}, folder="results/pots")
+        print(found); found.to_csv("pots.csv"); found.plot_effects("evenness")
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import os
+import pickle
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from contextlib import nullcontext
+from dataclasses import asdict, dataclass, field
+from multiprocessing import get_context
+from pathlib import Path as FilePath
+from typing import Any, NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+
+from .errors import InputError, count, finite, known, place, several
+from .results.files import replace
+from .results.files.sheet import Sheet
+from .results.show import effects
+
+Measure = Callable[[Any], float] | str
+
+
+@dataclass(frozen=True)
+class StudyRun:
+    """One run of a study.
+
+    Attributes:
+        values: {variable: its value}.
+        measures: {name: number}; empty if it failed.
+        error: why it failed, or "".
+        seconds: that it took.
+    """
+
+    values: dict[str, float]
+    measures: dict[str, float] = field(default_factory=dict)
+    error: str = ""
+    seconds: float = 0.0
+
+
+class _Task(NamedTuple):
+    """What a process runs."""
+
+    build: Callable[..., Any]
+    measure: dict[str, Measure]
+
+    def __call__(self, values: dict[str, float]) -> StudyRun:
+        began = time.perf_counter()
+        try:
+            result = self.build(**values)
+            found = {name: float(result.last.measures[of] if isinstance(of, str) else of(result))
+                     for name, of in self.measure.items()}
+            error = next((f"{name} is not a finite number" for name, v in found.items() if not math.isfinite(v)), "")
+        except Exception as failure:                         # whatever a script raises: the others go on
+            found, error = {}, f"{type(failure).__name__}: {failure}"
+        return StudyRun(values, {} if error else found, error, time.perf_counter() - began)
+
+
+class Study(Sheet):
+    """The runs of a study.
+
+    Attributes:
+        runs: in the order of the design; variables, measures: names; goal: {measure: "max" or "min"}.
+    """
+
+    comm = MPI.COMM_SELF
+
+    def __init__(self, task: _Task, variables: list[str], goal: dict[str, str], folder: FilePath | None):
+        self._task, self._folder, self.variables, self.goal = task, folder, variables, goal
+        self.measures, self.runs = list(task.measure), list[StudyRun]()
+
+    @property
+    def good(self) -> list[StudyRun]:
+        """The runs that did not fail."""
+        return [run for run in self.runs if not run.error]
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """{name: values, shape (runs,)}: variables, measures (nan where a run failed), seconds, error."""
+        found: dict[str, Any] = {name: [run.values[name] for run in self.runs] for name in self.variables}
+        found |= {name: [run.measures.get(name, math.nan) for run in self.runs] for name in self.measures}
+        found |= {"seconds": [run.seconds for run in self.runs], "error": [run.error for run in self.runs]}
+        return {name: np.array(values) for name, values in found.items()}
+
+    @property
+    def best(self) -> StudyRun:
+        """The run that comes nearest to the first goal.
+
+        Raises:
+            InputError: the study has no goal, or no run that did not fail.
+        """
+        if not self.goal or not self.good:
+            raise InputError("Study.best: the study has no goal" if not self.goal else "Study.best: all runs failed")
+        return min(self.good, key=self._distance)
+
+    def pareto(self, a: str, b: str) -> list[StudyRun]:
+        """The runs that no other beats in two measures at once, by the first; each to its goal, else to the largest."""
+        signs = {name: -1 if self.goal.get(name, "max") == "max" else 1 for name in (self._known(a), self._known(b))}
+        points = [tuple(sign * run.measures[name] for name, sign in signs.items()) for run in self.good]
+        front = [run for run, p in zip(self.good, points)
+                 if not any(q[0] <= p[0] and q[1] <= p[1] and q != p for q in points)]
+        return sorted(front, key=lambda run: run.measures[a])
+
+    def effects(self, measure: str) -> dict[str, dict[float, float]]:
+        """Main effects: {variable: {level: mean of the measure over the runs at that level}}."""
+        self._known(measure)
+        return {name: {level: float(np.mean([run.measures[measure] for run in self.good if run.values[name] == level]))
+                       for level in sorted({run.values[name] for run in self.good})} for name in self.variables}
+
+    def plot_effects(self, measure: str) -> Any:
+        """Draw the main effects on a measure, and every run; returns the matplotlib figure."""
+        return effects.main_effects(self.good, self.effects(measure), measure)
+
+    def plot_pareto(self, a: str, b: str) -> Any:
+        """Draw two measures of all runs against each other, and those that no other beats; the matplotlib figure."""
+        return effects.pareto(self.good, self.pareto(a, b), a, b)
+
+    def report(self, file: Any, title: str = "Study") -> None:
+        """Write one HTML file: the best, main effects, Pareto fronts of the goals, all runs."""
+        replace(file, lambda stream: stream.write(effects.page(self, title)))
+
+    def refine(self, evaluations: int = 30, within: Mapping[str, tuple[float, float]] | None = None,
+               executor: Executor | None = None) -> StudyRun:
+        """Search between the runs for the best, by the method of Nelder and Mead from the best run; all runs are kept.
+
+        Nelder and Mead, Computer Journal 7 (1965) 308 (doi:10.1093/comjnl/7.4.308), as in SciPy, with bounds. For few
+        variables whose effect is smooth. A run that fails counts as worse than all others.
+
+        Args:
+            evaluations: at most so many more runs, one after the other.
+            within: {variable: (lowest, highest)}; what is not named stays at its best. Default: all that vary, within
+                what was run.
+            executor: as in `study`; default: a process of its own.
+
+        Raises:
+            InputError: no goal, no run that did not fail, a variable that is not known.
+        """
+        from scipy.optimize import minimize
+        start, evaluations = self.best, count("refine: evaluations", evaluations)
+        within = within if within is not None else {
+            name: (min(levels), max(levels)) for name in self.variables
+            if len(levels := {run.values[name] for run in self.runs}) > 1}
+        for name in within:
+            known("refine: variable", name, self.variables)
+        low, high = np.array(list(within.values()), dtype=float).T
+        worst = max(map(self._distance, self.good))
+
+        def objective(x):
+            values = start.values | dict(zip(within, (low + np.clip(x, 0, 1) * (high - low)).tolist()))
+            run = next((run for run in self.runs if run.values == values), None) or pool.submit(
+                self._task, values).result()
+            if run not in self.runs:
+                self._keep(run)
+            return worst + abs(worst) if run.error else self._distance(run)
+        first = (np.array([start.values[name] for name in within]) - low) / (high - low)
+        simplex = np.vstack([first, *(first + np.eye(len(first))[k] * (0.2 if first[k] < 0.5 else -0.2)
+                                      for k in range(len(first)))])
+        with _pool(executor, 1) as pool:
+            minimize(objective, first, method="Nelder-Mead", bounds=[(0, 1)] * len(first),
+                     options={"maxfev": evaluations, "initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-6})
+        return self.best
+
+    def __str__(self) -> str:
+        failed = len(self.runs) - len(self.good)
+        lines = [f"{len(self.runs)} runs" + f", of which {failed} failed" * bool(failed)
+                 + f", {sum(run.seconds for run in self.runs):.1f} s in all"]
+        if self.goal and self.good:
+            shown = ", ".join(f"{k} = {v:.4g}" for k, v in {**self.best.values, **self.best.measures}.items())
+            lines.append(f"best ({', '.join(f'{way} {name}' for name, way in self.goal.items())}): {shown}")
+        return "\n".join([*lines, *(f"failed: {run.values}: {run.error.splitlines()[0]}" for run in self.runs
+                                    if run.error)])
+
+    def _distance(self, run: StudyRun) -> float:
+        name, way = next(iter(self.goal.items()))
+        return run.measures[name] * (1 if way == "min" else -1)
+
+    def _known(self, measure: str) -> str:
+        known("Study: measure", measure, self.measures)
+        return measure
+
+    def _keep(self, run: StudyRun) -> None:
+        """Take up a run, and write it to the folder."""
+        if self._folder is not None:
+            file = self._folder / f"{len(list(self._folder.glob('run-*.json'))):05d}"
+            replace(file.with_name(f"run-{file.name}.json"), lambda stream: json.dump(asdict(run), stream, indent=1))
+        self.runs.append(run)
+
+
+def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | Sequence[Mapping[str, float]],
+          measure: Mapping[str, Measure], *, goal: Mapping[str, str] | None = None, folder: Any = None,
+          executor: Executor | None = None, workers: int | None = None, progress: bool = True) -> Study:
+    """Run a script with many sets of numbers, and measure each.
+
+    The first run goes alone, so that forms are compiled once for all; then as many at a time as there are workers.
+
+    Args:
+        build: called with one value for each variable, by name; gives back a path. Under an MPI executor it must make
+            its mesh on `MPI.COMM_SELF`.
+        variables: {name: values}: all their combinations; or a list of {name: value}, one for each run.
+        measure: {name: a function of the path that gives a number, or the name of a column, at the last state}.
+        goal: {measure: "max" or "min"}: what is best, the first before the others.
+        folder: where runs are kept as they come in; those in it are not run again.
+        executor: any of `concurrent.futures`, `mpi4py.futures.MPIPoolExecutor` for one; default: processes of this
+            machine. What is run in other processes must be importable: no lambda, no function inside another.
+        workers: how many processes at a time; default one for each core.
+        progress: show a progress bar.
+
+    Raises:
+        InputError: an argument that is not allowed; a folder of another study. A run that fails raises nothing.
+    """
+    from tqdm import tqdm
+    cases = _cases(variables)
+    task, ways = _Task(build, _measures(build, measure)), dict(goal or {})
+    for name, way in ways.items():
+        known("study: goal", name, task.measure)
+        known(f"study: goal of {name}: way", way, ("max", "min"))
+    place_of = None if folder is None else _folder(place("study: folder", folder), task, list(cases[0]))
+    found = Study(task, list(cases[0]), ways, place_of)
+    found.runs += [] if place_of is None else _there(place_of)
+    todo = [case for case in cases if not any(run.values == case for run in found.runs)]
+    with _pool(executor, min(workers or os.cpu_count() or 1, max(len(todo), 1))) as pool:
+        if isinstance(pool, ProcessPoolExecutor):
+            _check_importable(task)
+        for run in tqdm(_finished(pool, task, todo), total=len(todo), disable=not progress, desc="study", unit="run"):
+            found._keep(run)
+    order = {tuple(case.items()): k for k, case in enumerate(cases)}
+    found.runs.sort(key=lambda run: order.get(tuple(run.values.items()), len(order)))
+    return found
+
+
+def _finished(pool: Any, task: _Task, cases: list[dict]) -> Iterator[StudyRun]:
+    """The runs as they finish; the first one alone."""
+    for some in (cases[:1], cases[1:]):
+        jobs: dict[Any, dict] = {pool.submit(task, case): case for case in some}
+        for job in as_completed(jobs):
+            failure = job.exception()
+            yield job.result() if failure is None else StudyRun(jobs[job], error=f"{type(failure).__name__}: {failure}")
+
+
+def _pool(executor: Executor | None, workers: int) -> Any:
+    """The user's executor, left open; or processes of our own, which end with the block."""
+    return nullcontext(executor) if executor else ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+
+
+def _cases(variables: Any) -> list[dict[str, float]]:
+    if isinstance(variables, Mapping):
+        levels = {str(name): [finite(f"study: {name}", v) for v in several(f"study: {name}", values, "numbers")]
+                  for name, values in variables.items()}
+        found = [dict(zip(levels, row)) for row in itertools.product(*levels.values())]
+    else:
+        found = [{str(k): finite(f"study: {k}", v) for k, v in dict(case).items()}
+                 for case in several("study: variables", variables, "{name: value}")]
+    if not found or not found[0] or any(set(case) != set(found[0]) for case in found):
+        raise InputError("study: variables: must be {name: values}, with at least one value each, or a list of"
+                         " {name: value} with the same names")
+    return found
+
+
+def _measures(build: Any, measure: Any) -> dict[str, Measure]:
+    if not callable(build):
+        raise InputError(f"study: build = {build!r}: must be a function of the variables that gives back a path")
+    if not isinstance(measure, Mapping) or not measure or not all(callable(m) or isinstance(m, str)
+                                                                  for m in measure.values()):
+        raise InputError(f"study: measure = {measure!r}: must be {{name: function of the path, or a column's name}}")
+    return dict(measure)
+
+
+def _check_importable(task: _Task) -> None:
+    try:
+        pickle.dumps(task)
+    except Exception as error:
+        raise InputError(f"study: what is run in processes must be importable by name, no lambda and no function inside"
+                         f" another: {error}; or give an executor that runs here") from None
+
+
+def _folder(folder: FilePath, task: _Task, variables: list[str]) -> FilePath:
+    """The folder, made or checked."""
+    about = {"study": 1, "build": getattr(task.build, "__qualname__", ""), "variables": variables,
+             "measures": list(task.measure)}
+    file = folder / "study.json"
+    if file.exists():
+        there = json.loads(file.read_text())
+        if there != about:
+            raise InputError(f"study: folder {str(folder)!r} holds another study: {there}; here: {about}")
+    elif folder.exists() and any(folder.iterdir()):
+        raise InputError(f"study: folder {str(folder)!r} is there already and holds no study")
+    else:
+        replace(file, lambda stream: json.dump(about, stream, indent=1))
+    return folder
+
+
+def _there(folder: FilePath) -> list[StudyRun]:
+    return [StudyRun(**json.loads(file.read_text())) for file in sorted(folder.glob("run-*.json"))]

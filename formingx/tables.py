@@ -1,0 +1,88 @@
+"""A quantity given by a few points of another, such as a modulus at some temperatures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from .errors import InputError, finite
+
+
+class Table:
+    """A smooth curve through points, monotone between each two of them (see `table`).
+
+    Call it with numbers, shape (...), for values of that shape, or with a UFL expression for one. Numbers outside the
+    table are refused. An expression cannot refuse: it goes on straight beyond the ends, so that an iteration may pass
+    there; who accepts a state calls `check`.
+
+    Attributes:
+        x, y: the points, sorted by x, shape (n,).
+    """
+
+    def __init__(self, points: Mapping[float, float]):
+        if not isinstance(points, Mapping) or len(points) < 2:
+            raise InputError(f"table({points!r}): must be {{x: y, ...}} with at least two points")
+        pairs = sorted((finite("table: x", x), finite(f"table: y at {x!r}", y)) for x, y in points.items())
+        self.x, self.y = (np.array(column) for column in zip(*pairs))
+        if np.any(np.diff(self.x) <= 0):
+            raise InputError(f"table({points!r}): two points have the same x")
+
+    def __call__(self, x: Any) -> Any:
+        """The values at x: numbers, or an expression for an expression.
+
+        Raises:
+            InputError: a number outside the table.
+        """
+        if isinstance(x, ufl.core.expr.Expr):
+            return self._expression(x)
+        self.check(x)
+        return self._curve(np.clip(x, self.x[0], self.x[-1]))
+
+    def check(self, x: Any, name: str = "x") -> None:
+        """An InputError unless all numbers x lie in the table; `name`: what they are called in it."""
+        x = np.asarray(x, dtype=float)
+        near = 1e-9 * (self.x[-1] - self.x[0])
+        outside = ~((x >= self.x[0] - near) & (x <= self.x[-1] + near))
+        if np.any(outside):
+            raise InputError(f"{self!r}: {name} = {x[outside].flat[0]:.6g}: must be from {self.x[0]:g} to"
+                             f" {self.x[-1]:g}")
+
+    @cached_property
+    def _curve(self) -> Any:
+        """Piecewise cubic Hermite interpolation (Fritsch and Butland 1984)."""
+        from scipy.interpolate import PchipInterpolator
+        return PchipInterpolator(self.x, self.y)
+
+    def _expression(self, x: Any) -> Any:
+        # numbers as constants: tables of as many points share one compiled form
+        domain = ufl.domain.extract_unique_domain(x)
+        slopes = self._curve.derivative()(self.x[[0, -1]])
+        ends = fem.Constant(domain, np.array([self.x[[0, -1]], self.y[[0, -1]], slopes]).T.copy())
+        pieces = fem.Constant(domain, np.vstack([self.x[:-1], self._curve.c]).T.copy())
+        value = ends[1, 1] + ends[1, 2] * (x - ends[1, 0])
+        upper = ends[1, 0]
+        for k in reversed(range(len(self.x) - 1)):
+            s = x - pieces[k, 0]
+            cubic = ((pieces[k, 1] * s + pieces[k, 2]) * s + pieces[k, 3]) * s + pieces[k, 4]
+            value = ufl.conditional(ufl.lt(x, upper), cubic, value)
+            upper = pieces[k, 0]
+        return ufl.conditional(ufl.lt(x, upper), ends[0, 1] + ends[0, 2] * (x - ends[0, 0]), value)
+
+    def __repr__(self) -> str:
+        return f"table({{{', '.join(f'{x:g}: {y:g}' for x, y in zip(self.x, self.y))}}})"
+
+
+def table(points: Mapping[float, float]) -> Table:
+    """A curve through points {x: y}, for a constant that depends on temperature, or a temperature that does on R.
+
+    Between two points it is a cubic that neither overshoots nor turns (Fritsch and Butland 1984).
+
+    Raises:
+        InputError: fewer than two points, or one that is not two finite numbers.
+    """
+    return Table(points)

@@ -1,0 +1,87 @@
+"""Time-temperature superposition: how much slower a material relaxes at another temperature."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import ufl
+
+from .errors import InputError, finite, known, positive
+
+ABSOLUTE_ZERO = {"C": -273.15, "K": 0.0}
+"""By unit of temperature."""
+GAS_CONSTANT = 8.31446261815324
+"""J/(mol K)."""
+
+
+class WLF:
+    """log10 aT = -c1 (T - Tr)/(c2 + T - Tr) (Williams, Landel and Ferry 1955): relaxation times at T are aT times
+    those at Tr.
+
+    Call it with numbers, shape (...), or a UFL expression of the temperature. It has a meaning above Tr - c2 only.
+
+    Args:
+        c1: number; c2: temperature difference; both above 0, for logarithms to the base 10.
+        reference: Tr, temperature.
+    """
+
+    def __init__(self, c1: float, c2: float, reference: float):
+        self.c1, self.c2 = positive("WLF: c1", c1), positive("WLF: c2", c2)
+        self.reference = finite("WLF: reference", reference)
+
+    def __call__(self, temperature: Any) -> Any:
+        """aT.
+
+        Raises:
+            InputError: a number that is not above Tr - c2.
+        """
+        above = _above(self, temperature, self.reference - self.c2, "reference - c2")
+        return _exp(-np.log(10) * self.c1 * (above - self.c2) / above)
+
+    def __repr__(self) -> str:
+        return f"WLF({self.c1!r}, {self.c2!r}, {self.reference!r})"
+
+
+class Arrhenius:
+    """ln aT = E/R (1/T - 1/Tr), temperatures counted from absolute zero; called as `WLF`.
+
+    Args:
+        activation_energy: E, J/mol, above 0.
+        reference: Tr, temperature.
+        unit: of temperatures, "C" or "K".
+    """
+
+    def __init__(self, activation_energy: float, reference: float, *, unit: str):
+        known("Arrhenius: unit", unit, ABSOLUTE_ZERO)
+        self.activation_energy, self.unit = positive("Arrhenius: activation_energy", activation_energy), unit
+        self.reference = finite("Arrhenius: reference", reference)
+        _above(self, self.reference, ABSOLUTE_ZERO[unit], "absolute zero")
+
+    def __call__(self, temperature: Any) -> Any:
+        """aT.
+
+        Raises:
+            InputError: a number that is not above absolute zero.
+        """
+        zero = ABSOLUTE_ZERO[self.unit]
+        kelvin = _above(self, temperature, zero, "absolute zero")
+        return _exp(self.activation_energy / GAS_CONSTANT * (1 / kelvin - 1 / (self.reference - zero)))
+
+    def __repr__(self) -> str:
+        return f"Arrhenius({self.activation_energy!r}, {self.reference!r}, unit={self.unit!r})"
+
+
+def _above(shift: Any, temperature: Any, limit: float, what: str) -> Any:
+    """Temperature less a limit that numbers must be above."""
+    if isinstance(temperature, ufl.core.expr.Expr):
+        return temperature - limit
+    temperature = np.asarray(temperature, dtype=float)
+    wrong = ~(temperature > limit)
+    if np.any(wrong):
+        raise InputError(f"{shift!r}: temperature = {temperature[wrong].flat[0]:.6g}: must be above {what}, {limit:g}")
+    return temperature - limit
+
+
+def _exp(x: Any) -> Any:
+    return ufl.exp(x) if isinstance(x, ufl.core.expr.Expr) else np.exp(x)

@@ -1,0 +1,97 @@
+"""Names of the units that a script is written in: for labels, and to weigh a part. Numbers stay as they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from .errors import InputError, known
+
+# in m, and in Pa; kg/cm2 is the technical atmosphere of the older literature (kgf/cm2)
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
+STRESSES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6, "bar": 1e5, "atm": 101325.0,
+            "psi": 6894.757293168, "kg/cm2": 98066.5, "kgf/cm2": 98066.5}
+_FORCES = {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "kgf": 9.80665, "lbf": 4.4482216152605}
+_ENERGIES = {"J": 1.0, "kJ": 1e3, "MJ": 1e6, "mJ": 1e-3, "uJ": 1e-6}
+_KINDS = (("pressure", "stress"), ("stress", "stress"), ("force", "force"), ("energy", "energy"), ("work", "energy"),
+          ("enclosed_volume", "volume"), ("volume", "volume"), ("area", "area"), ("travel", "length"),
+          ("height", "length"), ("contact_length", "length"), ("arc_length", "length"), ("reference_length", "length"),
+          ("penetration", "length"), ("displacement", "length"), ("radius", "length"), ("wall", "length"),
+          ("gap", "length"), ("thickness", "length"), ("process_time", "time"), ("temperature", "temperature"))
+
+
+@dataclass(frozen=True)
+class Units:
+    """What the numbers of a script are in.
+
+    Args:
+        length: "m", "cm", "mm", "um", "in" or "ft"; None: it is not said.
+        stress: "Pa", "kPa", "MPa", "GPa", "N/mm2", "bar", "atm", "psi" or "kg/cm2"; None: it is not said.
+        time: a word for the unit of process time.
+
+    Raises:
+        InputError: a unit that is not known.
+    """
+
+    length: str | None = None
+    stress: str | None = None
+    time: str = "s"
+
+    def __post_init__(self) -> None:
+        for kind, unit, names in (("length", self.length, LENGTHS), ("stress", self.stress, STRESSES)):
+            if unit is not None:
+                known(f"Units: {kind}", unit, names)
+        if not isinstance(self.time, str):
+            raise InputError(f"Units: time = {self.time!r}: must be a word, such as 's'")
+
+    def __bool__(self) -> bool:
+        return self.length is not None or self.stress is not None
+
+    @property
+    def area(self) -> str:
+        """The unit of areas, "" if that of length is not said."""
+        return f"{self.length}2" if self.length else ""
+
+    @property
+    def volume(self) -> str:
+        """The unit of volumes, "" if that of length is not said."""
+        return f"{self.length}3" if self.length else ""
+
+    @property
+    def force(self) -> str:
+        """The unit of forces, stress length^2: "N" of mm and MPa, "lbf" of in and psi; "" if one is not said."""
+        return self._derived(_FORCES, 2)
+
+    @property
+    def energy(self) -> str:
+        """The unit of energies, stress length^3: "mJ" of mm and MPa; "" if one is not said."""
+        return self._derived(_ENERGIES, 3)
+
+    def mass(self, volume: float, density: float) -> float:
+        """Grams of a volume (length^3) of a density in g/cm3; a length that is not said is taken for cm."""
+        return volume * (LENGTHS[self.length or "cm"] / LENGTHS["cm"]) ** 3 * density
+
+    def of(self, column: str) -> str:
+        """The unit of a column of results by its name, "" of numbers without one, or where it is not said."""
+        if column in ("r", "z"):
+            return self.length or ""
+        if column.endswith(("ratio", "stretch", "error")):
+            return ""
+        kind = next((kind for end, kind in _KINDS if column.endswith(end) or column.startswith(f"{end}_of")), None)
+        return {"temperature": ""}.get(kind, getattr(self, kind) or "") if kind else ""
+
+    def label(self, column: str, words: str = "") -> str:
+        """A column's name in words, with its unit: "plug force, N"."""
+        unit = self.of(column)
+        return (words or column.replace("_", " ")) + (f", {unit}" if unit else "")
+
+    def _derived(self, names: dict[str, float], power: int) -> str:
+        if not (self.length and self.stress):
+            return ""
+        size = STRESSES[self.stress] * LENGTHS[self.length] ** power
+        exact = (name for name, unit in names.items() if abs(unit / size - 1) < 1e-9)
+        return next(exact, f"{self.stress} {self.length}{power}")
+
+
+NONE: Any = Units()
+"""Units that are not said."""

@@ -1,0 +1,165 @@
+"""What an engineer asks of a run: wall, part, filling, contact, forces, work; against closed forms and conservation."""
+
+import numpy as np
+import pytest
+from conftest import treloar
+from test_contact import cup
+
+import formingx as fx
+from formingx.results.files import tables
+
+
+@pytest.fixture(scope="module")
+def inflated():
+    return fx.trace(treloar((20, 2)), until=fx.pole_stretch(2.5), progress=False)
+
+
+@pytest.fixture(scope="module")
+def formed():
+    return fx.trace(cup("none"), until=fx.pressure(8.0), progress=False)
+
+
+def sphere(inner, wall, elements=(24, 2), until=1.0):
+    """A hollow sphere, blown until its inner radius has grown by `until`."""
+    mesh = fx.mesh.sphere(inner_radius=inner, thickness=wall, elements=elements)
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("inner")],
+                     supports=[fx.Symmetry("axis"), fx.Symmetry("equator", "z")])
+    return fx.trace(scene, until=fx.displacement(until, at=(0.0, inner)), progress=False)
+
+
+def test_a_flat_sheet(inflated):
+    R, h, part = 1.25, 0.082, inflated.part(inflated.states[0], density=0.93, units=fx.Units("cm", "kg/cm2"))
+    assert part.volume == pytest.approx(np.pi * R**2 * h, rel=1e-12)
+    assert part.area == pytest.approx(np.pi * R**2, rel=1e-12) and part.draw_ratio == pytest.approx(1, rel=1e-12)
+    assert part.least_wall == pytest.approx(h, rel=1e-12) and part.evenness == pytest.approx(1, rel=1e-12)
+    assert part.variation < 1e-10 and part.scrap == 0
+    assert part.weight == pytest.approx(0.93 * np.pi * R**2 * h, rel=1e-12)
+    assert inflated.part(inflated.states[0], trim=0.7).volume == pytest.approx(np.pi * 0.7**2 * h, rel=1e-3)
+
+
+@pytest.mark.parametrize("length", ["mm", "cm", "in"])
+def test_weight_knows_the_unit_of_length(length):
+    size = {"mm": 10.0, "cm": 1.0, "in": 1 / 2.54}[length]          # one cubic centimetre of 1.2 g/cm3
+    assert fx.Units(length).mass(size**3, 1.2) == pytest.approx(1.2, rel=1e-12)
+
+
+def test_mass_is_kept(inflated, formed):
+    for path, volume in ((inflated, np.pi * 1.25**2 * 0.082), (formed, np.pi * 10**2 * 0.3)):
+        part = path.part()
+        assert part.volume == pytest.approx(volume, rel=1e-3)          # a rim that bulges is not between the faces
+        assert part.mean_wall * part.area == pytest.approx(part.volume, rel=1e-12)
+        assert part.least_wall < part.mean_wall and part.evenness == pytest.approx(part.least_wall / part.mean_wall)
+
+
+def test_trimmed_parts_add_up(formed):
+    whole, inner = formed.part(), formed.part(trim=6.0)
+    assert inner.volume == pytest.approx((1 - inner.scrap) * whole.volume, rel=1e-12) and inner.scrap > 0.1
+    with pytest.raises(fx.InputError, match="trim = 99.* goes from"):
+        formed.part(trim=99.0)
+    with pytest.raises(fx.InputError, match="trim along 'x' is not known"):
+        formed.part(trim=("x", 1.0))
+
+
+def test_a_sphere_of_two_layers():
+    """r^3 = R^3 + a^3 - A^3 for every shell: walls, area and volume of each layer follow."""
+    A, layers = 1.0, {"in": 0.1, "out": 0.3}
+    path = sphere(A, layers, until=0.5)
+    moved = [((A + t) ** 3 + 1.5**3 - A**3) ** (1 / 3) for t in (0.0, 0.1, 0.4)]
+    wall, part = path.wall(), path.part()
+    exact = np.diff(moved)
+    assert wall.wall[1:] == pytest.approx(np.full(len(wall.wall) - 1, exact.sum()), rel=2e-4)
+    assert wall.wall[0] == pytest.approx(exact.sum(), rel=1e-3)          # the pole is the least accurate node
+    assert list(wall.layers) == ["in", "out"]
+    for name, thickness in zip(layers, exact):
+        assert wall.columns[f"wall_of_{name}"] == pytest.approx(np.full(len(wall.wall), thickness), rel=2e-3)
+    assert part.area == pytest.approx(2 * np.pi * ((moved[0] + moved[2]) / 2) ** 2, rel=2e-4)
+    assert part.volume == pytest.approx(2 * np.pi / 3 * (1.4**3 - 1), rel=2e-4)
+    assert wall.height[0] == 0 and wall.height[-1] == pytest.approx((moved[0] + moved[2]) / 2, rel=1e-4)
+
+
+def test_wall_at_heights(formed):
+    wall = formed.wall()
+    for k in (3, 10):
+        assert wall.at_height(wall.height[k]) <= wall.wall[k] * (1 + 1e-9)
+    with pytest.raises(fx.InputError, match="height = 100: the part goes from"):
+        wall.at_height(100.0)
+    assert formed.part(heights=[1.0, 3.0]).walls == {h: wall.at_height(h) for h in (1.0, 3.0)}
+
+
+def test_filling_of_a_cup(formed):
+    filling = formed.filling()
+    assert len(filling.corners) == 1 and filling.corners[0].radius == formed.problem.contacts[0].contact.tool.pieces[
+        1].radius
+    top = max(p[1] for p in formed.problem.contacts[0].contact.tool.outline())
+    assert filling.gaps[0, 0] == pytest.approx(top - 0.3, rel=1e-9)      # the flat sheet, right under the floor
+    assert np.all(np.diff(filling.gaps[:, 0]) < 1e-12)                   # more pressure leaves less
+    k = len(formed) // 2
+    assert filling.pressure_at(filling.gaps[k, 0]) == pytest.approx(formed["pressure"][k], rel=1e-9)
+    with pytest.raises(fx.InputError, match="gap = 0 is not reached"):
+        filling.pressure_at(0.0)
+    with pytest.raises(fx.InputError, match="no such tool; it has 'top'"):
+        formed.filling("plug")
+
+
+def test_contact_presses_as_the_air_does(formed):
+    """On the flat floor the sheet passes on the pressure; there is none where there is a gap, and no friction."""
+    table = formed.contact()
+    flat = (table.rest[:, 0] > 0.9) & (table.rest[:, 0] < 2.8)
+    assert flat.sum() > 5 and table.pressure[flat] == pytest.approx(np.full(flat.sum(), 8.0), rel=5e-4)
+    assert np.all(table.pressure[table.gap > 1e-3] == 0) and not table.friction.any()
+
+
+def test_tool_force_resists(formed):
+    """The floor takes what the air presses on it: the column's force; all of it along Z, upwards."""
+    force = next(iter(formed.tool_forces().values()))
+    assert force == pytest.approx(formed["tool_force"], rel=1e-12, abs=1e-12) and force[-1] > 0
+
+
+def test_work_is_stored(inflated):
+    """Rubber gives back all: the air's work is the strain energy, up to the rule between states (second order)."""
+    def gap(path):
+        work = path.work()
+        return work["pressure"][-1] / work["strain_energy"][-1] - 1
+    fine = fx.trace(treloar((20, 2)), until=fx.pole_stretch(2.5), progress=False,
+                    step=fx.StepControl(largest=inflated_step(inflated) / 4))
+    assert abs(gap(fine)) < 2e-3 and abs(gap(fine)) < abs(gap(inflated)) / 4
+
+
+def inflated_step(path):
+    return max(path.distance(a, b) for a, b in zip(path.states, path.states[1:]))
+
+
+def test_tables_are_read_back(formed, tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    wall, units = formed.wall(), fx.Units("cm", "psi")
+    wall.to_csv(tmp_path / "pot.csv", units)
+    table = tables.read(tmp_path / "pot.csv")
+    assert table.units["wall"] == "cm" and table.units["wall_ratio"] is None
+    assert table.take("wall", "mm") == pytest.approx(10 * wall.wall, rel=1e-12)
+    wall.to_excel(tmp_path / "pot.xlsx", units)
+    rows = list(openpyxl.load_workbook(tmp_path / "pot.xlsx").active.values)
+    assert rows[0] == ("reference_radius [cm]", "arc_length [cm]", "r [cm]", "z [cm]", "height [cm]", "wall [cm]",
+                       "wall_ratio")
+    assert np.array(rows[1:], float)[:, 5] == pytest.approx(wall.wall, rel=1e-12)
+
+
+def test_wrong_names_are_refused(formed, tmp_path):
+    for write, name, words in ((formed.wall().to_csv, "pot.xlsx", "must end in .csv; to_excel writes that"),
+                               (formed.to_csv, "pot.xlsx", "must end in .csv"),
+                               (formed.contact().to_excel, "pot.csv", "must end in .xlsx; to_csv")):
+        with pytest.raises(fx.InputError, match=words):
+            write(tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_units():
+    units = fx.Units("mm", "MPa")
+    assert (units.force, units.energy, units.volume) == ("N", "mJ", "mm3")
+    assert fx.Units("in", "psi").force == "lbf" and fx.Units("cm", "kg/cm2").force == "kgf"
+    assert fx.Units("cm", "psi").force == "psi cm2" and fx.Units().force == ""
+    labels = {"plug_force": "N", "vacuum_pressure": "MPa", "plug_travel": "mm", "pole_stretch": "", "wall_ratio": "",
+              "enclosed_volume": "mm3", "strain_energy": "mJ", "process_time": "s", "mass_error": "", "r": "mm",
+              "contact_pressure": "MPa", "contact_length": "mm", "wall_of_outer": "mm"}
+    assert {name: units.of(name) for name in labels} == labels
+    with pytest.raises(fx.InputError, match="length 'furlong' is not known"):
+        fx.Units("furlong")

@@ -1,0 +1,21 @@
+"""A hundred of the random calls of benchmarks/fuzz.py: each ends in a result or an error in words, in time."""
+
+import sys
+
+from conftest import ROOT
+
+sys.path.insert(0, str(ROOT / "benchmarks"))
+import fuzz  # noqa: E402
+
+
+def test_random_calls_end_well():
+    endings = fuzz.run(100, 0, ("constructors", "files", "fits", "mesh", "tools"))
+    assert len(endings) == 100 and not [e for e in endings if e.bad]
+    assert {"result", "InputError"} <= {e.how for e in endings}
+
+
+def test_a_call_that_dies_is_found():
+    """What ends the process counts as one bad call, and the calls after it are made all the same."""
+    endings = fuzz.run(4, 0, ("itself",))
+    assert [e.number for e in endings] == [0, 1, 2, 3] and all(e.bad for e in endings)
+    assert {e.how.split(" (")[0] for e in endings} == {"the process died", "ZeroDivisionError"}

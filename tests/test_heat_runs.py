@@ -1,0 +1,179 @@
+"""What `fx.heat` takes and gives: starts, units, ranks, windows, files, pictures, and what it refuses."""
+
+import numpy as np
+import pytest
+from conftest import run_json
+from test_heat import SHEET, D, strip
+
+import formingx as fx
+
+SIDES = [fx.Convection("bottom", h=60, air=220), fx.Convection("top", h=10, air=80)]
+
+
+def sides(**options):
+    return fx.heat(strip(6), SHEET, SIDES, **({"start": 25.0, "times": [5.0, 20.0], "unit": "C"} | options))
+
+
+@pytest.fixture(scope="module")
+def heated():
+    return sides()
+
+
+def test_times_of_output_are_hit_and_between_steps_the_temperature_is_smooth(heated):
+    assert all(t in heated.times for t in (0.0, 5.0, 20.0)) and heated.times[-1] == 20.0
+    assert heated.errors.max() <= 1e-3
+    point, t = [(0.0, D / 2)], 11.3
+    exact = sides(times=[t, 20.0]).at(point)[0]
+    assert heated.at(point, t)[0] == pytest.approx(exact, abs=5e-3)
+    assert heated.at(point, [0.0])[0] == pytest.approx(25.0, abs=1e-12)
+
+
+def test_hottest_coldest_and_when_the_sheet_is_in_a_window(heated):
+    hot, cold = heated.hottest(), heated.coldest()
+    assert abs(hot.Z) < 1e-9 and cold.Z > D / 2
+    distance, T = heated.through([20.0])
+    assert T.max() == pytest.approx(hot.temperature, abs=1e-9) and distance[-1] == pytest.approx(D)
+    assert T.min() >= cold.temperature - 0.05
+    window = heated.time_to_reach(30.0, 90.0)
+    assert heated.coldest(window.reached).temperature == pytest.approx(30.0, abs=1e-6)
+    assert heated.hottest(window.left).temperature == pytest.approx(90.0, abs=1e-6)
+    assert heated.time_to_reach(150.0, 160.0) == (None, None)
+    assert heated.time_to_reach(20.0, 300.0) == (0.0, None)
+
+
+def test_starts(heated, tmp_path):
+    """A number, a function, a table, a file, a run and a Function: the same temperatures where they say the same."""
+    heated.field_to_csv(tmp_path / "start.csv")
+    (tmp_path / "line.csv").write_text("R,Z,T\n0,0,20\n0,0.003,80\n")
+    places = [(0.0, D * x) for x in (0, 0.31, 1)]
+    begin = {name: sides(start=start, times=[1e-3]).at(places, [0.0])[0] for name, start in {
+        "run": heated, "function": heated.temperature(), "file": tmp_path / "start.csv",
+        "line": tmp_path / "line.csv", "of Z": lambda R, Z: 20 + 60 * Z / D}.items()}
+    end = heated.at(places)[-1]
+    assert begin["run"] == pytest.approx(end, abs=1e-9) and begin["function"] == pytest.approx(end, abs=1e-9)
+    assert begin["file"] == pytest.approx(end, abs=0.2)               # linear between nodes
+    assert begin["line"] == pytest.approx(begin["of Z"], abs=1e-9)
+    table = fx.table({0.0: 100.0, 1.0: 50.0})
+    assert sides(start=table, times=[1e-3]).at(places, [0.0])[0] == pytest.approx(100.0, abs=1e-2)
+    cooled = fx.heat(strip(6), SHEET, [], start=heated, times=30.0, unit="C")      # no law: nothing gets out
+    assert cooled.heat_stored.sum() == pytest.approx(0.0, abs=1e-9 * heated.heat_stored.sum())
+    assert np.ptp(cooled.through()[1]) < np.ptp(heated.through()[1][-1]) / 3
+
+
+def test_celsius_and_kelvin_are_the_same_run():
+    """So is a run in millimetres."""
+    found = {}
+    for unit, zero, mm in (("C", 0.0, 1.0), ("K", 273.15, 1.0), ("mm", 0.0, 1e3)):
+        mesh = fx.mesh.disc(radius=0.05 * D * mm, thickness=D * mm, elements=(1, 4))
+        sheet = fx.ThermalProperties(conductivity=0.17 / mm, density=1050 / mm**3, heat_capacity=1800.0)
+        laws = [fx.Radiation("top", emissivity=0.85, heater=400 + zero, stefan_boltzmann=5.670374419e-8 / mm**2),
+                fx.ContactWithTool("bottom", conductance=50 / mm**2, tool=60 + zero)]
+        run = fx.heat(mesh, sheet, laws, start=25.0 + zero, times=[4.0], unit="K" if unit == "K" else "C")
+        found[unit] = run.through(points=9)[1][0] - zero
+        assert np.abs(run.balance).max() < 1e-10
+    assert found["K"] == pytest.approx(found["C"], rel=1e-7)
+    assert found["mm"] == pytest.approx(found["C"], rel=1e-7)
+
+
+def test_files_and_picture(heated, tmp_path):
+    heated.to_csv(tmp_path / "steps.csv")
+    rows = (tmp_path / "steps.csv").read_text().splitlines()
+    assert rows[0].startswith("time,estimated_error [C],coldest [C],hottest [C],heat_stored,heat of Convection")
+    assert len(rows) == len(heated.times) + 1
+    assert float(rows[-1].split(",")[3]) == heated.hottest().temperature
+    axes = heated.plot_through()
+    assert [line.get_label() for line in axes.lines] == ["t = 5", "t = 20"]
+    assert axes.lines[1].get_ydata()[0] == pytest.approx(heated.at([(0.0, 0.0)])[-1, 0])
+
+
+RANKS = """
+import json, sys
+sys.path.insert(0, "tests")
+import formingx as fx
+from test_heat import SHEET, SKIN, TWO, everything
+mesh = fx.mesh.disc(radius=5e-3, thickness=TWO, elements=(3, 2))
+run = fx.heat(mesh, {"core": SHEET, "skin": SKIN}, everything(), start=25.0, times=[1.0, 5.0], unit="C", tolerance=1e-2)
+numbers = [*run.at([(1e-3, 1e-3), (4e-3, 2e-3)]).ravel(), *run.hottest(), *run.mean_through(),
+           *(h.sum() for h in run.heat_through.values()), *run.tool_profile("bottom", (2e-3, 0))[1], len(run.times)]
+try:
+    fx.heat(mesh, {"core": SHEET, "skin": SKIN}, [], start=fx.table({0: 20, 3e-3: 50}), times=1.0, unit="C")
+except fx.InputError as error:
+    found = mesh.comm.gather("must be from 0 to 0.003" in str(error))
+if mesh.comm.rank == 0:
+    print(json.dumps(list(map(float, numbers)) + found[:1]))
+"""
+
+
+def test_ranks_agree():
+    one, two = (run_json(RANKS, ranks) for ranks in (1, 2))
+    assert two == pytest.approx(one, rel=1e-8)
+
+
+MESH = {"radius": 5e-3, "thickness": D, "elements": (1, 1)}
+
+
+@pytest.mark.parametrize("make, words", [
+    (lambda: fx.ThermalProperties(conductivity=-0.17, density=1, heat_capacity=1), "conductivity = -0.17"),
+    (lambda: fx.ThermalProperties(conductivity=1, density=0, heat_capacity=1), "density = 0"),
+    (lambda: fx.Convection("top", h=-1, air=20), "h = -1"),
+    (lambda: fx.Radiation("top", emissivity=1.2, heater=400), "emissivity = 1.2: must be from 0 to 1"),
+    (lambda: fx.Radiation("top", emissivity=fx.table({0: 0.5, 1: 1.1}), heater=400), "emissivity = 1.1"),
+    (lambda: fx.Radiation("top", emissivity=0.9, heater=400, view_factor=-0.1), "view_factor = -0.1"),
+    (lambda: fx.Absorption("top", flux=8000, coefficient=0), "coefficient = 0"),
+    (lambda: fx.ContactWithTool("top", conductance=-5, tool=20), "conductance = -5"),
+    (lambda: fx.ContactWithTool("top", conductance=5, tool="cold"), "tool = 'cold'"),
+    (lambda: fx.ConductingTool(thickness=0.02, conductivity=-1, heat_capacity=1, back=30), "conductivity = -1"),
+    (lambda: fx.ConductingTool(thickness=0.02, conductivity=1, heat_capacity=1, back=30, finest=0.1), "finest = 0.1"),
+])
+def test_laws_that_are_refused(make, words):
+    with pytest.raises(fx.InputError, match=words):
+        make()
+
+
+@pytest.mark.parametrize("changes, words", [
+    ({"boundaries": [fx.Convection("side", h=1, air=20)]}, "boundary 'side' is not known; known: 'axis'"),
+    ({"boundaries": [fx.Convection("top", h=1, air=-300)]}, "air = -300.0: must be at least -273.15"),
+    ({"boundaries": [fx.Radiation("top", emissivity=1, heater=fx.table({0: 300, 4e-3: 400}))]}, "R on 'top' = 0.005"),
+    ({"boundaries": [fx.ContactWithTool("top", conductance=1, tool=-280)]}, "must be at least -273.15"),
+    ({"boundaries": ["top"]}, "'top' is not allowed here"),
+    ({"boundaries": [fx.FixedTemperature("top", temperature=30), fx.HeatFlux("top", flux=1)]}, "does nothing"),
+    ({"unit": "F"}, "unit 'F' is not known"),
+    ({"start": -274.0}, "absolute zero"),
+    ({"start": "missing.csv"}, "cannot be read"),
+    ({"start": lambda R, Z: R / 0 * np.nan}, "not a finite number at"),
+    ({"times": [2.0, 1.0]}, "times that grow|several that grow"),
+    ({"times": []}, "several that grow"),
+    ({"times": 0.0}, "times = 0.0"),
+    ({"tolerance": 0}, "tolerance = 0"),
+    ({"materials": {"skin": SHEET}}, "layer 'skin' is not known"),
+    ({"materials": {}}, "layer 'sheet' has no material"),
+    ({"materials": 3.0}, "must be ThermalProperties"),
+    ({"kinematics": "plane"}, "must be Axisymmetric"),
+    ({"displacement": 1.0}, "must be a Function or expression"),
+    ({"mesh": "disc"}, "must come from formingx.mesh"),
+])
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_runs_that_are_refused(changes, words):
+    arguments = {"mesh": fx.mesh.disc(**MESH), "materials": SHEET, "boundaries": [], "start": 25.0, "times": 1.0,
+                 "unit": "C"} | changes
+    with pytest.raises(fx.InputError, match=words):
+        fx.heat(arguments.pop("mesh"), arguments.pop("materials"), arguments.pop("boundaries"), **arguments)
+
+
+def test_what_a_result_refuses(heated, tmp_path):
+    for ask, words in ((lambda: heated.at([(0.0, 2 * D)]), "not in the mesh"),
+                       (lambda: heated.temperature(21.0), "must be from 0 to 20"),
+                       (lambda: heated.time_to_reach(3.0, 2.0), "must be below high"),
+                       (lambda: heated.tool_profile("top", (0, 0)), "conducting tool on boundary 'top' is not known"),
+                       (lambda: sides(start=heated, unit="K"), "is in 'C', this run in 'K'")):
+        with pytest.raises(fx.InputError, match=words):
+            ask()
+    (tmp_path / "part.csv").write_text("R,Z,T\n0,0,20\n1,0,30\n0,1e-3,40\n1,1e-3,50\n")
+    with pytest.raises(fx.InputError, match="lies outside the points of the file"):
+        sides(start=tmp_path / "part.csv")
+
+
+def test_a_run_that_takes_too_many_steps_says_so():
+    with pytest.raises(fx.ConvergenceError, match="max_steps = 5") as error:
+        sides(max_steps=5)
+    assert len(error.value.path.times) == 6

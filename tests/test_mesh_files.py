@@ -1,0 +1,209 @@
+"""Mesh files are data: nothing in one runs, gmsh's formats give one mesh, and a bad one is refused in words."""
+
+import numpy as np
+import pytest
+
+import formingx as fx
+
+SQUARE = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+3
+1 2 "bottom"
+1 3 "top"
+2 1 "sheet"
+$EndPhysicalNames
+$Nodes
+4
+1 0 0 0
+2 1 0 0
+3 1 1 0
+4 0 1 0
+$EndNodes
+$Elements
+4
+1 1 2 2 1 1 2
+2 1 2 3 2 3 4
+3 2 2 1 1 1 2 3
+4 2 2 1 1 1 3 4
+$EndElements
+"""
+
+
+def read(tmp_path, text, name="mesh.msh"):
+    (tmp_path / name).write_bytes(text if isinstance(text, bytes) else text.encode())
+    return fx.mesh.read(tmp_path / name)
+
+
+def hostile(marker):
+    """gmsh scripts that would leave a file behind, in every place where a file may hold them."""
+    order = f'SystemCall "touch {marker}";\n'
+    return {"script": order, "after comments": "// a mesh\n" + order, "before a mesh": order + SQUARE,
+            "after a mesh": SQUARE + order, "between sections": SQUARE.replace("$Nodes", order + "$Nodes"),
+            "in the nodes": SQUARE.replace("1 0 0 0", order + "1 0 0 0"),
+            "in the names": SQUARE.replace('"sheet"', '"sheet"; ' + order.strip()),
+            "in the format": SQUARE.replace("2.2 0 8", "2.2 0 8 " + order.strip()),
+            "in the elements": SQUARE.replace("1 1 2 2 1 1 2", order + "1 1 2 2 1 1 2"),
+            "gmsh options": f'Mesh.SaveAll = 1; NonBlockingSystemCall "touch {marker}";',
+            "python": f"Merge \"x.py\"; PrintString StrPrefix('touch {marker}');"}
+
+
+@pytest.mark.parametrize("kind", hostile(""))
+@pytest.mark.parametrize("name", ["mesh.msh", "mesh.txt", "mesh.geo", "mesh"])
+def test_no_file_runs_anything(tmp_path, kind, name):
+    marker = tmp_path / "it ran"
+    with pytest.raises(fx.InputError, match="mesh file"):
+        read(tmp_path, hostile(str(marker).replace(" ", r"\ "))[kind], name)
+    assert not marker.exists()
+
+
+@pytest.mark.parametrize("version", [2.2, 4.1])
+@pytest.mark.parametrize("binary", [0, 1])
+@pytest.mark.parametrize("order", [1, 2])
+def test_formats_of_gmsh(tmp_path, version, binary, order):
+    """Two layers and a curved edge, as gmsh itself writes them."""
+    import gmsh
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        occ = gmsh.model.occ
+        lower, upper = occ.addRectangle(0, 0, 0, 2, 1), occ.addDisk(0, 0, 0, 1.5, 1.5)
+        (_, parts) = occ.fragment([(2, lower)], [(2, upper)])
+        occ.synchronize()
+        inside = [e[1] for e in parts[0] if e in parts[1]]
+        outside = [e[1] for e in parts[0] if e not in parts[1]]
+        gmsh.model.addPhysicalGroup(2, inside, name="inner layer")
+        gmsh.model.addPhysicalGroup(2, outside, name="outer")
+        rim = [abs(e[1]) for e in gmsh.model.getBoundary([(2, outside[0])])]
+        gmsh.model.addPhysicalGroup(1, rim, name="around")
+        gmsh.model.addPhysicalGroup(1, rim[:1], name="one of them")
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.3)
+        gmsh.model.mesh.generate(2)
+        gmsh.model.mesh.setOrder(order)
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.option.setNumber("Mesh.Binary", binary)
+        gmsh.write(str(tmp_path / "mesh.msh"))
+        numbers = [len(np.concatenate([gmsh.model.mesh.getElements(2, e)[1][0] for e in part]))
+                   for part in (inside, outside)]
+    finally:
+        gmsh.finalize()
+    mesh = fx.mesh.read(tmp_path / "mesh.msh")
+    assert [len(mesh.cells.find(mesh.layers[n])) for n in ("inner layer", "outer")] == numbers
+    area = sum(_area(rows, fx.mesh.to_grid(mesh).points) for rows in fx.mesh.to_grid(mesh).layers.values())
+    assert area == pytest.approx(2.0, rel=1e-9)              # the inner edge is shared, whatever its shape
+    assert set(mesh.facets_of("one of them")) < set(mesh.facets_of("around"))
+
+
+def _area(triangles, x):
+    """Corners, and what curved edges add: two thirds of chord times sagitta."""
+    a, b, c = (x[triangles[:, k]] for k in range(3))
+    area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]).sum() / 2
+    for i, j, k in ((0, 1, 3), (1, 2, 4), (2, 0, 5)) if triangles.shape[1] == 6 else ():
+        p, q, m = x[triangles[:, i]], x[triangles[:, j]], x[triangles[:, k]]
+        out = m - (p + q) / 2
+        area += 2 / 3 * ((q - p)[:, 1] * out[:, 0] - (q - p)[:, 0] * out[:, 1]).sum()
+    return area
+
+
+def changed(*pairs):
+    text = SQUARE
+    for old, new in pairs:
+        assert old in text
+        text = text.replace(old, new, 1)
+    return text
+
+
+QUADS = changed(("4\n1 1 2 2", "3\n1 1 2 2"), ("3 2 2 1 1 1 2 3\n4 2 2 1 1 1 3 4", "3 3 2 1 1 1 2 3 4"))
+BAD = {
+    "no mesh": ("hello", "does not begin with"), "empty": ("", "does not begin with"),
+    "version": (changed(("2.2 0 8", "4.0 0 8")), "must be MSH 2.2 or 4.1"),
+    "cut off": (SQUARE[:200], "ends within its section"),
+    "unmeshed": (changed((SQUARE[SQUARE.index("$Nodes"):], "")), "no section \\$Nodes: was it meshed"),
+    "no elements": (changed((SQUARE[SQUARE.index("$Elements"):], "$Elements\n0\n$EndElements\n")), "was it meshed"),
+    "3-D": (changed(("4\n1 1 2 2", "5\n1 1 2 2"), ("$EndElements", "5 4 2 0 1 1 2 3 4\n$EndElements")),
+            "three-dimensional"),
+    "out of the plane": (changed(("3 1 1 0", "3 1 1 0.5")), "not a plane section: z goes from 0 to 0.5"),
+    "quads": (QUADS, "group 'sheet' has elements of 4 nodes .*formingx needs triangles of 3 or 6"),
+    "triangles and quads": (changed(("4\n1 1 2 2", "5\n1 1 2 2"), ("$EndElements", "5 3 2 1 1 1 2 3 4\n$EndElements")),
+                            "formingx needs triangles"),
+    "two orders": (changed(("$Nodes\n4", "$Nodes\n7"), ("4 0 1 0\n", "4 0 1 0\n5 .5 0 0\n6 1 .5 0\n7 .5 .5 0\n"),
+                           ("3 2 2 1 1 1 2 3", "3 9 2 1 1 1 2 3 5 6 7")), "mixes triangles of 3 and 6"),
+    "one surface in two groups": (changed(("4\n1 1 2 2", "6\n1 1 2 2"), ("$EndElements", "5 2 2 9 1 1 2 3\n"
+                                          "6 2 2 9 1 1 3 4\n$EndElements")), "belong to more than one layer"),
+    "nan": (changed(("3 1 1 0", "3 nan 1 0")), "must be finite"),
+    "huge": (changed(("3 1 1 0", "3 1e300 1 0")), "must be between"),
+    "no such node": (changed(("1 2 3\n4", "1 2 9\n4")), "a node that is not in"),
+    "node twice": (changed(("3 1 1 0", "2 1 1 0")), "stands twice"),
+    "too few nodes": (changed(("$Nodes\n4", "$Nodes\n400000000000")), "ends too early"),
+    "a fraction of a node": (changed(("1 2 3\n4", "1 2 2.5\n4")), "whole number"),
+    "an unknown type": (changed(("3 2 2 1 1 1 2 3", "3 99 2 1 1 1 2 3")), "type 99"),
+    "same names": (changed(('"top"', '"bottom"')), "have the same name"),
+    "flat": (changed(("3 1 1 0", "3 2 0 0")), "flat"),
+    "over each other": (changed(("3 1 1 0", "3 -2 1.5 0")), "over each other|touches or crosses"),
+    "an edge inside": (changed(("2 1 2 3 2 3 4", "2 1 2 2 2 2 4")), "is not an edge of an element"),
+    "not joined": (changed(("$Nodes\n4", "$Nodes\n6"), ("4 0 1 0\n", "4 0 1 0\n5 0 0 0\n6 1 1 0\n"),
+                           ("1 1 3 4\n$End", "1 5 6 4\n$End")), "touches or crosses itself"),
+    "binary without its mark": (changed(("2.2 0 8", "2.2 1 8")), "must hold the number one"),
+    "bytes": (b"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n\xff\xfe\x00\n$EndNodes\n$Elements\n$EndElements",
+              "must be numbers"),
+}
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_bad_files(tmp_path, what):
+    text, words = BAD[what]
+    with pytest.raises(fx.InputError, match=words):
+        read(tmp_path, text)
+
+
+def test_square_is_read(tmp_path):
+    mesh = read(tmp_path, SQUARE)
+    assert mesh.nodes_of("top").tolist() == [[0, 1], [1, 1]] and list(mesh.layers) == ["sheet"]
+    apart = changed(("$Nodes\n4", "$Nodes\n6"), ("4 0 1 0\n", "4 0 1 0\n5 0 5 0\n6 1 5 0\n"), ("2 1 2 3 2 3 4",
+                                                                                             "2 1 2 3 2 5 6"))
+    assert len(read(tmp_path, apart).facets_of("top")) == 0         # a curve that is no part of the body
+
+
+def moved(change, **disc):
+    mesh = fx.mesh.disc(**{"radius": 1.0, "thickness": 0.1, "elements": (4, 2)} | disc)
+    change(mesh.domain.geometry.x)
+    return mesh
+
+
+def nearest(x, R, Z):
+    return np.argmin((x[:, 0] - R) ** 2 + (x[:, 1] - Z) ** 2)
+
+
+def one_node(x):
+    x[nearest(x, 0.5, 0.05)] = 0.9, 0.05, 0
+
+
+def fold(x):
+    x[:, 0] = np.minimum(x[:, 0], 1 - x[:, 0])
+
+
+def bend_an_edge(x):
+    x[nearest(x, 0.625, 0.1)] = 0.625, -0.5, 0
+
+
+@pytest.mark.parametrize("change, words", [
+    (one_node, "inside out"), (fold, "over each other"), (bend_an_edge, "inside out"),
+    (lambda x: x.__setitem__((0, 0), np.nan), "finite"),
+    (lambda x: x.__setitem__((slice(None), 1), 0), "flat")])
+def test_tangled_meshes_are_refused(change, words):
+    with pytest.raises(fx.InputError, match=words):
+        moved(change).check()
+
+
+def test_bodies_that_only_bend_pass():
+    """A strip rolled up to a ring that does not quite close, and every mesh that is made here."""
+    def roll(x, angle):
+        a, r = angle * x[:, 0], 0.5 - x[:, 1]
+        x[:, 0], x[:, 1] = 2 + r * np.sin(a), r * np.cos(a)
+    moved(lambda x: roll(x, 6.2), elements=(40, 2)).check()
+    with pytest.raises(fx.InputError, match="touches or crosses itself"):
+        moved(lambda x: roll(x, 6.5), elements=(40, 2)).check()
+    for mesh in (fx.mesh.disc(radius=1, thickness=1e-4), fx.mesh.sphere(inner_radius=1, thickness=5),
+                 fx.mesh.parison(inner_radius=1, thickness=0.01, length=9)):
+        mesh.check()

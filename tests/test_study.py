@@ -1,0 +1,107 @@
+"""Studies: all combinations, failures that end nothing, folders that are gone on with, effects and the best."""
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from conftest import treloar
+from mpi4py import MPI
+
+import formingx as fx
+
+RUNS = []
+
+
+def formula(x, y):
+    """In place of a run: f = -(x - 1)^2 - 3 (y - 2)^2, g = x; fails at x = 3."""
+    RUNS.append((x, y))
+    if x == 3:
+        raise fx.ConvergenceError("no state was found")
+    return SimpleNamespace(f=-((x - 1) ** 2) - 3 * (y - 2) ** 2, last=SimpleNamespace(measures={"g": x}))
+
+
+def f(path):
+    return path.f
+
+
+def inflate(modulus):
+    scene = treloar((6, 1), stress=1 / modulus, comm=MPI.COMM_SELF)
+    return fx.trace(scene, until=fx.pole_stretch(1.5), progress=False)
+
+
+@pytest.fixture
+def here():
+    RUNS.clear()
+    with ThreadPoolExecutor(1) as pool:
+        yield pool
+
+
+def run(pool, x=(0, 1, 2), y=(1, 2), **more):
+    return fx.study(formula, {"x": x, "y": y}, {"f": f, "g": "g"}, goal={"f": "max", "g": "min"}, executor=pool,
+                    progress=False, **more)
+
+
+def test_all_combinations(here, tmp_path):
+    found = run(here)
+    assert [run.values for run in found.runs] == [{"x": x, "y": y} for x in (0, 1, 2) for y in (1, 2)]
+    assert found.best.values == {"x": 1, "y": 2} and found.best.measures == {"f": 0, "g": 1}
+    assert found.effects("f") == {"x": {0: -2.5, 1: -1.5, 2: -2.5}, "y": {1: -11 / 3, 2: -2 / 3}}
+    assert [run.values for run in found.pareto("f", "g")] == [{"x": 0, "y": 2}, {"x": 1, "y": 2}]
+    found.to_csv(tmp_path / "all.csv")
+    assert (tmp_path / "all.csv").read_text().splitlines()[:2][0] == "x,y,f,g,seconds,error"
+    found.report(tmp_path / "all.html")
+    assert (tmp_path / "all.html").read_text().count("data:image/png") == 3
+    with pytest.raises(fx.InputError, match="measure 'h' is not known"):
+        found.effects("h")
+
+
+def test_a_run_that_fails_ends_nothing(here):
+    found = run(here, x=(3, 1))
+    assert [bool(r.error) for r in found.runs] == [True, True, False, False]
+    assert "ConvergenceError: no state was found" in str(found) and "2 failed" in str(found)
+    assert np.isnan(found.columns["f"][0]) and found.best.values == {"x": 1, "y": 2}
+    with pytest.raises(fx.InputError, match="all runs failed"):
+        _ = run(here, x=(3,)).best
+
+
+def test_a_folder_is_gone_on_with(here, tmp_path):
+    run(here, x=(0, 1), folder=tmp_path / "runs")
+    assert len(RUNS) == 4
+    found = run(here, x=(0, 1, 2), folder=tmp_path / "runs")
+    assert RUNS[4:] == [(2, 1), (2, 2)] and len(found.runs) == 6
+    assert [tuple(r.values.values()) for r in found.runs] == [(x, y) for x in (0, 1, 2) for y in (1, 2)]
+    again = run(here, folder=tmp_path / "runs")
+    assert len(RUNS) == 6 and again.runs == found.runs
+    with pytest.raises(fx.InputError, match="holds another study"):
+        fx.study(formula, {"x": [1.0]}, {"f": f}, executor=here, folder=tmp_path / "runs")
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "thesis.txt").write_text("mine")
+    with pytest.raises(fx.InputError, match="holds no study"):
+        run(here, folder=tmp_path / "other")
+
+
+def test_refining_finds_what_lies_between(here):
+    """The maximum of the quadratic at (1, 2), which no run of the design is at."""
+    found = run(here, x=(0.0, 2.5), y=(0.5, 3.0))
+    before = found.best.measures["f"]
+    best = found.refine(evaluations=60, executor=here)
+    assert best.measures["f"] > before and len(found.runs) <= 4 + 60
+    assert (best.values["x"], best.values["y"]) == (pytest.approx(1, abs=0.03), pytest.approx(2, abs=0.03))
+
+
+def test_what_cannot_be_run_is_refused():
+    for given, message in ((({"x": [1]}, {"f": lambda path: 1.0}), "importable by name"), (({}, {"f": f}), "variables"),
+                           (({"x": ["a"]}, {"f": f}), "study: x = 'a'"), (({"x": [1]}, {}), "measure = {}")):
+        with pytest.raises(fx.InputError, match=message):
+            fx.study(formula, *given, progress=False)
+    with pytest.raises(fx.InputError, match="way 'big' is not known"):
+        fx.study(formula, {"x": [1]}, {"f": f}, goal={"f": "big"})
+
+
+def test_runs_in_processes():
+    """A neo-Hookean sheet's pressure is proportional to its modulus."""
+    found = fx.study(inflate, {"modulus": [1.0, 3.0]}, {"p": "pressure"}, workers=2, progress=False)
+    a, b = (run.measures["p"] for run in found.runs)
+    assert b == pytest.approx(3 * a, rel=1e-8) and math.isfinite(a) and found.columns["seconds"].min() > 0

@@ -1,0 +1,391 @@
+"""Loads, constants and histories of a user's own: closed forms, differences, and nothing lost on the way."""
+
+import json
+
+import numpy as np
+import pytest
+import ufl
+from conftest import run_json
+from dolfinx import fem
+from petsc4py import PETSc
+from scipy.integrate import quad
+from test_derivatives import difference, random_state, residual
+
+import formingx as fx
+from formingx.discrete.problem import Problem
+from formingx.discrete.schedule import Setting
+from formingx.materials.material import Material
+from formingx.physics.supports import MeanHeld
+
+SYMMETRY = fx.Symmetry("axis")
+
+
+class Gravity(fx.Load):
+    """Weight along -Z of a density; the value is the acceleration."""
+
+    symmetric = True
+
+    def __init__(self, density, value=None, name=None):
+        super().__init__(None, value, name)
+        self.density = density
+
+    def virtual_work(self, body, value):
+        return body.integral(-body.constant(self.density) * value * body.du[1])
+
+
+class Spin(fx.Load):
+    """Centrifugal force of a body that turns about the axis; the value is the square of the angular speed."""
+
+    symmetric = True
+
+    def virtual_work(self, body, value):
+        return body.integral(value * (body.X[0] + body.u[0]) * body.du[0])
+
+
+class Hung(fx.Support):
+    """The mean displacement along Z is 0: an even traction carries what hangs."""
+
+    def constraints(self):
+        return [MeanHeld(1, self.on)]
+
+
+class Relaxing(Material):
+    """W = c10 (I1 - 3) and beside it a spring in series with a dashpot: q follows e = (I1 - 3)/2 in the time tau."""
+
+    internal = {"q": 0.0, "C": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))}
+
+    def __init__(self, c10, spring, tau):
+        self.parameters = {"c10": c10, "spring": spring, "tau": tau}
+        self.check()
+
+    @staticmethod
+    def strain(F):
+        return (ufl.inner(F, F) - 3) / 2
+
+    def step_energy(self, F, internal, time_step, c10, spring, tau):
+        e = self.strain(F)
+        return 2 * c10 * e + spring / 2 * (e - internal["q"]) ** 2 / (1 + time_step / tau)
+
+    def updated(self, F, internal, time_step, c10, spring, tau):
+        return {"q": internal["q"] + (self.strain(F) - internal["q"]) * time_step / (tau + time_step), "C": F.T * F}
+
+    def stored_energy(self, F, internal, c10, spring, tau):
+        return 2 * c10 * self.strain(F) + spring / 2 * (self.strain(F) - internal["q"]) ** 2
+
+    def dissipation(self, F, internal, c10, spring, tau):
+        return spring / tau * (self.strain(F) - internal["q"]) ** 2
+
+
+def disc(elements=(3, 1), thickness=0.3, **options):
+    return fx.mesh.disc(radius=2.0, thickness=thickness, elements=elements, **options)
+
+
+def displacement(path, points):
+    return path.problem.forms.probe(path.problem, points).displacement(vector(path))
+
+
+def vector(path):
+    x = path.problem.x.duplicate()
+    x.setArray(path.last.x)
+    return x
+
+
+def test_a_hanging_bar():
+    """Its own weight: elongation rho g H^2 / (2 E) on the axis, E = 6 c10, exact for P2 at small strain."""
+    height, density, c10, g = 2.0, 3.0, 1.0, 1e-6
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=0.5, thickness=height, elements=(2, 3)),
+                     materials=fx.NeoHookean(c10=c10), supports=[SYMMETRY, Hung("top")], loads=[Gravity(density)])
+    u = displacement(fx.solve(scene, to=g), [(0.0, 0.0), (0.0, height)])
+    assert u[1, 1] - u[0, 1] == pytest.approx(density * g * height**2 / (2 * 6 * c10), rel=1e-5)
+    assert Problem(scene).symmetric
+
+
+def test_a_spinning_tube():
+    """Held along Z, incompressible: u = A/R with A = rho w^2 a^2 b^2 / (4 mu) at small strain."""
+    a, b, speed2, c10 = 1.0, 2.0, 1e-6, 0.5
+    held = [fx.Symmetry(face, normal="z") for face in ("bottom", "top")]
+    scene = fx.Scene(mesh=disc((8, 1), inner_radius=a), materials=fx.NeoHookean(c10=c10), supports=held,
+                     loads=[Spin()])
+    R = np.array([a, 1.5, b])
+    u = displacement(fx.solve(scene, to=speed2), np.column_stack([R, 0 * R]))[:, 0]
+    np.testing.assert_allclose(u, speed2 * a**2 * b**2 / (4 * 2 * c10) / R, rtol=2e-4)
+
+
+@pytest.mark.parametrize("model", [fx.MixedPressure(), fx.Membrane()], ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("value", [None, 9.81], ids=["driven", "fixed"])
+def test_a_rigid_translation_does_the_work_of_the_weight(model, value):
+    scene = fx.Scene(mesh=disc(thickness={"low": 0.1, "high": 0.2}), materials=fx.NeoHookean(c10=1.0), model=model,
+                     supports=[SYMMETRY, fx.SimplySupported("rim")], loads=[Gravity(2.0, value)])
+    problem = Problem(scene)
+    forms, up, out = problem.forms, problem.x.duplicate(), problem.x.duplicate()
+    forms.w.sub(0).interpolate(lambda X: np.stack([0 * X[0], 0 * X[0] + 1 / forms.length]))
+    problem.fill(up, forms.w.x.array)
+    problem.set_state(out, 1.0)
+    work = problem.assemble(problem._residual) @ up.array_r[:problem._n] * forms.stress * forms.volume
+    weight = 2.0 * (9.81 if value else forms.scales[0]) * np.pi * 2.0**2 * 0.3
+    assert forms.volume == pytest.approx(np.pi * 2.0**2 * 0.3) and work == pytest.approx(weight, rel=1e-12)
+
+
+@pytest.mark.parametrize("load", [Gravity(2.0), Spin(), fx.Pressure("bottom")], ids=lambda v: type(v).__name__)
+def test_derivatives_of_a_driven_load(load):
+    problem = Problem(fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0), loads=[load],
+                               supports=[SYMMETRY, fx.SimplySupported("rim")]))
+    assert_derivatives_by_state_and_control(problem, *random_state(problem))
+
+
+def assert_derivatives_by_state_and_control(problem, x, d, control=0.7):
+    exact, f = problem.x.duplicate(), residual(problem, control)
+    problem.tangent(x, control).mult(d, exact)
+    errors = [np.abs(difference(f, x, d, h) - exact.array_r).max() / np.abs(exact.array_r).max() for h in (1e-4, 1e-5)]
+    assert errors[1] < 1e-6 and (errors[0] < 1e-8 or errors[1] < 0.05 * errors[0])
+    problem.control_derivative(x, control, exact)
+    numeric = (residual(problem, control + 1e-4)(x) - residual(problem, control - 1e-4)(x)) / 2e-4
+    free = np.ones(len(numeric), dtype=bool)
+    free[problem._held] = False
+    size = np.abs(exact.array_r[free]).max()
+    assert size > 1e-4 and np.abs(numeric - exact.array_r)[free].max() < 1e-6 * size
+
+
+@pytest.mark.parametrize("work, message", [
+    (lambda body, value: body.integral(value * body.u[0]), "linear in body.du"),
+    (lambda body, value: value * body.du[0], "linear in body.du"),
+    (lambda body, value: body.integral(value * body.u[0] * body.du[0]), "unit"),
+    (lambda body, value: body.integral(value * body.du[0], "skin"), "skin"),
+])
+def test_a_load_that_is_none(work, message):
+    load = type("Mine", (fx.Load,), {"virtual_work": lambda self, body, value: work(body, value)})()
+    with pytest.raises(fx.InputError, match=message):
+        Problem(fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0), loads=[load],
+                         supports=[SYMMETRY, fx.SimplySupported("rim")]))
+
+
+def test_a_tube_whose_modulus_varies():
+    """p = integral of 2 c10(R) (l^2 - l^-2) R/r^2 dR with r^2 = R^2 + c: plane strain along Z."""
+    a, b, speed = 1.0, 2.0, lambda R, Z: 1.0 + (R - 1) ** 2
+    held = [fx.Symmetry(face, normal="z") for face in ("bottom", "top")]
+    mine = fx.Hyperelastic(lambda I1, I2, c: c * (I1 - 3), c=speed)
+    scene = fx.Scene(mesh=disc((12, 1), inner_radius=a), materials=mine, supports=held, loads=[fx.Pressure("inner")])
+    u = displacement(path := fx.solve(scene, to=0.4, increments=2), [(a, 0.0)])[0, 0]
+    c = (a + u) ** 2 - a**2
+
+    def slope(R):
+        l2 = (R**2 + c) / R**2
+        return 2 * speed(R, 0) * (l2 - 1 / l2) * R / (R**2 + c)
+    assert u > 0.05 and path["pressure"][-1] == pytest.approx(quad(slope, a, b)[0], rel=1e-4)
+
+
+def layered(materials, **options):
+    return fx.Scene(mesh=disc(thickness={"low": 0.1, "high": 0.2}), materials=materials, loads=[fx.Pressure("bottom")],
+                    supports=[SYMMETRY, fx.SimplySupported("rim")], **options)
+
+
+@pytest.mark.parametrize("model", [fx.MixedPressure(), fx.Membrane()], ids=lambda m: type(m).__name__)
+def test_a_step_of_a_constant_is_two_layers(model):
+    """As a function of (R, Z) and as a Function of the mesh: the residual of two layers of numbers, to round-off."""
+    two = layered({"low": fx.Gent(mu=1.0, Jm=9.0), "high": fx.Gent(mu=3.0, Jm=9.0)}, model=model)
+    step = fx.Gent(mu=lambda R, Z: np.where(Z < 0.1, 1.0, 3.0), Jm=9.0)
+    scenes = [two, layered({"low": step, "high": step}, model=model)]
+    if model.solid:
+        field = fem.Function(fem.functionspace(two.mesh.domain, ("DG", 0)))
+        for name, value in (("low", 1.0), ("high", 3.0)):
+            field.x.array[two.mesh.cells.find(two.mesh.layers[name])] = value
+        scenes.append(fx.Scene(mesh=two.mesh, materials=fx.Gent(mu=field, Jm=9.0), loads=two.loads,
+                               supports=two.supports))
+    found = []
+    for scene in scenes:
+        problem = Problem(scene)
+        x, _ = random_state(problem)
+        if not model.solid:
+            problem.forms.w.sub(0).interpolate(lambda X: 0.1 * X[:2])
+            problem.fill(x, problem.forms.w.x.array)
+        found.append(residual(problem, 0.0)(x))
+        assert problem.forms.stress == pytest.approx(3.0)
+    for other in found[1:]:
+        assert np.abs(other - found[0]).max() < 1e-12 * np.abs(found[0]).max()
+
+
+@pytest.mark.parametrize("material", [fx.MooneyRivlin(c10=lambda R, Z: 1 + R, c01=0.1),
+                                      Relaxing(lambda R, Z: 1 + R, 2.0, 0.5)], ids=lambda m: type(m).__name__)
+def test_stresses_of_a_strain(material):
+    """Homogeneous, biaxial, incompressible: in-plane less normal Cauchy stress at every point, by its own constants."""
+    path = fx.solve(layered(material), to=1e-6)
+    problem, l, forms = path.problem, 1.2, path.problem.forms
+    forms.w.x.array[:] = 0
+    forms.w.sub(0).interpolate(lambda X: np.stack([(l - 1) * X[0], (l**-2 - 1) * X[1]]) / forms.length)
+    problem.fill(problem.x, forms.w.x.array)
+    path.last.x[:] = problem.x.array_r
+    stress = path.stress().at_quadrature_points("low")
+    c10, strain = 1 + stress.points[:, 0], (2 * l**2 + l**-4 - 3) / 2
+    slope = c10 + 0.1 * l**2 if isinstance(material, fx.MooneyRivlin) else c10 + 2.0 * strain / 2
+    sigma = stress.cauchy
+    np.testing.assert_allclose(sigma[:, 2, 2] - sigma[:, 1, 1], 2 * slope * (l**2 - l**-4), rtol=1e-8)
+
+
+@pytest.mark.parametrize("constant, message", [
+    (lambda R, Z: R - 1.0, "must be at least 0"),
+    (lambda R, Z: np.nan * R, "nan at"),
+    (lambda R: R, "function of arrays"),
+    (lambda R, Z: R[:2], "function of arrays"),
+])
+def test_bad_constants(constant, message):
+    with pytest.raises(fx.InputError, match=message):
+        layered(fx.MooneyRivlin(c10=constant, c01=0.1))
+
+
+def test_where_constants_must_be_numbers():
+    varies = fx.NeoHookean(c10=lambda R, Z: 1 + R)
+    for ask in (lambda: varies.shear_modulus, lambda: varies.stress("uniaxial", 2.0),
+                lambda: fx.Ogden(mu=1.0, alpha=lambda R, Z: 2 + R),
+                lambda: layered(varies, model=fx.DisplacementPenalty())):
+        with pytest.raises(fx.InputError, match="vary|must be numbers"):
+            ask()
+    assert layered(varies).shear_modulus("low") == pytest.approx(2 * (1 + 2.0), rel=0.1)
+
+
+def test_the_identity_of_a_scene_sees_its_fields():
+    from formingx.results.files.description import describe, differences
+    def about(f):
+        return json.loads(json.dumps(describe(Problem(layered(fx.NeoHookean(c10=f))))))
+    one, same, other = (about(f) for f in (lambda R, Z: 1 + R, lambda R, Z: 1 + R, lambda R, Z: 1 + R + 1e-6 * Z))
+    assert not list(differences(one, same)) and list(differences(one, other))
+
+
+def relaxing(model, material=None):
+    problem = Problem(fx.Scene(mesh=disc(), materials=material or Relaxing(1.0, 2.0, 0.5), model=model,
+                               supports=[SYMMETRY, fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")]))
+    problem.enter(Setting([0.1, 0, 0, 0.2], [0.5, 0, 0, 2.0], []), np.zeros(problem.x.getLocalSize()), 0.0)
+    return problem
+
+
+@pytest.mark.parametrize("material", [Relaxing(1.0, 2.0, 0.5), Relaxing(lambda R, Z: 1 + R, 2.0, 0.5)],
+                         ids=["numbers", "field"])
+@pytest.mark.parametrize("model", [fx.MixedPressure(), fx.Membrane()], ids=lambda m: type(m).__name__)
+def test_derivatives_with_a_history(model, material):
+    """Residual and tangent after an accepted state, time running with the control."""
+    problem = relaxing(model, material)
+    x, d = random_state(problem)
+    if not model.solid:                                          # a membrane without stretch has no stiffness
+        problem.forms.w.sub(0).interpolate(lambda X: 0.1 * X[:2])
+        problem.fill(x, problem.forms.w.x.array)
+        x.array_w[problem._held] = 0
+    problem.set_state(x, 0.3)
+    problem.forms.histories[0].advance(x.array_r, 0.3)
+    x.axpy(0.3, d)
+    assert_derivatives_by_state_and_control(problem, x, d)
+
+
+def test_internal_variables_follow_the_strain():
+    """A homogeneous strain held: q of implicit Euler by hand, energy and power of what is left."""
+    problem = relaxing(fx.MixedPressure())
+    forms, history, x = problem.forms, problem.forms.histories[0], problem.x.duplicate()
+    l = 1.2                                                                                   # noqa: E741
+    forms.w.sub(0).interpolate(lambda X: np.stack([(l - 1) * X[0], (l**-2 - 1) * X[1]]) / forms.length)
+    problem.fill(x, forms.w.x.array)
+    e, q, tau = (2 * l**2 + l**-4 - 3) / 2, 0.0, 0.5
+    for control in (0.1, 0.4):
+        step = forms.time_at(control) - history.get().time
+        problem.set_state(x, control)
+        history.advance(x.array_r, control)
+        q += (e - q) * step / (tau + step)
+        memory = history.get()
+        np.testing.assert_allclose(memory.values["q"], q, rtol=1e-12)
+        np.testing.assert_allclose(memory.values["C"].reshape(-1, 3, 3)[:, range(3), range(3)][0], [l**2, l**-4, l**2])
+    stored = problem.assemble_scalar(forms.compile(forms.energy)) * forms.stress
+    power = problem.assemble_scalar(forms.compile(forms.dissipation)) * forms.stress
+    assert stored == pytest.approx(2 * e + (e - q) ** 2, rel=1e-6)
+    assert power == pytest.approx(4 * (e - q) ** 2, rel=1e-6)
+
+
+def test_a_memory_is_kept():
+    """get, put, save and load give back what was there; what does not fit is refused."""
+    problem = relaxing(fx.MixedPressure())
+    history, (x, _) = problem.forms.histories[0], random_state(problem)
+    rest = history.get()
+    problem.set_state(x, 0.3)
+    history.advance(x.array_r, 0.3)
+    memory, force = history.get(), residual(problem, 0.5)(x)
+    data = json.loads(json.dumps(history.save(memory)))
+    history.start()
+    assert history.get().time == 0 and np.array_equal(history.get().values["C"], rest.values["C"])
+    assert np.abs(residual(problem, 0.5)(x) - force).max() > 1e-6 * np.abs(force).max()
+    history.put(history.load(data))
+    assert np.array_equal(residual(problem, 0.5)(x), force) and history.get().time == memory.time
+    with pytest.raises(ValueError, match="read-only"):
+        memory.values["q"][0] = 1
+    for broken in (data | {"cells": data["cells"][:-1]}, data | {"values": {"q": data["values"]["q"]}}, {}):
+        with pytest.raises(fx.InputError, match="another mesh"):
+            history.load(broken)
+
+
+MEMORY = """
+import sys; sys.path.insert(0, "tests")
+import json, numpy as np, formingx as fx
+from formingx.results.files.description import describe
+from test_terms import Relaxing, relaxing
+found = []
+for model in (fx.MixedPressure(), fx.Membrane()):
+    problem = relaxing(model, Relaxing(lambda R, Z: 1 + R + Z, 2.0, 0.5))
+    forms, history, x = problem.forms, problem.forms.histories[0], problem.x.duplicate()
+    forms.w.sub(0).interpolate(lambda X: np.stack([0.1 * X[0] + 0.01 * X[0]**2, X[1] - 0.2 * X[0]]) / forms.length)
+    problem.fill(x, forms.w.x.array[:forms.space.dofmap.index_map.size_local])
+    problem.set_state(x, 0.3)
+    history.advance(x.array_r, 0.3)
+    memory = history.get()
+    saved = history.save(memory)
+    history.start()
+    history.put(history.load(saved))
+    energy = problem.assemble_scalar(forms.compile(forms.potential))
+    found.append([saved, energy, describe(problem)["materials"]["sheet"]["sums"]])
+if problem.comm.rank == 0:
+    print(json.dumps(found))
+"""
+
+
+def test_a_memory_does_not_know_ranks():
+    for (one, energy, sums), (two, energy_two, sums_two) in zip(run_json(MEMORY, None), run_json(MEMORY, 2)):
+        assert one["cells"] == two["cells"] and energy == pytest.approx(energy_two, rel=1e-12)
+        assert sums == pytest.approx(sums_two, rel=1e-12)
+        for name in ("q", "C"):
+            np.testing.assert_allclose(one["values"][name], two["values"][name], rtol=1e-12)
+
+
+def test_a_scene_without_time_compiles_no_derivative_by_it():
+    scene = fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0),
+                     supports=[SYMMETRY, fx.Clamped("rim"), fx.Displaced("bottom")])
+    forms = Problem(scene).forms
+    assert forms.control_derivative is None and not forms.histories and forms.energy is forms.potential
+
+
+def test_a_constant_can_be_set():
+    """The residual is then that of a scene with the new value, what the energy leaves at rest included."""
+    def problem(c10):
+        return Problem(layered({"low": fx.MooneyRivlin(c10=c10, c01=0.1), "high": fx.NeoHookean(c10=5.0)}))
+    one, two = problem(1.0), problem(2.0)
+    x, _ = random_state(one)
+    one.forms.set_constant("low", "c10", 2.0)
+    assert one.forms.coefficients["low", "c10"].value == 2.0
+    assert np.array_equal(residual(one, 0.3)(x), residual(two, 0.3)(x))
+    with pytest.raises(fx.InputError, match="at least 0"):
+        one.forms.set_constant("low", "c10", -1.0)
+
+
+def test_gradient_by_a_constant():
+    """d(displacement)/d(c10) at a pressure, by the tangent, against scenes with other constants."""
+    def inflated(c10):
+        return fx.solve(layered({"low": fx.MooneyRivlin(c10=c10, c01=0.1), "high": fx.NeoHookean(c10=2.0)}), to=0.1)
+    path, h = inflated(1.0), 1e-4
+    problem, x, point = path.problem, vector(path), [(0.0, 0.0)]
+    by_constant = problem.forms.compile(problem.forms.constant_derivative("low", "c10"))
+    tangent, right, dx = problem.tangent(x, path.last.control), x.duplicate(), x.duplicate()
+    values = -problem.assemble(by_constant)
+    values[problem._held] = 0
+    problem.fill(right, values)
+    solver = PETSc.KSP().create(problem.comm)
+    solver.setOperators(tangent)
+    solver.setType("preonly")
+    solver.getPC().setType("lu")
+    solver.getPC().setFactorSolverType("mumps")
+    solver.solve(right, dx)
+    exact = problem.forms.probe(problem, point).displacement(dx)[0, 1]
+    plus, minus = (displacement(inflated(1.0 + s), point)[0, 1] for s in (h, -h))
+    assert exact == pytest.approx((plus - minus) / (2 * h), rel=1e-6) and exact < 0

@@ -1,0 +1,177 @@
+"""Tools from drawings: splines as arcs to a tolerance, DXF, curves put end to end, the solid on the right side."""
+
+import math
+
+import numpy as np
+import pytest
+
+import formingx as fx
+from formingx.physics.arcs import arcs_along
+
+tools = fx.tools
+POINTS = np.random.default_rng(1).uniform([0, 1.5], [12, 7], (100, 2))
+
+
+def ellipse(t):
+    a = math.pi / 2 * t
+    return np.column_stack([3 * np.cos(a), np.sin(a)]), np.column_stack([-3 * np.sin(a), np.cos(a)])
+
+
+def test_arcs_converge_to_a_curve():
+    """Closer with the tolerance, smooth at every joint, and no more than its inverse third root asks for."""
+    numbers = []
+    exact = ellipse(np.linspace(0, 1, 1000))[0]
+    for tolerance in (1e-2, 1e-4, 1e-6):
+        pieces = arcs_along(ellipse, tolerance, "ellipse")
+        tool = tools.Tool.of_pieces(pieces)
+        assert np.abs(tool.signed_distance(exact[1:-1])).max() < 1.05 * tolerance
+        for p, q in zip(pieces, pieces[1:]):
+            assert math.cos(p.angles[1] - q.angles[0]) == pytest.approx(1, abs=1e-12)
+            np.testing.assert_allclose(p.ends[1], q.ends[0], atol=1e-12)
+        numbers.append(len(pieces))
+    assert numbers[0] < numbers[1] < numbers[2] < 12 * numbers[1], numbers      # 100^(1/3) = 4.6 times
+
+
+@pytest.mark.parametrize("curve, words", [
+    (lambda t: (np.column_stack([t, np.abs(t - 0.3)]), np.column_stack([1 + 0 * t, np.sign(t - 0.3)])), "not within"),
+    (lambda t: (np.column_stack([t**2, t**3]), np.column_stack([2 * t, 3 * t**2])), "no direction"),
+    (lambda t: (np.column_stack([t, t * np.nan]), np.ones((len(t), 2))), "no direction")])
+def test_curves_that_are_not_smooth(curve, words):
+    with pytest.raises(fx.InputError, match=f"a curve: .*{words}"):
+        arcs_along(curve, 1e-6, "a curve")
+
+
+@pytest.mark.parametrize("kind", ["step", "brep"])
+def test_splines_of_cad(tmp_path, kind):
+    import gmsh
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        occ = gmsh.model.occ
+        knots = [occ.addPoint(x, math.sin(x), 0) for x in np.linspace(0, 3, 9)]
+        occ.addSpline(knots)
+        occ.synchronize()
+        (low,), (high,) = gmsh.model.getParametrizationBounds(1, 1)
+        exact = np.array(gmsh.model.getValue(1, 1, np.linspace(low, high, 300))).reshape(-1, 3)[:, :2]
+        gmsh.write(str(tmp_path / f"wave.{kind}"))
+    finally:
+        gmsh.finalize()
+    tool = tools.read(tmp_path / f"wave.{kind}", [1], tolerance=1e-4)
+    assert 1e-7 < np.abs(tool.signed_distance(exact)).max() < 1e-4
+    assert all(isinstance(p, tools.Arc) for p in tool.pieces)
+    with pytest.raises(fx.InputError, match="give tolerance="):
+        tools.read(tmp_path / f"wave.{kind}", [1])
+    with pytest.raises(fx.InputError, match="tolerance = 0: must be greater"):
+        tools.read(tmp_path / f"wave.{kind}", [1], tolerance=0)
+
+
+CUP = """Point(1) = {0, 5, 0}; Point(2) = {9, 5, 0}; Point(3) = {9, 4, 0}; Point(4) = {10, 4, 0}; Point(5) = {10, 0, 0};
+Line(3) = {1, 2}; Circle(2) = {4, 3, 2}; Line(1) = {5, 4};"""
+
+
+def test_end_to_end_and_the_side_of_the_body(tmp_path):
+    """Curves in any order and direction are one profile; the body says where the solid is."""
+    (tmp_path / "cup.geo").write_text(CUP)
+    same = tools.cup(radius=10, depth=5, fillet=1)
+    mesh = fx.mesh.disc(radius=9.0, thickness=0.5, elements=(4, 1))
+    for body in ((1.0, 1.0), mesh):
+        tool = tools.read(tmp_path / "cup.geo", body=body)
+        np.testing.assert_allclose(tool.signed_distance(POINTS), same.signed_distance(POINTS), atol=1e-12)
+    other = tools.read(tmp_path / "cup.geo", body=(20.0, 3.0))
+    np.testing.assert_allclose(other.signed_distance(POINTS), -same.signed_distance(POINTS), atol=1e-12)
+    np.testing.assert_allclose(other.reversed().signed_distance(POINTS), same.signed_distance(POINTS), atol=1e-12)
+    with pytest.raises(fx.InputError, match="the body is on both sides of the profile"):
+        tools.read(tmp_path / "cup.geo", body=fx.mesh.disc(radius=12.0, thickness=0.5, elements=(4, 1)))
+
+
+@pytest.mark.parametrize("more, words", [
+    ("Point(6) = {20, 0, 0}; Point(7) = {21, 0, 0}; Line(9) = {6, 7};", "4 free ends"),
+    ("Point(6) = {20, 5, 0}; Line(9) = {2, 6};", "more than two ends"),
+    ("Circle(9) = {20, 0, 0, 1};", "closes in itself")])
+def test_curves_that_are_not_one_profile(tmp_path, more, words):
+    (tmp_path / "cup.geo").write_text(CUP + more)
+    with pytest.raises(fx.InputError, match=words):
+        tools.read(tmp_path / "cup.geo")
+
+
+def test_closed_curves_close(tmp_path):
+    (tmp_path / "ring.geo").write_text("Circle(1) = {0, 2, 0, 1};")
+    tool = tools.read(tmp_path / "ring.geo", body=(0, 5))
+    np.testing.assert_allclose(tool.signed_distance(POINTS), 1 - np.hypot(*(POINTS - (0, 2)).T), atol=1e-12)
+
+
+def drawing(tmp_path, fill):
+    ezdxf = pytest.importorskip("ezdxf")
+    doc = ezdxf.new()
+    fill(doc.modelspace())
+    doc.saveas(tmp_path / "drawing.dxf")
+    return tmp_path / "drawing.dxf"
+
+
+def test_dxf(tmp_path):
+    """Lines, an arc, a polyline with a bulge, beside a text: all the same cup."""
+    same = tools.cup(radius=10, depth=5, fillet=1).signed_distance(POINTS)
+
+    def curves(space):
+        space.add_line((10, 0), (10, 4)), space.add_text("cup")
+        space.add_arc((9, 4), 1, 0, 90), space.add_line((0, 5), (9, 5))
+    tool = tools.read(drawing(tmp_path, curves), body=(1, 1))
+    np.testing.assert_allclose(tool.signed_distance(POINTS), same, atol=1e-12)
+    np.testing.assert_allclose(tools.read(tmp_path / "drawing.dxf", [3, -2, -1]).signed_distance(POINTS), same,
+                               atol=1e-12)
+    rows = [(0, 5, 0), (9, 5, -math.tan(math.pi / 8)), (10, 4, 0), (10, 0, 0)]
+    for old in (False, True):
+        file = drawing(tmp_path, lambda space, old=old: (space.add_polyline2d if old else space.add_lwpolyline)(
+            rows, format="xyb"))
+        np.testing.assert_allclose(tools.read(file).signed_distance(POINTS), same, atol=1e-12)
+
+
+def test_dxf_splines_and_ellipses(tmp_path):
+    file = drawing(tmp_path, lambda space: (space.add_ellipse((0, 0), (3, 0), 1 / 3, 0, math.pi / 2),
+                                            space.add_spline([(0, 0), (1, 1), (2, 0.5), (3, 2)])))
+    tool = tools.read(file, [1], tolerance=1e-3)
+    assert np.abs(tool.signed_distance(ellipse(np.linspace(0.01, 0.99, 100))[0])).max() < 1e-3
+    wave = tools.read(file, [2], tolerance=1e-4)
+    assert np.abs(wave.signed_distance(np.array([(0, 0), (1, 1), (2, 0.5), (3, 2.0)]))).max() < 1e-4
+    with pytest.raises(fx.InputError, match="curve 1 is neither .*give tolerance"):
+        tools.read(file, [1])
+
+
+@pytest.mark.parametrize("fill, words", [
+    (lambda s: s.add_line((0, 0, 1), (1, 0, 0)), "z must be 0"), (lambda s: s.add_text("a"), "has no curves"),
+    (lambda s: s.add_3dface([(0, 0), (1, 0), (1, 1)]), "3DFACE, which is no curve"),
+    (lambda s: s.add_arc((0, 0), 1, 0, 90, dxfattribs={"extrusion": (0, 0, -1)}), "extrusion"),
+    (lambda s: s.add_circle((0, 0), 0), "radius = 0")])
+def test_dxf_refuses(tmp_path, fill, words):
+    with pytest.raises(fx.InputError, match=words):
+        tools.read(drawing(tmp_path, fill))
+
+
+@pytest.mark.parametrize("text", ["", "hello", "  0\nSECTION\n  2\nENTITIES\n  0\nLINE\n 10\nx\n"])
+def test_broken_dxf(tmp_path, text):
+    pytest.importorskip("ezdxf")
+    (tmp_path / "a.dxf").write_text(text)
+    with pytest.raises(fx.InputError, match="cannot be read"):
+        tools.read(tmp_path / "a.dxf", [1])
+
+
+def test_pot():
+    """The mould's radii and depth, a plug that clears the wall all the way down, a sheet that starts between them."""
+    mould, plug = tools.pot(mouth=40, base=25, depth=70, sheet=1.2, fillet=4, lip=2)
+    wall = np.column_stack([np.linspace(39, 26.5, 9), np.linspace(1.2 + 70 / 15, 1.2 + 63, 9)])
+    exact = (wall - (40, 1.2)) @ [70, 15] / math.hypot(70, 15)
+    np.testing.assert_allclose(mould.signed_distance(wall), exact, atol=1e-12)
+    assert mould.signed_distance([[0, 71.2]])[0] == pytest.approx(0) and plug.signed_distance([[0, 0]])[0] == 0
+    assert np.all(mould.moved(z=-70 - 1.2).signed_distance(plug.outline()) < 1e-12)
+    sheet = fx.mesh.disc(radius=45, thickness=1.2, elements=(20, 1))
+    fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=0.2), loads=[fx.Pressure("bottom", name="air")],
+             supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+             contacts=[fx.Contact("top", mould, "stick"), fx.Contact("bottom", plug, moves=(0, 1), name="plug")])
+
+
+@pytest.mark.parametrize("wrong, words", [
+    ({"base": 41}, "base = 41: must not be wider"), ({"plug": 25}, "plug = 25: must be below base"),
+    ({"nose": 30}, "nose = 30: must not be above"), ({"depth": 0}, "depth = 0"), ({"fillet": 40}, "too large")])
+def test_pot_refuses(wrong, words):
+    with pytest.raises(fx.InputError, match=words):
+        tools.pot(**{"mouth": 40, "base": 25, "depth": 70, "sheet": 1.2, "fillet": 4} | wrong)
