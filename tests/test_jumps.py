@@ -75,8 +75,8 @@ def plug(mu=3.0, thickness=1 / 3):
                     contacts=[fx.Contact("top", tool, mu, moves=(0, -1))])
 
 
-def pushed(travel, **options):
-    return fx.trace(plug(), until=fx.travel(travel), step=fx.StepControl(target=6), progress=False, **options)
+def pushed(travel, made=None, **options):
+    return fx.trace(made or plug(), until=fx.travel(travel), step=fx.StepControl(target=6), progress=False, **options)
 
 
 def balance(path):
@@ -115,6 +115,15 @@ def test_friction_keeps_its_law_through_jumps(rough):
 def test_work_is_energy_and_friction_and_what_jumps_lose(rough):
     work, energy, slips, lost = balance(rough)
     assert work == pytest.approx(energy + slips + lost, rel=5e-3)
+
+
+@pytest.mark.slow
+def test_a_plug_that_stopped_arrives_by_a_jump():
+    path = pushed(7.5, plug(mu=1.0, thickness=0.5))
+    work, energy, slips, lost = balance(path)
+    assert path.jumps and all(state.jump["dissipated"] > 0 for state in path.jumps)
+    assert path.counts.iterations < 400
+    assert work == pytest.approx(energy + slips + lost, rel=1e-3)
 
 
 @pytest.mark.slow

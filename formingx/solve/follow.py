@@ -166,7 +166,7 @@ class Run:
 
         Failures halve the step; where a short one fails, or the control has its limit, the body jumps.
         """
-        problem, first, jumps = self.problem, self.step.length, list(_JUMPS)
+        problem, first, jumps, failed = self.problem, self.step.length, list(_JUMPS), 0
         if old.kind == "limit point" and self._at_fold == "jump":
             return self._snap(old)
         while True:
@@ -199,7 +199,8 @@ class Run:
                 self.step.length = length
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good = self.step.failed()
-                if self._at_fold == "jump" and length < jumps[0] and not isinstance(failure, _Astray):
+                failed += not isinstance(failure, _Astray)
+                if failed > 1 and length < jumps[0] and self._at_fold == "jump":
                     jumps.pop(0)
                     with contextlib.suppress(Failure):
                         return [self._jump(old, reach, first)]

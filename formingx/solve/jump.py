@@ -25,8 +25,8 @@ AHEAD = 1e-6
 _FIRST, _LARGEST, _FALLS, _GROWS = 1e3, 1e10, 0.3, 10.0
 """Of eta: at first, at most; factors after a success and a failure."""
 
-_MOST = 200
-"""Viscous solutions before the body counts as never coming to rest."""
+_MOST_AT_FOLD, _MOST = 200, 60
+"""Viscous solutions before the body counts as never coming to rest (from a fold, which it leaves slowly)."""
 
 _NEAR_REST = 1e-3
 """Viscous forces (over the support forces) below which the state at rest is looked for."""
@@ -78,7 +78,8 @@ class _Way:
         self._newton = BorderedNewton(self.viscous, Tolerances(1e-8, 1e-6), curve.norm)
         self._x, self._drag = curve.problem.x.duplicate(), np.zeros(len(old.x))
         self.at, self.lost, self.solved = old, 0.0, 0
-        self.rest, self.settles = np.inf, False             # what is out of balance; it is little, and fades
+        self.rest, self.near = np.inf, _NEAR_REST           # what is out of balance; little enough to look for rest
+        self.settles = False
 
     def move(self, origin: np.ndarray, eta: float) -> bool:
         """One viscous solution from `origin`; False if there is none."""
@@ -95,8 +96,10 @@ class _Way:
             return False
         x, drag = self._x.array_r.copy(), viscous.drag(self._x.array_r)
         before, self.rest = self.rest, np.sqrt(self._sum(drag * drag)) / (self.problem.force_scale + UNLOADED)
-        self.settles = self.rest < min(_NEAR_REST, before)
-        self._lose(self.at.x if self.solved else origin, x, drag)
+        self.settles = self.rest < min(self.near, before)
+        if self.solved or origin is self.at.x:              # what was foretold is no way that the body went
+            self._lose(self.at.x, x, drag)
+        self._drag = drag
         by, self.at = x - self.at.x, replace(self.at, x=x, control=self.control)
         self.problem.advance(x, self.control)
         self.problem.prepare(x, self.control, by, 0.0, 1.0)
@@ -108,6 +111,7 @@ class _Way:
         try:
             state = self.curve.solve(self.at.x, self.control, fixed(self.control), "jump", self.at)
         except Failure:
+            self.settles, self.near = False, 0.3 * self.rest
             return None
         self._lose(self.at.x, state.x, np.zeros(len(state.x)))
         forms = self.problem.forms
@@ -120,7 +124,6 @@ class _Way:
         self._x.array_w[:] = (a + x) / 2
         self.problem.residual(self._x, self.control, self._newton.F)
         self.lost += self._sum((self._drag + drag - 4 * self._newton.F.array_r) * (x - a)) / 6
-        self._drag = drag
 
     def _sum(self, values: np.ndarray) -> float:
         return float(self.problem.comm.allreduce(values.sum()))
@@ -145,18 +148,15 @@ def jump(curve: Any, old: State, by: float) -> State:
     fold = old.kind == "limit point" or old.slope * by <= 0
     way = _Way(curve, old, old.control + by)
     origin = old.x if fold else old.x + by / old.slope * old.direction
-    eta = _FIRST
+    eta, most = _FIRST, _MOST_AT_FOLD if fold else _MOST
     try:
-        while way.solved < _MOST and eta < _LARGEST:
-            if way.settles:
-                state = way.end(old)
-                if state is not None:
-                    if state.slope * by < 0:
-                        state.direction, state.slope = -state.direction, -state.slope
-                    return state
-                way.settles = False
-            moved = way.move(origin, eta)
-            origin, eta = way.at.x if way.solved else origin, eta * (_FALLS if moved else _GROWS)
+        while way.solved < most and eta < _LARGEST:
+            state = way.end(old) if way.settles else None
+            if state is not None:
+                if state.slope * by < 0:
+                    state.direction, state.slope = -state.direction, -state.slope
+                return state
+            eta *= _FALLS if way.move(way.at.x if way.solved else origin, eta) else _GROWS
         raise Failure("no state follows that the body could snap to: it comes to rest nowhere", [])
     except Failure:
         problem.memory = kept
