@@ -7,6 +7,8 @@ ARG PACKAGES="\
     python3-gmsh \
     python3-matplotlib \
     python3-myst-parser \
+    python3-openpyxl \
+    python3-plotly \
     python3-pytest \
     python3-pyvista \
     python3-scipy \
