@@ -118,20 +118,21 @@ def _varying_membrane(pole_stretch: float, radius: float, thickness: float, c10:
         return solve_ivp(slopes, (start, 1), [stretch * start, 0.0, start * N], args=(p,), rtol=1e-9, atol=1e-12,
                          method="DOP853", dense_output=True)
 
-    stretches = np.geomspace(1.02, pole_stretch, max(2, int(np.ceil(np.log(pole_stretch) / 0.1))))
+    stretches = np.geomspace(1.02, pole_stretch, max(2, int(np.ceil(np.log(pole_stretch) / 0.25))))
     p = membrane_inflation(1.02, radius=1, thickness=0.5, c10=1).pressure
     for stretch in stretches:
-        found = root_scalar(lambda p, stretch=stretch: integrate(p, stretch).y[0, -1] - 1, x0=p, x1=1.02 * p, rtol=1e-12)
+        found = root_scalar(lambda p, stretch=stretch: integrate(p, stretch).y[0, -1] - 1, x0=p, x1=1.02 * p,
+                            rtol=1e-9)
         if not found.converged:
-            raise InputError(f"pole_stretch = {pole_stretch!r}: no pressure was found beyond a stretch of {stretch:.6g}")
+            raise InputError(f"pole_stretch = {pole_stretch!r}: no pressure was found at a stretch of {stretch:.6g}")
         p = found.root
     s = np.linspace(1e-4, 1, 400)
     r, z, H = integrate(p, pole_stretch).sol(s)
     a, l2 = np.array([c10(radius * x) for x in s]) / unit, r / s
     N = np.hypot(H, p * r**2 / 2) / s / (a + c01 / unit * l2**2)
     l1 = _meridional_stretch(N, l2)
-    return MembraneState(2 * unit * thickness / radius * p, -z[-1] * radius, s * radius, r * radius, (z - z[-1]) * radius,
-                         1 / (l1 * l2))
+    return MembraneState(2 * unit * thickness / radius * p, -z[-1] * radius, s * radius, r * radius,
+                         (z - z[-1]) * radius, 1 / (l1 * l2))
 
 
 def _meridional_stretch(n: Any, l2: Any) -> Any:
