@@ -7,6 +7,7 @@ from .heat.boundaries import Absorption, Convection, FixedTemperature, HeatFlux,
 from .heat.contact import ConductingTool, ContactWithTool
 from .heat.result import HeatRun
 from .heat.run import heat
+from .materials.constants import entropic, of_temperature
 from .materials.data import treloar1944
 from .materials.fit import Fit, fit
 from .materials.fit_in_time import TimedTest

@@ -140,6 +140,15 @@ class Formulation(ABC):
         self.dissipation = sum(self.weighted(self._scale * terms.dissipation(self.F), terms.names)
                                for terms in changing) if changing else None
 
+    def temperatures(self, terms: MaterialTerms) -> np.ndarray:
+        """The scene's temperature at the quadrature points of a material, shape (cells, points)."""
+        return self.scene.temperature.in_cells(terms.cells, terms.places)
+
+    def take_temperature(self) -> None:
+        """The scene's temperature has changed: constants follow it; scales stay as they are; collective."""
+        for terms in dict.fromkeys(self._terms.values()):
+            terms.take_temperature()
+
     def cells_of(self, layers: list[str]) -> np.ndarray:
         """The cells of `mesh` in which some layers are, this rank's own and ghosts, ascending local numbers."""
         return np.sort(np.concatenate([self.mesh.cells.find(self.mesh.layers[name]) for name in layers]))

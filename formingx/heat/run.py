@@ -12,8 +12,9 @@ from mpi4py import MPI
 from ..errors import ConvergenceError, InputError, finite, instance, known, positive, several
 from ..mesh import Mesh
 from ..physics.kinematics import Axisymmetric
+from ..scene import fields
 from ..time_temperature import ABSOLUTE_ZERO
-from . import fields, stepping
+from . import stepping
 from .boundaries import FixedTemperature, ThermalProperties
 from .conduction import Conduction
 from .result import HeatRun

@@ -1,0 +1,110 @@
+"""Constants that depend on the temperature of a scene, and theirs shifts in time."""
+
+import numpy as np
+import pytest
+
+import formingx as fx
+from formingx.discrete.problem import Problem
+
+HOT = {130.0: 2.0, 150.0: 0.6, 170.0: 0.2}
+
+
+def scene(material, temperature=None, model=None, thickness=0.05, elements=(6, 1), **more):
+    body = fx.mesh.disc(radius=1.0, thickness=thickness, elements=elements)
+    return fx.Scene(mesh=body, materials=material, loads=[fx.Pressure("bottom")], model=model, temperature=temperature,
+                    supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], **more)
+
+
+def inflate(scene, stretch=1.5):
+    return fx.trace(scene, until=fx.pole_stretch(stretch), progress=False)
+
+
+@pytest.mark.parametrize("model", [fx.Membrane(), fx.MixedPressure()], ids=["membrane", "solid"])
+def test_uniform_temperature_is_the_plain_material(model):
+    """Between two points of the table, too; the same states to round-off."""
+    material = fx.NeoHookean(c10=fx.table(HOT))
+    paths = [inflate(s) for s in (scene(material, 143.0, model), scene(material.at_temperature(143.0), None, model))]
+    assert paths[0]["pressure"] == pytest.approx(paths[1]["pressure"], rel=1e-9)
+    assert paths[0].problem.forms.stress == pytest.approx(2 * fx.table(HOT)(143.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("model", [fx.Membrane(), fx.MixedPressure()], ids=["membrane", "solid"])
+def test_it_is_the_constant_at_the_temperature_of_each_point(model):
+    """c10(T(R)) is a constant that varies with R."""
+    c10 = fx.table(HOT)
+
+    def temperature(R, Z):                              # quadratic: exact in the elements
+        return 160 - 20 * R**2
+    a = inflate(scene(fx.NeoHookean(c10=c10), temperature, model))
+    b = inflate(scene(fx.NeoHookean(c10=lambda R, Z: c10(temperature(R, Z))), None, model))
+    assert a["pressure"] == pytest.approx(b["pressure"], rel=1e-9)
+    even = inflate(scene(fx.NeoHookean(c10=0.4), None, model))
+    assert np.all(a.profile().thickness_ratio[6:] > 1.02 * even.profile().thickness_ratio[6:])  # a hot pole thins more
+
+
+def test_temperature_given_in_all_ways(tmp_path):
+    field = tmp_path / "T.csv"
+    field.write_text("R,Z,T\n0,0,160\n1,0,140\n0,0.05,160\n1,0.05,140\n")
+    mesh = fx.mesh.disc(radius=1.0, thickness=0.05, elements=(3, 1))
+    heated = fx.heat(mesh, fx.ThermalProperties(conductivity=0.2, density=1e3, heat_capacity=2e3), start=150.0,
+                     times=1.0, unit="C")
+    material = fx.NeoHookean(c10=fx.of_temperature(lambda T: np.exp(-(T - 150) / 20)))
+    ways = {"number": 150.0, "run": heated, "table": fx.table({0.0: 160.0, 1.0: 140.0}), "file": field}
+    moduli = {name: scene(material, T, elements=(3, 1)).shear_modulus("sheet") for name, T in ways.items()}
+    assert moduli["number"] == pytest.approx(2.0) and moduli["run"] == pytest.approx(2.0)
+    assert 2 * np.exp(0.45) < moduli["table"] < 2 * np.exp(0.5)                # largest near the rim, at 140
+    assert moduli["file"] == pytest.approx(moduli["table"], rel=1e-9)
+
+
+def test_constants_follow_a_temperature_that_changes():
+    """The stiffness of the forms is that of the new temperature; one outside the table is refused."""
+    here = scene(fx.NeoHookean(c10=fx.table(HOT)), 150.0, fx.MixedPressure())
+    problem = Problem(here)
+    c10 = problem.forms.coefficients["sheet", "c10"]
+    assert np.allclose(c10.x.array, 0.6)
+    here.temperature.T.x.array[:] = 130.0
+    problem.forms.take_temperature()
+    assert np.allclose(c10.x.array, 2.0)
+    here.temperature.T.x.array[:] = 120.0
+    with pytest.raises(fx.InputError, match=r"temperature = 120: must be from 130 to 170"):
+        problem.forms.take_temperature()
+
+
+@pytest.mark.parametrize("kind", [fx.Viscoelastic, fx.TransientNetwork])
+def test_time_temperature_superposition(kind):
+    """sigma(T, t) = sigma(T0, t/aT): a whole scene at T, aT times as fast, follows the same path."""
+    shift, T = fx.WLF(8.86, 101.6, 150.0), 158.0
+    rest, branches = fx.NeoHookean(c10=0.2), [(1.0, 2.0), (0.5, 20.0)]
+    found = []
+    for temperature, duration in ((150.0, 3.0), (T, 3.0 * float(shift(T)))):
+        body = scene(kind(rest, branches, shift=shift), temperature, fx.Membrane())
+        process = fx.Process(body, [fx.Stage("blow", drive=body.loads[0], until=fx.pressure(0.03), duration=duration)])
+        found.append(process.run(progress=False).last.measures)
+    plain = scene(kind(rest, branches), None, fx.Membrane())
+    process = fx.Process(plain, [fx.Stage("blow", drive=plain.loads[0], until=fx.pressure(0.03), duration=3.0)])
+    found.append(process.run(progress=False).last.measures)
+    assert found[0]["process_time"] == pytest.approx(3.0) and shift(T) < 0.3
+    for other in found[1:]:
+        assert other["pole_height"] == pytest.approx(found[0]["pole_height"], rel=1e-8)
+
+
+def test_entropic_modulus():
+    c10 = fx.entropic(2.0, 150.0, unit="C")
+    material = fx.Viscoelastic(fx.NeoHookean(c10=c10), [(c10, 1.0)])
+    warm = material.at_temperature(170.0)
+    assert warm.shear_modulus == pytest.approx(6.0 * (170 + 273.15) / (150 + 273.15), rel=1e-12)
+    assert scene(material, 170.0).shear_modulus("sheet") == pytest.approx(warm.shear_modulus, rel=1e-9)
+
+
+@pytest.mark.parametrize("material, temperature, words", [
+    (fx.NeoHookean(c10=fx.table(HOT)), None, "give Scene a temperature"),
+    (fx.NeoHookean(c10=fx.table(HOT)), 180.0, "temperature = 180: must be from 130 to 170"),
+    (fx.NeoHookean(c10=fx.of_temperature(lambda T: 160 - T)), 170.0, "no stiffness"),
+    (fx.Viscoelastic(None, [(1.0, 1.0)], shift=fx.WLF(8.86, 101.6, 150.0)), 20.0, "must be above reference - c2"),
+    (fx.NeoHookean(c10=1.0), fx.table({0.0: 150.0, 0.5: 140.0}), "R = "),
+    (fx.NeoHookean(c10=1.0), lambda R, Z: R / 0, "not a finite number"),
+])
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_what_is_refused(material, temperature, words):
+    with pytest.raises(fx.InputError, match=words):
+        scene(material, temperature)
