@@ -45,14 +45,14 @@ class Admissible:
         self._has_hoop = forms.scene.kinematics.axisymmetric
         cell = basix.CellType[domain.topology.cell_name()]
         scene = forms.scene
-        inside = basix.make_quadrature(cell, scene.quadrature_degree)[0]
-        beside = basix.make_quadrature(cell, scene.quadrature_degree + 1)[0]
+        inside: Any = basix.make_quadrature(cell, scene.quadrature_degree)[0]
+        beside: Any = basix.make_quadrature(cell, scene.quadrature_degree + 1)[0]
         points = np.concatenate([inside, beside, np.array(_MIDDLES[cell], dtype=float)])
         n = domain.topology.index_map(domain.topology.dim).size_local
         self._dofs = [forms.space.sub(0).sub(i).dofmap.list[:n] for i in (0, 1)]
-        shapes = forms.displacement_element.tabulate(1, points)                    # (1 + dim, points, dofs)
+        shapes: Any = forms.displacement_element.tabulate(1, points)                    # (1 + dim, points, dofs)
         geometry = basix.ufl.element("Lagrange", domain.basix_cell(), _compat.coordinate_map(domain).degree)
-        map_shapes = geometry.tabulate(1, points)
+        map_shapes: Any = geometry.tabulate(1, points)
         nodes = domain.geometry.x[_compat.cell_nodes(domain)[:n], :2]
         self._X = np.einsum("pk,ckx->cpx", map_shapes[0], nodes)
         self._values, self._on_axis = shapes[0], np.abs(self._X[..., 0]) <= 1e-12 * forms.length

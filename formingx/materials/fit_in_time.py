@@ -189,7 +189,7 @@ def _scaled(material: Material | None, factor: float) -> Material | None:
         return material
 
 
-def _checked(name: str, test: TimedTest) -> dict[str, np.ndarray]:
+def _checked(name: str, test: TimedTest) -> dict[str, Any]:
     t, l = branches.checked(name, test.mode, test.times, test.stretches, test.between)
     try:
         stress = np.asarray(test.stress, float)

@@ -21,6 +21,7 @@ import ufl
 from ..errors import InputError, instance, known, positive, several
 from ..physics import kinematics
 from . import branches as tests
+from .constants import Sample
 from .homogeneous import MODES
 from .material import Material
 
@@ -63,13 +64,13 @@ class RelaxingMaterial(Material):
                 self.parameters[constant] = value
         self.check()
 
-    def check(self):
+    def check(self, sample: Sample | None = None) -> None:
         for k, mu, tau in self._branches(self.parameters):
             positive(f"{type(self).__name__}: mu_{k}", mu)
             positive(f"{type(self).__name__}: tau_{k}", tau)
         if (rest := self.equilibrium) is not None:
             rest.check()
-        super().check()
+        super().check(sample)
 
     @property
     def equilibrium(self) -> Material | None:
@@ -98,7 +99,7 @@ class RelaxingMaterial(Material):
         return 0.0 if (rest := self.equilibrium) is None else rest.rest_stress
 
     @property
-    def internal(self) -> dict[str, tuple]:
+    def internal(self) -> dict[str, tuple]:  # type: ignore[override]  # read only here
         """{name: value at rest} of what the material remembers: entries (11, 22, 12, 33) of tensors."""
         names = ["C"] * self._remembers + [f"{self._tensor}_{k}" for k, *_ in self._branches(self.parameters)]
         return dict.fromkeys(names, _IDENTITY)
@@ -157,7 +158,7 @@ class RelaxingMaterial(Material):
     def relaxation_modulus(self, times: Any) -> np.ndarray:
         """G(t) = G_equilibrium + sum mu exp(-t/tau) of small shear, at times of any shape; stress."""
         t = np.asarray(times, float)
-        modulus = 0.0 if (rest := self.equilibrium) is None else rest.shear_modulus
+        modulus: Any = 0.0 if (rest := self.equilibrium) is None else rest.shear_modulus
         return modulus + sum(mu * np.exp(-t / tau) for mu, tau in self.branches)
 
     def stress(self, mode: str, stretches: Any, times: Any = None, between: str = "stretch") -> np.ndarray:
