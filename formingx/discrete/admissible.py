@@ -20,8 +20,8 @@ there has no limit.)"""
 
 
 class Least(NamedTuple):
-    """The smallest value found: which quantity ("hoop stretch" or "in-plane determinant"), its value, and the reference
-    point (R, Z) where it is, length."""
+    """The worst value found: which quantity ("hoop stretch", "in-plane determinant" or "volume ratio"), its value, and
+    the reference point (R, Z) where it is, length."""
 
     quantity: str
     value: float
@@ -74,6 +74,17 @@ class Admissible:
                 found.append(Least(quantity, float(values[k]), tuple(self._X[k].tolist())))
         parts = [part for parts in self._forms.comm.allgather(found) for part in parts]
         return min(parts, key=lambda part: part.value if np.isfinite(part.value) or part.value > 0 else -np.inf)
+
+    def furthest_volume_ratio(self) -> Least | None:
+        """The volume ratio J whose logarithm is largest at the state last set; None of a membrane; collective."""
+        if not self._solid:
+            return None
+        found = Least("volume ratio", 1.0, (0.0, 0.0))
+        J = np.prod(list(self._quantities().values()), axis=0)
+        if J.size:
+            k = np.unravel_index(np.argmax(np.abs(np.log(np.maximum(J, 1e-300)))), J.shape)
+            found = Least("volume ratio", float(J[k]), tuple(self._X[k].tolist()))
+        return max(self._forms.comm.allgather(found), key=lambda part: abs(np.log(max(part.value, 1e-300))))
 
     def holds(self) -> bool:
         """True if all of them are positive, all ranks, at the state last set; collective."""
