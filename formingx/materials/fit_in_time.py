@@ -196,7 +196,7 @@ def _scaled(material: Material | None, factor: float, I1: float) -> Material | N
         return material
 
 
-def _checked(name: str, test: TimedTest) -> dict[str, np.ndarray]:
+def _checked(name: str, test: TimedTest) -> dict[str, Any]:
     t, l = branches.checked(name, test.mode, test.times, test.stretches, test.between)
     try:
         stress = np.asarray(test.stress, float)

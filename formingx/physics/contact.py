@@ -239,7 +239,7 @@ class Law:
         N = pressed + k * slope * ahead
         force = N[:, None] * n
         stiffness = _outer(k * slope, n, n) + _outer(pressed * bend, t, t)
-        zero = np.zeros(len(x))
+        zero: np.ndarray = np.zeros(len(x))
         kept_at = np.where(held, np.maximum(d, 0.0), d)         # held for ever
         if self.mu == 0:
             return Tractions(force, stiffness, _touch(x, kept_at, zero), N, zero, zero)

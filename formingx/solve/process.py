@@ -179,13 +179,15 @@ class Execution:
         rate, control, scale = [0.0] * len(base), base[numbers[0]], self.problem.forms.scales[numbers[0]]
         for number in numbers:
             base[number], rate[number] = 0.0, 1.0
-        stage, way = self._stage, 0.0
-        if clocked and (stage.speed or stage.duration):
-            there = stage.until.value / scale if stage.until.name.endswith(("pressure", "travel")) else np.inf
+        stage, until = self._stage, self._stage.until
+        if clocked and until is not None and (stage.speed or stage.duration):
+            there = until.value / scale if until.name.endswith(("pressure", "travel")) else np.inf
             way = there - control
-            if way:
-                rate[-1] = np.sign(way) * scale / stage.speed if stage.speed else stage.duration / way
-                base[-1] -= rate[-1] * control
+            if way and stage.speed:
+                rate[-1] = np.sign(way) * scale / stage.speed
+            elif way and stage.duration:
+                rate[-1] = stage.duration / way
+            base[-1] -= rate[-1] * control
         self._enter(base, rate, 1, control)
         return control
 
