@@ -42,7 +42,7 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
     outline = _outline(points, triangles[:, :3], np.sign(area), what)
     place = crossing(points, outline)
     if place is not None:
-        raise InputError(f"{what}: the body touches or crosses itself near {_show(place)}: elements that meet must share"
+        raise InputError(f"{what}: the body touches or crosses itself near {_show(place)}: elements that meet share"
                          f" their nodes, and none may lie over another")
 
 

@@ -39,7 +39,7 @@ class Scene:
             arrays (R, Z), a CSV file with columns R, Z, T, what `formingx.heat` returned, or a DOLFINx Function.
 
     Raises:
-        InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0 or one whose
+        InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, or whose
             elements lie over each other or are inside out, two driven objects that no name tells apart.
     """
 

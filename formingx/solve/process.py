@@ -211,9 +211,10 @@ class Execution:
     def _course(self, now: float) -> tuple[Target, Callable[[float], float], list[float]]:
         """(a target of the measure, the measure at a time, the times of its corners) of a flow that begins now."""
         stage, end = self._stage, self._stage.until
-        if stage.hold:
+        if stage.hold and stage.duration:
             value = stage.hold.value
             return stage.hold, lambda time: value, [now, now + stage.duration]
+        assert stage.flow is not None
         measure, course = stage.flow
         corners = [] if callable(course) else course[:, 0].tolist()
         if corners and corners[0] > now:
