@@ -294,17 +294,12 @@ class Problem:
 
     def foretell(self, x: np.ndarray, control: float) -> dict[int, Any]:
         """{number of a history: what it would remember, were a state accepted} of those that change with time."""
-        found, timed = {}, self.forms.histories
+        timed = self.forms.histories
         if timed:
             self.forms.control.value = control
             self._set_own(x)
-        for k, history in enumerate(self.histories):
-            if any(history is one for one in timed):
-                kept = history.get()
-                history.advance(x[: self._n], control)
-                found[k] = history.get()
-                history.put(kept)
-        return found
+        return {k: history.foretell(control) for k, history in enumerate(self.histories)
+                if any(history is one for one in timed)}
 
     def reach(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step of at most `length` from x along (direction, slope) may be. Arrays: own part."""
