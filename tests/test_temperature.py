@@ -145,7 +145,7 @@ def test_a_sheet_that_cools_needs_more_pressure():
 
 
 def test_a_tool_takes_heat_only_where_and_while_it_touches():
-    tool = fx.tools.plug(radius=0.008, edge_radius=0.002, z=1.5e-3) if hasattr(fx.tools, "plug") else None
+    tool = fx.tools.male(radius=8e-3, height=0.02, base=-0.02, fillet=2e-3).mirrored().moved(z=1.5e-3)
     plug = fx.Contact("top", tool, moves=(0.0, -1.0), name="plug", friction="stick")
     scene = cooled({"plug": (1000.0, 30.0)}, [plug], h=0)
     push = fx.Stage("push", drive="plug", until=fx.travel(4e-3), through=[fx.travel(0.4e-3)], duration=0.5)

@@ -86,7 +86,8 @@ class MidSurface(Formulation):
         """That halfway between the faces of the layer."""
         nodes = self.domain.geometry.x[_compat.cell_nodes(self.domain)[terms.cells], :2]
         geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(self.domain).degree)
-        R, Z = np.einsum("qk,nkd->dnq", geometry.tabulate(0, terms.places)[0], nodes)
+        shapes: Any = geometry.tabulate(0, terms.places)
+        R, Z = np.einsum("qk,nkd->dnq", shapes[0], nodes)
         points = np.column_stack([R.ravel(), self.mid(terms.names[0], R.ravel(), Z.ravel())])
         return self.scene.temperature.at(points).reshape(R.shape)
 

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..scene.scene import Scene
-from .admissible import Admissible
+from .admissible import Admissible, Least
 from .constraints import Active, Constraints
 from .contact_nodes import ContactNodes
 from .formulations import formulate
@@ -244,6 +244,11 @@ class Problem:
         """True if the body has no shape: a hoop stretch or an in-plane determinant is not positive (`Admissible`)."""
         self.set_state(x, control)
         return not self._admissible.holds()
+
+    def furthest_volume_ratio(self, state: Any) -> Least | None:
+        """Where J is furthest from 1 in a state, see `Admissible.furthest_volume_ratio`; collective."""
+        with self.at(state):
+            return self._admissible.furthest_volume_ratio()
 
     def begin(self, old: Any = None) -> None:
         """Newton's method begins at a guess ahead of a state (None: of none)."""

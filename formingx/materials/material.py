@@ -203,12 +203,12 @@ class Material:
     def check(self, sample: Sample | None = None) -> None:
         """Raise an InputError unless the constants are admissible: finite, with a positive stiffness at rest.
 
+        What is a number, of whatever type, is kept as a float.
         sample: where to look at constants that vary; None: only those that do not vary are checked.
         """
+        self.parameters = {name: value if varying(value) is not None else finite(f"{self}: {name}", value)
+                           for name, value in self.parameters.items()}
         if self.varies and sample is None:
-            for name, value in self.parameters.items():
-                if varying(value) is None:
-                    finite(f"{self}: {name}", value)
             return
         if sample is None:
             self.check_constants(**self.parameters)

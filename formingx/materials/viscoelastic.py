@@ -22,7 +22,7 @@ import ufl
 from ..errors import InputError, instance, known, positive, several
 from ..physics import kinematics
 from . import branches as tests
-from .constants import OfTemperature, varying
+from .constants import OfTemperature, Sample, varying
 from .homogeneous import MODES
 from .material import Material
 
@@ -69,7 +69,7 @@ class RelaxingMaterial(Material):
                 self.parameters[f"tau_{k}"] = _shifted(f"{name}: tau_{k}", values[1], shift)
         self.check()
 
-    def check(self, sample=None):
+    def check(self, sample: Sample | None = None) -> None:
         if sample is None and (rest := self.equilibrium) is not None:
             rest.check()
         super().check(sample)
@@ -111,7 +111,7 @@ class RelaxingMaterial(Material):
         return 0.0 if (rest := self.equilibrium) is None else rest.rest_stress
 
     @property
-    def internal(self) -> dict[str, tuple]:
+    def internal(self) -> dict[str, tuple]:  # type: ignore[override]  # read only here
         """{name: value at rest} of what the material remembers: entries (11, 22, 12, 33) of tensors."""
         names = ["C"] * self._remembers + [f"{self._tensor}_{k}" for k, *_ in self._branches(self.parameters)]
         return dict.fromkeys(names, _IDENTITY)
@@ -173,7 +173,7 @@ class RelaxingMaterial(Material):
     def relaxation_modulus(self, times: Any) -> np.ndarray:
         """G(t) = G_equilibrium + sum mu exp(-t/tau) of small shear, at times of any shape; stress."""
         t = np.asarray(times, float)
-        modulus = 0.0 if (rest := self.equilibrium) is None else rest.shear_modulus
+        modulus: Any = 0.0 if (rest := self.equilibrium) is None else rest.shear_modulus
         return modulus + sum(mu * np.exp(-t / tau) for mu, tau in self.branches)
 
     def stress(self, mode: str, stretches: Any, times: Any = None, between: str = "stretch") -> np.ndarray:

@@ -3,7 +3,8 @@
 Song (1993), eqs. (5.7) to (5.14), per unit reference area, at a point whose signed distance to the tool is d:
 
     normal traction      N = k F(d),  F the ramp (5.13) of half-width theta: 0 below -theta, d above theta, C1 between;
-    tangential traction  T = k_t F'(d) g, not more than mu N; k_t = k for stick, k/100 for Coulomb's law,
+    tangential traction  T = k_t F'(d) g, not more than mu N; k_t = k for stick, k max(1, mu)/100 but at most k for
+    Coulomb's law,
 
 g being the elastic slip: the tangential motion since the point touched (entered the ramp), less what has slid. Stick
 is mu = inf, frictionless mu = 0. A point that was out of touch at the last accepted state slips from where it arrives
@@ -31,7 +32,8 @@ from .tools import Nearest, Tool
 SOFTER = 0.01
 """Stiffness of elastic slip over that of the ramp, under Coulomb's law: a point slides after some mu 100 N/k of slip.
 
-Were it as stiff as the ramp, that range would be narrower than a step of Newton's method can aim at.
+Were it as stiff as the ramp, that range would be narrower than a step of Newton's method can aim at. It grows with mu
+above 1, so that the range is no wider than needed, and what never slides (mu = 100 and above) is as stiff as stick.
 """
 
 
@@ -237,14 +239,14 @@ class Law:
         N = pressed + k * slope * ahead
         force = N[:, None] * n
         stiffness = _outer(k * slope, n, n) + _outer(pressed * bend, t, t)
-        zero = np.zeros(len(x))
+        zero: np.ndarray = np.zeros(len(x))
         kept_at = np.where(held, np.maximum(d, 0.0), d)         # held for ever
         if self.mu == 0:
             return Tractions(force, stiffness, _touch(x, kept_at, zero), N, zero, zero)
         assert old is not None
         g, dg = self._slip(x, near, old)
         rising = (np.abs(at) < self.theta) * k / (2 * self.theta) * self.separates
-        kt = k if self.mu == math.inf else SOFTER * k
+        kt = k * min(SOFTER * max(self.mu, 1.0), 1.0)
         rising *= kt / k
         T, dT = (kt * slope + rising * ahead) * g, (kt * slope)[:, None] * dg
         dT += (rising * g)[:, None] * n

@@ -230,9 +230,9 @@ class Smooth:
             past = -t[j]
         elif high == _SAMPLES - 1 and j == len(t) - 1:
             past = t[j] - 1
-        past *= np.linalg.norm(d[j])
-        across = np.linalg.norm(point - line[j] - t[j] * d[j])
-        return feet[j], bool(past > max(across, 1e-9))
+        beyond = float(past * np.linalg.norm(d[j]))
+        across = float(np.linalg.norm(point - line[j] - t[j] * d[j]))
+        return feet[j], beyond > max(across, 1e-9)
 
 
 def _costs(points: np.ndarray, line: np.ndarray) -> np.ndarray:

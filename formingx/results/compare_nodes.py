@@ -128,7 +128,7 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
         for node in nodes.tolist():
             if node not in at:
                 raise InputError(f"{table.name}: node {node} is not in the mesh file {os.fspath(mesh)!r}")
-        points = plain.points[[at[n] for n in nodes.tolist()]]
+        points = plain.points[[at[int(n)] for n in nodes]]
     ours = _displacements(path, state, points)
     return NodalComparison(nodes, points, ours, np.column_stack([take(c) for c in _COMPONENTS]),
                            float(np.hypot(*ours.T).max()))

@@ -166,7 +166,8 @@ class Path:
         record.segments[-1].states.append(replace(left, met=None))
         record.stage = left.stage
         before = segment.states[: segment.states.index(left) + 1]
-        step = next((s.stepping["step"] for s in reversed(before) if s.stepping and s.setting == left.setting), {})
+        step: dict[str, Any] = next((s.stepping["step"] for s in reversed(before)
+                                     if s.stepping and s.setting == left.setting), {})
         try:
             Run(record, [(target, bound)], StepControl(**step)).follow(200, False, None)
         except (ConvergenceError, Failure) as error:

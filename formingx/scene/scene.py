@@ -40,8 +40,8 @@ class Scene:
         heat: `Cooling(...)`: the temperature changes as time goes by.
 
     Raises:
-        InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, two
-            driven objects that no name tells apart.
+        InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, or whose
+            elements lie over each other or are inside out, two driven objects that no name tells apart.
     """
 
     def __init__(self, *, mesh: Mesh, materials: Material | Mapping[str, Material], supports: Sequence[Any],
@@ -53,6 +53,7 @@ class Scene:
             materials = dict.fromkeys(mesh.layers, materials)
         if not isinstance(materials, Mapping):
             raise InputError(f"Scene: materials = {materials!r}: must be a formingx material, or {{layer: material}}")
+        mesh.check()                                           # its nodes may have been moved
         self.mesh = mesh
         self.materials = dict(materials)
         self.supports = _all_of(Support, "supports", supports, "supports, such as Clamped('rim')")
@@ -212,8 +213,10 @@ class Scene:
         depth = contact.tool.signed_distance(points)
         worst = int(np.argmax(depth))
         if depth[worst] > near:
+            free = contact.tool.reversed().signed_distance(points).max() <= near
             raise InputError(f"{contact!r}: the body starts inside the tool: {depth[worst]:.6g} deep at (R, Z) ="
-                             f" ({points[worst, 0]:.6g}, {points[worst, 1]:.6g})")
+                             f" ({points[worst, 0]:.6g}, {points[worst, 1]:.6g})"
+                             + ("; the other side of its profile is free of it: use tool.reversed()" if free else ""))
         if depth[worst] > contact.tool.signed_distance(face).max() + near:
             raise InputError(f"{contact!r}: the tool is behind this face of the body: another face is closer to it;"
                              f" boundaries are {list(mesh.boundaries)}")
