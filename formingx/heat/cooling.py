@@ -99,7 +99,7 @@ class CoolingHistory:
                                 checked_boundaries(scene.mesh, [*cooling.boundaries, *touches], self._zero),
                                 scene.kinematics, self._zero, forms.u)
         touching = [c for c in problem.contacts if c.contact.name in cooling.tools]
-        self._touches = [(touch, nodes, touch.conductance.copy(), _rows(touch.points, nodes.points))
+        self._touches = [(touch, nodes, touch.conductance.copy(), _rows(touch.points, self._gathered(nodes.points)))
                          for touch, nodes in zip(self._body.touches, touching, strict=True)]
         self._n = len(self._body.points)
         self._first = scene.temperature.first[: self._n].copy()
@@ -119,7 +119,7 @@ class CoolingHistory:
         if until <= self._time:
             return
         for touch, nodes, conductance, order in self._touches:
-            distance = nodes.contact.tool.signed_distance(nodes.positions(x, control))[order]
+            distance = self._gathered(nodes.contact.tool.signed_distance(nodes.positions(x, control)))[order]
             touch.conductance[:] = conductance * (nodes.present & (distance > -_NEAR * nodes.thickness))
         self._body.update()
         self._go(until)
@@ -154,13 +154,12 @@ class CoolingHistory:
 
     def save(self, memory: Memory) -> dict[str, Any]:
         """See `History`."""
-        gather = self._problem.comm.allgather
-        points = [touch.points for touch in self._body.touches]
-        return {"time": memory.time, "points": np.concatenate(gather(self._body.points)).tolist(),
-                "temperature": np.concatenate(gather(memory.values["temperature"][:, 0])).tolist(),
-                "lines": [{"points": np.concatenate(gather(p)).tolist(),
-                           "above_back": np.concatenate(gather(v)).tolist()}
-                          for p, v in zip(points, memory.lines, strict=True)]}
+        def plain(own):
+            return self._gathered(own).tolist()
+        return {"time": memory.time, "points": plain(self._body.points),
+                "temperature": plain(memory.values["temperature"][:, 0]),
+                "lines": [{"points": plain(touch.points), "above_back": plain(lines)}
+                          for touch, lines in zip(self._body.touches, memory.lines, strict=True)]}
 
     def load(self, data: dict[str, Any]) -> Memory:
         """See `History`."""
@@ -168,6 +167,10 @@ class CoolingHistory:
         lines = [np.array(d["above_back"])[_rows(touch.points, d["points"])].reshape(len(touch.points), -1)
                  for touch, d in zip(self._body.touches, data["lines"], strict=True)]
         return Memory(float(data["time"]), {"temperature": T[:, None]}, lines)
+
+    def _gathered(self, own: np.ndarray) -> np.ndarray:
+        """Of all ranks, one after the other."""
+        return np.concatenate(self._problem.comm.allgather(own))
 
     def _take(self, T: np.ndarray) -> None:
         """The temperature of the scene, which other problems may have changed, and the constants of this one."""
