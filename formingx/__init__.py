@@ -5,6 +5,7 @@ from .doctor import doctor
 from .errors import ConvergenceError, InputError, Interrupted
 from .heat.boundaries import Absorption, Convection, FixedTemperature, HeatFlux, Radiation, ThermalProperties
 from .heat.contact import ConductingTool, ContactWithTool
+from .heat.cooling import Cooling
 from .heat.result import HeatRun
 from .heat.run import heat
 from .materials.constants import entropic, of_temperature

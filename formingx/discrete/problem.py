@@ -67,6 +67,8 @@ class Problem:
         self._residual = forms.compile(forms.residual)
         self._by_control = forms.control_derivative and forms.compile(forms.control_derivative)
         self.contacts = [ContactNodes(forms, contact, self.assemble) for contact in scene.contacts]
+        if scene.heat is not None:                              # after the materials: they relax at the old temperature
+            forms.histories.append(scene.heat.history(self))
         self.histories = [*(contact for contact in self.contacts if contact.law.remembers), *forms.histories]
         self._admissible = Admissible(forms)
         self._constraints = Constraints(forms, self.assemble)

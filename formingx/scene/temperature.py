@@ -19,7 +19,8 @@ class BodyTemperature:
         mesh: of the scene.
 
     Attributes:
-        T: the DOLFINx `Function` (P2). Who changes it calls `Problem.take_temperature`.
+        T: the DOLFINx `Function` (P2). Who changes it calls `take_temperature` of the problem's `forms`.
+        first: its values as given, ghosts included.
 
     Raises:
         InputError: it is not given all over the body.
@@ -31,12 +32,16 @@ class BodyTemperature:
         self.T = fem.Function(fem.functionspace(mesh.domain, ("Lagrange", 2)), name="temperature")
         points = self.T.function_space.tabulate_dof_coordinates()[:, :2]
         self.T.x.array[:] = fields.values_at(given, points, mesh, "Scene: temperature")
+        self.first = self.T.x.array.copy()
 
-    def in_cells(self, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """Temperatures in some cells (local numbers) at places in the reference cell, shape (q, 2): (cells, q)."""
+    def in_cells(self, cells: np.ndarray, places: np.ndarray, first: bool = False) -> np.ndarray:
+        """Temperatures in some cells (local numbers) at places in the reference cell, shape (q, 2): (cells, q).
+
+        first: those that were given, in place of those now.
+        """
         space = self.T.function_space
         basis = space.element.basix_element.tabulate(0, places)[0, :, :, 0]
-        return self.T.x.array[space.dofmap.list[cells]] @ basis.T
+        return (self.first if first else self.T.x.array)[space.dofmap.list[cells]] @ basis.T
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """Temperatures at points, shape (n, 2), of this rank's own choice, shape (n,); collective."""
