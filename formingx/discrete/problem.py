@@ -20,6 +20,7 @@ from ..scene.scene import Scene
 from .admissible import Admissible, Least
 from .constraints import Active, Constraints
 from .contact_nodes import ContactNodes
+from .contact_points import ContactPoints
 from .formulations import formulate
 from .matrix import ExtendedMatrix
 from .schedule import Setting
@@ -66,7 +67,8 @@ class Problem:
         tangent = ufl.derivative(forms.residual, forms.w, ufl.TrialFunction(forms.space))
         self._residual = forms.compile(forms.residual)
         self._by_control = forms.control_derivative and forms.compile(forms.control_derivative)
-        self.contacts = [ContactNodes(forms, contact, self.assemble) for contact in scene.contacts]
+        self.contacts = [(ContactNodes if contact.points == "nodes" else ContactPoints)(forms, contact, self.assemble)
+                         for contact in scene.contacts]
         if scene.heat is not None:                              # after the materials: they relax at the old temperature
             forms.histories.append(scene.heat.history(self))
         self.histories = [*(contact for contact in self.contacts if contact.law.remembers), *forms.histories]

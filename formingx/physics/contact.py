@@ -70,6 +70,7 @@ class Contact(Part):
 
     def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float | None = None,
                  ramp: float | None = None, separates: bool = True, nodes_per_step: int = 1,
+                 points: str | int = "nodes",
                  moves: tuple[float, float] | None = None, name: str | None = None):
         self.name, name = name, f"Contact({on!r})"
         if not isinstance(tool, Tool):
@@ -87,6 +88,7 @@ class Contact(Part):
             raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
                              f" Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = count(f"{name}: nodes_per_step", nodes_per_step)
+        self.points = points if points == "nodes" else count(f"{name}: points", points)
         self.moves = None if moves is None else pair(f"{name}: moves", moves)
         if self.moves == (0.0, 0.0):
             raise InputError(f"{name}: moves = (0, 0): must name a direction, or be None")
