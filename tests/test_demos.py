@@ -102,9 +102,9 @@ def test_compression_stick_quick(tmp_path):
         assert set(group["force_N_at_total_deflection_cm"]) == keys
         assert all(set(v) == {"0.1", "0.2", "0.3", "0.4"} for v in group["force_N_at_total_deflection_cm"].values())
     assert all(1.05 < v < 1.15 for v in found["stick_over_lindley"].values())
-    for run in found["further"].values():                   # also of runs that ended early, or turned back
-        assert run["force_N"] > 1000 and run["total_deflection_cm"] > 0.5
-        assert run["reached"] == (abs(run["total_deflection_cm"] - 1.3) < 1e-9) == (run["ended"] == "done")
+    for one in found["further"].values():                   # also of runs that ended early, or turned back
+        assert one["force_N"] > 1000 and one["total_deflection_cm"] > 0.5
+        assert one["reached"] == (abs(one["total_deflection_cm"] - 1.3) < 1e-9) == (one["ended"] == "done")
 
 
 def test_compression_roll_over_quick(tmp_path):

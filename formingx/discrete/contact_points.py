@@ -1,4 +1,4 @@
-"""Contact of one face at Gauss points of its facets: a point lets go by itself, and the forces of a facet change less."""
+"""Contact of one face at Gauss points of its facets: they let go one by one, and a facet's forces change less."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class ContactPoints(ContactNodes):
         facets = mesh.facets_of(self.contact.on)
         nodes = np.array([_ends_first(fem.locate_dofs_topological(vectors, 1, np.array([f], dtype=np.int32)), X)
                           for f in facets], dtype=np.int32).reshape(-1, 3)
-        at, weights = np.polynomial.legendre.leggauss(self.contact.points)
+        at, weights = np.polynomial.legendre.leggauss(int(self.contact.points))
         s, q = (1 + at) / 2, len(at)
         shapes = np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)])
         slopes = np.column_stack([4 * s - 3, 4 * s - 1, 4 - 8 * s])

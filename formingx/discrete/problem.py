@@ -22,6 +22,7 @@ from .constraints import Active, Constraints
 from .contact_nodes import ContactNodes
 from .contact_points import ContactPoints
 from .formulations import formulate
+from .history import MaterialHistory
 from .matrix import ExtendedMatrix
 from .schedule import Setting
 
@@ -297,13 +298,12 @@ class Problem:
             history.advance(x[: self._n], control)
 
     def foretell(self, x: np.ndarray, control: float) -> dict[int, Any]:
-        """{number of a history: what it would remember, were a state accepted} of those that change with time."""
-        timed = self.forms.histories
-        if timed:
+        """{number of a material's history: what it would remember, were a state accepted}."""
+        relaxing = {k: one for k, one in enumerate(self.histories) if isinstance(one, MaterialHistory)}
+        if relaxing:
             self.forms.control.value = control
             self._set_own(x)
-        return {k: history.foretell(control) for k, history in enumerate(self.histories)
-                if any(history is one for one in timed)}
+        return {k: history.foretell(control) for k, history in relaxing.items()}
 
     def reach(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step of at most `length` from x along (direction, slope) may be. Arrays: own part."""
