@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import ConvergenceError, InputError, known, positive, several
+from ..tables import Table
 from ..time_temperature import ABSOLUTE_ZERO
 from . import stepping
 from .boundaries import ThermalProperties
@@ -104,6 +105,8 @@ class CoolingHistory:
         self._n = len(self._body.points)
         self._first = scene.temperature.first[: self._n].copy()
         self._seen: Any = None                              # by the constants of this problem
+        ends = problem.comm.allgather((self._first.min(initial=np.inf), self._first.max(initial=-np.inf)))
+        self._extremes = _extremes([*np.ravel(ends)], [*cooling.boundaries, *touches])
         self._dt: float | None = None
         self.start()
 
@@ -173,13 +176,29 @@ class CoolingHistory:
         return np.concatenate(self._problem.comm.allgather(own))
 
     def _take(self, T: np.ndarray) -> None:
-        """The temperature of the scene, which other problems may have changed, and the constants of this one."""
+        """The temperature of the scene, which other problems may have changed, and the constants of this one.
+
+        Next to a face that is chilled at once the temperature in elements overshoots: that is cut off.
+        """
+        T = np.clip(T, *self._extremes)
         here = self._T.x.array[: self._n]
         same = self._seen is not None and np.array_equal(T, self._seen) and np.array_equal(T, here)
         if self._problem.comm.allreduce(int(not same)):
             self._seen = here[:] = T
             self._T.x.scatter_forward()
             self._forms.take_temperature()
+
+
+def _extremes(temperatures: list[float], laws: Sequence[Any]) -> tuple[float, float]:
+    """Between which a body of these temperatures stays under these laws, by the maximum principle."""
+    for law in laws:
+        if not getattr(law, "temperatures", ()):            # heat from elsewhere
+            return -np.inf, np.inf
+        touches = isinstance(law, ContactWithTool)
+        for value in [law.tool] if touches else [law.parameters[name] for name in law.temperatures]:
+            temperatures += (value.y.tolist() if isinstance(value, Table) else
+                             [value.back, value.start] if isinstance(value, ConductingTool) else [value])
+    return min(temperatures), max(temperatures)
 
 
 def _rows(points: np.ndarray, others: Any) -> np.ndarray:
