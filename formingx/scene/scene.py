@@ -36,7 +36,7 @@ class Scene:
         quadrature_degree: of the energy; 5 (seven points) is the thesis' rule.
 
     Raises:
-        InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0 or one whose
+        InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0 or whose
             elements lie over each other or are inside out, two driven objects that no name tells apart.
     """
 
