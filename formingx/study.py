@@ -22,10 +22,9 @@ import os
 import pickle
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from concurrent import futures
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field
-from multiprocessing import get_context
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
@@ -139,7 +138,7 @@ class Study(Sheet):
         replace(file, lambda stream: stream.write(effects.page(self, title)))
 
     def refine(self, evaluations: int = 30, within: Mapping[str, tuple[float, float]] | None = None,
-               executor: Executor | None = None) -> StudyRun:
+               executor: futures.Executor | None = None) -> StudyRun:
         """Search between the runs for the best, by the method of Nelder and Mead from the best run; all runs are kept.
 
         Nelder and Mead, Computer Journal 7 (1965) 308 (doi:10.1093/comjnl/7.4.308), as in SciPy, with bounds. For few
@@ -207,7 +206,7 @@ class Study(Sheet):
 
 def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | Sequence[Mapping[str, float]],
           measure: Mapping[str, Measure], *, goal: Mapping[str, str] | None = None, folder: Any = None,
-          executor: Executor | None = None, workers: int | None = None, progress: bool = True) -> Study:
+          executor: futures.Executor | None = None, workers: int | None = None, progress: bool = True) -> Study:
     """Run a script with many sets of numbers, and measure each.
 
     The first run goes alone, so that forms are compiled once for all; then as many at a time as there are workers.
@@ -238,7 +237,7 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
     found.runs += [] if place_of is None else _there(place_of)
     todo = [case for case in cases if not any(run.values == case for run in found.runs)]
     with _pool(executor, min(workers or os.cpu_count() or 1, max(len(todo), 1))) as pool:
-        if isinstance(pool, ProcessPoolExecutor):
+        if isinstance(pool, futures.ProcessPoolExecutor):
             _check_importable(task)
         for run in tqdm(_finished(pool, task, todo), total=len(todo), disable=not progress, desc="study", unit="run"):
             found._keep(run)
@@ -251,14 +250,17 @@ def _finished(pool: Any, task: _Task, cases: list[dict]) -> Iterator[StudyRun]:
     """The runs as they finish; the first one alone."""
     for some in (cases[:1], cases[1:]):
         jobs: dict[Any, dict] = {pool.submit(task, case): case for case in some}
-        for job in as_completed(jobs):
+        for job in futures.as_completed(jobs):
             failure = job.exception()
             yield job.result() if failure is None else StudyRun(jobs[job], error=f"{type(failure).__name__}: {failure}")
 
 
-def _pool(executor: Executor | None, workers: int) -> Any:
+def _pool(executor: futures.Executor | None, workers: int) -> Any:
     """The user's executor, left open; or processes of our own, which end with the block."""
-    return nullcontext(executor) if executor else ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    if executor:
+        return nullcontext(executor)
+    from multiprocessing import get_context  # costs time, which others do not spend
+    return futures.ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
 
 
 def _cases(variables: Any) -> list[dict[str, float]]:

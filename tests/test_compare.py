@@ -7,7 +7,7 @@ from reference import element
 from test_reference_element import follow, pair
 
 import formingx as fx
-from formingx.results.files import tables
+from formingx import csv_files
 
 
 def spiral(t, shift=0.0):
@@ -83,7 +83,7 @@ def test_units(tmp_path):
         fx.compare(ours, tmp_path / "theirs.csv", columns=names, units={"pressure": "cm", "pole_height": "cm"})
     with pytest.raises(fx.InputError, match="unit 'ksc' is not known; known: m, cm"):
         fx.compare(ours, tmp_path / "theirs.csv", columns=names, units={"pressure": "ksc", "pole_height": "cm"})
-    assert tables.conversion("cm3", "m3") == pytest.approx(1e-6)
+    assert csv_files.conversion("cm3", "m3") == pytest.approx(1e-6)
 
 
 def test_run_against_hand_coded_solver(tmp_path):

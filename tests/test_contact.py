@@ -286,3 +286,11 @@ def test_bad_contacts(change, message):
 def scene_with(contact, pressed="bottom"):
     return fx.Scene(mesh=fx.mesh.disc(radius=1, thickness=0.1, elements=(4, 1)), materials=fx.NeoHookean(c10=1.0),
                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure(pressed)], contacts=[contact])
+
+
+def test_what_never_slides_is_stick():
+    """Coulomb's law with a coefficient that is never reached gives the numbers of stick."""
+    ends = [fx.trace(cup(friction, (20, 2)), until=fx.pressure(8.0), progress=False).last
+            for friction in ("stick", 1000.0, 10.0)]
+    assert np.abs(ends[1].x - ends[0].x).max() < 1e-12 * np.abs(ends[0].x).max()
+    assert np.abs(ends[2].x - ends[0].x).max() < 1e-4 * np.abs(ends[0].x).max()

@@ -188,3 +188,66 @@ def test_pot_study_quick(tmp_path):
     assert found["best"]["travel"] == 48 and found["best"]["evenness"] == pytest.approx(0.3387, rel=1e-3)
     for file in ("best.gif", "best.html", "effects.png", "pareto.png", "study.html"):
         assert drawn(tmp_path / file) if file.endswith(".png") else (tmp_path / file).stat().st_size > 10_000
+
+
+def test_relaxation_quick(tmp_path):
+    found = summary("relaxation", tmp_path, "--quick")
+    assert found["accuracy"] == 2e-3
+    for mode in ("uniaxial", "equibiaxial"):
+        assert set(found["relaxation"][mode]) == {"1.5", "2", "3", "5", "10"}
+        assert all(list(of) == ["0", "0.1", "0.25", "0.5", "1", "2", "5"] for of in found["relaxation"][mode].values())
+        assert all(list(of) == ["1.1", "1.25", "1.5", "2", "3", "5"] for of in found["rate"][mode].values())
+        assert max(found["largest_error_of_homogeneous_tests"][mode].values()) < 4e-3
+    assert list(found["creep"]) == ["0", "0.5", "1", "2", "5"]
+    assert found["creep"]["5"] == pytest.approx(1.2891402, rel=2e-3)
+    assert found["recovery"]["0"] == pytest.approx(1.1651652, rel=2e-3)
+    assert found["recovery"]["50"] == pytest.approx(1.0161384, rel=2e-3)
+    assert drawn(tmp_path / "relaxation.png")
+
+
+def test_viscoelastic_tube_quick(tmp_path):
+    found = summary("viscoelastic_tube", tmp_path, "--quick")
+    for group in (found, found["sphere"]):
+        for speed in ("speed_0.1", "speed_1", "speed_10"):
+            assert list(group[speed]["held"]) == ["0", "0.1", "0.5", "1", "2"]
+            assert group[speed]["held"]["0"] == group[speed]["pressure_at_inner_radius"]["2"]
+            after = list(group[speed]["inner_radius_after_release"].values())
+            assert after == sorted(after, reverse=True) and 1 < after[-1] < after[0] < 2
+        at_full = [group[f"speed_{v}"]["held"]["0"] for v in ("0.1", "1", "10")]
+        assert at_full == sorted(at_full)
+    # an ODE solver's: 0.2496187 and 1.7379486
+    assert found["sphere"]["speed_0.1"]["held"]["0"] == pytest.approx(0.2496187, rel=3e-3)
+    assert found["sphere"]["speed_0.1"]["inner_radius_after_release"]["0"] == pytest.approx(1.7379486, rel=3e-3)
+    assert drawn(tmp_path / "viscoelastic_tube.png")
+
+
+def test_balloon_quick(tmp_path):
+    found = summary("balloon", tmp_path, "--quick")
+    # a thin balloon, integrated as ordinary differential equations
+    assert found["flow_26"]["p_R0_over_H0_at_stretch"]["1.5"] == pytest.approx(0.935217, rel=3e-3)
+    assert found["flow_260"]["held"]["20"] == pytest.approx(0.0712642, rel=5e-3)
+    for p, time in (("0.2", 64.9544), ("0.4", 11.4654), ("0.8", 0.622319)):
+        assert found[f"pressure_{p}"]["snap_time_s"] == pytest.approx(time, rel=3e-3)
+    held = found["pressure_0.1"]
+    assert "snap_time_s" not in held and held["time_at_stretch"]["1.1"] == pytest.approx(46.287, rel=3e-3)
+    assert drawn(tmp_path / "balloon.png")
+
+
+def test_viscoelastic_disc_quick(tmp_path):
+    found = summary("viscoelastic_disc", tmp_path, "--quick")
+    for T, volumes in (("0.4", "4"), ("4", "2"), ("40", "2")):
+        membrane, solid = (found[model][f"T_{T}"] for model in ("membrane", "solid"))
+        assert list(solid["p_R0_over_h0_at_volume"])[-1] == volumes and len(solid["held"]) == 4
+        for v, p in membrane["p_R0_over_h0_at_volume"].items():
+            assert solid["p_R0_over_h0_at_volume"][v] == pytest.approx(p, rel=5e-3 if float(v) < 0.5 else 2e-3)
+        held = list(membrane["held"].values())
+        assert held == sorted(held, reverse=True)
+    assert drawn(tmp_path / "viscoelastic_disc.png")
+
+
+@pytest.mark.slow
+def test_relaxing_pot_quick(tmp_path):
+    found = summary("relaxing_pot", tmp_path, "--quick")
+    assert "base" in found["straight"] and set(found["plug"]) == {"speed_6"}
+    assert found["plug"]["speed_6"]["hold_1"]["base"] > found["straight"]["base"]
+    assert drawn(tmp_path / "relaxing_pot.png")

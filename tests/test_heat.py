@@ -45,7 +45,7 @@ def test_series_and_finite_volumes_agree():
     def source(x):
         return 4e6 * np.exp(-1500 * x)
     fluxes = [lambda T, k=k: h[k] * (air[k] - T) for k in (0, 1)]
-    x, T = reference.lines(SLAB, 25.0, fluxes, times, cells=100, source=source)
+    x, T = reference.lines(SLAB, 25.0, fluxes, times, cells=200, source=source)
     assert reference.series(SLAB, 25.0, h, air, x, times, source) == pytest.approx(T, abs=2e-5)
 
 

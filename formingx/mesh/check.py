@@ -42,8 +42,8 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
     outline = _outline(points, triangles[:, :3], np.sign(area), what)
     place = crossing(points, outline)
     if place is not None:
-        raise InputError(f"{what}: the body touches or crosses itself near {_show(place)}: elements that meet must"
-                         f" share their nodes, and none may lie over another")
+        raise InputError(f"{what}: the body touches or crosses itself near {_show(place)}: elements that meet share"
+                         f" their nodes, and none may lie over another")
 
 
 def turned_inside_out(nodes: np.ndarray) -> np.ndarray:

@@ -3,7 +3,8 @@
 Song (1993), eqs. (5.7) to (5.14), per unit reference area, at a point whose signed distance to the tool is d:
 
     normal traction      N = k F(d),  F the ramp (5.13) of half-width theta: 0 below -theta, d above theta, C1 between;
-    tangential traction  T = k_t F'(d) g, not more than mu N; k_t = k for stick, k/100 for Coulomb's law,
+    tangential traction  T = k_t F'(d) g, not more than mu N; k_t = k for stick, k max(1, mu)/100 but at most k for
+    Coulomb's law,
 
 g being the elastic slip: the tangential motion since the point touched (entered the ramp), less what has slid. Stick
 is mu = inf, frictionless mu = 0. A point that was out of touch at the last accepted state slips from where it arrives
@@ -31,9 +32,13 @@ from .tools import Nearest, Tool
 SOFTER = 0.01
 """Stiffness of elastic slip over that of the ramp, under Coulomb's law: a point slides after some mu 100 N/k of slip.
 
-Were it as stiff as the ramp, that range would be narrower than a step of Newton's method can aim at.
+Were it as stiff as the ramp, that range would be narrower than a step of Newton's method can aim at. It grows with mu
+above 1, so that the range is no wider than needed, and what never slides (mu = 100 and above) is as stiff as stick.
 """
 
+
+_SMOOTH, _ROUGH = (2e5, 1e-7), (2e4, 1e-5)
+"""Penalty and ramp without friction, where stiffer contact costs no iterations, and with it."""
 
 _AT_FOOT = 1e-7
 """Distances from the foot of the ramp, over theta, that are as good as none."""
@@ -47,8 +52,8 @@ class Contact(Part):
         tool: a `Tool`, see `formingx.tools`.
         friction: "stick" (a point that touches stays where it touched), "none", or the coefficient mu of Coulomb's
             law (5.9), from 0 (none).
-        penalty: k over shear modulus / thickness of the sheet.
-        ramp: theta over thickness of the sheet.
+        penalty: k over shear modulus / thickness of the sheet; default 2e4, without friction 2e5.
+        ramp: theta over thickness of the sheet; default 1e-5, without friction 1e-7.
         separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
             start); with "stick" or "none".
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge).
@@ -63,8 +68,9 @@ class Contact(Part):
     quantity = "travel"
     on: str
 
-    def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float = 2e4,
-                 ramp: float = 1e-5, separates: bool = True, nodes_per_step: int = 1,
+    def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float | None = None,
+                 ramp: float | None = None, separates: bool = True, nodes_per_step: int = 1,
+                 points: str | int = "nodes",
                  moves: tuple[float, float] | None = None, name: str | None = None):
         self.name, name = name, f"Contact({on!r})"
         if not isinstance(tool, Tool):
@@ -74,12 +80,15 @@ class Contact(Part):
             raise InputError(f"{name}: friction = {friction!r}: must be 'stick', 'none' or a coefficient of friction")
         self.on, self.tool, self.friction = on, tool, friction
         self.mu = words[friction] if isinstance(friction, str) else non_negative(f"{name}: friction", friction)
-        self.penalty, self.ramp = positive(f"{name}: penalty", penalty), positive(f"{name}: ramp", ramp)
         self.separates = instance(f"{name}: separates", separates, bool, "True or False")
+        usual = _SMOOTH if self.symmetric else _ROUGH
+        self.penalty = positive(f"{name}: penalty", usual[0] if penalty is None else penalty)
+        self.ramp = positive(f"{name}: ramp", usual[1] if ramp is None else ramp)
         if not separates and 0 < self.mu < math.inf:
             raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
                              f" Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = count(f"{name}: nodes_per_step", nodes_per_step)
+        self.points = points if points == "nodes" else count(f"{name}: points", points)
         self.moves = None if moves is None else pair(f"{name}: moves", moves)
         if self.moves == (0.0, 0.0):
             raise InputError(f"{name}: moves = (0, 0): must name a direction, or be None")
@@ -244,7 +253,7 @@ class Law:
         assert old is not None
         g, dg = self._slip(x, near, old)
         rising = (np.abs(at) < self.theta) * k / (2 * self.theta) * self.separates
-        kt = k if self.mu == math.inf else SOFTER * k
+        kt = k * min(SOFTER * max(self.mu, 1.0), 1.0)
         rising *= kt / k
         T, dT = (kt * slope + rising * ahead) * g, (kt * slope)[:, None] * dg
         dT += (rising * g)[:, None] * n

@@ -218,7 +218,8 @@ class Curve:
         """The state at (self._x, control); its tangent, from the last factorisation, points away from `before`."""
         b = self.newton.b
         size = self._length_of(b)
-        state = State(self._x.array_r.copy(), control, b.array_r / size, 1 / size, history=history, kind=kind)
+        state = State(self._x.array_r.copy(), control, b.array_r / size, 1 / size, history=history, kind=kind,
+                      time=self.problem.forms.time_at(control))
         if before is not None and self._inner(state.direction, state.slope, state.x - before.x,
                                               control - before.control) < 0:
             state.direction, state.slope = -state.direction, -state.slope

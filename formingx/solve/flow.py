@@ -1,7 +1,7 @@
-"""A flow: what is driven is the unknown that makes a measure follow a table in time.
+"""A flow: what is driven is the unknown that makes a measure follow a course in time.
 
 A volume of air that is fed, a force that is held. Time is given, step by step, and the state solves F(x, control) = 0
-with the measure at the table's value: so a pressure passes its maximum as it does in practice.
+with the measure at its value for that time: so a pressure passes its maximum as it does in practice.
 """
 
 from __future__ import annotations
@@ -20,21 +20,23 @@ _SAME = 1e-12          # relative: times that are the same
 
 
 class Flow(Run):
-    """States in time along a table of a measure.
+    """States in time along the course of a measure.
 
     Args:
         record, accuracy: as of a `Run`.
-        measure: the `Bound` that follows the table.
-        table: (time, value in the user's units), shape (n, 2); the run ends with it.
+        measure: the `Bound` that follows the course.
+        course: its value, in the user's units, at a time.
+        times: that are hit, where the course begins, has its corners and ends.
         targets: (target, its measure) to meet on the way.
-        step: step control whose lengths are parts of the table's duration.
+        step: step control whose lengths are parts of the duration.
     """
 
-    def __init__(self, record: Record, measure: Bound, table: np.ndarray,
-                 targets: Sequence[tuple[Target, Bound]], step: StepControl, accuracy: float, label: str = ""):
-        end = process_time(float(table[-1, 0]))
+    def __init__(self, record: Record, measure: Bound, course: Callable[[float], float], times: Sequence[float],
+                 targets: Sequence[tuple[Target, Bound]], step: StepControl | None, accuracy: float,
+                 label: str = ""):
+        end = process_time(times[-1])
         super().__init__(record, [*targets, (end, end.bind(record.problem))], step, "follow", accuracy, label)
-        self._measure, self._table, self._duration = measure, table, float(table[-1, 0] - table[0, 0])
+        self._measure, self._course, self._times, self._duration = measure, course, times, times[-1] - times[0]
 
     def _facing_target(self, start: State) -> State:
         return start
@@ -67,14 +69,14 @@ class Flow(Run):
                                   f" {failure.reason}", failure.attempt)
 
     def _next_event(self, time: float) -> float:
-        """The next time that must be hit: a knot of the table, or a target."""
-        times = [*self._table[:, 0], *(t.value for t, _ in self.open if t.name == "process_time")]
+        """The next time that must be hit: a corner of the course, or a target."""
+        times = [*self._times, *(t.value for t, _ in self.open if t.name == "process_time")]
         return min(t for t in times if t > time + _SAME * max(abs(time), self._duration))
 
     def _at(self, old: State, time: float) -> State:
         """The state at a time, one step from `old`; raises `Failure`."""
         problem, problem.forms.clock = self.problem, time
-        value = float(np.interp(time, *self._table.T))
+        value = float(self._course(time))
         x, control = self._foretold(old, time, value)
         by, slope = x - old.x, control - old.control
         if problem.reach(old.x, old.control, by, slope, 1.0) < 0.5:
@@ -83,7 +85,6 @@ class Flow(Run):
         new = self.curve.solve(x, control, self._measure.equation(value), "step", old)
         if problem.too_far(old.x, old.control, new.x, new.control):
             raise Failure("too much came into contact in one step", [])
-        new.time = time
         return new
 
     def _foretold(self, old: State, time: float, value: float) -> tuple[np.ndarray, float]:

@@ -92,7 +92,7 @@ class Run:
                     self._accept(state)
                     if state.kind == "limit point" and self._at_fold == "stop":
                         record.ended = f"the {self._driven} has a limit point at {record.describe(state)}"
-                    if self.problem.has_history or self._at_fold == "jump":
+                    if record.ended or self.problem.has_history or self._at_fold == "jump":
                         break                           # the rest of the step starts from here
                     if not self._is_open(self.until) and state.met is self.until:
                         break

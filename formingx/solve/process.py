@@ -8,6 +8,7 @@ yet) leaves forces without balance: they are taken away gradually, which is one 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -129,8 +130,8 @@ class Execution:
     def _trace(self, targets: list, control: float | None) -> list:
         """Follow the path from a control (None: on from the last state); returns the targets that are still open."""
         step = self._stage.step or self._step
-        if self.problem.setting.rate[-1] and self.problem.relaxes:
-            step = step or _IN_TIME
+        if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
+            step = step or _IN_TIME                          # a piece that has begun goes on with its own steps
         run = Run(self.record, targets, step, self._stage.at_fold, self._accuracy, self._label)
         start = None if control is None else self._resumed(control)
         run.follow(self._max_steps, self._progress, start)
@@ -200,23 +201,31 @@ class Execution:
         return [*setting.standing(control)[:-1], self.problem.forms.time_at(control)]
 
     def _flow(self, numbers: list[int], begun: bool) -> None:
-        """Piece 1: one thing is what makes a measure follow a table in time."""
-        stage = self._stage
+        """Piece 1: one thing is what makes a measure follow a course in time."""
         control = None if begun else self._enter_driving(numbers, clocked=False)
-        now = self.problem.setting.base[-1]
-        if stage.hold:
-            target, table = stage.hold, np.array([[now, stage.hold.value], [now + stage.duration, stage.hold.value]])
-        else:
-            assert stage.flow is not None
-            target, table = stage.flow[0](0.5), stage.flow[1]
-            if table[0, 0] > now:
-                raise InputError(f"{stage.who}: the table begins at time {table[0, 0]:g}, but the process time is"
-                                 f" {now:g}: time would stand still between")
-            table = np.vstack([[now, np.interp(now, *table.T)], table[table[:, 0] > now]])
-        step = stage.step or _IN_TIME
-        run = Flow(self.record, target.bind(self.problem), table, self._targets[self._k], step, self._accuracy,
-                   self._label)
+        target, course, times = self._course(self.problem.setting.base[-1])
+        run = Flow(self.record, target.bind(self.problem), course, times, self._targets[self._k],
+                   self._stage.step or (None if begun else _IN_TIME), self._accuracy, self._label)
         run.follow(self._max_steps, self._progress, None if control is None else self._resumed(control))
+
+    def _course(self, now: float) -> tuple[Target, Callable[[float], float], list[float]]:
+        """(a target of the measure, the measure at a time, the times of its corners) of a flow that begins now."""
+        stage, end = self._stage, self._stage.until
+        if stage.hold and stage.duration:
+            value = stage.hold.value
+            return stage.hold, lambda time: value, [now, now + stage.duration]
+        assert stage.flow is not None
+        measure, course = stage.flow
+        corners = [] if callable(course) else course[:, 0].tolist()
+        if corners and corners[0] > now:
+            raise InputError(f"{stage.who}: the table begins at time {corners[0]:g}, but the process time is"
+                             f" {now:g}: time would stand still between")
+        last = corners[-1] if end is None else end.value
+        if last <= now:
+            raise InputError(f"{stage.who}: ends at time {last:g}, but the process time is {now:g} already: time cannot"
+                             f" go back")
+        at = course if callable(course) else lambda time: np.interp(time, *course.T)
+        return measure(float(at(now))), at, [now, *(t for t in corners if now < t < last), last]
 
     def _follow(self, tables: list[tuple[int, np.ndarray]], piece: int) -> None:
         """Pieces 1, 2, ...: from knot to knot of the tables, the time being the control."""

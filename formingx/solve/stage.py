@@ -32,7 +32,8 @@ class Stage:
         follow: instead of `drive`: {thing: [(time, value), ...]}, piecewise linear in time, values in the user's units
             (the last one stays). A table that begins later than the stage is reached in a straight line from
             where the thing stands. With `drive`, instead of a thing a function that makes targets, such as
-            `enclosed_volume`: what is driven is what makes that measure follow the table: a flow.
+            `enclosed_volume`: what is driven is what makes that measure follow the table: a flow. Its course may
+            be a function of time, too; then `until` is the `process_time` of its end.
         speed: of what is driven (its unit per time), greater than 0: time goes by while it moves.
         duration: time that the stage takes: on the way to a target of what is driven, or while it stands still.
         hold: with `drive` and `duration`: a target, such as `force(2.0)`: what is driven gives way so that it stays
@@ -64,7 +65,7 @@ class Stage:
         self.speed = None if speed is None else positive(f"{who}: speed", speed)
         self.duration = None if duration is None else positive(f"{who}: duration", duration)
         self.hold = instance(f"{who}: hold", hold, Target | None, "a target, such as force(2.0), or None")
-        self.flow: tuple[Any, np.ndarray] | None = None
+        self.flow: tuple[Any, Any] | None = None
         if drive is not None and follow is not None:
             self.flow = self._flow(follow)
         self.tables = [] if follow is None or self.flow else self._tables(follow)
@@ -96,16 +97,23 @@ class Stage:
         if follow is not None and until is not None and until.name != "process_time":
             raise InputError(f"{who}: until = {until}: tables are followed until a process_time, or to their end")
 
-    def _flow(self, follow: Any) -> tuple[Any, np.ndarray]:
-        """(what makes targets, knots, shape (n, 2)) of a measure that follows a table."""
+    def _flow(self, follow: Any) -> tuple[Any, Any]:
+        """(what makes targets, knots, shape (n, 2), or a function of time) of a measure that follows a course."""
         if not isinstance(follow, Mapping) or len(follow) != 1 or not callable(next(iter(follow))):
             raise InputError(f"{self.who}: both drive and follow are given: then follow must be {{measure: [(time,"
                              f" value), ...]}} with a function that makes targets, such as enclosed_volume")
-        ((measure, table),) = self._tables(follow)
-        if len(table) < 2:
-            raise InputError(f"{self.who}: the table of {measure!r} must have two points at least")
-        instance(f"{self.who}: follow", measure(float(table[0, 1])), Target, "made by its measure")
-        return measure, table
+        ((measure, course),) = follow.items()
+        if callable(course):
+            if self.until is None:
+                raise InputError(f"{self.who}: follows a function of time: until when? give it until=process_time(...)")
+        else:
+            ((measure, course),) = self._tables(follow)
+            if len(course) < 2:
+                raise InputError(f"{self.who}: the table of {measure!r} must have two points at least")
+        first = course(0.0) if callable(course) else course[0, 1]
+        instance(f"{self.who}: follow", measure(finite(f"{self.who}: follow: value", first)), Target,
+                 "made by its measure")
+        return measure, course
 
     def _tables(self, follow: Any) -> list[tuple[Any, np.ndarray]]:
         """[(thing, knots, shape (n, 2))]."""

@@ -13,7 +13,7 @@ _NEAR = 1e-6               # of the thickness: closer to the axis is on it
 
 
 def fold(profile: Profile, axisymmetric: bool) -> tuple[str, np.ndarray] | None:
-    """(what the faces of a sheet do: "cross the axis" or "cross each other or themselves"; (r, z) there), or None."""
+    """(what the faces of a sheet do: "cross the axis" or "cross each other or themselves", (r, z) there) or None."""
     line = np.vstack([profile.bottom, profile.top[::-1]])
     beyond = int(np.argmin(line[:, 0]))
     if axisymmetric and line[beyond, 0] < -_NEAR * profile.original_thickness.max():

@@ -28,8 +28,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ... import _compat
-from ...discrete.locate import locate
 from ...errors import InputError, known, pair
+from ...mesh.locate import locate
 from .patches import Patches
 from .stress_error import Fitted, StressError, StressPeak
 

@@ -1,0 +1,115 @@
+"""A balloon that relaxes: blown up by a flow, or by a pressure that is held until it snaps.
+
+A thin solid sphere, R0/H0 = 100 (R0 to the middle of the wall), c10 = 0.05, branches (0.3, 0.5 s), (0.4, 5 s); MPa, s.
+Flow: the air drives the volume from V0 to 27 V0, V0 = 4/3 pi R0^3, at q V0 per second, and holds it there. Pressure:
+put on at once and held, the balloon creeps until no state follows: the time has its maximum along the path, and the run
+ends there. Pressures as p R0/H0; stretches are those of the middle of the wall.
+"""
+
+import numpy as np
+from common import parser, save, say, summarise
+from relaxing import P1, at_time, cost, times
+
+import formingx as fx
+from formingx.results import files
+from formingx.results.show import plots
+
+R0, H0 = 1.0, 0.01
+HALF = 2 / 3 * np.pi * R0**3                                 # V0 of the half that is meshed
+FLOWS, STRETCHES, HELD = (2.6, 26, 260), (1.1, 1.25, 1.5, 2, 2.5, 3), (0.1, 0.5, 1, 2, 5, 20)
+PRESSURES, CREPT = (0.1, 0.2, 0.4, 0.8), (1.1, 1.2, 1.3, 1.5)
+LONG = 1000.0                                                # s: 200 times the longest relaxation
+
+
+def balloon(n):
+    """Half a sphere, n elements along the meridian."""
+    return fx.Scene(mesh=fx.mesh.sphere(inner_radius=R0 - H0 / 2, thickness=H0, elements=(n, 1)), materials=P1,
+                    supports=[fx.Symmetry("axis"), fx.Symmetry("equator", normal="z")],
+                    loads=[fx.Pressure("inner", name="air")])
+
+
+def blow(q, n, accuracy):
+    """The path of a flow, and its numbers."""
+    full = STRETCHES[-1] ** 3 - 1
+    at = [(stretch**3 - 1) / q for stretch in STRETCHES]     # volume grows with the middle of the wall
+    end = at[-1]
+    stage = fx.Stage("blow", drive="air",
+                     follow={fx.enclosed_volume: [(0, 0), (end, full * HALF), (end + HELD[-1], full * HALF)]},
+                     through=times(0.0, at) + times(end, HELD[:-1]))
+    path = fx.Process(balloon(n)).run([stage], accuracy=accuracy, max_steps=100_000)
+
+    def scaled(time):
+        return float(at_time(path, "blow", time).measures["pressure"] * R0 / H0)
+    return path, {"p_R0_over_H0_at_stretch": {f"{s:g}": scaled(t) for s, t in zip(STRETCHES, at)},
+                  "held": {f"{t:g}": scaled(end + t) for t in HELD}}
+
+
+def creep(p, n, accuracy):
+    """The path under a held pressure, and its numbers."""
+    through = [fx.pole_stretch(s) for s in CREPT]
+    stages = [fx.Stage("put on", drive="air", until=fx.pressure(p * H0 / R0), through=through),
+              fx.Stage("creep", duration=LONG, through=through, at_fold="stop")]
+    path = fx.Process(balloon(n)).run(stages, accuracy=accuracy, max_steps=100_000)
+    met = {f"{s:g}": path.met(target) for s, target in zip(CREPT, through)}
+    found: dict = {"time_at_stretch": {s: float(state.time) for s, state in met.items() if state is not None}}
+    if path.limit_points:
+        found |= {"snap_time_s": float(path.limit_points[-1].time),
+                  "stretch_at_snap": float(path.limit_points[-1].measures["pole_stretch"])}
+    else:
+        found |= {"stretch_at_the_end": float(path.last.measures["pole_stretch"])}
+    return path, found
+
+
+def draw(flows, creeps):
+    """Pressure over stretch, pressure held, stretch over time."""
+    figure, (blown, held, crept) = plots.figure(3, width=3.9)
+    for k, (q, path) in enumerate(flows.items()):
+        end = (STRETCHES[-1] ** 3 - 1) / q
+        p, t = path["pressure"] * R0 / H0, path["process_time"]
+        blown.plot(path["pole_stretch"][t <= end], p[t <= end], color=f"C{k}", label=f"q = {q:g}/s")
+        held.semilogx(t[t > end] - end, p[t > end], color=f"C{k}")
+    for k, (p, path) in enumerate(creeps.items()):
+        t, stretch = path["process_time"], path["pole_stretch"]
+        crept.semilogx(t[t > 0], stretch[t > 0], color=f"C{k}", label=f"{p:g} MPa")
+        if path.limit_points:
+            crept.plot(t[-1], stretch[-1], "o", color=f"C{k}")
+    blown.set(xlabel="stretch", ylabel="p R$_0$/H$_0$, MPa", title="flow", ylim=(0, None))
+    blown.legend(frameon=False)
+    held.set(xlabel="time after the flow, s", ylabel="p R$_0$/H$_0$, MPa", title="held at stretch 3", xlim=(1e-2, None),
+             ylim=(0, None))
+    crept.set(xlabel="time, s", ylabel="stretch", title="pressure held; dot: snap", xlim=(1e-3, None))
+    crept.legend(frameon=False, title="p R$_0$/H$_0$")
+    return figure
+
+
+def main():
+    options = parser("balloon", __doc__.splitlines()[0])
+    options.add_argument("--elements", type=int, default=8, help="elements along the meridian")
+    options.add_argument("--accuracy", type=float, default=1e-4, help="relative error in time")
+    args = options.parse_args()
+    n, accuracy = (4, 2e-3) if args.quick else (args.elements, args.accuracy)
+    summary: dict = {}
+    flows, creeps = {}, {}
+    for q in FLOWS:
+        flows[q], found = blow(q, n, accuracy)
+        summary[f"flow_{q:g}"] = found
+        met = ", ".join(f"{p:.5f} at {s}" for s, p in found["p_R0_over_H0_at_stretch"].items())
+        say(f"q = {q:g}/s: p R0/H0 = {met}; {found['held']['20']:.5f} after 20 s; {len(flows[q])} states,"
+            f" {flows[q].counts.seconds:.1f} s")
+        flows[q].to_csv(args.out / f"flow_{q:g}.csv")
+    for p in PRESSURES:
+        creeps[p], found = creep(p, n, accuracy)
+        summary[f"pressure_{p:g}"] = found
+        say(f"p R0/H0 = {p:g} held: " + ", ".join(f"{t:.5g} s at {s}" for s, t in found["time_at_stretch"].items())
+            + (f"; snaps at {found['snap_time_s']:.6g} s, stretch {found['stretch_at_snap']:.4f}"
+               if "snap_time_s" in found else f"; comes to rest at {found['stretch_at_the_end']:.5f}")
+            + f"; {len(creeps[p])} states, {creeps[p].counts.seconds:.1f} s")
+        creeps[p].to_csv(args.out / f"pressure_{p:g}.csv")
+    save(draw(flows, creeps), args.out / "balloon.png")
+    every = [*flows.values(), *creeps.values()]
+    summary["cost"] = {k: sum(cost(path)[k] for path in every) for k in cost(every[0])}
+    summarise(args.out, summary | {"elements": n, "accuracy": accuracy, "versions": files.versions()})
+
+
+if __name__ == "__main__":
+    main()
