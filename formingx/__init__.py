@@ -11,6 +11,7 @@ from .materials.data import treloar1944
 from .materials.fit import Fit, fit
 from .materials.fit_in_time import TimedTest
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
+from .materials.kbkz import KBKZ, PSM, Wagner
 from .materials.material import Material
 from .materials.viscoelastic import TransientNetwork, Viscoelastic
 from .physics import tools
