@@ -15,7 +15,7 @@ A tool that the body does not separate from holds what has touched it: F(d) = d 
 sign, and max(d + theta, 0) for the others, which carries on without a jump when one arrives.
 
 Contact acts at the nodes of six-node triangles, which are the points of the Gauss-Lobatto rule on a facet (exact
-for the lumped area): there history is read where it lives.
+for the lumped area), or at Gauss points of the facets: history is read where it lives.
 """
 
 from __future__ import annotations
@@ -58,6 +58,8 @@ class Contact(Part):
             start); with "stick" or "none".
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge).
             What sticks depends on when it touched: with more, thickness changes by some 0.1 % of itself.
+        points: where it acts: at the "nodes" of the face, or at so many Gauss points of each facet, which let go one by
+            one: smoother where a sheet slides over an edge (in one process, not under mpirun).
         moves: (r, z) of the tool's motion per unit of travel: the tool is what the run controls; None: it stays.
         name: what it is called in a process and in its columns.
 
