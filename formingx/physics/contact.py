@@ -190,8 +190,10 @@ class Law:
         return False if self.separates or old is None else old.distance > -self.theta
 
     def distance(self, x: np.ndarray) -> np.ndarray:
-        """Signed distance less the shift of the points, n of them or several places x of each, shape (..., n, 2)."""
-        return self.tool.signed_distance(x).reshape(x.shape[:-1]) - self.shift if x.ndim > 2 else self.nearest(x).distance
+        """Signed distance of points x, shape (n, 2) or several places of each (m, n, 2), less the shift, length."""
+        if x.ndim == 2:
+            return self.nearest(x).distance
+        return self.tool.signed_distance(x).reshape(x.shape[:-1]) - self.shift
 
     def nearest(self, x: np.ndarray) -> Nearest:
         """`Tool.nearest` at points x, shape (n, 2), the distances less the shift; found once for the same points."""
