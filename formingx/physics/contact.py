@@ -178,6 +178,7 @@ class Law:
     def __init__(self, tool: Tool, mu: float, k: float, theta: float, shift: np.ndarray | float = 0.0,
                  separates: bool = True):
         self.tool, self.mu, self.k, self.theta, self.shift, self.separates = tool, mu, k, theta, shift, separates
+        self._near: tuple[np.ndarray, Nearest] | None = None        # points last asked for, and what was found
 
     def part(self, points: np.ndarray | slice) -> Law:
         """The law of some of its points."""
@@ -198,13 +199,17 @@ class Law:
         return False if self.separates or old is None else old.distance > -self.theta
 
     def distance(self, x: np.ndarray) -> np.ndarray:
-        """Signed distance less the shift of points x, shape (n,), length."""
-        return self.tool.signed_distance(x) - self.shift
+        """Signed distance of points x, shape (n, 2) or several places of each (m, n, 2), less the shift, length."""
+        if x.ndim == 2:
+            return self.nearest(x).distance
+        return self.tool.signed_distance(x).reshape(x.shape[:-1]) - self.shift
 
     def nearest(self, x: np.ndarray) -> Nearest:
-        """`Tool.nearest`, the distances less the shift."""
-        near = self.tool.nearest(x)
-        return near._replace(distance=near.distance - self.shift)
+        """`Tool.nearest` at points x, shape (n, 2), the distances less the shift; found once for the same points."""
+        if self._near is None or not np.array_equal(x, self._near[0]):
+            near = self.tool.nearest(x)
+            self._near = x.copy(), near._replace(distance=near.distance - self.shift)
+        return self._near[1]
 
     def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
         """F(d), eq. (5.13) if the body separates from the tool, and its derivative."""
