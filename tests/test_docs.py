@@ -1,4 +1,4 @@
-"""Every code block of the pages runs, one after the other; Sphinx builds them without a warning; all names are there."""
+"""Every code block of the pages runs, one after the other; Sphinx builds them without a warning."""
 
 import re
 
