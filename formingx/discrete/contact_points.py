@@ -24,7 +24,7 @@ class ContactPoints(ContactNodes):
 
     def _place(self, assemble: Any) -> None:
         if self._comm.size > 1:
-            raise InputError(f"Contact({self.contact.on!r}): points = {self.contact.points!r} on {self._comm.size} ranks:"
+            raise InputError(f"Contact({self.contact.on!r}): points = {self.contact.points!r}, {self._comm.size} ranks:"
                              " contact at Gauss points runs in one process; use points='nodes' under mpirun")
         solid, mesh = self.solid, self.solid.scene.mesh
         vectors, numbers = solid.space.sub(0).collapse()
