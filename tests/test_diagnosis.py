@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import ROOT, run_json, treloar
+from conftest import ROOT, drawn, run_json, treloar
 
 import formingx as fx
 
@@ -67,7 +67,7 @@ def test_element_about_to_turn_inside_out(tmp_path):
     assert found.at_J.R > 0.6 and found.at_J.Z < 0.4 and found.at_J.layer == "sheet"      # the outer foot
     assert "smaller elements around (R, Z) = (0.8" in found.advice[0]
     found.picture(tmp_path / "a" / "last.png")
-    assert (tmp_path / "a" / "last.png").stat().st_size > 10_000
+    assert drawn(tmp_path / "a" / "last.png")
 
 
 def test_buckling():
