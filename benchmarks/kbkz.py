@@ -107,6 +107,8 @@ def main():
         for rate in RATES:
             say(row(f"{rate:g} /s", *(f"{100 * found[f'{mode}/{rate:g}/{l:g}']:+.0f} %"
                                       for mode in MODES for l in STRETCHES)))
+    summary["undetermined"] = {"both": fit.undetermined, "uniaxial": only.undetermined}
+    say(f"\nnot determined by both: {fit.undetermined}; by uniaxial: {only.undetermined}")
     say("", head("damping", "work by another path", "asymmetry of the tangent"))
     for damping in (DAMPING, MILDER.damping, fx.PSM(10.0, 0.5), fx.PSM(10.0, 1.0), fx.Wagner(1.0, 0.15)):
         work, asymmetry = no_potential(damping)
