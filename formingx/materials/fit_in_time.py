@@ -26,11 +26,13 @@ _PER_DECADE = 16
 class TimedTest(NamedTuple):
     """A homogeneous test in time, the body at rest before.
 
-    mode: "uniaxial", "pure_shear" or "equibiaxial".
-    times: shape (n,), not falling; a stretch that changes while the time does not is put on at once, and so is the
-        first one.
-    stretches: shape (n,). stress: nominal, shape (n,); not a number where it was not measured.
-    between: what grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
+    Args:
+        mode: "uniaxial", "pure_shear" or "equibiaxial".
+        times: shape (n,), not falling; a stretch that changes while the time does not is put on at once, and so is the
+            first one.
+        stretches: shape (n,).
+        stress: nominal, shape (n,); not a number where it was not measured.
+        between: what grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
     """
 
     mode: str
