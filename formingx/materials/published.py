@@ -47,7 +47,7 @@ def published() -> dict[str, Published]:
         "PMMA 163 C": Published(
             NeoHookean(c10=40 * _PSI), "MPa", "polymethyl methacrylate", 163.0, "a sheet is formed in about 6 s",
             "estimated from sigma = K t^-0.05 epsilon with K = 240 psi, relaxation left out: K = 6 c10",
-            f"{_SONG}, section 4.4, from M. O. Lai and D. L. Holt, J. Appl. Polym. Sci. 19 (1975) 1805-1814"),
+            f"{_SONG}, section 4.4, from M. O. Lai and D. L. Holt, J. Appl. Polym. Sci. 19 (1975) 1209 and 1805"),
         "natural rubber, Treloar's sheet": Published(
             NeoHookean(c10=2.0 * _KG_PER_CM2), "MPa", "rubber with 8 % sulphur", None, _NOT_STATED,
             "inflation of a sheet",

@@ -46,10 +46,9 @@ def _slope(stress: Callable, first: np.ndarray, values: np.ndarray, i: int, scal
     """Derivative of the stresses by a constant; 0 where no change of it can be seen."""
     step = math.copysign(max(1e-4 * abs(values[i]), 1e-30), values[i])
     for _ in range(50):
-        moved = stress(values + step * np.eye(len(values))[i]) - first
-        if not np.all(np.isfinite(moved)):
-            break
-        if np.abs(moved).max() > _VISIBLE * scale:
-            return moved / step
+        for change in (step, -step)[:1 + (abs(step) < abs(values[i]))]:             # it may be at the upper bound
+            moved = stress(values + change * np.eye(len(values))[i]) - first
+            if np.all(np.isfinite(moved)) and np.abs(moved).max() > _VISIBLE * scale:
+                return moved / change
         step *= 10
     return np.zeros(len(first))
