@@ -86,7 +86,8 @@ def draw(relaxing, pulling, path):
     crept.plot(path["process_time"], 1 + path["travel"])
     held.set(xlabel="time, s", ylabel="$\\sigma_1-\\sigma_3$, MPa", title="held, uniaxial")
     held.legend(frameon=False, title="stretch", ncols=2)
-    pulled.set(xlabel="stretch", ylabel="$\\sigma_1-\\sigma_3$, MPa", title="constant Hencky rate, uniaxial")
+    pulled.set(xlabel="stretch", ylabel="$\\sigma_1-\\sigma_3$, MPa", title="constant Hencky rate, uniaxial",
+               ylim=(0.05, None))
     pulled.legend(frameon=False)
     crept.set(xlabel="time, s", ylabel="stretch", title="creep and recovery", xlim=(-1, 30))
     return figure

@@ -6,6 +6,7 @@ from typing import Any
 
 import dolfinx
 import ufl
+from dolfinx.fem import petsc as fem_petsc
 
 from .errors import InputError
 
@@ -35,6 +36,11 @@ def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges:
         domain.topology.create_connectivity(dim, 2)
         marks.append(mesh.meshtags_from_entities(domain, dim, graph.adjacencylist(found), values.astype("int32")))
     return domain, marks[0], marks[1]
+
+
+def assemble_matrix(matrix: Any, form: Any, bcs: Any) -> None:
+    """Add a compiled form's entries to a PETSc matrix, but none in the rows and columns that `bcs` hold: 1 there."""
+    fem_petsc.assemble_matrix(matrix, form, bcs=bcs)  # type: ignore[misc]  # its types are those of another variant
 
 
 def coordinate_map(mesh: Any) -> Any:

@@ -30,7 +30,7 @@ def tools(axes: Any, placed: Any, low: Any, high: Any, mirror: bool = False, col
     """
     box = np.array([low, high], dtype=float)
     n = np.maximum(300 * (box[1] - box[0]) / np.max(box[1] - box[0]), 40).astype(int)
-    r, z = (np.linspace(*box[:, k], n[k]) for k in (0, 1))
+    r, z = (np.linspace(box[0, k], box[1, k], n[k]) for k in (0, 1))
     points = np.stack(np.meshgrid(np.abs(r) if mirror else r, z), axis=-1)
     for tool, shift in placed:
         depth = tool.signed_distance(points.reshape(-1, 2) - shift).reshape(points.shape[:2])

@@ -4,7 +4,9 @@ Membrane: Adkins & Rivlin, Phil. Trans. R. Soc. A 244 (1952) 505-531. A flat cir
 pressure. With stretches l1 (meridional), l2 = r/R, l3 = 1/(l1 l2) and the Mooney energy, tensions per deformed length
 are T1 = 2 h0 l3 (l1^2 - l3^2)(c10 + c01 l2^2), T2 likewise. Equilibrium: d(T1 r)/dr = T2 and
 T1 dtheta/ds + T2 sin(theta)/r = p, theta the slope of the meridian. Integrated from the pole until l2 = 1: only the
-product p R counts, so no shooting is needed.
+product p R counts, so no shooting is needed. Where c10 varies with R it is: per original length, with
+N1 = 2 h0 (c10 + c01 l2^2)(l1 - l1^-3 l2^-2), N2 likewise, the axial force R N1 sin(theta) is p r^2/2, and
+d(R N1 cos(theta))/dR = N2 - p r l1 sin(theta); p is found so that l2 = 1 at the rim.
 
 Plug: the same membrane pushed by a sharp-edged flat plug of radius rp; no pressure acts. Outside the plug, with
 tensions per original length N1 = 2 h0 (l1 - l1^-3 l2^-2)(c10 + c01 l2^2), N2 likewise, and H, V the radial and axial
@@ -19,6 +21,8 @@ tube: g = 2 (c10 + c01) (ln l - l^-2/2), sphere: g = -c10 (4/l + l^-4) + c01 (4 
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,19 +49,24 @@ class MembraneState:
     thickness_ratio: np.ndarray
 
 
-def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float, c10: float,
-                       c01: float = 0.0) -> MembraneState:
+def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
+                       c10: float | Callable[[float], float], c01: float = 0.0) -> MembraneState:
     """The inflated membrane whose stretch at the pole is `pole_stretch` (above 1).
 
+    Args:
+        c10: stress; a number, or a smooth function of R (length).
+
     Raises:
-        InputError: a size or constant that is not allowed.
+        InputError: a size or constant that is not allowed; no pressure leads from rest to this stretch.
     """
     from scipy.integrate import solve_ivp
     radius, thickness = positive("radius", radius), positive("thickness", thickness)
-    c10, c01 = positive("c10", c10), non_negative("c01", c01)
+    c01 = non_negative("c01", c01)
     if not positive("pole_stretch", pole_stretch) > 1:
         raise InputError(f"pole_stretch = {pole_stretch!r}: must be above 1")
-    k = c01 / c10
+    if callable(c10):
+        return _varying_membrane(pole_stretch, radius, thickness, c10, c01)
+    k = c01 / positive("c10", c10)
 
     def slopes(R, y):                         # lengths over R0 p/(c10 h0), tensions over c10 h0: pressure is 1
         l1, r, _, theta = y
@@ -86,6 +95,52 @@ def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float, 
     scale = radius / end
     return MembraneState(end * c10 * thickness / radius, -z[-1] * scale, R * scale, r * scale, (z - z[-1]) * scale,
                          R / (l1 * r))
+
+
+def _varying_membrane(pole_stretch: float, radius: float, thickness: float, c10: Callable[[float], float],
+                      c01: float) -> MembraneState:
+    """`membrane_inflation` with c10(R): the pressure by the secant method, followed from a small stretch."""
+    from scipy.integrate import solve_ivp
+    from scipy.optimize import root_scalar
+    unit = positive("c10 at R = 0", float(c10(0.0)))       # lengths over radius, tensions over 2 c10(0) h0
+
+    def slopes(s, y, p):
+        r, _, H = map(float, y)
+        V, a, k = p * r**2 / 2, float(c10(radius * s)) / unit, c01 / unit
+        sN, l2 = math.hypot(H, V), r / s
+        l1 = _meridional_stretch(sN / s / (a + k * l2**2), l2)
+        N2 = (l2 - l2**-3 * l1**-2) * (a + k * l1**2)
+        return [l1 * H / sN, -l1 * V / sN, N2 - p * r * l1 * V / sN]
+
+    def integrate(p, stretch):
+        start = 1e-4                                       # a flat pole: errors of start^2
+        N = (stretch - stretch**-5) * (1 + c01 / unit * stretch**2)
+        return solve_ivp(slopes, (start, 1), [stretch * start, 0.0, start * N], args=(p,), rtol=1e-9, atol=1e-12,
+                         method="DOP853", dense_output=True)
+
+    stretches = np.geomspace(1.02, pole_stretch, max(2, int(np.ceil(np.log(pole_stretch) / 0.1))))
+    p = membrane_inflation(1.02, radius=1, thickness=0.5, c10=1).pressure
+    for stretch in stretches:
+        found = root_scalar(lambda p, stretch=stretch: integrate(p, stretch).y[0, -1] - 1, x0=p, x1=1.02 * p,
+                            rtol=1e-9 if stretch == stretches[-1] else 1e-3)
+        if not found.converged:
+            raise InputError(f"pole_stretch = {pole_stretch!r}: no pressure was found at a stretch of {stretch:.6g}")
+        p = found.root
+    s = np.linspace(1e-4, 1, 400)
+    r, z, H = integrate(p, pole_stretch).sol(s)
+    a, l2 = np.array([c10(radius * x) for x in s]) / unit, r / s
+    N = np.hypot(H, p * r**2 / 2) / s / (a + c01 / unit * l2**2)
+    l1 = _meridional_stretch(N, l2)
+    return MembraneState(2 * unit * thickness / radius * p, -z[-1] * radius, s * radius, r * radius,
+                         (z - z[-1]) * radius, 1 / (l1 * l2))
+
+
+def _meridional_stretch(n: Any, l2: Any) -> Any:
+    """l1 of l1 - l1^-3 l2^-2 = n: Newton's method from above."""
+    l1 = n + l2**-0.5
+    for _ in range(20):
+        l1 = l1 - (l1 - l1**-3 * l2**-2 - n) / (1 + 3 * l1**-4 * l2**-2)
+    return l1
 
 
 def membrane_limit_point(*, radius: float, thickness: float, c10: float,
@@ -147,12 +202,8 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
     def tension(l1, l2):                      # lengths over the radius, tensions over 2 c10 h0
         return (l1 - l1**-3 * l2**-2) * (1 + k * l2**2)
 
-    def stretch(n, l2):                       # l1 of that tension: Newton's method from above
-        n = n / (1 + k * l2**2)
-        l1 = n + l2**-0.5
-        for _ in range(60):
-            l1 = l1 - (l1 - l1**-3 * l2**-2 - n) / (1 + 3 * l1**-4 * l2**-2)
-        return l1
+    def stretch(n, l2):                       # l1 of that tension
+        return _meridional_stretch(n / (1 + k * l2**2), l2)
 
     def start(p):
         return edge / p[1] if slides else edge

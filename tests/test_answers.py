@@ -6,7 +6,7 @@ from conftest import treloar
 from test_contact import cup
 
 import formingx as fx
-from formingx.results.files import tables
+from formingx import csv_files
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +133,7 @@ def test_tables_are_read_back(formed, tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     wall, units = formed.wall(), fx.Units("cm", "psi")
     wall.to_csv(tmp_path / "pot.csv", units)
-    table = tables.read(tmp_path / "pot.csv")
+    table = csv_files.read(tmp_path / "pot.csv")
     assert table.units["wall"] == "cm" and table.units["wall_ratio"] is None
     assert table.take("wall", "mm") == pytest.approx(10 * wall.wall, rel=1e-12)
     wall.to_excel(tmp_path / "pot.xlsx", units)

@@ -5,6 +5,7 @@ import gzip
 import json
 import re
 import shutil
+from dataclasses import replace
 from html.parser import HTMLParser
 from xml.etree import ElementTree
 
@@ -169,7 +170,7 @@ def test_animation(formed, tmp_path):
 
 def test_every_stage_has_its_frames(plugged):
     """Frames are even in the process: the plug goes down by 1 and up by 0.5."""
-    shown = [b.stage for _, b, _ in animation._spread(plugged, 60)]
+    shown = [b.stage for _, b, _ in animation.spread(plugged, 60)]
     assert 30 <= shown.count("down") <= 50 and shown.count("up") >= 10
 
 
@@ -344,11 +345,28 @@ def test_forces_of_tools_do_not_leap_between_states(formed):
     assert drawn.max() == formed["tool_force"].max()
 
 
-def test_warnings(formed):
+def test_warnings(formed, inflated):
+    assert report.of_path(inflated).warnings() == []
     record = report.of_path(formed)
-    assert record.warnings() == []
-    record.measures |= {"penetration": np.array([0.1]), "mass_error": np.array([-0.02])}
+    worst = formed["volume_error"].max()                    # the corner of the clamped rim
+    assert worst > 0.02 and [bad for bad, _ in record.findings()] == ["serious"]
+    assert f"J - 1 is up to {100 * worst:.2g} %" in record.warnings()[0]
+    n = len(formed)
+    record.measures |= {"penetration": np.full(n, 0.1), "mass_error": np.full(n, -0.02), "volume_error": np.zeros(n)}
+    record.furthest = None
     assert [w[:24] for w in record.warnings()] == ["The body penetrates a to", "The mass changes by up t"]
+
+
+def test_folded_faces_are_named(inflated):
+    """One node of the bottom face moved through the top face, and one beyond the axis."""
+    for node, by, what in ((8, (0.0, 0.2), "cross each other"), (1, (-0.5, 0.0), "cross the axis")):
+        record = report.of_path(inflated)
+        shape = record.profiles[4]
+        moved = shape.bottom.copy()
+        moved[node] += by
+        record.profiles[4] = replace(shape, bottom=moved)
+        (bad, text), = record.findings()
+        assert bad == "serious" and f"its faces {what}" in text and "first in state 4" in text
 
 
 def test_command_line(inflated, tmp_path, capsys):

@@ -1,7 +1,10 @@
 """Bad input: an error that names the thing, its value and what is allowed, before any solve."""
 
 import math
+from decimal import Decimal
+from fractions import Fraction
 
+import numpy as np
 import pytest
 from conftest import treloar
 
@@ -38,6 +41,14 @@ def test_mesh(change, words):
     (lambda: fx.Ogden(mu=(1.0, 0.1), alpha=(2.0, -2.0)), "not stable.*mu alpha > 0"),
     (lambda: fx.Hyperelastic(lambda I1, I2, a: a * (3 - I1), a=1.0), "no stiffness"),
     (lambda: fx.Hyperelastic(lambda I1, I2, a: a * I1, b=1.0), r"constants \['a'\]"),
+    (lambda: fx.Hyperelastic(lambda I1, I2: None), "energy fails"),
+    (lambda: fx.Hyperelastic(lambda I1, I2, a: a[0], a=1.0), "energy fails: .*"),
+    (lambda: fx.Hyperelastic(lambda F: F, of="F"), r"shape \(3, 3\): must be a UFL scalar"),
+    (lambda: fx.Hyperelastic("I1 - 3"), "energy = 'I1 - 3'.*function"),
+    (lambda: fx.Ogden(mu=np.array("x"), alpha=2.0), "must be a number"),
+    (lambda: fx.displacement(1.0, at=(0, 0), component=np.array([1.0, 2.0])), "component = .*'r' or 'z'"),
+    (lambda: fx.SimplySupported("rim", weight=np.zeros(2)), "weight = .*'area' or 'stiffness'"),
+    (lambda: fx.Symmetry("axis", normal=np.zeros(2)), "normal = .*'r' or 'z'"),
     (lambda: fx.MixedPressure(eps=-1e-3), "eps = -0.001.*negative"),
     (lambda: fx.DisplacementPenalty(eps=0), "eps = 0.*greater than 0"),
     (lambda: fx.DisplacementPenalty(points=5), "points = 5.*3, 4, 7"),
@@ -49,6 +60,14 @@ def test_mesh(change, words):
 def test_objects(make, words):
     with pytest.raises(fx.InputError, match=words):
         make()
+
+
+def test_numbers_of_any_type():
+    """Constants are kept as floats."""
+    for made in (fx.Yeoh(c10=Decimal("0.5"), c20=Fraction(1, 8), c30=np.float32(0.25)),
+                 fx.Ogden(mu=np.array(1.0), alpha=np.array(2)), fx.Ogden(mu=[Decimal(1)], alpha=[Decimal(2)])):
+        assert made.shear_modulus == pytest.approx(1.0, rel=1e-12)
+        assert {type(value) for value in made.parameters.values()} == {float}
 
 
 def scene(**change):
@@ -115,6 +134,22 @@ def test_nothing_driven():
     for run in (lambda s: fx.trace(s, until=fx.pressure(1.0)), lambda s: fx.solve(s, to=1.0)):
         with pytest.raises(fx.InputError, match="nothing is driven"):
             run(scene(loads=[fx.Pressure("bottom", 0.1)]))
+
+
+def test_moved_nodes():
+    """One node of a good mesh moved so that elements lie over each other, or turn inside out: no scene."""
+    for by, words in ((-0.6, "lie over each other|touches or crosses itself|inside out"), (math.nan, "finite")):
+        mesh = fx.mesh.disc(radius=1.0, thickness=0.3, elements=(4, 2))
+        x = mesh.domain.geometry.x
+        x[np.argmin(np.hypot(x[:, 0] - 0.5, x[:, 1] - 0.15)), 0] += by
+        with pytest.raises(fx.InputError, match=words):
+            scene(mesh=mesh)
+
+
+def test_tool_with_its_solid_on_the_other_side():
+    cup = fx.tools.cup(radius=1.25, depth=0.4, mouth=0.1, fillet=0.1)
+    with pytest.raises(fx.InputError, match=r"starts inside the tool.*use tool.reversed\(\)"):
+        scene(contacts=[fx.Contact("top", cup.reversed())])
 
 
 def test_column_and_value_that_a_path_does_not_have():

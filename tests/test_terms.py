@@ -120,8 +120,7 @@ def test_a_rigid_translation_does_the_work_of_the_weight(model, value):
     forms, up, out = problem.forms, problem.x.duplicate(), problem.x.duplicate()
     forms.w.sub(0).interpolate(lambda X: np.stack([0 * X[0], 0 * X[0] + 1 / forms.length]))
     problem.fill(up, forms.w.x.array)
-    problem.set_state(out, 1.0)
-    work = problem.assemble(problem._residual) @ up.array_r[:problem._n] * forms.stress * forms.volume
+    work = problem.forces(out, 1.0) @ up.array_r[:problem.n_owned] * forms.stress * forms.volume
     weight = 2.0 * (9.81 if value else forms.scales[0]) * np.pi * 2.0**2 * 0.3
     assert forms.volume == pytest.approx(np.pi * 2.0**2 * 0.3) and work == pytest.approx(weight, rel=1e-12)
 
@@ -141,7 +140,7 @@ def assert_derivatives_by_state_and_control(problem, x, d, control=0.7):
     problem.control_derivative(x, control, exact)
     numeric = (residual(problem, control + 1e-4)(x) - residual(problem, control - 1e-4)(x)) / 2e-4
     free = np.ones(len(numeric), dtype=bool)
-    free[problem._held] = False
+    free[problem.held] = False
     size = np.abs(exact.array_r[free]).max()
     assert size > 1e-4 and np.abs(numeric - exact.array_r)[free].max() < 1e-6 * size
 
@@ -267,7 +266,7 @@ def test_derivatives_with_a_history(model, material):
     if not model.solid:                                          # a membrane without stretch has no stiffness
         problem.forms.w.sub(0).interpolate(lambda X: 0.1 * X[:2])
         problem.fill(x, problem.forms.w.x.array)
-        x.array_w[problem._held] = 0
+        x.array_w[problem.held] = 0
     problem.set_state(x, 0.3)
     problem.forms.histories[0].advance(x.array_r, 0.3)
     x.axpy(0.3, d)
@@ -378,7 +377,7 @@ def test_gradient_by_a_constant():
     by_constant = problem.forms.compile(problem.forms.constant_derivative("low", "c10"))
     tangent, right, dx = problem.tangent(x, path.last.control), x.duplicate(), x.duplicate()
     values = -problem.assemble(by_constant)
-    values[problem._held] = 0
+    values[problem.held] = 0
     problem.fill(right, values)
     solver = PETSc.KSP().create(problem.comm)
     solver.setOperators(tangent)

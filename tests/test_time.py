@@ -165,6 +165,7 @@ def test_steps_of_any_length(ratio):
     assert rest * (1 - 1e-8) < pull(path) < now
 
 
+@pytest.mark.slow
 def test_many_branches():
     tau = np.geomspace(1e-3, 1e3, 20)
     material = fx.Viscoelastic(RUBBER, branches=[(0.03 * (1 + k % 3), float(t)) for k, t in enumerate(tau)])
@@ -222,7 +223,8 @@ def test_recovery_after_creep():
     """A force that is held when time has gone by already; taken off, it leaves the stretch that the creep has left."""
     force = fx.force(-0.2 * AREA)
     path = run(block(P1), Stage("load", drive="pull", until=force),
-               Stage("creep", drive="pull", hold=force, duration=5.0), Stage("unload", drive="pull", until=fx.force(0.0)),
+               Stage("creep", drive="pull", hold=force, duration=5.0),
+               Stage("unload", drive="pull", until=fx.force(0.0)),
                Stage("recovery", drive="pull", hold=fx.force(0.0), duration=5.0), accuracy=2e-3)
     begin = next(s for s in path.states if s.stage == "recovery")
     assert begin.time == 5.0 and np.all(np.diff(path["process_time"]) >= 0)

@@ -1,4 +1,4 @@
-"""Whether a body has a shape: lengths along the hoop and areas in the plane are positive wherever they are looked at.
+"""Whether a body has a shape: lengths along the hoop and areas in the plane are positive.
 
 det F > 0 at the quadrature points is not enough: beyond the axis the hoop stretch and the in-plane determinant are both
 negative, and between those points a strongly bent edge may turn an element inside out.
@@ -20,8 +20,8 @@ there has no limit.)"""
 
 
 class Least(NamedTuple):
-    """The smallest value found: which quantity ("hoop stretch" or "in-plane determinant"), its value, and the reference
-    point (R, Z) where it is, length."""
+    """The worst value found: which quantity ("hoop stretch", "in-plane determinant" or "volume ratio"), its value, and
+    the reference point (R, Z) where it is, length."""
 
     quantity: str
     value: float
@@ -37,6 +37,9 @@ class Admissible:
 
     Args:
         forms: a `Formulation`; its `w` is what is looked at.
+
+    Attributes:
+        dofs: unknowns of u_r and of u_z of this rank's own cells, shape (cells, n) each.
     """
 
     def __init__(self, forms: Any):
@@ -45,14 +48,15 @@ class Admissible:
         self._has_hoop = forms.scene.kinematics.axisymmetric
         cell = basix.CellType[domain.topology.cell_name()]
         scene = forms.scene
-        inside = basix.make_quadrature(cell, scene.quadrature_degree)[0]
-        beside = basix.make_quadrature(cell, scene.quadrature_degree + 1)[0]
+        inside: Any = basix.make_quadrature(cell, scene.quadrature_degree)[0]
+        beside: Any = basix.make_quadrature(cell, scene.quadrature_degree + 1)[0]
+        self._n = len(inside)
         points = np.concatenate([inside, beside, np.array(_MIDDLES[cell], dtype=float)])
         n = domain.topology.index_map(domain.topology.dim).size_local
-        self._dofs = [forms.space.sub(0).sub(i).dofmap.list[:n] for i in (0, 1)]
-        shapes = forms.displacement_element.tabulate(1, points)                    # (1 + dim, points, dofs)
+        self.dofs = [forms.space.sub(0).sub(i).dofmap.list[:n] for i in (0, 1)]
+        shapes: Any = forms.displacement_element.tabulate(1, points)                    # (1 + dim, points, dofs)
         geometry = basix.ufl.element("Lagrange", domain.basix_cell(), _compat.coordinate_map(domain).degree)
-        map_shapes = geometry.tabulate(1, points)
+        map_shapes: Any = geometry.tabulate(1, points)
         nodes = domain.geometry.x[_compat.cell_nodes(domain)[:n], :2]
         self._X = np.einsum("pk,ckx->cpx", map_shapes[0], nodes)
         self._values, self._on_axis = shapes[0], np.abs(self._X[..., 0]) <= 1e-12 * forms.length
@@ -68,22 +72,37 @@ class Admissible:
         Of values that are not finite, the first.
         """
         found = [Least("in-plane determinant", np.inf, (0.0, 0.0))]
-        for quantity, values in self._quantities().items():
+        for quantity, values in self.quantities().items():
             if values.size:
                 k = np.unravel_index(np.argmin(np.where(np.isfinite(values), values, -np.inf)), values.shape)
                 found.append(Least(quantity, float(values[k]), tuple(self._X[k].tolist())))
         parts = [part for parts in self._forms.comm.allgather(found) for part in parts]
         return min(parts, key=lambda part: part.value if np.isfinite(part.value) or part.value > 0 else -np.inf)
 
+    def furthest_volume_ratio(self) -> Least | None:
+        """The volume ratio J whose logarithm is largest at the state last set; None of a membrane; collective."""
+        if not self._solid:
+            return None
+        found = Least("volume ratio", 1.0, (0.0, 0.0))
+        J = np.prod(list(self.quantities().values()), axis=0)
+        if J.size:
+            k = np.unravel_index(np.argmax(np.abs(np.log(np.maximum(J, 1e-300)))), J.shape)
+            found = Least("volume ratio", float(J[k]), tuple(self._X[k].tolist()))
+        return max(self._forms.comm.allgather(found), key=lambda part: abs(np.log(max(part.value, 1e-300))))
+
     def holds(self) -> bool:
-        """True if all of them are positive, all ranks, at the state last set; collective."""
-        mine = all(bool(np.all(values > 0)) for values in self._quantities().values())
+        """True if all of them are positive at the quadrature points of the energy, all ranks, at the state last set.
+
+        (Between them an element that a sharp edge bends strongly may be inside out without harm to what is computed: a
+        coarse mesh under a plug. `least` tells.) Collective.
+        """
+        mine = all(bool(np.all(values[:, :self._n] > 0)) for values in self.quantities().values())
         return all(self._forms.comm.allgather(mine))
 
-    def _quantities(self) -> dict[str, np.ndarray]:
+    def quantities(self) -> dict[str, np.ndarray]:
         """{quantity: its values at the points of this rank's own cells, shape (cells, points)}."""
         w, size = self._forms.w.x.array, self._forms.length
-        u = np.stack([w[dofs] for dofs in self._dofs], -1) * size                  # (cells, dofs, 2)
+        u = np.stack([w[dofs] for dofs in self.dofs], -1) * size                  # (cells, dofs, 2)
         found, along = {}, np.ones(())
         if self._solid:
             by_R, by_Z = np.moveaxis((self._gradients @ u).reshape(*self._X.shape, 2), 2, 0)

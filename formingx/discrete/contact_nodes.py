@@ -38,17 +38,8 @@ class ContactNodes:
 
     def __init__(self, solid: Any, contact: Contact, assemble: Any):
         self.solid, self.contact = solid, contact
-        space, comm = solid.space, solid.comm
-        vectors, numbers = space.sub(0).collapse()
-        facets = solid.scene.mesh.facets_of(contact.on)
-        nodes = np.sort(fem.locate_dofs_topological(vectors, 1, facets))
-        dofs = np.asarray(numbers, dtype=np.int32).reshape(-1, 2)[nodes]
-        own = dofs[:, 0] < space.dofmap.index_map.size_local
-        self.dofs, self.points = dofs[own], vectors.tabulate_dof_coordinates()[nodes[own], :2].copy()
-        self.lengths = assemble(solid.compile(solid.length_row(contact.on)))[self.dofs[:, 0]]
-        self.area = self.lengths * solid.scene.kinematics.weight(self.points.T)
-        self._comm, self._length = comm, solid.length
-        self._spread_to_axis(solid.scene.kinematics)
+        self._comm, self._length = solid.comm, solid.length
+        self._place(assemble)
         self.thickness = solid.thickness(contact.on)
         self.law = contact.law(contact.penalty * solid.stress / self.thickness, contact.ramp * self.thickness,
                                self.points)
@@ -67,9 +58,33 @@ class ContactNodes:
         self._memory: Any = None
         self.start()
 
+    def _place(self, assemble: Any) -> None:
+        """Where the contact acts: `dofs`, `points`, `lengths` and `area`."""
+        solid, on = self.solid, self.contact.on
+        vectors, numbers = solid.space.sub(0).collapse()
+        nodes = np.sort(fem.locate_dofs_topological(vectors, 1, solid.scene.mesh.facets_of(on)))
+        dofs = np.asarray(numbers, dtype=np.int32).reshape(-1, 2)[nodes]
+        own = dofs[:, 0] < solid.space.dofmap.index_map.size_local
+        self.dofs, self.points = dofs[own], vectors.tabulate_dof_coordinates()[nodes[own], :2].copy()
+        self.lengths = assemble(solid.compile(solid.length_row(on)))[self.dofs[:, 0]]
+        self.area = self.lengths * solid.scene.kinematics.weight(self.points.T)
+        self._spread_to_axis(solid.scene.kinematics)
+
+    def displacement(self, values: np.ndarray) -> np.ndarray:
+        """Of the points, shape (n, 2), for owned unknowns, in their units."""
+        return values[self.dofs]
+
+    def add(self, values: np.ndarray, forces: np.ndarray) -> None:
+        """Add forces at the points, shape (n, 2), to the owned residual."""
+        values[self.dofs] += forces
+
+    def _between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
+        """Stiffness of the points, shape (n, 2, 2), as that of their unknowns."""
+        return stiffness
+
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Nodes seen from the tool, shape (n, 2), length; `fields`: owned unknowns."""
-        return self.points + self._length * fields[self.dofs] - (self.base + self.rate * control) * self._motion
+        return self.points + self._length * self.displacement(fields) - (self.base + self.rate * control) * self._motion
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
         """What the law gives at a state, computed once for it."""
@@ -166,14 +181,14 @@ class ContactNodes:
         plain = self.tractions(fields, control)
         if self._iterate is not None:
             found = self.law.tractions(x, self.touch, self._sense, self._iterate.to(x))
-            values[self.dofs] += self._scale[:, None] * (found.force - plain.force)
+            self.add(values, self._scale[:, None] * (found.force - plain.force))
             self._last = x, found
         self._sense = self._last[1].sense
         self._iterate = self.law.motion(x, self.touch)
 
     def moved(self, dx: np.ndarray, step: float) -> np.ndarray:
         """Change of `positions` by a correction of the unknowns (own part) and of the control, shape (n, 2), length."""
-        return self._length * dx[self.dofs] - self.rate * step * self._motion
+        return self._length * self.displacement(dx) - self.rate * step * self._motion
 
     def taken(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Forces and stiffnesses per area that `linearise` has taken, of some nodes, shapes (m, 2), (m, 2, 2)."""
@@ -191,10 +206,14 @@ class ContactNodes:
 
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Add the nodal forces to the owned residual."""
-        values[self.dofs] += self._scale[:, None] * self.tractions(fields, control).force
+        self.add(values, self._scale[:, None] * self.tractions(fields, control).force)
 
     def stiffness(self, fields: np.ndarray, control: float, ahead: bool = False) -> np.ndarray:
-        """Derivative of the nodal forces by the nodes' own unknowns, shape (n, 2, 2); `ahead`: see the law."""
+        """Derivative of the forces by the unknowns of each point, shape (n, m, m); `ahead`: see the law."""
+        return self._between_unknowns(self._stiffness(fields, control, ahead))
+
+    def _stiffness(self, fields: np.ndarray, control: float, ahead: bool) -> np.ndarray:
+        """Derivative of the forces by the displacements of their points, shape (n, 2, 2)."""
         values = self.tractions(fields, control).stiffness
         if ahead:
             arrived = self._memory.arrived if self._memory else np.zeros(len(self.points), dtype=bool)
@@ -205,8 +224,7 @@ class ContactNodes:
                                ahead: bool = False) -> None:
         """Add the derivative of the nodal forces by the control: the tool moves; `ahead`: as in `stiffness`."""
         if self.rate:
-            by_motion = self.stiffness(fields, control, ahead) @ (self.rate * self._motion / self._length)
-            values[self.dofs] -= by_motion
+            self.add(values, -self._stiffness(fields, control, ahead) @ (self.rate * self._motion / self._length))
 
     def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step along a tangent may be: to the first touch, or until enough new nodes touch.
@@ -214,7 +232,7 @@ class ContactNodes:
         A step that would bring a whole region into contact at once would decide by its own length where it sticks.
         """
         start = self.positions(fields, control)
-        velocity = self._length * direction[self.dofs] - slope * self.rate * self._motion
+        velocity = self._length * self.displacement(direction) - slope * self.rate * self._motion
         free = ~self.law.touching(start, self.touch)
         times = self._arrivals(start, velocity, length)
         ahead = (times > 0.02 * length) & (times < length)         # nearer ones are as good as in touch
@@ -226,7 +244,7 @@ class ContactNodes:
     def prepare(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> None:
         """A step of this length along a tangent is about to be taken: foretell where nodes arrive."""
         start = self.positions(fields, control)
-        velocity = self._length * direction[self.dofs] - slope * self.rate * self._motion
+        velocity = self._length * self.displacement(direction) - slope * self.rate * self._motion
         times = self._arrivals(start, velocity, length)
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         if self._memory is not None:

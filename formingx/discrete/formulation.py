@@ -19,6 +19,7 @@ from petsc4py import PETSc
 from ufl.algorithms.analysis import extract_constants
 
 from .. import _compat
+from ..errors import InputError
 from ..physics import kinematics as kin
 from .history import History, MaterialHistory
 from .loaded_body import LoadedBody
@@ -139,6 +140,25 @@ class Formulation(ABC):
         self.energy = self._energy(MaterialTerms.stored_energy) if changing else self.potential
         self.dissipation = sum(self.weighted(self._scale * terms.dissipation(self.F), terms.names)
                                for terms in changing) if changing else None
+
+    def temperatures(self, terms: MaterialTerms) -> np.ndarray:
+        """The scene's temperature at the quadrature points of a material, shape (cells, points)."""
+        return self.scene.temperature.in_cells(terms.cells, terms.places)
+
+    def take_temperature(self) -> None:
+        """The scene's temperature has changed: constants follow it; scales stay as they are; collective.
+
+        Raises:
+            InputError: a constant has no value at a temperature.
+        """
+        refused = None
+        for terms in dict.fromkeys(self._terms.values()):
+            try:
+                terms.take_temperature()
+            except InputError as error:
+                refused = refused or str(error)
+        for message in filter(None, self.comm.allgather(refused)):          # all ranks refuse, with one message
+            raise InputError(message)
 
     def cells_of(self, layers: list[str]) -> np.ndarray:
         """The cells of `mesh` in which some layers are, this rank's own and ghosts, ascending local numbers."""

@@ -32,6 +32,7 @@ class MaterialTerms:
         self.forms, self.material, self.names = forms, material, names
         self.cells = forms.cells_of(names)
         self.X = forms.X
+        self._of_temperature: list[tuple[fem.Function, Any]] = []
         cell, degree = forms.domain.basix_cell(), forms.scene.quadrature_degree
         self.places = basix.make_quadrature(cell, degree)[0]
         self.constants = {name: value.expression(self) if isinstance(value, Varying) else forms.constant(value)
@@ -52,6 +53,25 @@ class MaterialTerms:
         found, layer = self.quadrature_function(), self.names[0]
         found.interpolate(lambda X: function(X[0], self.forms.mid(layer, X[0], X[1])), self.cells)
         return found
+
+    def of_temperature(self, function: Any) -> fem.Function:
+        """f(T) at the quadrature points of the energy, exactly; see `take_temperature`."""
+        found = self.quadrature_function()
+        self._of_temperature.append((found, function))
+        self.take_temperature()
+        return found
+
+    def take_temperature(self) -> None:
+        """The temperature has changed: constants follow it.
+
+        Raises:
+            InputError: a constant has no value at a temperature.
+        """
+        if not self._of_temperature:
+            return
+        T = self.forms.temperatures(self)
+        for found, function in self._of_temperature:
+            found.x.array[found.function_space.dofmap.list[self.cells]] = function(T)
 
     def of_mesh(self, expression: Any) -> Any:
         """A UFL scalar of the scene's mesh, where the fields live on it."""

@@ -13,6 +13,8 @@ import numpy as np
 from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
+from .. import _compat
+
 
 class ExtendedMatrix:
     """Created once, refilled for every tangent.
@@ -63,7 +65,7 @@ class ExtendedMatrix:
         """
         A, add = self.mat, PETSc.InsertMode.ADD_VALUES
         A.zeroEntries()
-        fem_petsc.assemble_matrix(A, self._form, bcs=self._bcs)
+        _compat.assemble_matrix(A, self._form, self._bcs)
         A.assemble(PETSc.Mat.AssemblyType.FLUSH)
         for dofs, values in blocks:
             free = ~self._held[dofs]
@@ -81,7 +83,7 @@ class ExtendedMatrix:
     def _pattern(self, rows: list[np.ndarray], m: int) -> tuple[np.ndarray, np.ndarray]:
         """Row pointers and global columns of all owned rows."""
         plain = fem_petsc.create_matrix(self._form)
-        fem_petsc.assemble_matrix(plain, self._form, bcs=self._bcs)
+        _compat.assemble_matrix(plain, self._form, self._bcs)
         plain.assemble()
         indptr, indices, _ = plain.getValuesCSR()
         plain.destroy()

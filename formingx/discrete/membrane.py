@@ -82,6 +82,15 @@ class MidSurface(Formulation):
         topology = self.domain.topology
         return np.arange(topology.index_map(1).size_local + topology.index_map(1).num_ghosts, dtype=np.int32)
 
+    def temperatures(self, terms):
+        """That halfway between the faces of the layer."""
+        nodes = self.domain.geometry.x[_compat.cell_nodes(self.domain)[terms.cells], :2]
+        geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(self.domain).degree)
+        shapes: Any = geometry.tabulate(0, terms.places)
+        R, Z = np.einsum("qk,nkd->dnq", shapes[0], nodes)
+        points = np.column_stack([R.ravel(), self.mid(terms.names[0], R.ravel(), Z.ravel())])
+        return self.scene.temperature.at(points).reshape(R.shape)
+
     def probe(self, problem, points):
         return MidSurfaceProbe(problem, points)
 

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from .. import _compat
 from ..errors import InputError
-from .locate import locate
+from ..mesh.locate import locate
 
 
 class Probe:

@@ -17,10 +17,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..scene.scene import Scene
-from .admissible import Admissible
+from .admissible import Admissible, Least
 from .constraints import Active, Constraints
 from .contact_nodes import ContactNodes
+from .contact_points import ContactPoints
 from .formulations import formulate
+from .history import MaterialHistory
 from .matrix import ExtendedMatrix
 from .schedule import Setting
 
@@ -66,7 +68,10 @@ class Problem:
         tangent = ufl.derivative(forms.residual, forms.w, ufl.TrialFunction(forms.space))
         self._residual = forms.compile(forms.residual)
         self._by_control = forms.control_derivative and forms.compile(forms.control_derivative)
-        self.contacts = [ContactNodes(forms, contact, self.assemble) for contact in scene.contacts]
+        self.contacts = [(ContactNodes if contact.points == "nodes" else ContactPoints)(forms, contact, self.assemble)
+                         for contact in scene.contacts]
+        if scene.heat is not None:                              # after the materials: they relax at the old temperature
+            forms.histories.append(scene.heat.history(self))
         self.histories = [*(contact for contact in self.contacts if contact.law.remembers), *forms.histories]
         self._admissible = Admissible(forms)
         self._constraints = Constraints(forms, self.assemble)
@@ -245,6 +250,11 @@ class Problem:
         self.set_state(x, control)
         return not self._admissible.holds()
 
+    def furthest_volume_ratio(self, state: Any) -> Least | None:
+        """Where J is furthest from 1 in a state, see `Admissible.furthest_volume_ratio`; collective."""
+        with self.at(state):
+            return self._admissible.furthest_volume_ratio()
+
     def begin(self, old: Any = None) -> None:
         """Newton's method begins at a guess ahead of a state (None: of none)."""
         for contact in self.touching:
@@ -295,19 +305,13 @@ class Problem:
         self._foretold = None, {}
 
     def foretell(self, x: np.ndarray, control: float) -> dict[int, Any]:
-        """{number of a history: what it would remember, were a state accepted} of those that change with time."""
-        found, timed = {}, self.forms.histories
-        if timed:
+        """{number of a material's history: what it would remember, were a state accepted}."""
+        relaxing = {k: one for k, one in enumerate(self.histories) if isinstance(one, MaterialHistory)}
+        if relaxing:
             self.forms.control.value = control
             self._set_own(x)
-        for k, history in enumerate(self.histories):
-            if any(history is one for one in timed):
-                kept = history.get()
-                history.advance(x[: self._n], control)
-                found[k] = history.get()
-                history.put(kept)
-        self._foretold = x, found
-        return found
+        self._foretold = x, {k: history.foretell(control) for k, history in relaxing.items()}
+        return self._foretold[1]
 
     def reach(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step of at most `length` from x along (direction, slope) may be. Arrays: own part."""

@@ -50,8 +50,10 @@ class Tooling(NamedTuple):
 
 def _contact(data: dict[str, Any]) -> Contact:
     shape = data["tool"]
-    pieces = [(Line if len(piece) == 2 else Arc)(*(np.array(v) if isinstance(v, list) else v for v in piece))
-              for piece in shape["pieces"]]
+    pieces: list[Line | Arc] = []
+    for piece in shape["pieces"]:
+        values: list[Any] = [np.array(v) if isinstance(v, list) else v for v in piece]
+        pieces.append((Line if len(values) == 2 else Arc)(*values))
     moves = data["moves"] and tuple(data["moves"])
     more = {name: data[name] for name in ("penalty", "ramp", "separates", "nodes_per_step", "name")}
     return Contact(data["on"], Tool.of_pieces(pieces, shape["closed"]), data["friction"], moves=moves, **more)

@@ -327,7 +327,7 @@ class Conduction:
         self._factored_for = c
         self._c.value = c
         self._matrix.zeroEntries()
-        fem_petsc.assemble_matrix(self._matrix, self._tangent, bcs=self._bcs)
+        _compat.assemble_matrix(self._matrix, self._tangent, self._bcs)
         self._matrix.assemble()
         if self.touches:
             extra = np.zeros(self._n)

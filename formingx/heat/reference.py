@@ -42,8 +42,8 @@ def series(slab: Slab, start: float, h: tuple[float, float], air: tuple[float, f
     # tan(m) = m (b0 + b1)/(m^2 - b0 b1), one root in each interval of length pi
     roots = np.array([brentq(lambda m: (m * m - b0 * b1) * np.sin(m) - m * (b0 + b1) * np.cos(m),
                              n * np.pi + 1e-9, (n + 1) * np.pi - 1e-12, xtol=1e-14) for n in range(terms)])
-    nodes, weights = np.polynomial.legendre.leggauss(4 * terms)
-    s, weights = (nodes + 1) / 2, weights / 2
+    nodes, weights = np.polynomial.legendre.leggauss(4 * terms)                # on (-1, 1)
+    s = (nodes + 1) / 2
 
     def shapes(at):
         m = roots[:, None]

@@ -9,8 +9,8 @@ from dolfinx import fem
 
 from ..errors import InputError, finite, known
 from ..results import files
+from ..scene.fields import PointReader
 from .conduction import Conduction
-from .fields import PointReader
 
 _POINTS = 201
 """On a line through the body."""

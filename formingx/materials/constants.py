@@ -1,7 +1,8 @@
 """Constants of a material that vary over the body.
 
 A constant may be a number, a function of the reference position, called as f(R, Z) with arrays of shape (n,), a UFL
-expression of the scene's mesh (a DOLFINx `Function` is one), or an object of a class made from `Varying`.
+expression of the scene's mesh (a DOLFINx `Function` is one), a `table` over the temperature, what `of_temperature`
+returns, or an object of a class made from `Varying`.
 """
 
 from __future__ import annotations
@@ -14,20 +15,23 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from ..errors import InputError
+from ..errors import InputError, finite, known
+from ..tables import Table
+from ..time_temperature import ABSOLUTE_ZERO
 
 
 class Sample(NamedTuple):
     """Where constants are looked at before anything is solved: points of this rank's own cells of a layer.
 
     points: reference (R, Z), shape (m q, 2), length; cells: their numbers, shape (m,); places: of the q points in the
-    reference cell, shape (q, 2); domain: the `dolfinx.mesh.Mesh`.
+    reference cell, shape (q, 2); domain: the `dolfinx.mesh.Mesh`; temperature: there, shape (m q,), None: not given.
     """
 
     points: np.ndarray
     cells: np.ndarray
     places: np.ndarray
     domain: Any
+    temperature: np.ndarray | None = None
 
 
 class Varying(ABC):
@@ -47,7 +51,8 @@ class Varying(ABC):
 
         Args:
             fields: what it may depend on: `fields.X`, the reference position (UFL, shape (2,)), and
-                `fields.of_position(f)`, a coefficient that holds f(R, Z) at the quadrature points of the energy.
+                `fields.of_position(f)` and `fields.of_temperature(f)`, coefficients that hold f(R, Z) and f(T) at the
+                quadrature points of the energy; the latter follows the temperature when that changes.
         """
 
 
@@ -78,6 +83,74 @@ class OfPosition(Varying):
         return getattr(self.function, "__qualname__", repr(self.function))
 
 
+class OfTemperature(Varying):
+    """f(T) of the temperature of the scene; arrays of shape (n,) go in and come out.
+
+    Args:
+        function: f. words: what it is called in messages.
+    """
+
+    def __init__(self, function: Callable, words: str | None = None):
+        self.function = function
+        self._words = words or (repr(function) if isinstance(function, Table)
+                                else f"of_temperature({getattr(function, '__qualname__', repr(function))})")
+
+    def __call__(self, temperature: Any) -> np.ndarray:
+        """Values at temperatures, of their shape, all finite."""
+        T = np.asarray(temperature, dtype=float)
+        if isinstance(self.function, Table):
+            self.function.check(T, "temperature")
+        try:
+            found = np.broadcast_to(np.asarray(self.function(T), dtype=float), T.shape)
+        except (TypeError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"the constant {self!r} must be a function of an array of temperatures, shape (n,):"
+                             f" {error}") from None
+        wrong = ~np.isfinite(found)
+        if np.any(wrong):
+            raise InputError(f"the constant {self!r} is {found[wrong].flat[0]} at a temperature of"
+                             f" {T[wrong].flat[0]:.6g}")
+        return found
+
+    def values(self, sample):
+        if sample.temperature is None:
+            raise InputError(f"the constant {self!r} depends on the temperature: give Scene a temperature=...")
+        return self(sample.temperature)
+
+    def expression(self, fields):
+        return fields.of_temperature(self)
+
+    def __repr__(self) -> str:
+        return self._words
+
+
+def of_temperature(function: Callable) -> OfTemperature:
+    """A constant of a material that depends on the temperature of the scene.
+
+    Args:
+        function: f(T), called with an array of temperatures, shape (n,), in the unit that the scene's are given in.
+    """
+    if not callable(function):
+        raise InputError(f"of_temperature({function!r}): must be a function of the temperature")
+    return OfTemperature(function)
+
+
+def entropic(value: float, reference: float, *, unit: str) -> OfTemperature:
+    """A modulus in proportion to the absolute temperature, as of a network of flexible chains (Treloar 1975).
+
+    Args:
+        value: at the temperature `reference`. unit: of temperatures, "C" or "K".
+    """
+    value, reference = finite("entropic: value", value), finite("entropic: reference", reference)
+    known("entropic: unit", unit, ABSOLUTE_ZERO)
+    zero = ABSOLUTE_ZERO[unit]
+    if not reference > zero:
+        raise InputError(f"entropic: reference = {reference!r}: must be above {zero:g}, absolute zero")
+    return OfTemperature(lambda T: value * (T - zero) / (reference - zero),
+                         f"entropic({value!r}, {reference!r}, unit={unit!r})")
+
+
 class OfMesh(Varying):
     """A UFL scalar of the scene's own mesh."""
 
@@ -105,4 +178,6 @@ def varying(value: Any) -> Varying | None:
         return value
     if isinstance(value, ufl.core.expr.Expr):
         return OfMesh(value)
+    if isinstance(value, Table):
+        return OfTemperature(value)
     return OfPosition(value) if callable(value) else None

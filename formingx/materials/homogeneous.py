@@ -176,7 +176,7 @@ class _Program:
         return np.stack([np.broadcast_to(values[i], stretches.shape[1:]) for i in self._outputs]).astype(float)
 
 
-_OPERATIONS = {
+_OPERATIONS: dict[type, Callable] = {
     classes.Sum: operator.add, classes.Product: operator.mul, classes.Division: operator.truediv,
     classes.Power: np.float_power, classes.Abs: np.abs, classes.Conditional: np.where, classes.LT: operator.lt,
     classes.LE: operator.le, classes.GT: operator.gt, classes.GE: operator.ge, classes.EQ: operator.eq,

@@ -249,9 +249,15 @@ class Hyperelastic(Material):
     """
 
     def __init__(self, energy: Callable, of: str = "invariants", **constants: float):
-        if of not in ("invariants", "F"):
+        if not callable(energy):
+            raise InputError(f"Hyperelastic: energy = {energy!r}: must be a function of I1, I2 or of F, and constants")
+        if not isinstance(of, str) or of not in ("invariants", "F"):
             raise InputError(f"Hyperelastic: of = {of!r}: must be 'invariants' or 'F'")
-        names = list(inspect.signature(energy).parameters)[2 if of == "invariants" else 1:]
+        try:
+            names = list(inspect.signature(energy).parameters)[2 if of == "invariants" else 1:]
+        except ValueError:
+            raise InputError(f"Hyperelastic: energy = {energy!r}: its arguments cannot be read; give a Python function"
+                             ) from None
         if set(names) != set(constants):
             raise InputError(f"Hyperelastic: the energy takes the constants {names}, given are {sorted(constants)}")
         self.parameters, self._energy, self._of = constants, energy, of
@@ -259,7 +265,13 @@ class Hyperelastic(Material):
 
     def strain_energy(self, F, **constants):
         arguments = kinematics.invariants(F) if self._of == "invariants" else (F,)
-        return self._energy(*arguments, **constants)
+        try:
+            energy = ufl.as_ufl(self._energy(*arguments, **constants))
+        except Exception as error:
+            raise InputError(f"Hyperelastic: the energy fails: {type(error).__name__}: {error}") from error
+        if energy.ufl_shape != ():
+            raise InputError(f"Hyperelastic: the energy has the shape {energy.ufl_shape}: must be a UFL scalar")
+        return energy
 
 
 def _ln(x: Any) -> Any:
@@ -268,4 +280,5 @@ def _ln(x: Any) -> Any:
 
 
 def _as_tuple(values: Any) -> tuple:
-    return (values,) if varying(values) is not None or not hasattr(values, "__iter__") else tuple(values)
+    alone = varying(values) is not None or not hasattr(values, "__iter__") or getattr(values, "ndim", 1) == 0
+    return (values,) if alone else tuple(values)

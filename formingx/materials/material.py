@@ -18,7 +18,7 @@ import ufl
 
 from ..errors import InputError, finite, known, positive
 from . import homogeneous
-from .constants import Sample, Varying, varying
+from .constants import OfTemperature, Sample, Varying, varying
 from .homogeneous import MODES, Response, Stability
 
 
@@ -203,12 +203,12 @@ class Material:
     def check(self, sample: Sample | None = None) -> None:
         """Raise an InputError unless the constants are admissible: finite, with a positive stiffness at rest.
 
+        What is a number, of whatever type, is kept as a float.
         sample: where to look at constants that vary; None: only those that do not vary are checked.
         """
+        self.parameters = {name: value if varying(value) is not None else finite(f"{self}: {name}", value)
+                           for name, value in self.parameters.items()}
         if self.varies and sample is None:
-            for name, value in self.parameters.items():
-                if varying(value) is None:
-                    finite(f"{self}: {name}", value)
             return
         if sample is None:
             self.check_constants(**self.parameters)
@@ -245,6 +245,18 @@ class Material:
         other.parameters = dict(zip(self.parameters, map(float, constants), strict=True))
         other.check()
         return other
+
+    def at_temperature(self, temperature: float) -> Material:
+        """The material at one temperature: constants that depend on it are numbers there.
+
+        Raises:
+            InputError: a constant depends on the position, or has no value at this temperature.
+        """
+        found = [float(value(temperature)) if isinstance(value, OfTemperature) else value
+                 for value in self.constants().values()]
+        if any(isinstance(value, Varying) for value in found):
+            raise InputError(f"{self}: at_temperature: a constant depends on the position")
+        return self.with_constants(found)
 
     def _check_isotropic(self) -> None:
         """Turning the stretches round must turn the stresses round."""

@@ -11,6 +11,7 @@ A symmetric tensor with the block structure of F (`physics.kinematics`) is kept 
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -21,14 +22,16 @@ import ufl
 from ..errors import InputError, instance, known, positive, several
 from ..physics import kinematics
 from . import branches as tests
+from .constants import OfTemperature, Sample, varying
 from .homogeneous import MODES
+from .in_time import HistoryTests
 from .material import Material
 
 Entries = tuple[Any, Any, Any, Any]
 _IDENTITY = (1.0, 1.0, 0.0, 1.0)
 
 
-class RelaxingMaterial(Material):
+class RelaxingMaterial(HistoryTests, Material):
     """An equilibrium energy and relaxing branches, whatever the law of the branches.
 
     The constants are those of the equilibrium energy, then mu_1, tau_1, mu_2, ... As a material without time
@@ -37,12 +40,14 @@ class RelaxingMaterial(Material):
     Args:
         equilibrium: the material that is left when all has relaxed, or None.
         branches: [(mu, tau), ...], at least one: shear modulus, stress, and relaxation time, time; each above 0.
+        shift: how relaxation times depend on the temperature of the scene: `WLF`, `Arrhenius`, or any aT(T) of an
+            array; the taus, which must be numbers, are those where aT = 1. None: they do not.
     """
 
     _tensor = ""                    # name of the branches' state
     _remembers = True               # the last state's C is needed, too
 
-    def __init__(self, equilibrium: Material | None, branches: Any):
+    def __init__(self, equilibrium: Material | None, branches: Any, shift: Any = None):
         name = type(self).__name__
         if equilibrium is not None:
             instance(f"{name}: equilibrium", equilibrium, Material, "a material, or None")
@@ -61,22 +66,30 @@ class RelaxingMaterial(Material):
                     raise InputError(f"{name}: the equilibrium energy has a constant {constant!r}: that is the name of"
                                      f" a branch's; give it another")
                 self.parameters[constant] = value
+            if shift is not None:
+                self.parameters[f"tau_{k}"] = _shifted(f"{name}: tau_{k}", values[1], shift)
         self.check()
 
-    def check(self):
-        for k, mu, tau in self._branches(self.parameters):
+    def check(self, sample: Sample | None = None) -> None:
+        if sample is None and (rest := self.equilibrium) is not None:
+            rest.check()
+        super().check(sample)
+
+    def check_constants(self, **constants):
+        for k, mu, tau in self._branches(constants):
             positive(f"{type(self).__name__}: mu_{k}", mu)
             positive(f"{type(self).__name__}: tau_{k}", tau)
-        if (rest := self.equilibrium) is not None:
-            rest.check()
-        super().check()
+        if self._equilibrium is not None:
+            self._equilibrium.check_constants(**{k: constants[k] for k in self._equilibrium.parameters})
 
     @property
     def equilibrium(self) -> Material | None:
         """The material that is left when all branches have relaxed, or None."""
         if self._equilibrium is None:
             return None
-        return self._equilibrium.with_constants([self.parameters[k] for k in self._equilibrium.parameters])
+        rest = copy.copy(self._equilibrium)
+        rest.parameters = {k: self.parameters[k] for k in self._equilibrium.parameters}
+        return rest
 
     @property
     def branches(self) -> list[tuple[float, float]]:
@@ -90,6 +103,7 @@ class RelaxingMaterial(Material):
     @property
     def shear_modulus(self):
         """That of the instantaneous response; stress."""
+        self._numbers()
         return float(self.relaxation_modulus(0.0))
 
     @property
@@ -98,15 +112,18 @@ class RelaxingMaterial(Material):
         return 0.0 if (rest := self.equilibrium) is None else rest.rest_stress
 
     @property
-    def internal(self) -> dict[str, tuple]:
+    def internal(self) -> dict[str, tuple]:  # type: ignore[override]  # read only here
         """{name: value at rest} of what the material remembers: entries (11, 22, 12, 33) of tensors."""
         names = ["C"] * self._remembers + [f"{self._tensor}_{k}" for k, *_ in self._branches(self.parameters)]
         return dict.fromkeys(names, _IDENTITY)
 
     @property
     def error_weights(self) -> dict[str, float]:
-        """Of each branch its share of the instantaneous modulus; C is no unknown in time."""
-        total = self.shear_modulus
+        """Of each branch its share of the instantaneous modulus, all of it if moduli vary; C is no unknown in time."""
+        rest = self.equilibrium
+        if rest is not None and rest.varies or any(varying(mu) is not None for mu, _ in self.branches):
+            return {"C": 0.0}
+        total = sum(mu for mu, _ in self.branches) + (0.0 if rest is None else rest.shear_modulus)
         return {"C": 0.0} | {f"{self._tensor}_{k}": mu / total for k, mu, _ in self._branches(self.parameters)}
 
     def strain_energy(self, F, **constants):
@@ -157,7 +174,7 @@ class RelaxingMaterial(Material):
     def relaxation_modulus(self, times: Any) -> np.ndarray:
         """G(t) = G_equilibrium + sum mu exp(-t/tau) of small shear, at times of any shape; stress."""
         t = np.asarray(times, float)
-        modulus = 0.0 if (rest := self.equilibrium) is None else rest.shear_modulus
+        modulus: Any = 0.0 if (rest := self.equilibrium) is None else rest.shear_modulus
         return modulus + sum(mu * np.exp(-t / tau) for mu, tau in self.branches)
 
     def stress(self, mode: str, stretches: Any, times: Any = None, between: str = "stretch") -> np.ndarray:
@@ -187,28 +204,6 @@ class RelaxingMaterial(Material):
         """Nominal stress over mu, shape (n, branches), of branches with these tau; see `branches.elastic_strains`."""
         w = tests.elastic_strains(cls._flow, tau, mode, times, stretches, between, accuracy)
         return (np.exp(2 * w[..., 0]) - np.exp(2 * w[..., 2])) / stretches[:, None]
-
-    def relaxation(self, mode: str, stretch: float, times: Any) -> np.ndarray:
-        """Nominal stress at times (any shape, at least 0) after a stretch was put on at once, and held; stress."""
-        t = np.asarray(times, float)
-        if not np.all(t >= 0):
-            raise InputError(f"{self}: relaxation: times = {times!r}: must not be negative")
-        ordered, back = np.unique(np.append(0.0, t.ravel()), return_inverse=True)
-        held = np.full(len(ordered), positive(f"{self}: relaxation: stretch", stretch))
-        return self.stress(mode, held, times=ordered)[back[1:]].reshape(t.shape)[()]
-
-    def constant_rate(self, mode: str, rate: float, stretches: Any) -> np.ndarray:
-        """Nominal stress at stretches, shape (n,), all above or all below 1, met at a constant Hencky rate; stress.
-
-        Args:
-            rate: of the logarithmic strain in the direction pulled, 1/time, above 0 (pushed: of its size).
-        """
-        t = np.abs(np.log(np.asarray(stretches, float))) / positive(f"{self}: constant_rate: rate", rate)
-        ordered, back = np.unique(np.append(0.0, t), return_inverse=True)
-        l = np.exp(ordered * rate * np.sign(np.log(np.sum(stretches) / np.size(stretches))))
-        if not np.allclose(l[back[1:]], stretches, rtol=1e-12):
-            raise InputError(f"{self}: constant_rate: stretches = {stretches!r}: must be all above or all below 1")
-        return self.stress(mode, l, times=ordered, between="strain")[back[1:]]
 
     def plot(self, axes: Any = None, stretches: Any = None, unit: str = "", mode: str = "uniaxial",
              rates: Any = None, unit_of_time: str = "s") -> Any:
@@ -300,14 +295,15 @@ class Viscoelastic(RelaxingMaterial):
     Args:
         equilibrium, branches: as of `RelaxingMaterial`.
         order: of a step in time, 2 or 1.
+        shift: as of `RelaxingMaterial`.
     """
 
     _tensor = "Cv"
 
-    def __init__(self, equilibrium: Material | None, branches: Any, order: int = 2):
+    def __init__(self, equilibrium: Material | None, branches: Any, order: int = 2, shift: Any = None):
         known("Viscoelastic: order", order, (1, 2))
         self._remembers = order == 2
-        super().__init__(equilibrium, branches)
+        super().__init__(equilibrium, branches, shift)
 
     def step_error(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
         """How far a step of first order is from one of second; a UFL scalar, stress.
@@ -384,6 +380,14 @@ class TransientNetwork(RelaxingMaterial):
     @staticmethod
     def _flow(w):
         return 1 - np.exp(-2 * w)
+
+
+def _shifted(name: str, tau: Any, shift: Any) -> OfTemperature:
+    """aT(T) tau."""
+    if not callable(shift):
+        raise InputError(f"{name}: shift = {shift!r}: must be WLF(...), Arrhenius(...) or a function of temperature")
+    tau = positive(name, tau)
+    return OfTemperature(lambda T: tau * shift(T), f"{tau!r} * {shift!r}")
 
 
 def _mean_decay(x: Any) -> Any:

@@ -40,7 +40,10 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
                          f" {_show(corners[inside_out][0].mean(0))}: a node is out of place, or a curved edge bent too"
                          f" much for them: use smaller elements there")
     outline = _outline(points, triangles[:, :3], np.sign(area), what)
-    _check_outline(points, outline, what)
+    place = crossing(points, outline)
+    if place is not None:
+        raise InputError(f"{what}: the body touches or crosses itself near {_show(place)}: elements that meet share"
+                         f" their nodes, and none may lie over another")
 
 
 def turned_inside_out(nodes: np.ndarray) -> np.ndarray:
@@ -72,8 +75,11 @@ def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: 
     return edges[times == 1]
 
 
-def _check_outline(points: np.ndarray, edges: np.ndarray, what: str) -> None:
-    """An error if the outline touches or crosses itself other than at nodes that its edges share."""
+def crossing(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
+    """A place where edges touch or cross each other other than at nodes that they share, shape (2,), or None.
+
+    points: shape (n, 2), length; edges: indices of their ends, shape (k, 2).
+    """
     low, high = points[edges].min(1), points[edges].max(1)
     near = 1e-9 * float((high - low).max())
     pairs = min((_overlapping(low[:, k] - near, high[:, k] + near) for k in (0, 1)), key=lambda p: len(p[0]))
@@ -91,10 +97,8 @@ def _check_outline(points: np.ndarray, edges: np.ndarray, what: str) -> None:
         t = np.clip(((point - p) * along).sum(1) / length, 0, 1)
         gap = ((point - p - t[:, None] * along) ** 2).sum(1)
         crosses |= (node[:, None] != other).all(1) & (gap <= 1e-18 * length)
-    if crosses.any():
-        k = int(np.argmax(crosses))
-        raise InputError(f"{what}: the body touches or crosses itself near {_show((a[k] + b[k]) / 2)}: elements that"
-                         f" meet must share their nodes, and none may lie over another")
+    k = int(np.argmax(crosses)) if crosses.any() else None
+    return None if k is None else (a[k] + b[k]) / 2
 
 
 def _overlapping(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

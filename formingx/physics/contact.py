@@ -37,6 +37,9 @@ above 1, so that the range is no wider than needed, and what never slides (mu = 
 """
 
 
+_SMOOTH, _ROUGH = (2e5, 1e-7), (2e4, 1e-5)
+"""Penalty and ramp without friction, where stiffer contact costs no iterations, and with it."""
+
 _AT_FOOT = 1e-7
 """Distances from the foot of the ramp, over theta, that are as good as none."""
 
@@ -49,8 +52,8 @@ class Contact(Part):
         tool: a `Tool`, see `formingx.tools`.
         friction: "stick" (a point that touches stays where it touched), "none", or the coefficient mu of Coulomb's
             law (5.9), from 0 (none).
-        penalty: k over shear modulus / thickness of the sheet.
-        ramp: theta over thickness of the sheet.
+        penalty: k over shear modulus / thickness of the sheet; default 2e4, without friction 2e5.
+        ramp: theta over thickness of the sheet; default 1e-5, without friction 1e-7.
         separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
             start); with "stick" or "none".
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge).
@@ -65,8 +68,9 @@ class Contact(Part):
     quantity = "travel"
     on: str
 
-    def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float = 2e4,
-                 ramp: float = 1e-5, separates: bool = True, nodes_per_step: int = 1,
+    def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float | None = None,
+                 ramp: float | None = None, separates: bool = True, nodes_per_step: int = 1,
+                 points: str | int = "nodes",
                  moves: tuple[float, float] | None = None, name: str | None = None):
         self.name, name = name, f"Contact({on!r})"
         if not isinstance(tool, Tool):
@@ -76,12 +80,15 @@ class Contact(Part):
             raise InputError(f"{name}: friction = {friction!r}: must be 'stick', 'none' or a coefficient of friction")
         self.on, self.tool, self.friction = on, tool, friction
         self.mu = words[friction] if isinstance(friction, str) else non_negative(f"{name}: friction", friction)
-        self.penalty, self.ramp = positive(f"{name}: penalty", penalty), positive(f"{name}: ramp", ramp)
         self.separates = instance(f"{name}: separates", separates, bool, "True or False")
+        usual = _SMOOTH if self.symmetric else _ROUGH
+        self.penalty = positive(f"{name}: penalty", usual[0] if penalty is None else penalty)
+        self.ramp = positive(f"{name}: ramp", usual[1] if ramp is None else ramp)
         if not separates and 0 < self.mu < math.inf:
             raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
                              f" Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = count(f"{name}: nodes_per_step", nodes_per_step)
+        self.points = points if points == "nodes" else count(f"{name}: points", points)
         self.moves = None if moves is None else pair(f"{name}: moves", moves)
         if self.moves == (0.0, 0.0):
             raise InputError(f"{name}: moves = (0, 0): must name a direction, or be None")
@@ -244,7 +251,7 @@ class Law:
         N = pressed + k * slope * ahead
         force = N[:, None] * n
         stiffness = _outer(k * slope, n, n) + _outer(pressed * bend, t, t)
-        zero = np.zeros(len(x))
+        zero: np.ndarray = np.zeros(len(x))
         kept_at = np.where(held, np.maximum(d, 0.0), d)         # held for ever
         if self.mu == 0:
             return Tractions(force, stiffness, _touch(x, kept_at, zero), N, zero, zero)

@@ -87,7 +87,7 @@ class SimplySupported(Support):
 
     def __init__(self, on: str, weight: str = "area"):
         super().__init__(on)
-        if weight not in ("area", "stiffness"):
+        if not isinstance(weight, str) or weight not in ("area", "stiffness"):
             raise InputError(f"SimplySupported({on!r}): weight = {weight!r}: must be 'area' or 'stiffness'")
         self.weight = weight
 
@@ -137,6 +137,6 @@ class Displaced(Support):
 
 
 def _component(name: str, value: str) -> int:
-    if value not in ("r", "z"):
+    if not isinstance(value, str) or value not in ("r", "z"):
         raise InputError(f"{name} = {value!r}: must be 'r' or 'z'")
     return R if value == "r" else Z

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from .. import csv_files
 from ..errors import InputError, known
 from . import files
-from .files import tables
 from .show import plots
 
 _SAMPLES, _FINE = 2000, 33         # of a curve; and of the two pieces that meet at a sample
@@ -166,16 +166,16 @@ def _percent(share: float) -> str:
     return f"{f'{100 * share:.2g} %':>10}"
 
 
-def _table(side: str, given: Any) -> tables.Table:
+def _table(side: str, given: Any) -> csv_files.Table:
     if hasattr(given, "states"):
         if len(given) < 2:
             raise InputError(f"compare: {side}: the path has {len(given)} states; it needs at least 2")
-        found = tables.from_arrays(side, {c: given[c] for c in given.columns})
+        found = csv_files.from_arrays(side, {c: given[c] for c in given.columns})
         return found._replace(kinds=[state.kind for state in given.states])
-    return tables.from_arrays(f"compare: {side}", given) if isinstance(given, Mapping) else tables.read(given)
+    return csv_files.from_arrays(f"compare: {side}", given) if isinstance(given, Mapping) else csv_files.read(given)
 
 
-def _columns(left: tables.Table, right: tables.Table, given: Any) -> dict[str, str]:
+def _columns(left: csv_files.Table, right: csv_files.Table, given: Any) -> dict[str, str]:
     """{our name: their name}, checked."""
     if given is None:
         shared = [c for c in left.columns if c in right.columns and c != "iterations"]
@@ -230,9 +230,9 @@ class Smooth:
             past = -t[j]
         elif high == _SAMPLES - 1 and j == len(t) - 1:
             past = t[j] - 1
-        past *= np.linalg.norm(d[j])
-        across = np.linalg.norm(point - line[j] - t[j] * d[j])
-        return feet[j], bool(past > max(across, 1e-9))
+        beyond = float(past * np.linalg.norm(d[j]))
+        across = float(np.linalg.norm(point - line[j] - t[j] * d[j]))
+        return feet[j], beyond > max(across, 1e-9)
 
 
 def _costs(points: np.ndarray, line: np.ndarray) -> np.ndarray:
@@ -271,7 +271,7 @@ def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Differ
                       float(np.sqrt(np.average(values**2, weights=weights))))
 
 
-def _limit_points(table: tables.Table, points: np.ndarray, names: list[str], control: str) -> list[dict[str, float]]:
+def _limit_points(table: csv_files.Table, points: np.ndarray, names: list[str], control: str) -> list[dict[str, float]]:
     """Those that the table marks; else where the control turns, on the parabola (by arc length) of three points."""
     if table.kinds is not None and "start" in table.kinds:
         return [dict(zip(names, p.tolist())) for p, kind in zip(points, table.kinds) if kind == "limit point"]

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from .. import csv_files
 from .. import mesh as meshes
 from ..discrete.probes import probe
 from ..errors import InputError, known
 from ..mesh import text as grid
 from . import files
-from .files import tables
 from .show import plots
 
 _COMPONENTS = ("u_r", "u_z")
@@ -104,7 +104,8 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
     Raises:
         InputError: a file that cannot be read, a column, unit or node that is not known, or a node outside our mesh.
     """
-    table = tables.from_arrays("compare_nodes: theirs", theirs) if isinstance(theirs, Mapping) else tables.read(theirs)
+    table = (csv_files.from_arrays("compare_nodes: theirs", theirs) if isinstance(theirs, Mapping)
+             else csv_files.read(theirs))
     names, units = dict(columns or {}), dict(units or {})
     for name in (*names, *units):
         known("compare_nodes: column", name, ("node", "R", "Z", *_COMPONENTS))
@@ -127,7 +128,7 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
         for node in nodes.tolist():
             if node not in at:
                 raise InputError(f"{table.name}: node {node} is not in the mesh file {os.fspath(mesh)!r}")
-        points = plain.points[[at[n] for n in nodes.tolist()]]
+        points = plain.points[[at[int(n)] for n in nodes]]
     ours = _displacements(path, state, points)
     return NodalComparison(nodes, points, ours, np.column_stack([take(c) for c in _COMPONENTS]),
                            float(np.hypot(*ours.T).max()))

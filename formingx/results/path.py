@@ -166,7 +166,8 @@ class Path:
         record.segments[-1].states.append(replace(left, met=None))
         record.stage = left.stage
         before = segment.states[: segment.states.index(left) + 1]
-        step = next((s.stepping["step"] for s in reversed(before) if s.stepping and s.setting == left.setting), {})
+        step: dict[str, Any] = next((s.stepping["step"] for s in reversed(before)
+                                     if s.stepping and s.setting == left.setting), {})
         try:
             Run(record, [(target, bound)], StepControl(**step)).follow(200, False, None)
         except (ConvergenceError, Failure) as error:
@@ -241,7 +242,7 @@ class Path:
     def _measure(self, state: State) -> None:
         """Fill the columns of an accepted state."""
         state.measures = self._measures(self.segments[-1], state)
-        if self.problem.relaxes:                             # by the trapezoidal rule
+        if "dissipated_power" in state.measures:                             # by the trapezoidal rule
             states, lost = self.segments[-1].states, 0.0
             if len(states) > 1:
                 before = states[-2]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import basix
 import basix.ufl
 import numpy as np
@@ -9,15 +11,17 @@ import numpy as np
 from .. import _compat
 from ..materials.constants import Sample
 from ..mesh.mesh import Mesh
+from .temperature import BodyTemperature
 
 
-def sample(mesh: Mesh, layer: str, degree: int) -> Sample:
+def sample(mesh: Mesh, layer: str, degree: int, temperature: BodyTemperature | None = None) -> Sample:
     """The quadrature points of the energy, of a degree, in this rank's own cells of a layer, by their numbers."""
     domain = mesh.domain
     cells = mesh.cells.find(mesh.layers[layer])
     cells = np.sort(cells[cells < domain.topology.index_map(2).size_local])
-    places = basix.make_quadrature(basix.CellType.triangle, degree)[0]
+    places: Any = basix.make_quadrature(basix.CellType.triangle, degree)[0]
     geometry = basix.ufl.element("Lagrange", "triangle", _compat.coordinate_map(domain).degree)
-    weights = geometry.tabulate(0, places)[0]
+    shapes: Any = geometry.tabulate(0, places)
     nodes = domain.geometry.x[_compat.cell_nodes(domain)[cells], :2]
-    return Sample(np.einsum("qk,nkd->nqd", weights, nodes).reshape(-1, 2), cells, places, domain)
+    T = None if temperature is None else temperature.in_cells(cells, places, first=True).ravel()
+    return Sample(np.einsum("qk,nkd->nqd", shapes[0], nodes).reshape(-1, 2), cells, places, domain, T)

@@ -18,6 +18,7 @@ from ..physics.models import MixedPressure, Model
 from ..physics.part import Part
 from ..physics.supports import Held, Support
 from .sampling import sample
+from .temperature import BodyTemperature
 
 
 class Scene:
@@ -34,21 +35,25 @@ class Scene:
         model: how the scene is modelled: `MixedPressure()` (default) or `DisplacementPenalty()`, a solid; `Membrane()`.
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
         quadrature_degree: of the energy; 5 (seven points) is the thesis' rule.
+        temperature: of the body, which constants of materials may depend on: a number, a `table` over R, a function of
+            arrays (R, Z), a CSV file with columns R, Z, T, what `formingx.heat` returned, or a DOLFINx Function.
+        heat: `Cooling(...)`: the temperature changes as time goes by.
 
     Raises:
-        InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, two
-            driven objects that no name tells apart.
+        InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, or whose
+            elements lie over each other or are inside out, two driven objects that no name tells apart.
     """
 
     def __init__(self, *, mesh: Mesh, materials: Material | Mapping[str, Material], supports: Sequence[Any],
                  loads: Sequence[Any] = (), contacts: Sequence[Contact] = (), model: Any = None, kinematics: Any = None,
-                 quadrature_degree: int = 5):
+                 quadrature_degree: int = 5, temperature: Any = None, heat: Any = None):
         if not isinstance(mesh, Mesh):
             raise InputError(f"Scene: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")
         if isinstance(materials, Material):
             materials = dict.fromkeys(mesh.layers, materials)
         if not isinstance(materials, Mapping):
             raise InputError(f"Scene: materials = {materials!r}: must be a formingx material, or {{layer: material}}")
+        mesh.check()                                           # its nodes may have been moved
         self.mesh = mesh
         self.materials = dict(materials)
         self.supports = _all_of(Support, "supports", supports, "supports, such as Clamped('rim')")
@@ -61,6 +66,8 @@ class Scene:
         if not isinstance(self.kinematics, Kinematics):
             raise InputError(f"Scene: kinematics = {kinematics!r}: must be Axisymmetric() or PlaneStrain()")
         self.quadrature_degree = count("Scene: quadrature_degree", quadrature_degree)
+        if temperature is not None:
+            self.temperature = BodyTemperature(temperature, mesh)
         self._check_names()
         self._check_materials()
         self._check_boundaries()
@@ -70,6 +77,12 @@ class Scene:
             self._check_hinges()
         for contact in self.contacts:
             self._check_contact(contact)
+        if heat is not None:
+            heat.check(self)
+            self.heat = heat
+
+    temperature: BodyTemperature | None = None
+    heat: Any = None
 
     @property
     def things(self) -> list[Part]:
@@ -166,7 +179,7 @@ class Scene:
         if not material.varies:
             material.check()
             return material.shear_modulus
-        looked_at = sample(self.mesh, layer, self.quadrature_degree)
+        looked_at = sample(self.mesh, layer, self.quadrature_degree, self.temperature)
         refused, mine = None, -np.inf
         try:
             material.check(looked_at)
@@ -200,8 +213,10 @@ class Scene:
         depth = contact.tool.signed_distance(points)
         worst = int(np.argmax(depth))
         if depth[worst] > near:
+            free = contact.tool.reversed().signed_distance(points).max() <= near
             raise InputError(f"{contact!r}: the body starts inside the tool: {depth[worst]:.6g} deep at (R, Z) ="
-                             f" ({points[worst, 0]:.6g}, {points[worst, 1]:.6g})")
+                             f" ({points[worst, 0]:.6g}, {points[worst, 1]:.6g})"
+                             + ("; the other side of its profile is free of it: use tool.reversed()" if free else ""))
         if depth[worst] > contact.tool.signed_distance(face).max() + near:
             raise InputError(f"{contact!r}: the tool is behind this face of the body: another face is closer to it;"
                              f" boundaries are {list(mesh.boundaries)}")

@@ -109,7 +109,7 @@ def _draw(shape: Body, marks: list, tools: list, title: str, file: Any) -> None:
     figure, axes = figures.figure(width=8.0, height=height)
     J = shape.J[np.arange(len(shape.J)), np.argmax(np.abs(shape.J - 1), axis=1)]
     reach = float(np.clip(np.abs(J - 1).max(), 1e-3, 1.0))
-    drawn = PolyCollection(shape.outline, array=J, cmap="RdBu", edgecolors="0.35", linewidths=0.4,
+    drawn = PolyCollection(list(shape.outline), array=J, cmap="RdBu", edgecolors="0.35", linewidths=0.4,
                            clim=(1 - reach, 1 + reach))
     axes.add_collection(drawn)
     for (label, point), mark, colour in zip(marks, "osD^", ("tab:red", "black", "tab:purple", "tab:green")):

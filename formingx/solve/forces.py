@@ -88,7 +88,8 @@ class _ToolForce(Bound):
             for contact in self._contacts:
                 by_control = np.zeros(problem.n_owned)
                 blocks = contact.stiffness(x.array_r, control)
-                np.add.at(values, contact.dofs, np.einsum("i,nij->nj", self._way, blocks))
+                way = np.tile(self._way, blocks.shape[1] // 2)
+                np.add.at(values, contact.dofs, np.einsum("i,nij->nj", way, blocks))
                 contact.add_control_derivative(by_control, x.array_r, control)
                 slope += float(np.sum(by_control[contact.dofs] @ self._way))
             problem.fill(gradient, values)

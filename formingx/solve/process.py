@@ -130,8 +130,8 @@ class Execution:
     def _trace(self, targets: list, control: float | None) -> list:
         """Follow the path from a control (None: on from the last state); returns the targets that are still open."""
         step = self._stage.step or self._step
-        if self.problem.setting.rate[-1] and self.problem.relaxes:
-            step = step or _IN_TIME
+        if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
+            step = step or _IN_TIME                          # a piece that has begun goes on with its own steps
         run = Run(self.record, targets, step, self._stage.at_fold, self._accuracy, self._label)
         start = None if control is None else self._resumed(control)
         run.follow(self._max_steps, self._progress, start)
@@ -179,13 +179,15 @@ class Execution:
         rate, control, scale = [0.0] * len(base), base[numbers[0]], self.problem.forms.scales[numbers[0]]
         for number in numbers:
             base[number], rate[number] = 0.0, 1.0
-        stage, way = self._stage, 0.0
-        if clocked and (stage.speed or stage.duration):
-            there = stage.until.value / scale if stage.until.name.endswith(("pressure", "travel")) else np.inf
+        stage, until = self._stage, self._stage.until
+        if clocked and until is not None and (stage.speed or stage.duration):
+            there = until.value / scale if until.name.endswith(("pressure", "travel")) else np.inf
             way = there - control
-            if way:
-                rate[-1] = np.sign(way) * scale / stage.speed if stage.speed else stage.duration / way
-                base[-1] -= rate[-1] * control
+            if way and stage.speed:
+                rate[-1] = np.sign(way) * scale / stage.speed
+            elif way and stage.duration:
+                rate[-1] = stage.duration / way
+            base[-1] -= rate[-1] * control
         self._enter(base, rate, 1, control)
         return control
 
@@ -203,15 +205,16 @@ class Execution:
         control = None if begun else self._enter_driving(numbers, clocked=False)
         target, course, times = self._course(self.problem.setting.base[-1])
         run = Flow(self.record, target.bind(self.problem), course, times, self._targets[self._k],
-                   self._stage.step or _IN_TIME, self._accuracy, self._label)
+                   self._stage.step or (None if begun else _IN_TIME), self._accuracy, self._label)
         run.follow(self._max_steps, self._progress, None if control is None else self._resumed(control))
 
     def _course(self, now: float) -> tuple[Target, Callable[[float], float], list[float]]:
         """(a target of the measure, the measure at a time, the times of its corners) of a flow that begins now."""
         stage, end = self._stage, self._stage.until
-        if stage.hold:
+        if stage.hold and stage.duration:
             value = stage.hold.value
             return stage.hold, lambda time: value, [now, now + stage.duration]
+        assert stage.flow is not None
         measure, course = stage.flow
         corners = [] if callable(course) else course[:, 0].tolist()
         if corners and corners[0] > now:

@@ -82,18 +82,23 @@ class _Points:
 
     def __init__(self, problem: Any, contacts: list, chosen: list[np.ndarray], solver: DirectSolver, border: Any):
         self._comm, self._contacts, self._chosen = problem.comm, contacts, chosen
-        dofs = np.concatenate([c.dofs[i].ravel() for c, i in zip(contacts, chosen)])
-        free = ~np.isin(dofs, problem.held)
-        counts = self._comm.allgather(len(dofs))
+        unit, held = np.zeros(problem.x.getLocalSize()), problem.held
+        counts = self._comm.allgather(2 * sum(map(len, chosen)))
         first = sum(counts[: self._comm.rank])
-        self._own = slice(first, first + len(dofs))
+        self._own = slice(first, first + counts[self._comm.rank])
+        own = [(c, point, way) for c, points in zip(contacts, chosen) for point in points for way in (0, 1)]
         e, v = problem.x.duplicate(), problem.x.duplicate()
         columns, steps = [], []
         for rank, count in enumerate(counts):
             for k in range(count):
-                e.set(0)
+                unit[:] = 0
                 if rank == self._comm.rank:
-                    e.array_w[dofs[k]] = float(free[k])
+                    contact, point, way = own[k]
+                    forces = np.zeros((len(contact.points), 2))
+                    forces[point, way] = 1.0
+                    contact.add(unit, forces)
+                    unit[held] = 0
+                e.array_w[:] = unit
                 solver.solve(e, v)
                 steps.append(border(v))
                 columns.append(v.array_r.copy())
@@ -103,7 +108,7 @@ class _Points:
         scale = np.concatenate([np.repeat(c.scale[i], 2) for c, i in zip(contacts, chosen)])
         self._scale = self._gather(scale)
         moved = [self._moved(column, step) for column, step in zip(self._columns.T, steps)]
-        self._C = self._gather(np.array(moved).T.reshape(len(dofs), -1)) * self._scale
+        self._C = self._gather(np.array(moved).T.reshape(len(own), -1)) * self._scale
 
     def solve(self, dx: Any, step: float) -> tuple[np.ndarray, float] | None:
         """How a correction and its step change, own part; None if no consistent state was found."""

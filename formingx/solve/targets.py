@@ -183,7 +183,7 @@ def enclosed_volume(value: float) -> Target:
 def displacement(value: float, *, at: tuple[float, float], component: str = "z") -> Target:
     """The displacement component ("r" or "z") of the reference point `at` = (R, Z) reaches `value` (a length)."""
     at = pair("displacement: at", at)
-    if component not in ("r", "z"):
+    if not isinstance(component, str) or component not in ("r", "z"):
         raise InputError(f"displacement: component = {component!r}: must be 'r' or 'z'")
 
     def bind(problem):

@@ -101,10 +101,11 @@ def corners_of(tool: Tool) -> list[tuple[Corner, np.ndarray]]:
         if isinstance(piece, Arc) and -np.pi < piece.sweep < -_FLAT:
             angles = piece.start + piece.sweep * np.linspace(0, 1, 17)
             points = piece.centre + piece.radius * np.column_stack([np.cos(angles), np.sin(angles)])
-            found.append((Corner(tuple(points[8].tolist()), piece.radius), points))
+            found.append((Corner((float(points[8, 0]), float(points[8, 1])), piece.radius), points))
         following = pieces[i + 1] if i + 1 < len(pieces) else pieces[0] if tool.closed else None
         if following is not None:
             turn = np.pi - (np.pi - (following.angles[0] - piece.angles[1])) % (2 * np.pi)
             if turn < -_FLAT:
-                found.append((Corner(tuple(piece.ends[1].tolist()), 0.0), piece.ends[1][None]))
+                end = piece.ends[1]
+                found.append((Corner((float(end[0]), float(end[1])), 0.0), end[None]))
     return found

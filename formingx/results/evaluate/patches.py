@@ -29,9 +29,9 @@ class Patches:
     def __init__(self, points: np.ndarray, corners: np.ndarray, layer: np.ndarray, mine: np.ndarray):
         self._points = points
         at: dict[tuple[int, int], list[int]] = {}
-        for cell, (three, where) in enumerate(zip(corners.tolist(), layer.tolist(), strict=True)):
+        for cell, (three, where) in enumerate(zip(corners, layer, strict=True)):
             for corner in three:
-                at.setdefault((where, corner), []).append(cell)
+                at.setdefault((int(where), int(corner)), []).append(cell)
         patches = [sorted({c for corner in corners[cell].tolist() for c in at[int(layer[cell]), corner]})
                    for cell in mine]
         self._patch = np.full((len(mine), max(map(len, patches), default=0)), -1)

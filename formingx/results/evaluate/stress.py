@@ -28,8 +28,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ... import _compat
-from ...discrete.locate import locate
 from ...errors import InputError, known, pair
+from ...mesh.locate import locate
 from .patches import Patches
 from .stress_error import Fitted, StressError, StressPeak
 
@@ -130,10 +130,10 @@ class StressField:
         place = locate(domain, points, recovery.problem.forms.length, recovery.cells[layer], f"layer {layer!r}")
         values = np.zeros((len(points), _COUNT))
         if len(place.mine):
-            weights = recovery.element.tabulate(0, place.reference)[0]
+            shapes: Any = recovery.element.tabulate(0, place.reference)
             dofs = recovery.space.dofmap.list[place.cells]
             column = list(recovery.cells).index(layer)
-            values[place.mine] = np.einsum("nk,nkc->nc", weights, self._nodes[dofs, column])
+            values[place.mine] = np.einsum("nk,nkc->nc", shapes[0], self._nodes[dofs, column])
         return _unpack(points, comm.allreduce(values, MPI.SUM))
 
     def in_cells(self, reference: np.ndarray) -> Stress:
@@ -147,7 +147,8 @@ class StressField:
         for k, cells in enumerate(recovery.cells.values()):
             column[cells[cells < owned]] = k
         nodes = self._nodes[recovery.space.dofmap.list[:owned], column[:, None]]
-        values = np.einsum("kn,cnx->ckx", recovery.element.tabulate(0, reference)[0], nodes)
+        shapes: Any = recovery.element.tabulate(0, reference)
+        values = np.einsum("kn,cnx->ckx", shapes[0], nodes)
         return _unpack(np.zeros((owned * len(reference), 2)), values.reshape(-1, _COUNT))
 
     def at_quadrature_points(self, layer: str | None = None) -> Stress:
@@ -359,7 +360,7 @@ class Stresses:
         bcs = self._idle()
         mass = forms.compile(mass)
         matrix = fem_petsc.create_matrix(mass)
-        fem_petsc.assemble_matrix(matrix, mass, bcs=bcs)
+        _compat.assemble_matrix(matrix, mass, bcs)
         matrix.assemble()
         self._b, self._x = matrix.createVecLeft(), matrix.createVecRight()
         self._solver = PETSc.KSP().create(problem.comm)       # a mass matrix: a few dozen iterations to round-off

@@ -25,10 +25,12 @@ def describe(problem: Any) -> dict[str, Any]:
     their number; then every part of the scene by its public attributes.
     """
     scene = problem.scene
-    known = set(_PARTS) | {"mesh"}
+    known = set(_PARTS) | {"mesh", "temperature"}
     extra = sorted(name for name in vars(scene) if name not in known and not name.startswith("_"))
     found = {"mesh": _mesh(problem), "unknowns": problem.n_unknowns,
              **{name: plain(getattr(scene, name)) for name in (*_PARTS, *extra)}}
+    if scene.temperature is not None:
+        found["temperature"] = text(scene.temperature)
     for layer, material in scene.materials.items():
         if material.varies:
             found["materials"][layer] |= {"shear_modulus": scene.shear_modulus(layer),
@@ -52,7 +54,8 @@ def summary(scene: Any) -> dict[str, str]:
                               if isinstance(value, int | float) and repr(value) not in text(thing))
             lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if thing.driven else "")
     return lines | {"model": text(scene.model), "kinematics": text(scene.kinematics),
-                    "quadrature degree": str(scene.quadrature_degree)}
+                    "quadrature degree": str(scene.quadrature_degree),
+                    **({} if scene.temperature is None else {"temperature": text(scene.temperature)})}
 
 
 def text(thing: Any) -> str:
@@ -98,7 +101,7 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
 
 def _sums_of_constants(scene: Any, layer: str) -> dict[str, float]:
     """{constant that varies: sum over the layer that changes with the value at any of its points}."""
-    at = sample(scene.mesh, layer, scene.quadrature_degree)
+    at = sample(scene.mesh, layer, scene.quadrature_degree, scene.temperature)
     q, sums = len(at.places), {}
     numbers = np.sin(1.0 + scene.mesh.domain.topology.original_cell_index[at.cells])
     weights = (numbers[:, None] * np.sin(1.0 + np.arange(q))).ravel()

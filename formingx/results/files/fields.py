@@ -180,7 +180,7 @@ class _Body:
         for name, array in values.items():
             n = array.shape[-1]
             if name not in self._functions:
-                shape = {} if n == 1 else {"shape": (n,)}
+                shape: dict[str, Any] = {} if n == 1 else {"shape": (n,)}
                 element = basix.ufl.element("Lagrange", self.mesh.topology.cell_name(), 2, **shape)
                 self._functions[name] = fem.Function(fem.functionspace(self.mesh, element), name=name)
             f = self._functions[name]

@@ -50,7 +50,7 @@ def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
     bottom, top = np.asarray(profile.bottom) * scale, np.asarray(profile.top) * scale
     strips = np.stack([bottom[:-1], bottom[1:], top[1:], top[:-1]], 1)
     faces = (colours[1:] + colours[:-1]) / 2
-    axes.add_collection(PolyCollection(strips, facecolors=faces, edgecolors=faces, linewidths=1.8, zorder=2))
+    axes.add_collection(PolyCollection(list(strips), facecolors=faces, edgecolors=faces, linewidths=1.8, zorder=2))
 
 
 def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:

@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from ...discrete.admissible import Least
 from ...discrete.tooling import Tooling
 from ...errors import InputError
 from .. import files
 from ..evaluate.contact_face import ContactFace, ContactTable, tool_forces
+from ..evaluate.folding import first_fold
 from ..evaluate.profile import Profile
 
 PENETRATION = 0.05
@@ -19,6 +21,12 @@ PENETRATION = 0.05
 
 MASS = 1e-3
 """Relative error of the mass above which a report warns."""
+
+VOLUME = 5e-3
+"""Root mean square of J - 1 above which a report warns: elements have other volumes, though the mass is kept."""
+
+FURTHEST = 2.0
+"""J, or 1/J, at a point beside the quadrature points above which a report warns."""
 
 
 @dataclass
@@ -37,6 +45,7 @@ class Record:
         fields: of the n states, {name: values at the nodes of the bottom face, or of both faces, shape (m,)}; more than
             the profiles say; empty of a checkpoint.
         layers: of the last state, as in `Wall`; script: the file that ran; or "".
+        furthest: where J is furthest from 1 in the last state, or None: not known of a checkpoint or a membrane.
     """
 
     summary: dict[str, str]
@@ -55,6 +64,7 @@ class Record:
     fields: list[dict[str, np.ndarray]]
     layers: dict[str, np.ndarray]
     script: str = ""
+    furthest: Least | None = None
 
     @property
     def control(self) -> str:
@@ -84,10 +94,36 @@ class Record:
         if worst > MASS:
             found.append(("serious" if worst > 10 * MASS else "minor",
                           f"The mass changes by up to {100 * worst:.2g} %: a smaller eps, or a finer mesh, keeps it."))
+        found += self._of_volume() + self._of_folding()
         if self.counts.get("failures", 0) > len(self.kinds):
             found.append(("note", f"{self.counts['failures']} attempts at a step failed and were repeated with half its"
                                   f" length; the results do not suffer."))
         return found
+
+    def _of_volume(self) -> list[tuple[str, str]]:
+        errors, found = self.measures["volume_error"], []
+        k = int(np.argmax(errors))
+        if errors[k] > VOLUME:
+            found.append(("serious" if errors[k] > 4 * VOLUME else "minor",
+                          f"The elements do not keep their volumes: the root mean square of J - 1 is up to"
+                          f" {100 * errors[k]:.2g} % (state {k}, {words(self.control)} ="
+                          f" {self.measures[self.control][k]:.5g}): use a finer mesh; the corner of a clamped rim is"
+                          f" singular."))
+        J = 1.0 if self.furthest is None else self.furthest.value
+        if self.furthest is not None and not 1 / FURTHEST < J < FURTHEST:
+            found.append(("minor", f"J is {J:.3g} in the last state at (R, Z) = ({self.furthest.point[0]:.5g},"
+                                   f" {self.furthest.point[1]:.5g}): the stress of the element there means"
+                                   f" nothing."))
+        return found
+
+    def _of_folding(self) -> list[tuple[str, str]]:
+        first = first_fold(self.profiles, self.axisymmetric)
+        if first is None:
+            return []
+        k, what, place = first
+        return [("serious", f"The body folds: its faces {what}, first in state {k} ({words(self.control)} ="
+                            f" {self.measures[self.control][k]:.5g}), near (r, z) = ({place[0]:.5g}, {place[1]:.5g});"
+                            f" a body does not go through itself, what comes after that is not to be used.")]
 
     def warnings(self) -> list[str]:
         """What a reader should know before trusting the numbers, without how bad it is."""
@@ -113,7 +149,8 @@ def of_path(path: Any) -> Record:
                   [s.kind for s in path.states], [s.stage for s in path.states], {c: path[c] for c in path.columns},
                   [list(s.history) for s in path.states], profiles, vars(path.counts), stepping.get("until"), tooling,
                   [tooling.travels(s.setting, s.control) for s in path.states], tool_forces(path),
-                  _fields(path, profiles), dict(wall.layers) if wall else {}, sys.argv[0])
+                  _fields(path, profiles), dict(wall.layers) if wall else {}, sys.argv[0],
+                  problem.furthest_volume_ratio(path.last))
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:

@@ -129,7 +129,8 @@ def _behind(record: Record, units: Units) -> list[str]:
 
 def _warnings(record: Record) -> str:
     if not record.findings():
-        return "<p class=good>No warnings: the target was met, mass and penetration are within bounds.</p>"
+        return ("<p class=good>No warnings: the target was met; mass, volume of the elements and penetration are within"
+                " bounds, and no face crosses another or the axis.</p>")
     return "".join(f"<div class='note{' bad' if bad == 'serious' else ''}'><b>{bad}</b>: {html.escape(text)}</div>"
                    for bad, text in record.findings())
 

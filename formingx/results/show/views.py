@@ -87,7 +87,7 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
     rim = np.linspace(profile.bottom[-1], profile.top[-1], 3)[1:-1]
     line = np.vstack([profile.bottom, rim, profile.top[::-1]])
     values = np.concatenate([ratio, np.full(len(rim), ratio[-1]), beyond[::-1]])
-    plotter = pyvista.Plotter(off_screen=True, window_size=(1000, 800))
+    plotter: Any = pyvista.Plotter(off_screen=True, window_size=(1000, 800))
     plotter.set_background("white")
     bar = {"title": title + "\n", "color": "black", "vertical": True, "position_x": 0.85, "position_y": 0.2,
            "height": 0.6, "width": 0.07, "title_font_size": 20, "label_font_size": 18, "fmt": "%.2f", "n_labels": 5}

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import InputError, known, positive
-from ...units import LENGTHS, STRESSES
+from .errors import InputError, known, positive
+from .units import LENGTHS, STRESSES
 
 _VOLUMES = {f"{name}3": size**3 for name, size in LENGTHS.items()} | {"l": 1e-3, "ml": 1e-6}
 UNITS = {"length": LENGTHS, "stress": STRESSES, "volume": _VOLUMES}

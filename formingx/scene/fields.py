@@ -9,10 +9,10 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from ..discrete.locate import locate
+from .. import csv_files
 from ..errors import InputError, finite
 from ..mesh import Mesh
-from ..results.files import tables
+from ..mesh.locate import locate
 from ..tables import Table
 
 
@@ -83,7 +83,7 @@ class PointReader:
 def _from_file(file: Any, points: np.ndarray) -> np.ndarray:
     """Linear between the points of a CSV file."""
     from scipy.interpolate import LinearNDInterpolator
-    table = tables.read(file)
+    table = csv_files.read(file)
     R, Z, T = (table.take(column) for column in ("R", "Z", "T"))
     spans = np.ptp(R), np.ptp(Z)
     for axis, x, other in ((0, R, spans[1]), (1, Z, spans[0])):

@@ -1,0 +1,51 @@
+"""The temperature of a scene's body: a field on its mesh that constants may depend on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+
+from ..mesh import Mesh
+from . import fields
+
+
+class BodyTemperature:
+    """A temperature on the scene's own mesh, quadratic in each element.
+
+    Args:
+        given: what `fields.values_at` takes.
+        mesh: of the scene.
+
+    Attributes:
+        T: the DOLFINx `Function` (P2). Who changes it calls `take_temperature` of the problem's `forms`.
+        first: its values as given, ghosts included.
+
+    Raises:
+        InputError: it is not given all over the body.
+    """
+
+    def __init__(self, given: Any, mesh: Mesh):
+        self._text = "a function" if callable(given) and not hasattr(given, "check") else repr(given)
+        self._mesh = mesh
+        self.T = fem.Function(fem.functionspace(mesh.domain, ("Lagrange", 2)), name="temperature")
+        points = self.T.function_space.tabulate_dof_coordinates()[:, :2]
+        self.T.x.array[:] = fields.values_at(given, points, mesh, "Scene: temperature")
+        self.first = self.T.x.array.copy()
+
+    def in_cells(self, cells: np.ndarray, places: np.ndarray, first: bool = False) -> np.ndarray:
+        """Temperatures in some cells (local numbers) at places in the reference cell, shape (q, 2): (cells, q).
+
+        first: those that were given, in place of those now.
+        """
+        space = self.T.function_space
+        basis = space.element.basix_element.tabulate(0, places)[0, :, :, 0]
+        return (self.first if first else self.T.x.array)[space.dofmap.list[cells]] @ basis.T
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """Temperatures at points, shape (n, 2), of this rank's own choice, shape (n,); collective."""
+        return fields.values_at(self.T, points, self._mesh)
+
+    def __repr__(self) -> str:
+        return self._text

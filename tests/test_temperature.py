@@ -1,0 +1,158 @@
+"""Constants that depend on the temperature of a scene, and theirs shifts in time."""
+
+import numpy as np
+import pytest
+
+import formingx as fx
+from formingx.discrete.problem import Problem
+
+HOT = {130.0: 2.0, 150.0: 0.6, 170.0: 0.2}
+
+
+def scene(material, temperature=None, model=None, thickness=0.05, elements=(6, 1), **more):
+    body = fx.mesh.disc(radius=1.0, thickness=thickness, elements=elements)
+    return fx.Scene(mesh=body, materials=material, loads=[fx.Pressure("bottom")], model=model, temperature=temperature,
+                    supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], **more)
+
+
+def inflate(scene, stretch=1.5):
+    return fx.trace(scene, until=fx.pole_stretch(stretch), progress=False)
+
+
+@pytest.mark.parametrize("model", [fx.Membrane(), fx.MixedPressure()], ids=["membrane", "solid"])
+def test_uniform_temperature_is_the_plain_material(model):
+    """Between two points of the table, too; the same states to round-off."""
+    material = fx.NeoHookean(c10=fx.table(HOT))
+    paths = [inflate(s) for s in (scene(material, 143.0, model), scene(material.at_temperature(143.0), None, model))]
+    assert paths[0]["pressure"] == pytest.approx(paths[1]["pressure"], rel=1e-9)
+    assert paths[0].problem.forms.stress == pytest.approx(2 * fx.table(HOT)(143.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("model", [fx.Membrane(), fx.MixedPressure()], ids=["membrane", "solid"])
+def test_it_is_the_constant_at_the_temperature_of_each_point(model):
+    """c10(T(R)) is a constant that varies with R."""
+    c10 = fx.table(HOT)
+
+    def temperature(R, Z):                              # quadratic: exact in the elements
+        return 160 - 20 * R**2
+    a = inflate(scene(fx.NeoHookean(c10=c10), temperature, model))
+    b = inflate(scene(fx.NeoHookean(c10=lambda R, Z: c10(temperature(R, Z))), None, model))
+    assert a["pressure"] == pytest.approx(b["pressure"], rel=1e-9)
+    even = inflate(scene(fx.NeoHookean(c10=0.4), None, model))
+    assert np.all(a.profile().thickness_ratio[6:] > 1.02 * even.profile().thickness_ratio[6:])  # a hot pole thins more
+
+
+def test_temperature_given_in_all_ways(tmp_path):
+    field = tmp_path / "T.csv"
+    field.write_text("R,Z,T\n0,0,160\n1,0,140\n0,0.05,160\n1,0.05,140\n")
+    mesh = fx.mesh.disc(radius=1.0, thickness=0.05, elements=(3, 1))
+    heated = fx.heat(mesh, fx.ThermalProperties(conductivity=0.2, density=1e3, heat_capacity=2e3), start=150.0,
+                     times=1.0, unit="C")
+    material = fx.NeoHookean(c10=fx.of_temperature(lambda T: np.exp(-(T - 150) / 20)))
+    ways = {"number": 150.0, "run": heated, "table": fx.table({0.0: 160.0, 1.0: 140.0}), "file": field}
+    moduli = {name: scene(material, T, elements=(3, 1)).shear_modulus("sheet") for name, T in ways.items()}
+    assert moduli["number"] == pytest.approx(2.0) and moduli["run"] == pytest.approx(2.0)
+    assert 2 * np.exp(0.45) < moduli["table"] < 2 * np.exp(0.5)                # largest near the rim, at 140
+    assert moduli["file"] == pytest.approx(moduli["table"], rel=1e-9)
+
+
+def test_constants_follow_a_temperature_that_changes():
+    """The stiffness of the forms is that of the new temperature; one outside the table is refused."""
+    here = scene(fx.NeoHookean(c10=fx.table(HOT)), 150.0, fx.MixedPressure())
+    problem = Problem(here)
+    c10 = problem.forms.coefficients["sheet", "c10"]
+    assert np.allclose(c10.x.array, 0.6)
+    here.temperature.T.x.array[:] = 130.0
+    problem.forms.take_temperature()
+    assert np.allclose(c10.x.array, 2.0)
+    here.temperature.T.x.array[:] = 120.0
+    with pytest.raises(fx.InputError, match=r"temperature = 120: must be from 130 to 170"):
+        problem.forms.take_temperature()
+
+
+@pytest.mark.parametrize("kind", [fx.Viscoelastic, fx.TransientNetwork])
+def test_time_temperature_superposition(kind):
+    """sigma(T, t) = sigma(T0, t/aT): a whole scene at T, aT times as fast, follows the same path."""
+    shift, T = fx.WLF(8.86, 101.6, 150.0), 158.0
+    rest, branches = fx.NeoHookean(c10=0.2), [(1.0, 2.0), (0.5, 20.0)]
+    shifted = kind(rest, branches, shift=shift)
+    found = []
+    for material, temperature, time in ((shifted, 150.0, 3.0), (shifted, T, 3.0 * float(shift(T))),
+                                        (kind(rest, branches), None, 3.0)):
+        body = scene(material, temperature, fx.Membrane())
+        blow = fx.Stage("blow", drive=body.loads[0], until=fx.pressure(0.03), duration=time)
+        found.append(fx.Process(body).run([blow], progress=False, accuracy="draft").last.measures)
+    assert found[0]["process_time"] == pytest.approx(3.0) and shift(T) < 0.3
+    for other in found[1:]:
+        assert other["pole_height"] == pytest.approx(found[0]["pole_height"], rel=1e-8)
+
+
+def test_entropic_modulus():
+    c10 = fx.entropic(2.0, 150.0, unit="C")
+    material = fx.Viscoelastic(fx.NeoHookean(c10=c10), [(c10, 1.0)])
+    warm = material.at_temperature(170.0)
+    assert warm.shear_modulus == pytest.approx(6.0 * (170 + 273.15) / (150 + 273.15), rel=1e-12)
+    assert scene(material, 170.0).shear_modulus("sheet") == pytest.approx(warm.shear_modulus, rel=1e-9)
+
+
+@pytest.mark.parametrize("material, temperature, words", [
+    (fx.NeoHookean(c10=fx.table(HOT)), None, "give Scene a temperature"),
+    (fx.NeoHookean(c10=fx.table(HOT)), 180.0, "temperature = 180: must be from 130 to 170"),
+    (fx.NeoHookean(c10=fx.of_temperature(lambda T: 160 - T)), 170.0, "no stiffness"),
+    (fx.Viscoelastic(None, [(1.0, 1.0)], shift=fx.WLF(8.86, 101.6, 150.0)), 20.0, "must be above reference - c2"),
+    (fx.NeoHookean(c10=1.0), fx.table({0.0: 150.0, 0.5: 140.0}), "R = "),
+    (fx.NeoHookean(c10=1.0), lambda R, Z: R / 0, "not a finite number"),
+])
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_what_is_refused(material, temperature, words):
+    with pytest.raises(fx.InputError, match=words):
+        scene(material, temperature)
+
+
+SHEET = fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=1800.0)      # SI
+
+
+def cooled(tools=None, contacts=(), h=100.0, **more):
+    """A sheet of 1 mm at 150 C with air of 20 C above."""
+    body = fx.mesh.disc(radius=0.02, thickness=1e-3, elements=(6, 2))
+    heat = fx.Cooling(SHEET, [fx.Convection("top", h=h, air=20.0)] if h else [], unit="C", tools=tools, tolerance=0.01)
+    return fx.Scene(mesh=body, materials=fx.NeoHookean(c10=fx.table({20: 4e6, 130: 1e6, 150: 0.6e6})),
+                    loads=[] if contacts else [fx.Pressure("bottom")], contacts=contacts, temperature=150.0, heat=heat,
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")], **more)
+
+
+def test_a_sheet_cools_while_it_waits():
+    """At rest the temperature is that of `fx.heat`, and comes back with each state."""
+    scene = cooled()
+    path = fx.Process(scene).run([fx.Stage("wait", duration=2.0)], progress=False, accuracy="draft")
+    alone = fx.heat(scene.mesh, SHEET, [fx.Convection("top", h=100.0, air=20.0)], start=150.0, times=2.0, unit="C",
+                    tolerance=0.01)
+    points = np.array([[0.0, 0.0], [0.01, 1e-3]])
+    with path.problem.at(path.last):
+        assert scene.temperature.at(points) == pytest.approx(alone.at(points)[-1], abs=0.05)
+        stiffer = path.problem.forms.coefficients["sheet", "c10"].x.array.max()
+    with path.problem.at(path.states[0]):
+        assert np.all(scene.temperature.T.x.array == 150.0)
+        assert path.problem.forms.coefficients["sheet", "c10"].x.array == pytest.approx(0.6e6)
+    assert stiffer > 0.7e6
+
+
+def test_a_sheet_that_cools_needs_more_pressure():
+    def height(h):
+        scene = cooled(h=h)
+        blow = fx.Stage("blow", drive=scene.loads[0], until=fx.pressure(6e4), duration=2.0)
+        return fx.Process(scene).run([blow], progress=False, accuracy="draft").last.measures["pole_height"]
+    assert height(100.0) < 0.98 * height(0.0)
+
+
+def test_a_tool_takes_heat_only_where_and_while_it_touches():
+    tool = fx.tools.male(radius=8e-3, height=0.02, base=-0.02, fillet=2e-3).mirrored().moved(z=1.5e-3)
+    plug = fx.Contact("top", tool, moves=(0.0, -1.0), name="plug", friction="stick")
+    scene = cooled({"plug": (1000.0, 30.0)}, [plug], h=0)
+    push = fx.Stage("push", drive="plug", until=fx.travel(4e-3), through=[fx.travel(0.4e-3)], duration=0.5)
+    path = fx.Process(scene).run([push], progress=False, accuracy="draft")
+    with path.problem.at(path.met(fx.travel(0.4e-3))):
+        assert np.all(np.abs(scene.temperature.T.x.array - 150.0) < 1e-9)        # it has not come to the sheet yet
+    with path.problem.at(path.last):
+        under, beside = scene.temperature.at(np.array([[0.0, 1e-3], [0.019, 1e-3]]))
+    assert under < 130 and beside > 149.9
