@@ -276,8 +276,7 @@ class Conduction:
             return None
         space = fem.functionspace(self.mesh.domain, ("Lagrange", 2, (2,)))
         u = fem.Function(space)
-        points = space.element.interpolation_points
-        u.interpolate(fem.Expression(self._u, points() if callable(points) else points))
+        u.interpolate(fem.Expression(self._u, _compat.interpolation_points(space)))
         return u.x.array.reshape(-1, 2)[: self._n]
 
     @staticmethod
