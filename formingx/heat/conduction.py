@@ -277,8 +277,7 @@ class Conduction:
             return None
         if self._displaced is None:
             space = fem.functionspace(self.mesh.domain, ("Lagrange", 2, (2,)))
-            points = space.element.interpolation_points
-            self._displaced = fem.Function(space), fem.Expression(self._u, points() if callable(points) else points)
+            self._displaced = fem.Function(space), fem.Expression(self._u, _compat.interpolation_points(space))
         u, expression = self._displaced
         u.interpolate(expression)
         return u.x.array.reshape(-1, 2)[: self._n]
