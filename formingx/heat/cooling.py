@@ -196,8 +196,9 @@ def _extremes(temperatures: list[float], laws: Sequence[Any]) -> tuple[float, fl
             return -np.inf, np.inf
         touches = isinstance(law, ContactWithTool)
         for value in [law.tool] if touches else [law.parameters[name] for name in law.temperatures]:
-            temperatures += (value.y.tolist() if isinstance(value, Table) else
-                             [value.back, value.start] if isinstance(value, ConductingTool) else [value])
+            found: Any = (value.y.tolist() if isinstance(value, Table) else
+                          [value.back, value.start] if isinstance(value, ConductingTool) else [value])
+            temperatures += found
     return min(temperatures), max(temperatures)
 
 

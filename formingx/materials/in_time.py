@@ -12,9 +12,7 @@ from ..errors import InputError, positive
 class HistoryTests:
     """Tests of what has a nominal stress of a history, `stress(mode, stretches, times=, between=)`."""
 
-    def stress(self, mode: str, stretches: Any, times: Any = None, between: str = "stretch") -> np.ndarray:
-        """Nominal stress of a history."""
-        raise NotImplementedError
+    stress: Any
 
     def relaxation(self, mode: str, stretch: float, times: Any) -> np.ndarray:
         """Nominal stress at times (any shape, at least 0) after a stretch was put on at once, and held; stress."""

@@ -99,7 +99,7 @@ class KBKZ(HistoryTests):
     def relaxation_modulus(self, times: Any) -> np.ndarray:
         """G(t) = sum G exp(-t/tau) of small shear, at times of any shape; stress."""
         t = np.asarray(times, float)
-        return sum(G * np.exp(-t / tau) for G, tau in self.spectrum)
+        return sum((G * np.exp(-t / tau) for G, tau in self.spectrum), np.zeros(t.shape))
 
     def stress(self, mode: str, stretches: Any, times: Any = None, between: str = "stretch") -> np.ndarray:
         """Nominal stress, force over reference area, of a test; stress. Error below 1e-8 of it.
