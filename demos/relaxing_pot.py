@@ -3,8 +3,8 @@
 An elastic sheet that lifts off its plug forgets it: the base comes out as thin as without a plug. Here the same sheet
 relaxes: its instantaneous modulus is that of the elastic one (130 psi), and 90 % of it relaxes with tau = 1 s. The plug
 (radius 5 cm, edge 1.5 cm, friction 0.3) travels 60 % of the depth at 0.6, 6 or 60 cm/s, in 10, 1 or 0.1 tau, and waits
-0, 0.1, 1 or 10 tau; vacuum comes at once, faster than the sheet relaxes; the part stays 5 tau in the mould, the
-pressure goes, the mould goes, and the part, held by its rim, recovers for 10 tau. Beside it straight vacuum, and the
+0, 0.1, 1 or 10 tau; vacuum comes at once, faster than the sheet relaxes; the part stays 5 tau in the mould;
+pressure and mould are taken away together, and the part, held by its rim, recovers for 10 tau. Beside it straight vacuum, and the
 elastic sheet. Lengths in cm, stresses in psi, times in tau = 1 s.
 """
 
@@ -24,7 +24,7 @@ SHEETS = {"relaxing": fx.Viscoelastic(fx.NeoHookean(c10=0.05 * INSTANT), branche
 SPEEDS, HOLDS = (0.6, 6, 60), (0, 0.1, 1, 10)                # cm/s; s
 TRAVEL, PLUG_RADIUS, IN_MOULD, RECOVERY = SHARE * DEPTH, 5.0, 5.0, 10.0
 STEP = fx.StepControl(target=8)
-AWAY = ["mould", "plug"]
+AWAY = ["mould", "plug", "vacuum"]
 
 
 def scene(sheet, elements):
@@ -44,7 +44,6 @@ def process(speed, hold):
         stages += [fx.Stage("hold", duration=hold)] if hold else []
         stages += [fx.Stage("vacuum", step=STEP, **vacuum)]
     return [*stages, fx.Stage("in the mould", duration=IN_MOULD, without=["plug"]),
-            fx.Stage("vent", drive="vacuum", until=fx.pressure(0.0), without=["plug"], step=STEP),
             fx.Stage("out of the mould", without=AWAY), fx.Stage("recovery", duration=RECOVERY, without=AWAY)]
 
 

@@ -57,7 +57,7 @@ class Run:
     def __init__(self, record: Record, targets: Sequence[tuple[Target, Bound]], step: StepControl | None = None,
                  at_fold: str | None = None, accuracy: float = 2e-3, label: str = ""):
         self.record, self._label, self.curve, self.problem = record, label, record.curve, record.problem
-        self._at_fold = at_fold or _usual(self.problem)
+        self._at_fold = at_fold or ""
         self._time_error = TimeError(self.problem, accuracy) if self.problem.relaxes else None
         self.open = list(targets)
         self.until, self._aim = self.open[-1]
@@ -81,6 +81,7 @@ class Run:
                 kept = self._go_on()
             else:
                 self._accept(self._facing_target(start))
+            self._at_fold = self._at_fold or _usual(self.problem, self._falls)
             self.step = replace(self._step or StepControl(**kept))
             self._close_met(record.last)
             self._settle()
@@ -111,6 +112,11 @@ class Run:
     def _driven(self) -> str:
         """What the control stands for, in words."""
         return self.problem.shown(0.0)[0]
+
+    @property
+    def _falls(self) -> bool:
+        """True if what is driven is taken back towards 0, as a pressure that is let off."""
+        return isinstance(self._aim, Amplitude) and abs(self.until.value) < abs(self._values[0])
 
     @property
     def states(self) -> list[State]:
@@ -364,18 +370,17 @@ class _Astray(Failure):
     """A state was found, but not one that a step should come to: a shorter one will do better."""
 
 
-def _usual(problem: Any) -> str:
+def _usual(problem: Any, falls: bool) -> str:
     """What is done at folds: "jump" if the control goes one way.
 
     Time does. With a history so does whatever is driven, for to follow a fold would be to let it go back; but where a
-    pressure has its maximum it is the volume of the air that goes on growing.
+    pressure that is put on has its maximum it is the volume of the air that goes on growing. `falls`: it is let off.
     """
     setting, things = problem.setting, problem.scene.things
     if setting.leading == len(things):
         return "jump"
-    if not problem.has_history or setting.leading is not None and things[setting.leading].quantity == "pressure":
-        return "follow"
-    return "jump"
+    blown = setting.leading is not None and things[setting.leading].quantity == "pressure" and not falls
+    return "follow" if not problem.has_history or blown else "jump"
 
 
 def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) -> bool:
