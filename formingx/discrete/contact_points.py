@@ -1,4 +1,4 @@
-"""Contact of one face at Gauss points of its facets: a point lets go by itself, and the forces of a facet change less."""
+"""Contact of one face at Gauss points of its facets: they let go one by one, and less changes with each."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class ContactPoints(ContactNodes):
 
     def _place(self, assemble: Any) -> None:
         if self._comm.size > 1:
-            raise InputError(f"Contact({self.contact.on!r}): points = {self.contact.points!r} on {self._comm.size} ranks:"
-                             " contact at Gauss points runs in one process; use points='nodes' under mpirun")
+            raise InputError(f"Contact({self.contact.on!r}): points = {self.contact.points!r} on {self._comm.size} "
+                             "ranks: contact at Gauss points runs in one process; use points='nodes' under mpirun")
         solid, mesh = self.solid, self.solid.scene.mesh
         vectors, numbers = solid.space.sub(0).collapse()
         numbers, X = np.asarray(numbers, dtype=np.int32).reshape(-1, 2), vectors.tabulate_dof_coordinates()[:, :2]
