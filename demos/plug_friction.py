@@ -28,7 +28,7 @@ def main():
     for mu in (0.3,) if args.quick else FRICTIONS:
         made = plugs.scene(RADIUS, THICKNESS, PLUG, args.fillet, fx.NeoHookean(c10=C10), mu, elements,
                            points=4, ramp=1e-3)
-        path, end = plugs.push(made, TRAVELS, smallest=1e-4)
+        path, end = plugs.push(made, TRAVELS, smallest=1e-3)
         summary[f"mu_{mu:g}"], paths[mu] = key_numbers(path, end), path
         tell(mu, summary[f"mu_{mu:g}"])
         path.to_csv(args.out / f"mu_{mu:g}.csv")

@@ -31,9 +31,6 @@ log = logging.getLogger("formingx")
 _JUMPS = 1e-2, 1e-4, 1e-6, 0.0
 """Lengths of steps below which a failure makes the body try to jump, once each."""
 
-_BEYOND_KINK = 1e-4
-"""By how much the (dimensionless) control goes on at least in a jump from a kink."""
-
 _PATIENCE = 500
 """States that gain less than a thousandth of the way to the target, after which a run gives up."""
 
@@ -116,11 +113,6 @@ class Run:
         return self.problem.shown(0.0)[0]
 
     @property
-    def _sense(self) -> float:
-        """Which way the control is driven, 1 or -1."""
-        return float(np.sign(self.states[0].slope)) or 1.0
-
-    @property
     def states(self) -> list[State]:
         """Those of this run."""
         return self.record.states[self._first:]
@@ -175,8 +167,8 @@ class Run:
         Failures halve the step; where a short one fails, or the control has its limit, the body jumps.
         """
         problem, first, jumps, failed = self.problem, self.step.length, list(_JUMPS), 0
-        if self._at_fold == "jump" and (old.kind == "limit point" or old.slope * self._sense < 0):
-            return self._snap(old)                          # (the control turns round at a kink, too)
+        if old.kind == "limit point" and self._at_fold == "jump":
+            return self._snap(old)
         while True:
             length = problem.reach(old.x, old.control, old.direction, old.slope, self.step.length)
             limited = length < self.step.length
@@ -240,8 +232,8 @@ class Run:
 
         step: the length of the last step that went well.
         """
-        ahead = AHEAD if old.kind == "limit point" else _BEYOND_KINK
-        by = self._sense * max(ahead, length * old.slope * self._sense)
+        sense = np.sign(self.states[0].slope) or 1.0
+        by = sense * max(AHEAD, length * old.slope * sense)
         for target, bound in self.open:                      # of the control, which a jump must not pass
             if isinstance(bound, Amplitude) and bound.moves:
                 ahead, now = (self.curve.value(bound, old.x, c) - target.value for c in (old.control + by, old.control))
