@@ -36,6 +36,14 @@ def plate_stress(path, state):
     return rows[np.argsort(rows[:, 0])].T
 
 
+def compress(elements, friction="stick"):
+    """(path, {ratio as text: state that met it}, how it ended)."""
+    scene = block(fx.MooneyRivlin(c10=1.0, c01=0.1), friction, elements, roll_over=True)
+    path, end = press(scene, [travel(r) for r in RATIOS], max_steps=400)
+    met = {f"{r:g}": path.met(fx.travel(travel(r))) for r in RATIOS}
+    return path, {r: state for r, state in met.items() if state is not None}, end
+
+
 def main():
     options = parser("compression_roll_over", __doc__.splitlines()[0])
     options.add_argument("--friction", type=str, default="stick", help="stick, none, or a coefficient of friction")
@@ -43,10 +51,7 @@ def main():
     friction = args.friction if args.friction in ("stick", "none") else float(args.friction)
     grids, pictures = {}, None
     for elements in GRIDS[:1] if args.quick else GRIDS:
-        scene = block(fx.MooneyRivlin(c10=1.0, c01=0.1), friction, elements, roll_over=True)
-        path, end = press(scene, [travel(r) for r in RATIOS], max_steps=400)
-        met = {f"{r:g}": path.met(fx.travel(travel(r))) for r in RATIOS}
-        met = {r: state for r, state in met.items() if state is not None}
+        path, met, end = compress(elements, friction)
         reached = HALF_HEIGHT / (HALF_HEIGHT - path.last.measures["travel"])
         found = grids[f"{elements[0]}x{elements[1]}"] = {
             "force_N_at_ratio": {r: force(s) for r, s in met.items()},

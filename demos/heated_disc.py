@@ -7,6 +7,7 @@ stretches the pressure p r0/(C0 h0), the pole height w/r0 and thickness ratios, 
 
 import numpy as np
 from common import parser, save, say, summarise
+from scipy.interpolate import CubicSpline
 
 import formingx as fx
 from formingx.reference import membrane_inflation
@@ -52,7 +53,7 @@ def theory(modulus):
     found = {}
     for stretch in STRETCHES:
         exact = membrane_inflation(float(stretch), radius=1.0, thickness=THICKNESS, c10=modulus)
-        ratios = np.interp([float(R) for R in PLACES], exact.R, exact.thickness_ratio)
+        ratios = CubicSpline(exact.R, exact.thickness_ratio)([float(R) for R in PLACES])
         found[stretch] = {"p_R0_over_C0_h0": exact.pressure / (modulus(0.0) * THICKNESS), "w_over_R0": exact.height,
                           "thickness_ratio_at_R": dict(zip(PLACES, map(float, ratios)))}
     return found

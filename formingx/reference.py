@@ -118,11 +118,11 @@ def _varying_membrane(pole_stretch: float, radius: float, thickness: float, c10:
         return solve_ivp(slopes, (start, 1), [stretch * start, 0.0, start * N], args=(p,), rtol=1e-9, atol=1e-12,
                          method="DOP853", dense_output=True)
 
-    stretches = np.geomspace(1.02, pole_stretch, max(2, int(np.ceil(np.log(pole_stretch) / 0.25))))
+    stretches = np.geomspace(1.02, pole_stretch, max(2, int(np.ceil(np.log(pole_stretch) / 0.1))))
     p = membrane_inflation(1.02, radius=1, thickness=0.5, c10=1).pressure
     for stretch in stretches:
         found = root_scalar(lambda p, stretch=stretch: integrate(p, stretch).y[0, -1] - 1, x0=p, x1=1.02 * p,
-                            rtol=1e-9)
+                            rtol=1e-9 if stretch == stretches[-1] else 1e-3)
         if not found.converged:
             raise InputError(f"pole_stretch = {pole_stretch!r}: no pressure was found at a stretch of {stretch:.6g}")
         p = found.root

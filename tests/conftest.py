@@ -4,7 +4,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from matplotlib.image import imread
 from mpi4py import MPI
 
 import formingx as fx
@@ -30,6 +32,17 @@ def treloar(elements=(10, 1), support=None, length=1.0, stress=1.0, comm=MPI.COM
     mesh = fx.mesh.disc(radius=1.25 / length, thickness=0.082 / length, elements=elements, comm=comm)
     return fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=2.0 / stress), loads=[fx.Pressure("bottom")],
                     supports=[fx.Symmetry("axis"), support or fx.SimplySupported("rim")], **scene)
+
+
+def drawn(file):
+    """True if a picture shows something: coloured curves or faces, in several colours, on a plain ground.
+
+    Axes, grids and words alone are grey.
+    """
+    pixels = np.round(255 * imread(file)[..., :3]).astype(int)
+    coloured = pixels[np.ptp(pixels, axis=-1) > 50]
+    return min(pixels.shape[:2]) > 200 and 0.001 < len(coloured) / pixels[..., 0].size < 0.9 and len(
+        np.unique(coloured // 16, axis=0)) > 1
 
 
 def run(*command, ranks=None, timeout=600):

@@ -48,7 +48,7 @@ def test_values_are_those_of_the_deformation_gradient(space):
     forms.w.x.array[:] = 0.03 * rng.standard_normal(forms.w.x.array.size)
     inside = basix.make_quadrature(basix.CellType.triangle, scene.quadrature_degree)[0]
     F = forms.F
-    found = Admissible(forms)._quantities()
+    found = Admissible(forms).quantities()
     cells = np.arange(forms.domain.topology.index_map(2).size_local, dtype=np.int32)
     for quantity, form in (("in-plane determinant", F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]), ("hoop stretch", F[2, 2])):
         expected = fem.Expression(ufl.as_vector([form, 0]), inside).eval(forms.domain, cells)
@@ -80,7 +80,7 @@ def test_beside_the_quadrature_points():
     """A midpoint moved along its edge: det < 0 near a corner, det F > 0 where the energy looks."""
     problem = ring("P1")
     forms = problem.forms
-    dofs = Admissible(forms)._dofs[1]
+    dofs = Admissible(forms).dofs[1]
     nodes = forms.space.sub(0).sub(1).collapse()[0].tabulate_dof_coordinates()[:, :2]
     collapsed = forms.space.sub(0).sub(1).collapse()[1]
     edge = collapsed[np.argmin(np.hypot(nodes[:, 0] - 10, nodes[:, 1] - 0.5))]          # on the rim, along Z
@@ -110,7 +110,7 @@ def test_membranes_and_plane_strain():
     membrane = Problem(treloar(model=fx.Membrane()))
     membrane.forms.w.x.array[:] = 0
     assert Admissible(membrane.forms).holds()
-    dofs = Admissible(membrane.forms)._dofs[0]
+    dofs = Admissible(membrane.forms).dofs[0]
     membrane.forms.w.x.array[dofs[-1]] = -1.1
     assert Admissible(membrane.forms).least().quantity == "hoop stretch" and not Admissible(membrane.forms).holds()
 

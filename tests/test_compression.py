@@ -82,3 +82,18 @@ def test_the_side_rolls_onto_the_plate():
 def test_bad_input(change, message):
     with pytest.raises(fx.InputError, match=message):
         change()
+
+
+def test_forces_of_a_block_between_smooth_plates():
+    """Within 1e-4 of the homogeneous block's from the first 0.1 % of travel on."""
+    height, parts = 1.25, (0.001, 0.01, 0.1, 0.4)
+    mesh = fx.mesh.disc(radius=1.32, thickness=height, elements=(6, 3))
+    scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=0.1, c01=0.01),
+                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z")],
+                     contacts=[fx.Contact("top", fx.tools.plane(height), "none", moves=(0, -1))])
+    targets = [fx.travel(part * height) for part in parts]
+    path = fx.trace(scene, until=targets[-1], through=targets[:-1], progress=False)
+    for part, target in zip(parts, targets):
+        l = 1 - part
+        exact = 2 * (l**-2 - l) * (0.1 + 0.01 / l) * np.pi * 1.32**2
+        assert path.met(target).measures["tool_force"] == pytest.approx(exact, rel=1e-4)

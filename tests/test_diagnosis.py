@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import ROOT, run_json, treloar
+from conftest import ROOT, drawn, run_json, treloar
 
 import formingx as fx
 
@@ -67,7 +67,7 @@ def test_element_about_to_turn_inside_out(tmp_path):
     assert found.at_J.R > 0.6 and found.at_J.Z < 0.4 and found.at_J.layer == "sheet"      # the outer foot
     assert "smaller elements around (R, Z) = (0.8" in found.advice[0]
     found.picture(tmp_path / "a" / "last.png")
-    assert (tmp_path / "a" / "last.png").stat().st_size > 10_000
+    assert drawn(tmp_path / "a" / "last.png")
 
 
 def test_buckling():
@@ -87,17 +87,15 @@ def test_buckling():
     assert "possibly buckling" in found.causes[0] and found.limit_points == ()
 
 
-def test_contact_that_does_not_settle():
+def test_contact_that_settles_where_nodes_leave_an_edge():
     """A plug whose edge (fillet 0.05) falls between the nodes (0.44 apart): they slide off it one by one."""
     plug = fx.tools.male(radius=1.905, height=30.0, base=-30.0, fillet=0.05).mirrored().moved(z=0.6985)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=8.89, thickness=0.6985, elements=(20, 1)),
                      materials=fx.NeoHookean(c10=0.448), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      contacts=[fx.Contact("top", plug, 0.3, moves=(0, -1))])
-    step = fx.StepControl(target=8)
-    _, found = failure(lambda: fx.trace(scene, until=fx.travel(10.0), max_steps=80, step=step, progress=False))
-    assert "contact does not settle" in str(found) and found.touching
-    assert found.worst.boundary == "top" and found.worst.distance == 0 and found.worst.R < 1.905
-    assert found.residual["displacement"] > found.residual["pressure"]
+    path = fx.trace(scene, until=fx.travel(10.0), step=fx.StepControl(target=8), progress=False)
+    assert path["travel"][-1] == pytest.approx(10.0) and np.all(np.diff(path["travel"]) > 0)
+    assert all(state.jump["dissipated"] > 0 for state in path.jumps)
 
 
 def test_no_first_state_and_a_membrane(tmp_path):

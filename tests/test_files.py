@@ -170,7 +170,7 @@ def test_animation(formed, tmp_path):
 
 def test_every_stage_has_its_frames(plugged):
     """Frames are even in the process: the plug goes down by 1 and up by 0.5."""
-    shown = [b.stage for _, b, _ in animation._spread(plugged, 60)]
+    shown = [b.stage for _, b, _ in animation.spread(plugged, 60)]
     assert 30 <= shown.count("down") <= 50 and shown.count("up") >= 10
 
 

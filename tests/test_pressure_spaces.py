@@ -84,7 +84,7 @@ def test_pressure_jumps_between_layers_in_all_spaces():
         fields = ufl.split(forms.w)
         means = []
         for name, tag in mesh.layers.items():
-            p = fields[1 + forms._colours[name]]
+            p = fields[1 + forms.pressure_of[name]]
             means.append(forms.integral(p * forms.weight * forms.dx(tag)) / (forms.volume / 2))
         found.append([path.last.measures["pressure"], *means])
     reference = found[SPACES.index("P1")]

@@ -4,7 +4,7 @@ Refined: 80 x 4 elements (60 x 4 for the plate), agreeing with 40 x 2 in the dig
 """
 
 import pytest
-from conftest import run
+from conftest import drawn, run
 from test_demos import summary
 
 
@@ -17,7 +17,7 @@ def test_help_names_every_option(demo):
 
 def pictures(folder, *names):
     for name in names:
-        assert (folder / f"{name}.png").stat().st_size > 10_000
+        assert drawn(folder / f"{name}.png")
 
 
 def test_thick_cylinder(tmp_path):
@@ -79,7 +79,6 @@ def test_material_constants(tmp_path):
     assert A["pole_height_in"]["26"] is None and B["limit_pressure_psi"] is None
     assert [A["pole_height_in"][p] for p in ("15", "20")] == pytest.approx([4.29768, 5.39675], rel=1e-4)
     assert [B["pole_height_in"][p] for p in ("15", "20", "26")] == pytest.approx([4.13011, 4.94603, 6.10484], rel=1e-4)
-    assert B["pole_height_in"]["26"] == pytest.approx(6, abs=0.5)                       # thesis: about 6
     assert A["limit_pressure_psi"] == pytest.approx(25.0649, rel=1e-4)
     assert A["membrane_limit_pressure_psi"] == pytest.approx(25.0556, rel=1e-5)
     assert A["pole_height_in_at_25_psi"]["rising"] < 9 < A["pole_height_in_at_25_psi"]["falling"]

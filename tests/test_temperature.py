@@ -75,14 +75,13 @@ def test_time_temperature_superposition(kind):
     """sigma(T, t) = sigma(T0, t/aT): a whole scene at T, aT times as fast, follows the same path."""
     shift, T = fx.WLF(8.86, 101.6, 150.0), 158.0
     rest, branches = fx.NeoHookean(c10=0.2), [(1.0, 2.0), (0.5, 20.0)]
+    shifted = kind(rest, branches, shift=shift)
     found = []
-    for temperature, duration in ((150.0, 3.0), (T, 3.0 * float(shift(T)))):
-        body = scene(kind(rest, branches, shift=shift), temperature, fx.Membrane())
-        process = fx.Process(body, [fx.Stage("blow", drive=body.loads[0], until=fx.pressure(0.03), duration=duration)])
-        found.append(process.run(progress=False).last.measures)
-    plain = scene(kind(rest, branches), None, fx.Membrane())
-    process = fx.Process(plain, [fx.Stage("blow", drive=plain.loads[0], until=fx.pressure(0.03), duration=3.0)])
-    found.append(process.run(progress=False).last.measures)
+    for material, temperature, time in ((shifted, 150.0, 3.0), (shifted, T, 3.0 * float(shift(T))),
+                                        (kind(rest, branches), None, 3.0)):
+        body = scene(material, temperature, fx.Membrane())
+        blow = fx.Stage("blow", drive=body.loads[0], until=fx.pressure(0.03), duration=time)
+        found.append(fx.Process(body).run([blow], progress=False, accuracy="draft").last.measures)
     assert found[0]["process_time"] == pytest.approx(3.0) and shift(T) < 0.3
     for other in found[1:]:
         assert other["pole_height"] == pytest.approx(found[0]["pole_height"], rel=1e-8)
@@ -108,3 +107,52 @@ def test_entropic_modulus():
 def test_what_is_refused(material, temperature, words):
     with pytest.raises(fx.InputError, match=words):
         scene(material, temperature)
+
+
+SHEET = fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=1800.0)      # SI
+
+
+def cooled(tools=None, contacts=(), h=100.0, **more):
+    """A sheet of 1 mm at 150 C with air of 20 C above."""
+    body = fx.mesh.disc(radius=0.02, thickness=1e-3, elements=(6, 2))
+    heat = fx.Cooling(SHEET, [fx.Convection("top", h=h, air=20.0)] if h else [], unit="C", tools=tools, tolerance=0.01)
+    return fx.Scene(mesh=body, materials=fx.NeoHookean(c10=fx.table({20: 4e6, 130: 1e6, 150: 0.6e6})),
+                    loads=[] if contacts else [fx.Pressure("bottom")], contacts=contacts, temperature=150.0, heat=heat,
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")], **more)
+
+
+def test_a_sheet_cools_while_it_waits():
+    """At rest the temperature is that of `fx.heat`, and comes back with each state."""
+    scene = cooled()
+    path = fx.Process(scene).run([fx.Stage("wait", duration=2.0)], progress=False, accuracy="draft")
+    alone = fx.heat(scene.mesh, SHEET, [fx.Convection("top", h=100.0, air=20.0)], start=150.0, times=2.0, unit="C",
+                    tolerance=0.01)
+    points = np.array([[0.0, 0.0], [0.01, 1e-3]])
+    with path.problem.at(path.last):
+        assert scene.temperature.at(points) == pytest.approx(alone.at(points)[-1], abs=0.05)
+        stiffer = path.problem.forms.coefficients["sheet", "c10"].x.array.max()
+    with path.problem.at(path.states[0]):
+        assert np.all(scene.temperature.T.x.array == 150.0)
+        assert path.problem.forms.coefficients["sheet", "c10"].x.array == pytest.approx(0.6e6)
+    assert stiffer > 0.7e6
+
+
+def test_a_sheet_that_cools_needs_more_pressure():
+    def height(h):
+        scene = cooled(h=h)
+        blow = fx.Stage("blow", drive=scene.loads[0], until=fx.pressure(6e4), duration=2.0)
+        return fx.Process(scene).run([blow], progress=False, accuracy="draft").last.measures["pole_height"]
+    assert height(100.0) < 0.98 * height(0.0)
+
+
+def test_a_tool_takes_heat_only_where_and_while_it_touches():
+    tool = fx.tools.male(radius=8e-3, height=0.02, base=-0.02, fillet=2e-3).mirrored().moved(z=1.5e-3)
+    plug = fx.Contact("top", tool, moves=(0.0, -1.0), name="plug", friction="stick")
+    scene = cooled({"plug": (1000.0, 30.0)}, [plug], h=0)
+    push = fx.Stage("push", drive="plug", until=fx.travel(4e-3), through=[fx.travel(0.4e-3)], duration=0.5)
+    path = fx.Process(scene).run([push], progress=False, accuracy="draft")
+    with path.problem.at(path.met(fx.travel(0.4e-3))):
+        assert np.all(np.abs(scene.temperature.T.x.array - 150.0) < 1e-9)        # it has not come to the sheet yet
+    with path.problem.at(path.last):
+        *under, beside = scene.temperature.at(np.array([[R, 1e-3] for R in (0.0, 0.002, 0.004, 0.006, 0.019)]))
+    assert min(under) < 110 and beside > 149.9, under

@@ -165,6 +165,7 @@ def test_steps_of_any_length(ratio):
     assert rest * (1 - 1e-8) < pull(path) < now
 
 
+@pytest.mark.slow
 def test_many_branches():
     tau = np.geomspace(1e-3, 1e3, 20)
     material = fx.Viscoelastic(RUBBER, branches=[(0.03 * (1 + k % 3), float(t)) for k, t in enumerate(tau)])

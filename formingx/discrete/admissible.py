@@ -37,6 +37,9 @@ class Admissible:
 
     Args:
         forms: a `Formulation`; its `w` is what is looked at.
+
+    Attributes:
+        dofs: unknowns of u_r and of u_z of this rank's own cells, shape (cells, n) each.
     """
 
     def __init__(self, forms: Any):
@@ -50,7 +53,7 @@ class Admissible:
         self._n = len(inside)
         points = np.concatenate([inside, beside, np.array(_MIDDLES[cell], dtype=float)])
         n = domain.topology.index_map(domain.topology.dim).size_local
-        self._dofs = [forms.space.sub(0).sub(i).dofmap.list[:n] for i in (0, 1)]
+        self.dofs = [forms.space.sub(0).sub(i).dofmap.list[:n] for i in (0, 1)]
         shapes: Any = forms.displacement_element.tabulate(1, points)                    # (1 + dim, points, dofs)
         geometry = basix.ufl.element("Lagrange", domain.basix_cell(), _compat.coordinate_map(domain).degree)
         map_shapes: Any = geometry.tabulate(1, points)
@@ -69,7 +72,7 @@ class Admissible:
         Of values that are not finite, the first.
         """
         found = [Least("in-plane determinant", np.inf, (0.0, 0.0))]
-        for quantity, values in self._quantities().items():
+        for quantity, values in self.quantities().items():
             if values.size:
                 k = np.unravel_index(np.argmin(np.where(np.isfinite(values), values, -np.inf)), values.shape)
                 found.append(Least(quantity, float(values[k]), tuple(self._X[k].tolist())))
@@ -81,7 +84,7 @@ class Admissible:
         if not self._solid:
             return None
         found = Least("volume ratio", 1.0, (0.0, 0.0))
-        J = np.prod(list(self._quantities().values()), axis=0)
+        J = np.prod(list(self.quantities().values()), axis=0)
         if J.size:
             k = np.unravel_index(np.argmax(np.abs(np.log(np.maximum(J, 1e-300)))), J.shape)
             found = Least("volume ratio", float(J[k]), tuple(self._X[k].tolist()))
@@ -93,13 +96,13 @@ class Admissible:
         (Between them an element that a sharp edge bends strongly may be inside out without harm to what is computed: a
         coarse mesh under a plug. `least` tells.) Collective.
         """
-        mine = all(bool(np.all(values[:, :self._n] > 0)) for values in self._quantities().values())
+        mine = all(bool(np.all(values[:, :self._n] > 0)) for values in self.quantities().values())
         return all(self._forms.comm.allgather(mine))
 
-    def _quantities(self) -> dict[str, np.ndarray]:
+    def quantities(self) -> dict[str, np.ndarray]:
         """{quantity: its values at the points of this rank's own cells, shape (cells, points)}."""
         w, size = self._forms.w.x.array, self._forms.length
-        u = np.stack([w[dofs] for dofs in self._dofs], -1) * size                  # (cells, dofs, 2)
+        u = np.stack([w[dofs] for dofs in self.dofs], -1) * size                  # (cells, dofs, 2)
         found, along = {}, np.ones(())
         if self._solid:
             by_R, by_Z = np.moveaxis((self._gradients @ u).reshape(*self._X.shape, 2), 2, 0)

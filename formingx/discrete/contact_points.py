@@ -1,4 +1,4 @@
-"""Contact of one face at Gauss points of its facets: they let go one by one, and less changes with each."""
+"""Contact of one face at Gauss points of its facets: they let go one by one, and a facet's forces change less."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ class ContactPoints(ContactNodes):
 
     def _place(self, assemble: Any) -> None:
         if self._comm.size > 1:
-            raise InputError(f"Contact({self.contact.on!r}): points = {self.contact.points!r} on {self._comm.size} "
-                             "ranks: contact at Gauss points runs in one process; use points='nodes' under mpirun")
+            raise InputError(f"Contact({self.contact.on!r}): points = {self.contact.points!r}, {self._comm.size} ranks:"
+                             " contact at Gauss points runs in one process; use points='nodes' under mpirun")
         solid, mesh = self.solid, self.solid.scene.mesh
         vectors, numbers = solid.space.sub(0).collapse()
         numbers, X = np.asarray(numbers, dtype=np.int32).reshape(-1, 2), vectors.tabulate_dof_coordinates()[:, :2]
         facets = mesh.facets_of(self.contact.on)
         nodes = np.array([_ends_first(fem.locate_dofs_topological(vectors, 1, np.array([f], dtype=np.int32)), X)
                           for f in facets], dtype=np.int32).reshape(-1, 3)
-        at, weights = np.polynomial.legendre.leggauss(self.contact.points)
+        at, weights = np.polynomial.legendre.leggauss(int(self.contact.points))
         s, q = (1 + at) / 2, len(at)
         shapes = np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)])
         slopes = np.column_stack([4 * s - 3, 4 * s - 1, 4 - 8 * s])

@@ -19,6 +19,7 @@ from petsc4py import PETSc
 from ufl.algorithms.analysis import extract_constants
 
 from .. import _compat
+from ..errors import InputError
 from ..physics import kinematics as kin
 from .history import History, MaterialHistory
 from .loaded_body import LoadedBody
@@ -145,9 +146,19 @@ class Formulation(ABC):
         return self.scene.temperature.in_cells(terms.cells, terms.places)
 
     def take_temperature(self) -> None:
-        """The scene's temperature has changed: constants follow it; scales stay as they are; collective."""
+        """The scene's temperature has changed: constants follow it; scales stay as they are; collective.
+
+        Raises:
+            InputError: a constant has no value at a temperature.
+        """
+        refused = None
         for terms in dict.fromkeys(self._terms.values()):
-            terms.take_temperature()
+            try:
+                terms.take_temperature()
+            except InputError as error:
+                refused = refused or str(error)
+        for message in filter(None, self.comm.allgather(refused)):          # all ranks refuse, with one message
+            raise InputError(message)
 
     def cells_of(self, layers: list[str]) -> np.ndarray:
         """The cells of `mesh` in which some layers are, this rank's own and ghosts, ascending local numbers."""

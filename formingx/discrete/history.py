@@ -75,13 +75,20 @@ class MaterialHistory:
 
     def advance(self, x: np.ndarray, control: float) -> None:
         """See `History`."""
-        if len(self._cells):
-            values = self._updated.eval(self._forms.domain, self._cells)
-            values = values.reshape(len(self._cells), len(self._terms.places), -1)
-            parts = np.split(values, np.cumsum(list(self._sizes.values()))[:-1], axis=2)
-            for name, part in zip(self._sizes, parts, strict=True):
-                self._set(name, self._cells, part)
+        for name, values in self._after(self._cells).items():
+            self._set(name, self._cells, values)
         self._terms.start.value = self._forms.time_at(control)
+
+    def foretell(self, control: float) -> Memory:
+        """What `get` would give, were the state that the forms hold now accepted."""
+        return Memory(self._forms.time_at(control), self._after(self._own))
+
+    def _after(self, cells: np.ndarray) -> dict[str, np.ndarray]:
+        """{name: values in some cells, shape (cells, points, components)} at the end of the step."""
+        shape = len(cells), len(self._terms.places), sum(self._sizes.values())
+        values = self._updated.eval(self._forms.domain, cells).reshape(shape) if len(cells) else np.zeros(shape)
+        parts = np.split(values, np.cumsum(list(self._sizes.values()))[:-1], axis=2)
+        return dict(zip(self._sizes, parts, strict=True))
 
     def get(self) -> Memory:
         """See `History`."""

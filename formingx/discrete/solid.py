@@ -10,9 +10,13 @@ import numpy as np
 import ufl
 from dolfinx import fem, la
 
+from .. import _compat
 from ..physics import kinematics as kin
 from .formulation import Formulation
 from .material_terms import MaterialTerms
+
+_THIN = 5e-4               # volume over length^3 (a disc of r0/h0 = 6000) below which that of bending is round-off
+_FIRST_STRETCH = 1e-4
 
 
 class Solid(Formulation):
@@ -20,6 +24,7 @@ class Solid(Formulation):
 
     Attributes:
         bodies: [(material, its layers)]: layers of one material object are one body.
+        pressure_of: {layer: number of its pressure field}; empty without pressures as unknowns.
     """
 
     def boundary(self, name: str, quadrature_degree: int) -> ufl.Measure:
@@ -61,9 +66,10 @@ class Solid(Formulation):
     def idle_unknowns(self) -> list[tuple[Any, np.ndarray]]:
         """[(sub space, local dofs)] of pressures that belong to no cell of their layers."""
         found, mesh, dofmap = [], self.mesh, self.space.dofmap
-        for colour in sorted(set(self._colours.values())):
+        for colour in sorted(set(self.pressure_of.values())):
             sub = self.space.sub(1 + colour)
-            cells = np.concatenate([mesh.cells.find(mesh.layers[n]) for n, c in self._colours.items() if c == colour])
+            mine = [name for name, c in self.pressure_of.items() if c == colour]
+            cells = np.concatenate([mesh.cells.find(mesh.layers[name]) for name in mine])
             used = la.vector(dofmap.index_map, 1)              # the cells may all be on another rank
             used.array[sub.dofmap.list[cells].ravel()] = 1
             used.scatter_reverse(la.InsertMode.add)
@@ -72,10 +78,23 @@ class Solid(Formulation):
             found.append((sub, dofs[used.array[dofs] == 0].astype(np.int32)))
         return found
 
+    def set_stiff(self):
+        """Rest; of a sheet so thin that its bending stiffness is lost to round-off, a small stretch in all directions.
+
+        u = s X: the stress stiffens it as a membrane. (Interpolated: unknowns of bubbles are no nodal values.)
+        """
+        super().set_stiff()
+        if self.volume < _THIN * self.length**self.scene.kinematics.dimension_of_volume:
+            space, dofs = self.space.sub(0).collapse()
+            u = fem.Function(space)
+            stretched = self.constant(_FIRST_STRETCH / self.length) * self.X
+            u.interpolate(fem.Expression(stretched, _compat.interpolation_points(space)))
+            self.w.x.array[dofs] = u.x.array
+
     def _make_mesh(self) -> Any:
         scene = self.scene
         self.bodies = _by_material(scene)
-        self._colours = _colour(scene) if scene.model.pressure else {}
+        self.pressure_of = _colour(scene) if scene.model.pressure else {}
         return scene.mesh
 
     def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
@@ -86,7 +105,7 @@ class Solid(Formulation):
         fields = [basix.ufl.blocked_element(element, shape=(2,))]
         if pressure:
             field = basix.ufl.element(pressure.family, cell, pressure.degree)
-            fields += [field] * (max(self._colours.values()) + 1)
+            fields += [field] * (max(self.pressure_of.values()) + 1)
         return element, fields
 
     def _weight(self) -> Any:
@@ -117,7 +136,7 @@ class Solid(Formulation):
         if model.stress_free:
             W -= terms.rest_stress * ufl.ln(J)
         modulus = self.constant(max(self.scene.shear_modulus(name) for name in names))
-        p = self.constant(self.stress) * ufl.split(self.w)[1 + self._colours[names[0]]] if self._colours else None
+        p = self.constant(self.stress) * ufl.split(self.w)[1 + self.pressure_of[names[0]]] if self.pressure_of else None
         return [(W, {}), *model.terms(J, p, modulus, self._eps)]
 
 

@@ -48,8 +48,8 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
     if not isinstance(mesh, Mesh):
         raise InputError(f"heat: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")
     known("heat: unit", unit, ABSOLUTE_ZERO)
-    materials = _materials(mesh, materials)
-    boundaries = _boundaries(mesh, boundaries, ABSOLUTE_ZERO[unit])
+    materials = checked_materials(mesh, materials)
+    boundaries = checked_boundaries(mesh, boundaries, ABSOLUTE_ZERO[unit])
     outputs = _times(times)
     kinematics = Axisymmetric() if kinematics is None else kinematics
     if not hasattr(kinematics, "area_vector") or isinstance(kinematics, type):
@@ -100,7 +100,8 @@ def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: flo
     _log.info("heat: %d steps to time %g", len(run.times) - 1, t)
 
 
-def _materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties]:
+def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties]:
+    """{layer: `ThermalProperties`} of what a user gave, or an InputError."""
     if isinstance(materials, ThermalProperties):
         materials = dict.fromkeys(mesh.layers, materials)
     if not isinstance(materials, Mapping):
@@ -114,7 +115,8 @@ def _materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties]:
     return dict(materials)
 
 
-def _boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> list[Any]:
+def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> list[Any]:
+    """The laws of the faces that a user gave, or an InputError."""
     found = several("heat: boundaries", boundaries, "boundaries, such as Convection('top', h=40, air=20)")
     held = {b.on for b in found if isinstance(b, FixedTemperature)}
     for boundary in found:

@@ -37,6 +37,9 @@ above 1, so that the range is no wider than needed, and what never slides (mu = 
 """
 
 
+_SMOOTH, _ROUGH = (2e5, 1e-7), (2e4, 1e-5)
+"""Penalty and ramp without friction, where stiffer contact costs no iterations, and with it."""
+
 _AT_FOOT = 1e-7
 """Distances from the foot of the ramp, over theta, that are as good as none."""
 
@@ -49,8 +52,8 @@ class Contact(Part):
         tool: a `Tool`, see `formingx.tools`.
         friction: "stick" (a point that touches stays where it touched), "none", or the coefficient mu of Coulomb's
             law (5.9), from 0 (none).
-        penalty: k over shear modulus / thickness of the sheet.
-        ramp: theta over thickness of the sheet.
+        penalty: k over shear modulus / thickness of the sheet; default 2e4, without friction 2e5.
+        ramp: theta over thickness of the sheet; default 1e-5, without friction 1e-7.
         separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
             start); with "stick" or "none".
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge).
@@ -67,8 +70,8 @@ class Contact(Part):
     quantity = "travel"
     on: str
 
-    def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float = 2e4,
-                 ramp: float = 1e-5, separates: bool = True, nodes_per_step: int = 1,
+    def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float | None = None,
+                 ramp: float | None = None, separates: bool = True, nodes_per_step: int = 1,
                  points: str | int = "nodes",
                  moves: tuple[float, float] | None = None, name: str | None = None):
         self.name, name = name, f"Contact({on!r})"
@@ -79,8 +82,10 @@ class Contact(Part):
             raise InputError(f"{name}: friction = {friction!r}: must be 'stick', 'none' or a coefficient of friction")
         self.on, self.tool, self.friction = on, tool, friction
         self.mu = words[friction] if isinstance(friction, str) else non_negative(f"{name}: friction", friction)
-        self.penalty, self.ramp = positive(f"{name}: penalty", penalty), positive(f"{name}: ramp", ramp)
         self.separates = instance(f"{name}: separates", separates, bool, "True or False")
+        usual = _SMOOTH if self.symmetric else _ROUGH
+        self.penalty = positive(f"{name}: penalty", usual[0] if penalty is None else penalty)
+        self.ramp = positive(f"{name}: ramp", usual[1] if ramp is None else ramp)
         if not separates and 0 < self.mu < math.inf:
             raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
                              f" Coulomb friction; use 'stick' or 'none'")
@@ -173,6 +178,7 @@ class Law:
     def __init__(self, tool: Tool, mu: float, k: float, theta: float, shift: np.ndarray | float = 0.0,
                  separates: bool = True):
         self.tool, self.mu, self.k, self.theta, self.shift, self.separates = tool, mu, k, theta, shift, separates
+        self._near: tuple[np.ndarray, Nearest] | None = None        # points last asked for, and what was found
 
     def part(self, points: np.ndarray | slice) -> Law:
         """The law of some of its points."""
@@ -193,13 +199,17 @@ class Law:
         return False if self.separates or old is None else old.distance > -self.theta
 
     def distance(self, x: np.ndarray) -> np.ndarray:
-        """Signed distance less the shift of points x, shape (n,), length."""
-        return self.tool.signed_distance(x) - self.shift
+        """Signed distance of points x, shape (n, 2) or several places of each (m, n, 2), less the shift, length."""
+        if x.ndim == 2:
+            return self.nearest(x).distance
+        return self.tool.signed_distance(x).reshape(x.shape[:-1]) - self.shift
 
     def nearest(self, x: np.ndarray) -> Nearest:
-        """`Tool.nearest`, the distances less the shift."""
-        near = self.tool.nearest(x)
-        return near._replace(distance=near.distance - self.shift)
+        """`Tool.nearest` at points x, shape (n, 2), the distances less the shift; found once for the same points."""
+        if self._near is None or not np.array_equal(x, self._near[0]):
+            near = self.tool.nearest(x)
+            self._near = x.copy(), near._replace(distance=near.distance - self.shift)
+        return self._near[1]
 
     def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
         """F(d), eq. (5.13) if the body separates from the tool, and its derivative."""

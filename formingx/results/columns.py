@@ -117,7 +117,7 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     found["mass_error"] = _Scalar(problem, change * forms.weight * forms.dx, lambda v: v / volume)
     found["volume_error"] = _Scalar(problem, change**2 * forms.weight * forms.dx,
                                     lambda v: (v / volume) ** 0.5)
-    if problem.relaxes:
+    if forms.dissipation is not None:
         found["dissipated_power"] = _Scalar(problem, forms.dissipation, lambda v: v * forms.stress * volume)
     if problem.contacts:
         found["contact_length"] = _Nodal(problem, lambda c, *at: c.contact_length(*at), sum)

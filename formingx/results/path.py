@@ -60,7 +60,7 @@ class Path:
 
     @property
     def problem(self) -> Any:
-        """The (last) `Problem`, for further evaluation: `with path.problem.at(state): ...`."""
+        """The (last) `Problem`, for further evaluation at a state, within its `at(state)`."""
         return self.record.problem
 
     def __len__(self) -> int:
@@ -242,7 +242,7 @@ class Path:
     def _measure(self, state: State) -> None:
         """Fill the columns of an accepted state."""
         state.measures = self._measures(self.segments[-1], state)
-        if self.problem.relaxes:                             # by the trapezoidal rule
+        if "dissipated_power" in state.measures:                             # by the trapezoidal rule
             states, lost = self.segments[-1].states, 0.0
             if len(states) > 1:
                 before = states[-2]

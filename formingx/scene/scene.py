@@ -37,6 +37,7 @@ class Scene:
         quadrature_degree: of the energy; 5 (seven points) is the thesis' rule.
         temperature: of the body, which constants of materials may depend on: a number, a `table` over R, a function of
             arrays (R, Z), a CSV file with columns R, Z, T, what `formingx.heat` returned, or a DOLFINx Function.
+        heat: `Cooling(...)`: the temperature changes as time goes by.
 
     Raises:
         InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, or whose
@@ -45,7 +46,7 @@ class Scene:
 
     def __init__(self, *, mesh: Mesh, materials: Material | Mapping[str, Material], supports: Sequence[Any],
                  loads: Sequence[Any] = (), contacts: Sequence[Contact] = (), model: Any = None, kinematics: Any = None,
-                 quadrature_degree: int = 5, temperature: Any = None):
+                 quadrature_degree: int = 5, temperature: Any = None, heat: Any = None):
         if not isinstance(mesh, Mesh):
             raise InputError(f"Scene: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")
         if isinstance(materials, Material):
@@ -76,8 +77,12 @@ class Scene:
             self._check_hinges()
         for contact in self.contacts:
             self._check_contact(contact)
+        if heat is not None:
+            heat.check(self)
+            self.heat = heat
 
     temperature: BodyTemperature | None = None
+    heat: Any = None
 
     @property
     def things(self) -> list[Part]:

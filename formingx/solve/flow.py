@@ -32,7 +32,8 @@ class Flow(Run):
     """
 
     def __init__(self, record: Record, measure: Bound, course: Callable[[float], float], times: Sequence[float],
-                 targets: Sequence[tuple[Target, Bound]], step: StepControl, accuracy: float, label: str = ""):
+                 targets: Sequence[tuple[Target, Bound]], step: StepControl | None, accuracy: float,
+                 label: str = ""):
         end = process_time(times[-1])
         super().__init__(record, [*targets, (end, end.bind(record.problem))], step, "follow", accuracy, label)
         self._measure, self._course, self._times, self._duration = measure, course, times, times[-1] - times[0]

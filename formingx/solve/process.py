@@ -130,8 +130,8 @@ class Execution:
     def _trace(self, targets: list, control: float | None) -> list:
         """Follow the path from a control (None: on from the last state); returns the targets that are still open."""
         step = self._stage.step or self._step
-        if self.problem.setting.rate[-1] and self.problem.relaxes:
-            step = step or _IN_TIME
+        if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
+            step = step or _IN_TIME                          # a piece that has begun goes on with its own steps
         run = Run(self.record, targets, step, self._stage.at_fold, self._accuracy, self._label)
         start = None if control is None else self._resumed(control)
         run.follow(self._max_steps, self._progress, start)
@@ -205,7 +205,7 @@ class Execution:
         control = None if begun else self._enter_driving(numbers, clocked=False)
         target, course, times = self._course(self.problem.setting.base[-1])
         run = Flow(self.record, target.bind(self.problem), course, times, self._targets[self._k],
-                   self._stage.step or _IN_TIME, self._accuracy, self._label)
+                   self._stage.step or (None if begun else _IN_TIME), self._accuracy, self._label)
         run.follow(self._max_steps, self._progress, None if control is None else self._resumed(control))
 
     def _course(self, now: float) -> tuple[Target, Callable[[float], float], list[float]]:

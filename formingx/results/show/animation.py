@@ -27,7 +27,7 @@ def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
         raise InputError(f"animate: the path has {len(path)} states: nothing moves")
     x, y = plots.main_columns(path.columns)
     shapes, tools, now, tooling = [], [], [], Tooling.of_problem(path.problem)
-    for a, b, fraction in _spread(path, frames):
+    for a, b, fraction in spread(path, frames):
         at = path.between(a, b, fraction)
         shapes.append(path.profile(at))
         now.append([a.measures[c] + fraction * (b.measures[c] - a.measures[c]) for c in (x, y)])
@@ -42,7 +42,7 @@ def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
     files.on_root(path.problem.comm, draw)
 
 
-def _spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
+def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
     """(state, next state, fraction between them) of frames evenly spread over the progress of the process."""
     profiles = [path.profile(state) for state in path.states]
     at = progress({c: path[c] for c in path.columns}, profiles)
