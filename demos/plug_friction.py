@@ -27,7 +27,7 @@ def main():
     summary, paths = {}, {}
     for mu in (0.3,) if args.quick else FRICTIONS:
         made = plugs.scene(RADIUS, THICKNESS, PLUG, args.fillet, fx.NeoHookean(c10=C10), mu, elements,
-                            points=4, ramp=1e-3)
+                           points=4, ramp=1e-3)
         path, end = plugs.push(made, TRAVELS, smallest=1e-3)
         summary[f"mu_{mu:g}"], paths[mu] = key_numbers(path, end), path
         tell(mu, summary[f"mu_{mu:g}"])

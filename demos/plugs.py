@@ -51,8 +51,7 @@ def push(made, travels, pole_stretch=None, smallest=1e-6, **options):
     until = targets.pop() if pole_stretch is None else fx.pole_stretch(pole_stretch)
     try:
         return fx.trace(made, until=until, through=targets, step=fx.StepControl(target=6, smallest=smallest),
-                        max_steps=400,
-                        **options), "done"
+                        max_steps=400, **options), "done"
     except fx.ConvergenceError as error:
         return error.path, str(error)
 
