@@ -43,6 +43,12 @@ def assemble_matrix(matrix: Any, form: Any, bcs: Any) -> None:
     fem_petsc.assemble_matrix(matrix, form, bcs=bcs)  # type: ignore[misc]  # its types are those of another variant
 
 
+def interpolation_points(space: Any) -> Any:
+    """Points of the reference cell where a function space looks at what it interpolates, shape (n, 2)."""
+    points = space.element.interpolation_points
+    return points() if callable(points) else points
+
+
 def coordinate_map(mesh: Any) -> Any:
     """The map from reference to physical coordinates of the cells."""
     geometry = mesh.geometry

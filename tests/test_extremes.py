@@ -8,6 +8,9 @@ from conftest import ROOT
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import extremes  # noqa: E402
 
+import formingx as fx  # noqa: E402
+from formingx.reference import membrane_limit_point  # noqa: E402
+
 # What the reference leaves out (bending, a clamped rim, one element) sets how near a row can come.
 NEAR = {"eps": 2e-4, "stretch": 2e-4, "I1 to I2": 2e-4, "Ogden exponent": 5e-4, "Gent's limit": 5e-2, "layers": 2e-2,
         "mesh": 4e-2, "units": 1e-9, "r0/h0 2, SimplySupported": 3e-2, "r0/h0 2, Clamped": 0.3,
@@ -20,3 +23,13 @@ def test_extreme(row):
     assert found["outcome"] == "right"
     assert abs(found["deviation"]) < NEAR.get(found["name"], NEAR.get(found["group"]))
     assert found["mass_error"] < 1e-9 or "eps" in found["group"]
+
+
+@pytest.mark.parametrize("ratio", [2e4, 1e5, 1e6])
+def test_sheets_so_thin_that_bending_is_round_off(ratio):
+    """Each is a membrane: r0/h0 from 2e4 to 1e6 start, and pass the limit pressure of membrane theory."""
+    sheet = {"radius": 1.0, "thickness": 1 / ratio}
+    scene = fx.Scene(mesh=fx.mesh.disc(**sheet, elements=(40, 1)), materials=fx.NeoHookean(c10=1.0),
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")])
+    limit, = fx.trace(scene, until=fx.pole_stretch(3.0), progress=False).limit_points
+    assert limit.measures["pressure"] == pytest.approx(membrane_limit_point(**sheet, c10=1.0)[1].pressure, rel=1e-5)

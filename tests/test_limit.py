@@ -30,12 +30,12 @@ def test_a_tool_is_looked_at_once_for_the_same_points(monkeypatch):
 
 
 def test_what_materials_remember_is_computed_once_a_step(monkeypatch):
-    calls, advance = [0], MaterialHistory.advance
+    calls, after = [0], MaterialHistory._after
 
-    def counted(self, x, control):
+    def counted(self, cells):
         calls[0] += 1
-        advance(self, x, control)
-    monkeypatch.setattr(MaterialHistory, "advance", counted)
+        return after(self, cells)
+    monkeypatch.setattr(MaterialHistory, "_after", counted)
     fx = limit.fx
     mesh = fx.mesh.disc(radius=2.0, inner_radius=1.0, thickness=0.5, elements=(2, 1))
     scene = fx.Scene(mesh=mesh, materials=fx.Viscoelastic(fx.NeoHookean(c10=0.05), branches=[(0.3, 0.5), (0.4, 5.0)]),

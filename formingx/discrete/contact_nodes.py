@@ -84,7 +84,11 @@ class ContactNodes:
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Nodes seen from the tool, shape (n, 2), length; `fields`: owned unknowns."""
-        return self.points + self._length * self.displacement(fields) - (self.base + self.rate * control) * self._motion
+        return self.points + self._length * self.displacement(fields) - self.travelled(control)
+
+    def travelled(self, control: float) -> np.ndarray:
+        """How far the tool has moved in (r, z), shape (2,), length."""
+        return (self.base + self.rate * control) * self._motion
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
         """What the law gives at a state, computed once for it."""

@@ -10,9 +10,13 @@ import numpy as np
 import ufl
 from dolfinx import fem, la
 
+from .. import _compat
 from ..physics import kinematics as kin
 from .formulation import Formulation
 from .material_terms import MaterialTerms
+
+_THIN = 5e-4               # volume over length^3 (a disc of r0/h0 = 6000) below which that of bending is round-off
+_FIRST_STRETCH = 1e-4
 
 
 class Solid(Formulation):
@@ -73,6 +77,19 @@ class Solid(Formulation):
             dofs = np.unique(sub.dofmap.list)
             found.append((sub, dofs[used.array[dofs] == 0].astype(np.int32)))
         return found
+
+    def set_stiff(self):
+        """Rest; of a sheet so thin that its bending stiffness is lost to round-off, a small stretch in all directions.
+
+        u = s X: the stress stiffens it as a membrane. (Interpolated: unknowns of bubbles are no nodal values.)
+        """
+        super().set_stiff()
+        if self.volume < _THIN * self.length**self.scene.kinematics.dimension_of_volume:
+            space, dofs = self.space.sub(0).collapse()
+            u = fem.Function(space)
+            stretched = self.constant(_FIRST_STRETCH / self.length) * self.X
+            u.interpolate(fem.Expression(stretched, _compat.interpolation_points(space)))
+            self.w.x.array[dofs] = u.x.array
 
     def _make_mesh(self) -> Any:
         scene = self.scene
