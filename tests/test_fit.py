@@ -124,8 +124,7 @@ def test_what_the_data_leave_open_is_named():
     neo_hookean = measured(fx.NeoHookean(c10=0.3), reach=2.0)
     gent = fx.fit(fx.Gent, neo_hookean)
     assert gent.undetermined == ("Jm",) and "do not determine Jm" in str(gent)
-    assert {"mu2", "alpha2"} <= set(fx.fit(fx.Ogden, neo_hookean, terms=2).undetermined) \
-        or {"mu1", "alpha1"} <= set(fx.fit(fx.Ogden, neo_hookean, terms=2).undetermined)
+    assert {"mu1", "mu2"} & set(fx.fit(fx.Ogden, neo_hookean, terms=2).undetermined)
     small = np.linspace(0.98, 1.02, 9)
     rubber = fx.MooneyRivlin(c10=0.3, c01=0.05)
     assert "c01" in fx.fit(fx.MooneyRivlin, {"uniaxial": (small, rubber.stress("uniaxial", small))}).undetermined

