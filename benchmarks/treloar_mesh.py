@@ -1,6 +1,6 @@
 """Treloar's sheet under mesh refinement, and what the thesis' penalty makes of it.
 
-Prints the tables that the README quotes; writes results/treloar_mesh/summary.json. About 2 minutes (--quick: seconds).
+Prints the tables of docs/verification.md; writes results/treloar_mesh/summary.json. About 2 minutes (--quick: seconds).
 """
 
 import argparse

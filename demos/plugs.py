@@ -42,12 +42,16 @@ def scene(radius, thickness, plug_radius, fillet, material, law, elements, suppo
                                          moves=(0, -1), **options)])
 
 
-def push(made, travels, pole_stretch=None, **options):
-    """(path, how it ended): to the last travel, or to a pole stretch, through the (other) travels."""
+def push(made, travels, pole_stretch=None, smallest=1e-6, **options):
+    """(path, how it ended): to the last travel, or to a pole stretch, through the (other) travels.
+
+    smallest: length of a step below which a run gives up.
+    """
     targets = [fx.travel(t) for t in travels]
     until = targets.pop() if pole_stretch is None else fx.pole_stretch(pole_stretch)
     try:
-        return fx.trace(made, until=until, through=targets, step=fx.StepControl(target=6), max_steps=400,
+        return fx.trace(made, until=until, through=targets, step=fx.StepControl(target=6, smallest=smallest),
+                        max_steps=400,
                         **options), "done"
     except fx.ConvergenceError as error:
         return error.path, str(error)

@@ -83,8 +83,8 @@ def draw(paths):
 
 def main():
     options = parser("viscoelastic_tube", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=8, help="elements through the wall")
-    options.add_argument("--accuracy", type=float, default=1e-4, help="relative error in time")
+    options.add_argument("--elements", type=int, default=14, help="elements through the wall")
+    options.add_argument("--accuracy", type=float, default=3e-5, help="relative error in time")
     args = options.parse_args()
     n, accuracy = (4, 2e-3) if args.quick else (args.elements, args.accuracy)
     summary: dict = {"sphere": {}}

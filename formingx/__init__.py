@@ -13,7 +13,9 @@ from .materials.data import treloar1944
 from .materials.fit import Fit, fit
 from .materials.fit_in_time import TimedTest
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
+from .materials.kbkz import KBKZ, PSM, Wagner
 from .materials.material import Material
+from .materials.published import Published, published
 from .materials.viscoelastic import TransientNetwork, Viscoelastic
 from .physics import tools
 from .physics.contact import Contact

@@ -3,11 +3,14 @@
 All are incompressible, of W = c10 (I1 - 3) and the branches of `Viscoelastic`, and have one degree of freedom s. Their
 points have logarithmic strains e(s) along fixed directions; a branch has there the elastic strains w,
 dw_i/dt = de_i/dt - [exp(2 w_i) - (1/3) sum_j exp(2 w_j)]/(2 tau). With T = 2 c10 (l_1^2 - l_3^2)
-+ sum mu [exp(2 w_1) - exp(2 w_3)], the difference of the stresses along 1 and 3, the load is a sum over points, c(s) T:
++ sum mu [exp(2 w_1) - exp(2 w_3)], the difference of the stresses along 1 and 3, the load is a sum over
+points, c(s) T::
+
     block under a nominal stress P:  P = T/l,  s = ln l
     thick wall, r^n = R^n + s, s = a^n - A^n, n = 2 (tube in plane strain) or 3 (sphere), 1 = hoop, 3 = radial:
         p = integral of (n - 1) T R^(n-1)/r^n dR, by Gauss's rule
     thin balloon, R0 and H0 at rest:  p R0/H0 = 2 T/l^3,  s = ln l, 3 = through the wall
+
 Where s is driven the branches are integrated; where the load is held, its rate, zero, gives ds/dt.
 """
 

@@ -104,6 +104,68 @@ def test_ogden_on_treloar():
     assert found.material.check_stability((0.5, 7.6)).stable
 
 
+def test_standard_errors_are_the_scatter_of_the_fits():
+    """Of 60 fits to the same tests with other noise: the scatter of a constant is its standard error, and 95 % of the
+    intervals hold the true one."""
+    true, l = fx.MooneyRivlin(c10=0.3, c01=0.05), np.linspace(0.7, 3.0, 30)
+    noise = 0.01 * np.random.default_rng(1).standard_normal((60, 2, len(l)))
+    fits = [fx.fit(true, {m: (l, true.stress(m, l) + x) for m, x in zip(("uniaxial", "equibiaxial"), each)})
+            for each in noise]
+    for name, value in true.parameters.items():
+        found = np.array([f.material.parameters[name] for f in fits])
+        assert np.mean([f.errors[name] for f in fits]) == pytest.approx(found.std(), rel=0.25)      # 60 are few
+        inside = [low < value < high for low, high in (f.intervals()[name] for f in fits)]
+        assert 0.88 <= np.mean(inside) <= 1
+    assert fits[0].undetermined == () and fits[0].points == 60
+
+
+def test_what_the_data_leave_open_is_named():
+    """No limit in the data, a second term that is not needed, a constant of I2 from one test of small strain."""
+    neo_hookean = measured(fx.NeoHookean(c10=0.3), reach=2.0)
+    gent = fx.fit(fx.Gent, neo_hookean)
+    assert gent.undetermined == ("Jm",) and "do not determine Jm" in str(gent)
+    assert {"mu2", "alpha2"} <= set(fx.fit(fx.Ogden, neo_hookean, terms=2).undetermined) \
+        or {"mu1", "alpha1"} <= set(fx.fit(fx.Ogden, neo_hookean, terms=2).undetermined)
+    small = np.linspace(0.98, 1.02, 9)
+    rubber = fx.MooneyRivlin(c10=0.3, c01=0.05)
+    assert "c01" in fx.fit(fx.MooneyRivlin, {"uniaxial": (small, rubber.stress("uniaxial", small))}).undetermined
+    assert fx.fit(fx.MooneyRivlin, measured(rubber)).undetermined == ()
+    assert fx.fit(fx.Gent, fx.treloar1944()).undetermined == ()
+
+
+def test_file_and_picture(tmp_path):
+    data, file = fx.treloar1944(), tmp_path / "treloar.csv"
+    rows = [f"{mode}, {x!r}, {y!r}" for mode, (l, P) in data.items() for x, y in zip(l.tolist(), P.tolist())]
+    file.write_text("# Treloar (1944)\ntest, stretch, stress (MPa)\n" + "\n".join(rows) + "\n")
+    found = fx.fit(fx.Gent, file)
+    assert found.material.parameters == fx.fit(fx.Gent, data).material.parameters
+    axes = found.plot(unit="MPa")
+    assert len(axes.lines) == 6 and axes.get_ylabel() == "nominal stress (MPa)"
+    assert axes.lines[0].get_xdata() == pytest.approx(data["uniaxial"][0])
+
+
+@pytest.mark.parametrize("text, words", [
+    ("", "has no rows"), ("test,stretch,stress\n", "has no rows"),
+    ("uniaxial,1.5\n", "line 1: has 2 columns"),
+    ("uniaxial,1.5,0.2\nuniaxial,2.0\n", "line 2: has 2 columns"),
+    ("uniaxial;1,5;0,2\n", "line 1: '1,5': must be a number with a decimal point"),
+    ("test,stretch,stress\nbiaxial,1.5,0.2\n", "line 2: test 'biaxial' is not known"),
+    ("uniaxial,1.5,\n", "line 1: '': must be a number"),
+])
+def test_bad_file(tmp_path, text, words):
+    (tmp_path / "t.csv").write_text(text)
+    with pytest.raises(fx.InputError, match=words):
+        fx.fit(fx.NeoHookean, str(tmp_path / "t.csv"))
+
+
+def test_no_file(tmp_path):
+    with pytest.raises(fx.InputError, match="cannot be read"):
+        fx.fit(fx.NeoHookean, tmp_path / "none.csv")
+    with pytest.raises(fx.InputError, match="needs a fourth column"):
+        (tmp_path / "t.csv").write_text("uniaxial,1.5,0.2\n")
+        fx.fit(fx.Viscoelastic, tmp_path / "t.csv")
+
+
 L, P = np.array([1.1, 1.5, 2.0]), np.array([0.1, 0.4, 0.7])
 GENT = fx.Gent(mu=1.0, Jm=1.0)
 

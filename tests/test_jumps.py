@@ -6,6 +6,7 @@ from scipy import integrate, optimize
 
 import formingx as fx
 from formingx import tools
+from formingx.physics.contact import SOFTER
 from formingx.solve import jump
 
 
@@ -66,8 +67,8 @@ def test_what_a_balloon_loses_is_the_work_of_the_pressure_less_the_energy_gained
     assert lost == pytest.approx(work - (after.measures["strain_energy"] - before.measures["strain_energy"]), rel=6e-2)
 
 
-def plug(mu=3.0, thickness=1 / 3):
-    """A flat plug with a fillet on a clamped sheet: with these, points that leave the edge find no state nearby."""
+def plug(mu=1.0, thickness=0.5):
+    """A flat plug with a fillet on a clamped sheet: points that leave its edge find no state nearby."""
     mesh = fx.mesh.disc(radius=10.0, thickness=thickness, elements=(60, 2), concentrate={1.5: 0.2, 2.5: 0.2})
     tool = tools.male(radius=2.5, height=60.0, base=-60.0, fillet=0.5).mirrored().moved(z=thickness)
     return fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=0.4, c01=0.04),
@@ -95,34 +96,34 @@ def balance(path):
 
 @pytest.fixture(scope="module")
 def rough():
-    return pushed(3.5)
+    """A path with a jump."""
+    path = pushed(7.2)
+    assert len(path.jumps) >= 1
+    return path
 
 
 def test_a_rough_plug_goes_on_where_points_leave_its_edge(rough):
-    assert rough["travel"][-1] == pytest.approx(3.5, rel=1e-12)
+    assert rough["travel"][-1] == pytest.approx(7.2, rel=1e-12)
     assert np.all(np.diff(rough["travel"]) > 0)
     assert all(state.jump["dissipated"] > 0 and state.jump["moved"] > 0 for state in rough.jumps)
 
 
 def test_friction_keeps_its_law_through_jumps(rough):
-    contact, n = rough.problem.contacts[0], rough.problem.forms.space.dofmap.index_map.size_local
+    """The elastic slip that is remembered gives no more than mu N, and mu N where points slide."""
+    contact, n, most = rough.problem.contacts[0], rough.problem.forms.space.dofmap.index_map.size_local, 0.0
+    law = contact.law
     for state in rough.states:
         with rough.problem.at(state):
-            found = contact.law.tractions(contact.positions(state.x[:n], state.control), contact.touch)
-        assert np.all(np.abs(found.tangential) <= 3.0 * found.normal * (1 + 1e-9) + 1e-12)
+            F, slope = law.ramp(law.distance(contact.positions(state.x[:n], state.control)))
+            share = SOFTER * slope * np.abs(contact.touch.slip) / np.where(F > 0, law.mu * F, 1.0)
+        assert np.all(share[F > 0] <= 1 + 1e-6)
+        most = max(most, share[F > 0].max(initial=0.0))
+    assert most == pytest.approx(1.0, rel=1e-6)
 
 
 def test_work_is_energy_and_friction_and_what_jumps_lose(rough):
     work, energy, slips, lost = balance(rough)
-    assert work == pytest.approx(energy + slips + lost, rel=5e-3)
-
-
-@pytest.mark.slow
-def test_a_plug_that_stopped_arrives_by_a_jump():
-    path = pushed(7.5, plug(mu=1.0, thickness=0.5))
-    work, energy, slips, lost = balance(path)
-    assert path.jumps and all(state.jump["dissipated"] > 0 for state in path.jumps)
-    assert path.counts.iterations < 400
+    assert slips > 0 and lost > 1e-3 * work
     assert work == pytest.approx(energy + slips + lost, rel=1e-3)
 
 
@@ -130,7 +131,7 @@ def test_a_plug_that_stopped_arrives_by_a_jump():
 def test_where_a_jump_ends_does_not_depend_on_how_eta_falls(rough, monkeypatch):
     monkeypatch.setattr(jump, "_FIRST", 1e4)
     monkeypatch.setattr(jump, "_FALLS", 0.5)
-    other = pushed(3.5)
+    other = pushed(7.2)
     assert len(other.jumps) == len(rough.jumps)
     assert other["tool_force"][-1] == pytest.approx(rough["tool_force"][-1], rel=1e-4)
 

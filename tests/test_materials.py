@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 
 import basix.ufl
 import numpy as np
@@ -282,3 +283,18 @@ def test_isotropy_holds_for_every_material():
         P, Q = (material.response.stress(np.array([[a], [b]]), material.parameters.values())[:, 0]
                 for a, b in (l, l[::-1]))
         assert P[::-1] == pytest.approx(Q, rel=1e-12)
+
+
+def test_published_constants():
+    """Each has a source with a year, and the modulus that the source gives, in MPa."""
+    found = fx.published()
+    assert all(re.search(r"(19|20)\d\d", p.source) and p.unit == "MPa" for p in found.values())
+    c10 = {name: p.material.parameters["c10"] for name, p in found.items()}
+    assert c10["PMMA 160 C"] == pytest.approx(0.448, abs=5e-4)             # as given in MPa beside the psi
+    assert c10["natural rubber, 0.25 mm"] == pytest.approx(0.1213, abs=5e-5)
+    assert c10["natural rubber, 0.76 mm"] == pytest.approx(0.1731, abs=5e-5)
+    assert c10["natural rubber, Mooney"] == pytest.approx(0.143, abs=5e-4)
+    assert found["natural rubber, Mooney"].material.parameters["c01"] == pytest.approx(0.03327, abs=5e-6)
+    sheet = found["natural rubber, Treloar's sheet"].material              # his own equibiaxial data up to stretch 3
+    l, P = (x[:11] for x in fx.treloar1944()["equibiaxial"])
+    assert sheet.stress("equibiaxial", l) == pytest.approx(P, abs=0.05)

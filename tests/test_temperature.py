@@ -130,18 +130,19 @@ def test_a_sheet_cools_while_it_waits():
     points = np.array([[0.0, 0.0], [0.01, 1e-3]])
     with path.problem.at(path.last):
         assert scene.temperature.at(points) == pytest.approx(alone.at(points)[-1], abs=0.05)
-        stiffer = path.problem.forms.coefficients["sheet", "c10"].x.array.min()
+        stiffer = path.problem.forms.coefficients["sheet", "c10"].x.array.max()
     with path.problem.at(path.states[0]):
         assert np.all(scene.temperature.T.x.array == 150.0)
-        assert path.problem.forms.coefficients["sheet", "c10"].x.array.min() == pytest.approx(0.6e6) < 0.95 * stiffer
+        assert path.problem.forms.coefficients["sheet", "c10"].x.array == pytest.approx(0.6e6)
+    assert stiffer > 0.7e6
 
 
 def test_a_sheet_that_cools_needs_more_pressure():
-    def pressure(h):
+    def height(h):
         scene = cooled(h=h)
         blow = fx.Stage("blow", drive=scene.loads[0], until=fx.pressure(6e4), duration=2.0)
         return fx.Process(scene).run([blow], progress=False, accuracy="draft").last.measures["pole_height"]
-    assert pressure(100.0) < 0.98 * pressure(0.0)
+    assert height(100.0) < 0.98 * height(0.0)
 
 
 def test_a_tool_takes_heat_only_where_and_while_it_touches():
@@ -153,5 +154,5 @@ def test_a_tool_takes_heat_only_where_and_while_it_touches():
     with path.problem.at(path.met(fx.travel(0.4e-3))):
         assert np.all(np.abs(scene.temperature.T.x.array - 150.0) < 1e-9)        # it has not come to the sheet yet
     with path.problem.at(path.last):
-        under, beside = scene.temperature.at(np.array([[0.0, 1e-3], [0.019, 1e-3]]))
-    assert under < 130 and beside > 149.9
+        *under, beside = scene.temperature.at(np.array([[R, 1e-3] for R in (0.0, 0.002, 0.004, 0.006, 0.019)]))
+    assert min(under) < 110 and beside > 149.9, under

@@ -381,7 +381,7 @@ def test_plot():
 @pytest.mark.parametrize("make, words", [
     (lambda: Viscoelastic(RUBBER, []), "branches = .*must be at least one"),
     (lambda: Viscoelastic(RUBBER, [(0.5, 0.0)]), "tau_1 = 0.0: must be greater than 0"),
-    (lambda: Viscoelastic(RUBBER, [(0.5, 1.0), (-1, 1)]), "mu_2 = -1: must be greater than 0"),
+    (lambda: Viscoelastic(RUBBER, [(0.5, 1.0), (-1, 1)]), "mu_2 = -1.0: must be greater than 0"),
     (lambda: Viscoelastic(RUBBER, [(0.5, 1.0, 2.0)]), "number 1 is .0.5, 1.0, 2.0.: must be .mu, tau."),
     (lambda: Viscoelastic(RUBBER, 3), "must be a list of .mu, tau."),
     (lambda: Viscoelastic("rubber", P0), "must be a material, or None"),

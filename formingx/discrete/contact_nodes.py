@@ -84,7 +84,11 @@ class ContactNodes:
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Nodes seen from the tool, shape (n, 2), length; `fields`: owned unknowns."""
-        return self.points + self._length * self.displacement(fields) - (self.base + self.rate * control) * self._motion
+        return self.points + self._length * self.displacement(fields) - self.travelled(control)
+
+    def travelled(self, control: float) -> np.ndarray:
+        """How far the tool has moved in (r, z), shape (2,), length."""
+        return (self.base + self.rate * control) * self._motion
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
         """What the law gives at a state, computed once for it."""
@@ -253,13 +257,13 @@ class ContactNodes:
 
     def _arrivals(self, start: np.ndarray, velocity: np.ndarray, length: float) -> np.ndarray:
         """Arc length at which free nodes meet the ramp, `length` if they do not before, shape (n,)."""
-        before = -self.law.theta - self.law.distance(start)
-        free, at, times = ~self.law.touching(start, self.touch) & (self.area > 0), 0.0, np.full(len(start), length)
-        for s in length * np.linspace(0, 1, 17)[1:]:
-            now = -self.law.theta - self.law.distance(start + s * velocity)
-            hit = free & (now <= 0)
-            times[hit] = at + (s - at) * before[hit] / (before[hit] - now[hit])
-            free, before, at = free & ~hit, now, s
+        at, times = length * np.linspace(0, 1, 17), np.full(len(start), length)
+        gap = -self.law.theta - self.law.distance(start + at[:, None, None] * velocity)         # shape (17, n)
+        free = ~self.law.touching(start, self.touch) & (self.area > 0)
+        hit = np.flatnonzero(free & (gap[1:] <= 0).any(0))
+        k = np.argmax(gap[1:, hit] <= 0, axis=0)
+        before, now = gap[k, hit], gap[k + 1, hit]
+        times[hit] = at[k] + (at[k + 1] - at[k]) * before / (before - now)
         return times
 
     def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:

@@ -7,11 +7,15 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 
+from ..errors import InputError
 from .contact_nodes import ContactNodes
 
 
 class ContactPoints(ContactNodes):
     """`ContactNodes`, at `contact.points` Gauss points of each facet.
+
+    Raises:
+        InputError: there is more than one rank (a facet's nodes may belong to another).
 
     Attributes:
         dofs: local numbers of (u_r, u_z) of the three nodes of the facet that each point is on, shape (n, 6).
@@ -19,6 +23,9 @@ class ContactPoints(ContactNodes):
     """
 
     def _place(self, assemble: Any) -> None:
+        if self._comm.size > 1:
+            raise InputError(f"Contact({self.contact.on!r}): points = {self.contact.points!r}, {self._comm.size} ranks:"
+                             " contact at Gauss points runs in one process; use points='nodes' under mpirun")
         solid, mesh = self.solid, self.solid.scene.mesh
         vectors, numbers = solid.space.sub(0).collapse()
         numbers, X = np.asarray(numbers, dtype=np.int32).reshape(-1, 2), vectors.tabulate_dof_coordinates()[:, :2]

@@ -83,6 +83,7 @@ class Problem:
                                       [row for _, row in self._constraints.means], self.comm, self.symmetric)
         self.matrix = self._matrix.mat
         self.x = self.matrix.createVecRight()
+        self._foretold: tuple[Any, dict[int, Any]] = None, {}   # x, and what histories would remember there
         self._stage: Any = None
         self.enter(Setting.first(scene), np.zeros(self.x.getLocalSize()), 0.0)
         self._metric = np.maximum(self.assemble(forms.compile(forms.metric_row())), 0)
@@ -155,6 +156,7 @@ class Problem:
 
     @memory.setter
     def memory(self, memory: list[Any]) -> None:
+        self._foretold = None, {}
         for history, remembered in zip(self.histories, memory, strict=True):
             history.put(remembered)
 
@@ -294,8 +296,13 @@ class Problem:
         if self.forms.histories:
             self.forms.control.value = control
             self._set_own(x)
-        for history in self.histories:
-            history.advance(x[: self._n], control)
+        known = self._foretold[1] if self._foretold[0] is x else {}
+        for k, history in enumerate(self.histories):
+            if k in known:
+                history.put(known[k])
+            else:
+                history.advance(x[: self._n], control)
+        self._foretold = None, {}
 
     def foretell(self, x: np.ndarray, control: float) -> dict[int, Any]:
         """{number of a material's history: what it would remember, were a state accepted}."""
@@ -303,7 +310,9 @@ class Problem:
         if relaxing:
             self.forms.control.value = control
             self._set_own(x)
-        return {k: history.foretell(control) for k, history in relaxing.items()}
+        found = {k: history.foretell(control) for k, history in relaxing.items()}
+        self._foretold = x, found
+        return found
 
     def reach(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step of at most `length` from x along (direction, slope) may be. Arrays: own part."""
@@ -422,4 +431,5 @@ class Problem:
             self._lift.x.array[stage.active.dofs] = np.append(setting.rate, 0.0)[stage.active.driver]
 
     def _dot(self, a: np.ndarray, b: np.ndarray) -> float:
-        return float(self.comm.allreduce(float(np.dot(a, b)), MPI.SUM))
+        own = float(np.dot(a, b))
+        return own if self.comm.size == 1 else float(self.comm.allreduce(own, MPI.SUM))

@@ -69,6 +69,7 @@ class Conduction:
         self._scale, self._c = self.constant(1.0), self.constant(1.0)
         self._buffer = la.vector(self.space.dofmap.index_map, 1)
         self._factored_for: float | None = None
+        self._displaced: Any = None
         self._deform()
         one = self.constant(1.0)
         self.volume = self._integral(one * self._weight * self._dx)
@@ -100,7 +101,7 @@ class Conduction:
         for touch, area in zip(self.touches, self._areas):
             touch.area = self._assemble(area)[touch.dofs]
         for source, depth in self._sources:
-            depth.x.array[: self._n] = distance_to_line(self._moved(self.points, self._where_all()),
+            depth.x.array[: self._n] = distance_to_line(self._moved(self.points, self.displacements()),
                                                         self._face_line(source.on))
             depth.x.scatter_forward()
 
@@ -270,13 +271,15 @@ class Conduction:
         own = dofs[dofs < self._n]
         return Touch(contact, own, self.points[own])
 
-    def _where_all(self) -> Any:
+    def displacements(self) -> Any:
         """Displacements of the owned nodes, shape (n, 2), or None."""
         if self._u is None:
             return None
-        space = fem.functionspace(self.mesh.domain, ("Lagrange", 2, (2,)))
-        u = fem.Function(space)
-        u.interpolate(fem.Expression(self._u, _compat.interpolation_points(space)))
+        if self._displaced is None:
+            space = fem.functionspace(self.mesh.domain, ("Lagrange", 2, (2,)))
+            self._displaced = fem.Function(space), fem.Expression(self._u, _compat.interpolation_points(space))
+        u, expression = self._displaced
+        u.interpolate(expression)
         return u.x.array.reshape(-1, 2)[: self._n]
 
     @staticmethod
@@ -286,7 +289,7 @@ class Conduction:
     def _face_line(self, boundary: str) -> np.ndarray:
         """The deformed nodes of a boundary one after the other, shape (k, 2), all ranks."""
         line = self.mesh.line_of(boundary)
-        u = self._where_all()
+        u = self.displacements()
         if u is None:
             return line
         from scipy.spatial import cKDTree

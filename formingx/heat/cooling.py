@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import ConvergenceError, InputError, known, positive, several
+from ..tables import Table
 from ..time_temperature import ABSOLUTE_ZERO
 from . import stepping
 from .boundaries import ThermalProperties
@@ -16,8 +17,9 @@ from .contact import ConductingTool, ContactWithTool
 from .run import checked_boundaries, checked_materials
 
 _MOST_STEPS = 10_000
-_NEAR = 1e-3
-"""Distance to a tool over the thickness of the body within which a node touches it."""
+_NEAR = 1e-2
+"""Distance to a tool over the thickness of the body within which a node touches it, for heat: so thin a layer of air
+conducts as well as a contact does. (A sheet that is drawn over a flat face lifts off its middle by less.)"""
 
 
 class ToolHeat(NamedTuple):
@@ -99,11 +101,13 @@ class CoolingHistory:
                                 checked_boundaries(scene.mesh, [*cooling.boundaries, *touches], self._zero),
                                 scene.kinematics, self._zero, forms.u)
         touching = [c for c in problem.contacts if c.contact.name in cooling.tools]
-        self._touches = [(touch, nodes, touch.conductance.copy(), _rows(touch.points, self._gathered(nodes.points)))
-                         for touch, nodes in zip(self._body.touches, touching, strict=True)]
+        self._touches = [(touch, contact, touch.conductance.copy())
+                         for touch, contact in zip(self._body.touches, touching, strict=True)]
         self._n = len(self._body.points)
         self._first = scene.temperature.first[: self._n].copy()
         self._seen: Any = None                              # by the constants of this problem
+        ends = problem.comm.allgather((self._first.min(initial=np.inf), self._first.max(initial=-np.inf)))
+        scene.temperature.limits = _extremes([*np.ravel(ends)], [*cooling.boundaries, *touches])
         self._dt: float | None = None
         self.start()
 
@@ -118,9 +122,10 @@ class CoolingHistory:
         until = self._forms.time_at(control)
         if until <= self._time:
             return
-        for touch, nodes, conductance, order in self._touches:
-            distance = self._gathered(nodes.contact.tool.signed_distance(nodes.positions(x, control)))[order]
-            touch.conductance[:] = conductance * (nodes.present & (distance > -_NEAR * nodes.thickness))
+        u = self._body.displacements()
+        for touch, contact, conductance in self._touches:
+            depth = contact.contact.tool.signed_distance(touch.points + u[touch.dofs] - contact.travelled(control))
+            touch.conductance[:] = conductance * (contact.present & (depth > -_NEAR * contact.thickness))
         self._body.update()
         self._go(until)
         self._take(self._state[0])
@@ -180,6 +185,19 @@ class CoolingHistory:
             self._seen = here[:] = T
             self._T.x.scatter_forward()
             self._forms.take_temperature()
+
+
+def _extremes(temperatures: list[float], laws: Sequence[Any]) -> tuple[float, float]:
+    """Between which a body of these temperatures stays under these laws, by the maximum principle."""
+    for law in laws:
+        if not getattr(law, "temperatures", ()):            # heat from elsewhere
+            return -np.inf, np.inf
+        touches = isinstance(law, ContactWithTool)
+        for value in [law.tool] if touches else [law.parameters[name] for name in law.temperatures]:
+            found: Any = (value.y.tolist() if isinstance(value, Table) else
+                          [value.back, value.start] if isinstance(value, ConductingTool) else [value])
+            temperatures += found
+    return min(temperatures), max(temperatures)
 
 
 def _rows(points: np.ndarray, others: Any) -> np.ndarray:

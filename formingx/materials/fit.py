@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, known
+from ..errors import InputError, finite, known, place
 from . import homogeneous
-from .fit_in_time import fitted_in_time
+from .fit_in_time import TimedTest, fitted_in_time
+from .fit_plot import plotted
 from .material import Material
+from .measured import read_tests
+from .uncertainty import uncertainty
 from .viscoelastic import RelaxingMaterial
 
 _FIRST, _LAST = 20, 400
@@ -22,13 +26,36 @@ class Fit(NamedTuple):
     material: the material with the fitted constants, in the data's unit of stress.
     rms: {test: root mean square of the nominal stress' residual}, same unit; tests in time are numbered.
     rms_total: the same over all points of all tests: what was made small.
-    undetermined: of tests in time, the names of the constants that they leave open.
+    errors: {constant: its standard error}, from the misfit and the derivatives at the optimum; see `uncertainty`.
+    undetermined: the names of the constants that the tests leave open: with a noise of 1 % of the largest stress, or
+        with the misfit if that is more, the standard error is above half of the constant.
+    points: number of measured stresses.
+    data: the tests, as `fit` takes them.
     """
 
     material: Material
     rms: dict[str, float]
     rms_total: float
-    undetermined: tuple[str, ...] = ()
+    errors: dict[str, float]
+    undetermined: tuple[str, ...]
+    points: int
+    data: Any
+
+    def intervals(self, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
+        """{constant: (lowest, highest)} by Student's t, as if the stresses were linear in the constants."""
+        from scipy.stats import t
+        if not 0 < finite("intervals: confidence", confidence) < 1:
+            raise InputError(f"intervals: confidence = {confidence!r}: must be between 0 and 1")
+        width = t.ppf((1 + confidence) / 2, max(self.points - len(self.errors), 1))
+        return {name: (value - width * self.errors[name], value + width * self.errors[name])
+                for name, value in self.material.parameters.items()}
+
+    def plot(self, axes: Any = None, unit: str = "", unit_of_time: str = "s") -> Any:
+        """Draw the data and the material's nominal stress against stretch (held tests: time); returns the axes.
+
+        With tests that are held and tests that are not, two axes are needed: `axes` is then a pair of them.
+        """
+        return plotted(self.material, self.data, axes, unit, unit_of_time)
 
     def __str__(self) -> str:
         parts = ", ".join(f"{mode} {value:.4g}" for mode, value in self.rms.items())
@@ -48,6 +75,10 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
         data: {test: (stretch, nominal stress)}, each of shape (n,), for any of "uniaxial", "pure_shear" (planar)
             and "equibiaxial". Force over reference area, in any unit: the constants get the same.
             For a material that relaxes: a list of `TimedTest`.
+            Or the name of a CSV file with the columns test, stretch, nominal stress, separated by commas or semicolons,
+            names of the columns in the first line or not, # before remarks; for a material that relaxes a fourth
+            column with the time, in which each test begins where the time falls (rows as of `TimedTest`, a stress that
+            was not measured left empty).
         terms: number of terms if `material` is the class `Ogden`, default 3; number of branches if it is one that
             relaxes (its equilibrium is then neo-Hookean), default as many as the data determine.
 
@@ -56,12 +87,21 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
             all at stretch 1, stresses or stretches that are no test's, or beyond every
             admissible limit.
     """
-    from scipy.optimize import least_squares
-
     if isinstance(material, RelaxingMaterial) or isinstance(material, type) and issubclass(material, RelaxingMaterial):
-        relaxing, misfits, undetermined = fitted_in_time(material, data, terms)
-        numbered = {f"{i} {test.mode}": _rms(m) for i, (test, m) in enumerate(zip(data, misfits), 1)}
-        return Fit(relaxing, numbered, _rms(np.concatenate(misfits)), undetermined)
+        tests = _tests_in_time(data) if isinstance(data, str | os.PathLike) else data
+        relaxing, misfits, errors, undetermined = fitted_in_time(material, tests, terms)
+        numbered = {f"{i} {test.mode}": _rms(m) for i, (test, m) in enumerate(zip(tests, misfits), 1)}
+        every = np.concatenate(misfits)
+        return Fit(relaxing, numbered, _rms(every), errors, undetermined, len(every), tests)
+    tests = _tests(data) if isinstance(data, str | os.PathLike) else data
+    best, misfit, parts, (errors, undetermined) = _fitted(material, tests, terms)
+    rms = {mode: _rms(misfit[part]) for mode, part in parts.items()}
+    return Fit(best, rms, _rms(misfit), errors, undetermined, len(misfit), tests)
+
+
+def _fitted(material: Any, data: Any, terms: int | None) -> tuple[Material, np.ndarray, dict[str, slice], tuple]:
+    """(the material, misfits of all points, where each test is in them, errors and what is open)."""
+    from scipy.optimize import least_squares
     stretches, measured, parts = _checked(data)
     guesses = _guesses(material, stretches, measured, terms)
     response, n = guesses[0].response, len(guesses[0].parameters)
@@ -94,8 +134,26 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
                          f" limit lies beyond them")
     best = guess.with_constants(guess.constants_at(x))
     misfit = response.stress(stretches, best.parameters.values())[0] - measured
-    rms = {mode: _rms(misfit[part]) for mode, part in parts.items()}
-    return Fit(best, rms, _rms(misfit))
+    return best, misfit, parts, uncertainty(lambda x: response.stress(stretches, x)[0], best.parameters, measured)
+
+
+def _tests(file: Any) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """{test: (stretch, stress)} of a file; a fourth column is not for a material without time."""
+    found: dict[str, list] = {}
+    for mode, columns in read_tests(place("fit: data", file)):
+        if len(columns) != 2:
+            raise InputError(f"fit: data: {file}: has times; a material that does not relax has none: leave the column"
+                             f" out")
+        found.setdefault(mode, []).append(columns)
+    return {mode: tuple(np.hstack(parts)) for mode, parts in found.items()}
+
+
+def _tests_in_time(file: Any) -> list[TimedTest]:
+    tests = read_tests(place("fit: data", file))
+    if any(len(columns) != 3 for _, columns in tests):
+        raise InputError(f"fit: data: {file}: has no times: a material that relaxes needs a fourth column with"
+                         f" the time")
+    return [TimedTest(mode, times, stretches, stress) for mode, (stretches, stress, times) in tests]
 
 
 def _guesses(material: Any, stretches: np.ndarray, measured: np.ndarray, terms: int | None) -> list[Material]:

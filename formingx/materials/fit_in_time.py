@@ -16,23 +16,23 @@ from ..errors import InputError, count, positive, several
 from . import branches, homogeneous
 from .hyperelastic import NeoHookean
 from .material import Material
+from .uncertainty import uncertainty
 from .viscoelastic import RelaxingMaterial
 
 _PER_DECADE = 16
 """Relaxation times a decade at which a branch's stress is computed; between them a cubic spline."""
 
-_NOISE, _OPEN = 0.01, 0.5
-"""A constant is open if a noise of this share of the largest stress, or of the misfit, leaves it so far uncertain."""
-
 
 class TimedTest(NamedTuple):
     """A homogeneous test in time, the body at rest before.
 
-    mode: "uniaxial", "pure_shear" or "equibiaxial".
-    times: shape (n,), not falling; a stretch that changes while the time does not is put on at once, and so is the
-        first one.
-    stretches: shape (n,). stress: nominal, shape (n,); not a number where it was not measured.
-    between: what grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
+    Args:
+        mode: "uniaxial", "pure_shear" or "equibiaxial".
+        times: shape (n,), not falling; a stretch that changes while the time does not is put on at once, and so is the
+            first one.
+        stretches: shape (n,).
+        stress: nominal, shape (n,); not a number where it was not measured.
+        between: what grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
     """
 
     mode: str
@@ -56,8 +56,9 @@ class TimedTest(NamedTuple):
 
 
 def fitted_in_time(material: type[RelaxingMaterial] | RelaxingMaterial, tests: Any,
-                   terms: int | None = None) -> tuple[RelaxingMaterial, list[np.ndarray], tuple[str, ...]]:
-    """(the material, the misfit of every test, the names of the constants that the tests leave open); see `fit`."""
+                   terms: int | None = None
+                   ) -> tuple[RelaxingMaterial, list[np.ndarray], dict[str, float], tuple[str, ...]]:
+    """(the material, the misfit of every test, standard errors, the names of the constants left open); see `fit`."""
     data = _Data(tests, material if isinstance(material, type) else type(material))
     if isinstance(material, RelaxingMaterial):
         if terms is not None:
@@ -69,12 +70,12 @@ def fitted_in_time(material: type[RelaxingMaterial] | RelaxingMaterial, tests: A
         best = _refined(data, _first(material), 1)
         for n in range(2, 11):                  # a branch more while the misfit falls and the data determine all
             more = _refined(data, _first(material), n)
-            if more[1] > 0.8 * best[1] or data.undetermined(more[0]):
+            if more[1] > 0.8 * best[1] or data.uncertainty(more[0])[1]:
                 break
             best = more
     found = best[0]
     misfits = [found.stress(t.mode, t.stretches, times=t.times, between=t.between) - t.stress for t in data.tests]
-    return found, [m[np.isfinite(m)] for m in misfits], data.undetermined(found)
+    return found, [m[np.isfinite(m)] for m in misfits], *data.uncertainty(found)
 
 
 def _first(kind: type[RelaxingMaterial]) -> RelaxingMaterial:
@@ -110,27 +111,24 @@ class _Data:
                 for t, m in zip(self.tests, measured)]
         self.branch: Callable = CubicSpline(self.log_tau, np.concatenate(unit), axis=1)
 
-    def relaxed(self, material: Material | None) -> np.ndarray:
-        """Nominal stress of an equilibrium energy at all points; not finite beyond its limit."""
+    def relaxed(self, material: Material | None, constants: Any = None) -> np.ndarray:
+        """Nominal stress of an equilibrium energy at all points, its constants or others; not finite beyond its limit.
+        """
         if material is None:
             return np.zeros(len(self.stress))
-        return material.response.stress(self._stretches, material.parameters.values())[0]
+        values = material.parameters.values() if constants is None else constants
+        return material.response.stress(self._stretches, values)[0]
 
-    def residual(self, material: RelaxingMaterial) -> np.ndarray:
-        """Misfit over the largest stress."""
-        mu, tau = np.array(material.branches).T
-        return (self.relaxed(material.equilibrium) + self.branch(np.log(tau)) @ mu - self.stress) / self.scale
+    def stresses(self, material: RelaxingMaterial, constants: np.ndarray) -> np.ndarray:
+        """Nominal stress at all points of a material with other constants, which are not checked."""
+        n = len(constants) - 2 * len(material.branches)
+        mu, tau = constants[n::2], constants[n + 1::2]
+        log_tau = np.clip(np.log(tau), self.log_tau[0], self.log_tau[-1])
+        return self.relaxed(material.equilibrium, constants[:n]) + self.branch(log_tau) @ mu
 
-    def undetermined(self, material: RelaxingMaterial) -> tuple[str, ...]:
-        """The names of the constants whose standard error is more than half of their size."""
-        values, first = np.array(list(material.parameters.values())), self.residual(material)
-        moved = [material.with_constants(values * (1 + 1e-4 * unit)) for unit in np.eye(len(values))]
-        slopes = np.stack([self.residual(cast(RelaxingMaterial, m)) - first for m in moved], axis=1) / 1e-4
-        sizes = np.linalg.norm(slopes, axis=0)
-        _, s, V = np.linalg.svd(slopes / np.maximum(sizes, 1e-300), full_matrices=False)
-        noise = max(_NOISE, np.sqrt(np.mean(first**2)))
-        errors = noise * np.sqrt(np.sum((V / np.maximum(s, 1e-8)[:, None]) ** 2, axis=0)) / np.maximum(sizes, 1e-300)
-        return tuple(name for name, error in zip(material.parameters, errors) if error > _OPEN)
+    def uncertainty(self, material: RelaxingMaterial) -> tuple[dict[str, float], tuple[str, ...]]:
+        """See `uncertainty`."""
+        return uncertainty(lambda x: self.stresses(material, x), material.parameters, self.stress)
 
 
 def _refined(data: _Data, material: RelaxingMaterial, n: int) -> tuple[RelaxingMaterial, float]:
@@ -148,7 +146,7 @@ def _refined(data: _Data, material: RelaxingMaterial, n: int) -> tuple[RelaxingM
         x = np.clip(x, bounds[0] + 1e-9 * np.abs(x) + 1e-300, bounds[1] - 1e-9 * np.abs(x))
 
         def residual(x, start=start):
-            return data.residual(start.with_constants(start.constants_at(x)))
+            return (data.stresses(start, np.array(start.constants_at(x))) - data.stress) / data.scale
 
         if not np.all(np.isfinite(residual(x))):                # beyond the limit of the equilibrium energy
             continue

@@ -24,13 +24,14 @@ from ..physics import kinematics
 from . import branches as tests
 from .constants import OfTemperature, Sample, varying
 from .homogeneous import MODES
+from .in_time import HistoryTests
 from .material import Material
 
 Entries = tuple[Any, Any, Any, Any]
 _IDENTITY = (1.0, 1.0, 0.0, 1.0)
 
 
-class RelaxingMaterial(Material):
+class RelaxingMaterial(HistoryTests, Material):
     """An equilibrium energy and relaxing branches, whatever the law of the branches.
 
     The constants are those of the equilibrium energy, then mu_1, tau_1, mu_2, ... As a material without time
@@ -203,28 +204,6 @@ class RelaxingMaterial(Material):
         """Nominal stress over mu, shape (n, branches), of branches with these tau; see `branches.elastic_strains`."""
         w = tests.elastic_strains(cls._flow, tau, mode, times, stretches, between, accuracy)
         return (np.exp(2 * w[..., 0]) - np.exp(2 * w[..., 2])) / stretches[:, None]
-
-    def relaxation(self, mode: str, stretch: float, times: Any) -> np.ndarray:
-        """Nominal stress at times (any shape, at least 0) after a stretch was put on at once, and held; stress."""
-        t = np.asarray(times, float)
-        if not np.all(t >= 0):
-            raise InputError(f"{self}: relaxation: times = {times!r}: must not be negative")
-        ordered, back = np.unique(np.append(0.0, t.ravel()), return_inverse=True)
-        held = np.full(len(ordered), positive(f"{self}: relaxation: stretch", stretch))
-        return self.stress(mode, held, times=ordered)[back[1:]].reshape(t.shape)[()]
-
-    def constant_rate(self, mode: str, rate: float, stretches: Any) -> np.ndarray:
-        """Nominal stress at stretches, shape (n,), all above or all below 1, met at a constant Hencky rate; stress.
-
-        Args:
-            rate: of the logarithmic strain in the direction pulled, 1/time, above 0 (pushed: of its size).
-        """
-        t = np.abs(np.log(np.asarray(stretches, float))) / positive(f"{self}: constant_rate: rate", rate)
-        ordered, back = np.unique(np.append(0.0, t), return_inverse=True)
-        l = np.exp(ordered * rate * np.sign(np.log(np.sum(stretches) / np.size(stretches))))
-        if not np.allclose(l[back[1:]], stretches, rtol=1e-12):
-            raise InputError(f"{self}: constant_rate: stretches = {stretches!r}: must be all above or all below 1")
-        return self.stress(mode, l, times=ordered, between="strain")[back[1:]]
 
     def plot(self, axes: Any = None, stretches: Any = None, unit: str = "", mode: str = "uniaxial",
              rates: Any = None, unit_of_time: str = "s") -> Any:

@@ -15,7 +15,7 @@ A tool that the body does not separate from holds what has touched it: F(d) = d 
 sign, and max(d + theta, 0) for the others, which carries on without a jump when one arrives.
 
 Contact acts at the nodes of six-node triangles, which are the points of the Gauss-Lobatto rule on a facet (exact
-for the lumped area): there history is read where it lives.
+for the lumped area), or at Gauss points of the facets: history is read where it lives.
 """
 
 from __future__ import annotations
@@ -58,6 +58,8 @@ class Contact(Part):
             start); with "stick" or "none".
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge).
             What sticks depends on when it touched: with more, thickness changes by some 0.1 % of itself.
+        points: where it acts: at the "nodes" of the face, or at so many Gauss points of each facet, which let go one by
+            one: smoother where a sheet slides over an edge (in one process, not under mpirun).
         moves: (r, z) of the tool's motion per unit of travel: the tool is what the run controls; None: it stays.
         name: what it is called in a process and in its columns.
 
@@ -176,6 +178,7 @@ class Law:
     def __init__(self, tool: Tool, mu: float, k: float, theta: float, shift: np.ndarray | float = 0.0,
                  separates: bool = True):
         self.tool, self.mu, self.k, self.theta, self.shift, self.separates = tool, mu, k, theta, shift, separates
+        self._near: tuple[np.ndarray, Nearest] | None = None        # points last asked for, and what was found
 
     def part(self, points: np.ndarray | slice) -> Law:
         """The law of some of its points."""
@@ -196,13 +199,17 @@ class Law:
         return False if self.separates or old is None else old.distance > -self.theta
 
     def distance(self, x: np.ndarray) -> np.ndarray:
-        """Signed distance less the shift of points x, shape (n,), length."""
-        return self.tool.signed_distance(x) - self.shift
+        """Signed distance of points x, shape (n, 2) or several places of each (m, n, 2), less the shift, length."""
+        if x.ndim == 2:
+            return self.nearest(x).distance
+        return self.tool.signed_distance(x).reshape(x.shape[:-1]) - self.shift
 
     def nearest(self, x: np.ndarray) -> Nearest:
-        """`Tool.nearest`, the distances less the shift."""
-        near = self.tool.nearest(x)
-        return near._replace(distance=near.distance - self.shift)
+        """`Tool.nearest` at points x, shape (n, 2), the distances less the shift; found once for the same points."""
+        if self._near is None or not np.array_equal(x, self._near[0]):
+            near = self.tool.nearest(x)
+            self._near = x.copy(), near._replace(distance=near.distance - self.shift)
+        return self._near[1]
 
     def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
         """F(d), eq. (5.13) if the body separates from the tool, and its derivative."""

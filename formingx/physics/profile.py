@@ -156,21 +156,18 @@ class Tool:
     def nearest(self, x: np.ndarray) -> Nearest:
         """Signed distance of points x, shape (n, 2), its gradient and its curvature."""
         x = np.asarray(x, dtype=float).reshape(-1, 2)
-        rel = x[:, None] - self._origin
-        along = np.einsum("ijk,jk->ij", rel, self._along)
-        rho = np.maximum(np.hypot(rel[..., 0], rel[..., 1]), 1e-300)
-        straight = np.isnan(self._radius)
-        angle = np.mod(self._sign * (np.arctan2(rel[..., 1], rel[..., 0]) - self._start), TURN)
-        angle = np.where(angle > TURN - _FLAT, 0.0, angle)
-        with np.errstate(invalid="ignore"):
-            d = np.where(straight, np.einsum("ijk,jk->ij", rel, self._left), self._sign * (self._radius - rho))
-        at = np.where(straight, along, angle)
-        d = np.where((at >= self._low) & (at <= self._high), d, np.inf)
+        rel, arcs = x[:, None] - self._origin, self._arcs
+        at, d = (np.einsum("ijk,jk->ij", rel, way) for way in (self._along, self._left))
+        across, up = rel[:, arcs, 0], rel[:, arcs, 1]
+        angle = np.mod(self._sign[arcs] * (np.arctan2(up, across) - self._start[arcs]), TURN)
+        at[:, arcs] = np.where(angle > TURN - _FLAT, 0.0, angle)
+        d[:, arcs] = self._sign[arcs] * (self._radius[arcs] - np.maximum(np.hypot(across, up), 1e-300))
+        d[(at < self._low) | (at > self._high)] = np.inf
         best, i = np.argmin(np.abs(d), axis=1), np.arange(len(x))
-        s, line = self._sign[best], straight[best]
-        outward = rel[i, best] / rho[i, best][:, None]
-        normal = np.where(line[:, None], self._left[best], -s[:, None] * outward)
-        return Nearest(d[i, best], normal, np.where(line, 0.0, -s / rho[i, best]))
+        s, line, rel = self._sign[best], np.isnan(self._radius[best]), rel[i, best]
+        rho = np.maximum(np.hypot(rel[:, 0], rel[:, 1]), 1e-300)
+        normal = np.where(line[:, None], self._left[best], -s[:, None] * (rel / rho[:, None]))
+        return Nearest(d[i, best], normal, np.where(line, 0.0, -s / rho))
 
     def moved(self, r: float = 0.0, z: float = 0.0) -> Tool:
         """The tool shifted by (r, z), lengths."""
@@ -236,6 +233,7 @@ class Tool:
         self._origin, self._along = (np.array([row[k] for row in rows]) for k in (0, 1))
         self._radius, self._sign, self._start, self._low, self._high = np.array([row[2:] for row in rows], float).T
         self._left = np.column_stack([-self._along[:, 1], self._along[:, 0]])
+        self._arcs = np.flatnonzero(~np.isnan(self._radius))       # and corners: arcs of no radius
 
     def _ends(self) -> tuple:
         """For both ends: (point, turn of the mirrored corner) on R = 0, else None: the profile goes on."""

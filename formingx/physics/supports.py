@@ -63,7 +63,7 @@ class Symmetry(Support):
 class Clamped(Support):
     """All displacements of a boundary are 0.
 
-    The corner of a clamped rim is singular: see the README for the band that this leaves in a limit pressure.
+    The corner of a clamped rim is singular: see docs/verification.md for the band that this leaves in a limit pressure.
     """
 
     holds_rotation = True

@@ -60,7 +60,7 @@ class Path:
 
     @property
     def problem(self) -> Any:
-        """The (last) `Problem`, for further evaluation: `with path.problem.at(state): ...`."""
+        """The (last) `Problem`, for further evaluation at a state, within its `at(state)`."""
         return self.record.problem
 
     def __len__(self) -> int:

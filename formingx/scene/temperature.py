@@ -21,6 +21,8 @@ class BodyTemperature:
     Attributes:
         T: the DOLFINx `Function` (P2). Who changes it calls `take_temperature` of the problem's `forms`.
         first: its values as given, ghosts included.
+        limits: lowest and highest temperature that there can be. Next to a face that is chilled at once quadratic
+            elements overshoot: what lies beyond is cut off where temperatures are read.
 
     Raises:
         InputError: it is not given all over the body.
@@ -33,6 +35,7 @@ class BodyTemperature:
         points = self.T.function_space.tabulate_dof_coordinates()[:, :2]
         self.T.x.array[:] = fields.values_at(given, points, mesh, "Scene: temperature")
         self.first = self.T.x.array.copy()
+        self.limits = (-np.inf, np.inf)
 
     def in_cells(self, cells: np.ndarray, places: np.ndarray, first: bool = False) -> np.ndarray:
         """Temperatures in some cells (local numbers) at places in the reference cell, shape (q, 2): (cells, q).
@@ -41,11 +44,12 @@ class BodyTemperature:
         """
         space = self.T.function_space
         basis = space.element.basix_element.tabulate(0, places)[0, :, :, 0]
-        return (self.first if first else self.T.x.array)[space.dofmap.list[cells]] @ basis.T
+        found = (self.first if first else self.T.x.array)[space.dofmap.list[cells]] @ basis.T
+        return np.clip(found, *self.limits)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """Temperatures at points, shape (n, 2), of this rank's own choice, shape (n,); collective."""
-        return fields.values_at(self.T, points, self._mesh)
+        return np.clip(fields.values_at(self.T, np.asarray(points, dtype=float), self._mesh), *self.limits)
 
     def __repr__(self) -> str:
         return self._text

@@ -47,6 +47,9 @@ class ContactFace:
     """
 
     def __init__(self, path: Any, contact: Any):
+        if contact.contact.points != "nodes":
+            raise InputError(f"contact table: {contact.contact!r} acts at Gauss points: tables are made at nodes, of a"
+                             " scene with points='nodes'")
         self._path, self._contact = path, contact
         self.rest, _ = self._gathered(contact.points)
         self._edges = self._find_edges()

@@ -1,0 +1,105 @@
+"""How near a run is to what its linear algebra costs: CPU time over iterations x (tangent, factors, two solves).
+
+Inflation of Treloar's sheet to pole stretch 8.2, and the shallow cup with stick to 30 psi. `--profile` says where the
+rest goes. CPU seconds of one process: what else runs on the machine hardly enters.
+"""
+
+import argparse
+import cProfile
+import pstats
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
+from common import COMM, say  # noqa: E402
+
+import formingx as fx  # noqa: E402
+from formingx.results import files  # noqa: E402
+
+SIZES = {"inflation": [(20, 1), (40, 2), (80, 4)], "cup": [(30, 1), (60, 2)]}
+LARGE = {"inflation": [(160, 8), (320, 16)], "cup": []}
+
+
+def inflation(elements):
+    """(scene, target): Treloar's sheet, far beyond its limit point."""
+    mesh = fx.mesh.disc(radius=1.25, thickness=0.082, elements=elements)
+    return fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=2.0), loads=[fx.Pressure("bottom")],
+                    supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")]), fx.pole_stretch(8.2)
+
+
+def cup(elements):
+    """(scene, target): a clamped sheet that sticks to a shallow cup."""
+    mesh = fx.mesh.disc(radius=10.0, thickness=0.3, elements=elements)
+    mould = fx.tools.cup(radius=10.0, depth=5.0, mouth=0.3, fillet=1.0)
+    return fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0), loads=[fx.Pressure("bottom")],
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                    contacts=[fx.Contact("top", mould, "stick")]), fx.pressure(30.0)
+
+
+def unit(path, times=5):
+    """CPU seconds of one iteration's linear algebra at states along a path: {part: mean}."""
+    parts = dict.fromkeys(("tangent", "factors", "two solves"), 0.0)
+    states = [path.states[round(k * (len(path) - 1) / times)] for k in range(1, times + 1)]
+    for state in states:
+        newton = path.record.curve.newton
+        with path.problem.at(state) as problem:
+            at = [time.process_time()]
+            problem.tangent(problem.x, state.control)
+            at.append(time.process_time())
+            newton.solver.factorise()
+            at.append(time.process_time())
+            newton.solver.solve(newton.F, newton.a)
+            newton.solver.solve(newton.F_control, newton.b)
+            at.append(time.process_time())
+        for part, a, b in zip(parts, at, at[1:]):
+            parts[part] += (b - a) / times
+    return parts
+
+
+def measure(case, elements, profile=None):
+    """What a run costs: set-up and path (CPU seconds), its iterations, one iteration's linear algebra, and the ratio.
+
+    profile: a `cProfile.Profile` that looks on, or None.
+    """
+    scene, target = case(elements)
+    began = time.process_time()
+    rest = fx.trace(scene, until=fx.pressure(0.0), progress=False)
+    ready = time.process_time()
+    if profile:
+        profile.enable()
+    path = fx.trace(scene, until=target, step=fx.StepControl(target=8) if scene.contacts else None, start=rest,
+                    progress=False)
+    if profile:
+        profile.disable()
+    spent = time.process_time() - ready
+    parts, n = unit(path), path.counts.iterations
+    return {"unknowns": path.problem.n_unknowns, "states": len(path), "iterations": n, "set-up": ready - began,
+            "path": spent, **parts, "ratio": spent / (n * sum(parts.values()))}
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--quick", action="store_true", help="the smallest of each")
+    options.add_argument("--large", action="store_true", help="1e5 unknowns too (minutes)")
+    options.add_argument("--profile", action="store_true", help="where the time goes")
+    options.add_argument("--out", type=Path, default=Path("results/limit"))
+    args = options.parse_args()
+    results, head = [], f"{'':12}{'elements':>10}"
+    for case in (inflation, cup):
+        name = case.__name__
+        measure(case, (10, 1))                              # imports and forms
+        for elements in SIZES[name][:1 if args.quick else None] + LARGE[name] * args.large:
+            profile = cProfile.Profile(time.process_time) if args.profile else None
+            found = measure(case, elements, profile)
+            if not results:
+                say(head + "".join(f"{column:>12}" for column in found))
+            say(f"{name:12}{elements[0]:>6} x {elements[1]}" + "".join(f"{v:12.4g}" for v in found.values()))
+            if profile:
+                pstats.Stats(profile).sort_stats("tottime").print_stats(25)
+            results.append({"case": name, "elements": list(elements), **found})
+    files.write_summary(args.out / "summary.json", {"rows": results}, COMM)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,37 @@
+"""Tests of a material whose stress depends on the history: a stretch that is held, a constant Hencky rate."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, positive
+
+
+class HistoryTests:
+    """Tests of what has a nominal stress of a history, `stress(mode, stretches, times=, between=)`."""
+
+    stress: Any
+
+    def relaxation(self, mode: str, stretch: float, times: Any) -> np.ndarray:
+        """Nominal stress at times (any shape, at least 0) after a stretch was put on at once, and held; stress."""
+        t = np.asarray(times, float)
+        if not np.all(t >= 0):
+            raise InputError(f"{self}: relaxation: times = {times!r}: must not be negative")
+        ordered, back = np.unique(np.append(0.0, t.ravel()), return_inverse=True)
+        held = np.full(len(ordered), positive(f"{self}: relaxation: stretch", stretch))
+        return self.stress(mode, held, times=ordered)[back[1:]].reshape(t.shape)[()]
+
+    def constant_rate(self, mode: str, rate: float, stretches: Any) -> np.ndarray:
+        """Nominal stress at stretches, shape (n,), all above or all below 1, met at a constant Hencky rate; stress.
+
+        Args:
+            rate: of the logarithmic strain in the direction pulled, 1/time, above 0 (pushed: of its size).
+        """
+        t = np.abs(np.log(np.asarray(stretches, float))) / positive(f"{self}: constant_rate: rate", rate)
+        ordered, back = np.unique(np.append(0.0, t), return_inverse=True)
+        l = np.exp(ordered * rate * np.sign(np.log(np.sum(stretches) / np.size(stretches))))
+        if not np.allclose(l[back[1:]], stretches, rtol=1e-12):
+            raise InputError(f"{self}: constant_rate: stretches = {stretches!r}: must be all above or all below 1")
+        return self.stress(mode, l, times=ordered, between="strain")[back[1:]]

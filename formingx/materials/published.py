@@ -1,0 +1,64 @@
+"""Published constants of materials, each with its source: to begin with, not to design with."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from .hyperelastic import MooneyRivlin, NeoHookean
+from .material import Material
+
+
+class Published(NamedTuple):
+    """A material as published.
+
+    material: constants in `unit`, c10 of I1.
+    substance: what was tested.
+    temperature: in degrees Celsius, or None: not stated by the source.
+    rate: of the tests, in words. mode: the tests that the constants come from, in words.
+    source: who published the constants, and where they are quoted from if not from there.
+    """
+
+    material: Material
+    unit: str
+    substance: str
+    temperature: float | None
+    rate: str
+    mode: str
+    source: str
+
+
+_PSI = 0.006894757293168361                                                                             # MPa
+_KG_PER_CM2 = 0.0980665                                                                                 # MPa
+_SONG = "W. Song, PhD thesis, McMaster University, 1993"
+_THRONE = f"J. L. Throne, Adv. Polym. Technol. 9 (1989) 309-320, quoted by {_SONG}, section 6.4"
+_NOT_STATED = "not stated where quoted"
+
+
+def published() -> dict[str, Published]:
+    """{name: constants that can be cited}, in MPa.
+
+    They hold for the stretches, temperatures and rates of their tests, which are given as far as the source states
+    them. Quoted ones were not read in the original. Test data to fit to: `treloar1944`.
+    """
+    return {
+        "PMMA 160 C": Published(
+            NeoHookean(c10=65 * _PSI), "MPa", "polymethyl methacrylate", 160.0, _NOT_STATED, _NOT_STATED,
+            f"J. G. Williams, J. Strain Anal. 5 (1970) 49-57, quoted by {_SONG}, section 6.3"),
+        "PMMA 163 C": Published(
+            NeoHookean(c10=40 * _PSI), "MPa", "polymethyl methacrylate", 163.0, "a sheet is formed in about 6 s",
+            "estimated from sigma = K t^-0.05 epsilon with K = 240 psi, relaxation left out: K = 6 c10",
+            f"{_SONG}, section 4.4, from M. O. Lai and D. L. Holt, J. Appl. Polym. Sci. 19 (1975) 1209 and 1805"),
+        "natural rubber, Treloar's sheet": Published(
+            NeoHookean(c10=2.0 * _KG_PER_CM2), "MPa", "rubber with 8 % sulphur", None, _NOT_STATED,
+            "inflation of a sheet",
+            f"L. R. G. Treloar, Trans. Inst. Rubber Ind. 19 (1944) 201-212, quoted by {_SONG}, section 4.3.2"),
+        "natural rubber, Mooney": Published(
+            MooneyRivlin(c10=20.78 * _PSI, c01=4.825 * _PSI), "MPa", "natural rubber", None, _NOT_STATED, _NOT_STATED,
+            f"L. R. G. Treloar, The Physics of Rubber Elasticity, Oxford 1975, quoted by {_SONG}, section 6.4"),
+        "natural rubber, 0.25 mm": Published(
+            MooneyRivlin(c10=17.587 * _PSI, c01=4.825 * _PSI), "MPa", "sheet of natural rubber, room temperature", None,
+            _NOT_STATED, _NOT_STATED, _THRONE),
+        "natural rubber, 0.76 mm": Published(
+            MooneyRivlin(c10=25.11 * _PSI, c01=0.581 * _PSI), "MPa", "sheet of natural rubber, room temperature", None,
+            _NOT_STATED, _NOT_STATED, _THRONE),
+    }

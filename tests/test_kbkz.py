@@ -1,0 +1,97 @@
+"""The factorised K-BKZ equation in homogeneous tests: closed forms, the network without damping, small strains."""
+
+import numpy as np
+import pytest
+from conftest import ROOT, run
+
+import formingx as fx
+
+SPECTRUM = [(0.3, 0.5), (0.4, 5.0), (0.2, 60.0)]
+DAMPINGS = [fx.PSM(alpha=12.0, beta=0.1), fx.Wagner(alpha=0.2, beta=0.15)]
+MODES = {"uniaxial": -0.5, "pure_shear": 0.0, "equibiaxial": 1.0}
+L = np.array([1.1, 1.5, 2.0, 3.0, 5.0])
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("rate", [0.01, 1.0, 100.0])
+def test_without_damping_it_is_the_transient_network(mode, rate):
+    network = fx.TransientNetwork(None, SPECTRUM)
+    assert fx.KBKZ(SPECTRUM).constant_rate(mode, rate, L) == pytest.approx(network.constant_rate(mode, rate, L),
+                                                                           rel=1e-6)
+
+
+def test_a_history_with_jumps_holds_and_unloading():
+    times, l = [0, 0, 1, 3, 3, 3.001, 50], [1.2, 2, 3, 3, 1.5, 2.5, 2.5]
+    network = fx.TransientNetwork(None, SPECTRUM).stress("uniaxial", l, times=times)
+    assert fx.KBKZ(SPECTRUM).stress("uniaxial", l, times=times) == pytest.approx(network, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("damping", DAMPINGS, ids=str)
+@pytest.mark.parametrize("mode", MODES)
+def test_a_step_of_strain_separates_time_and_strain(damping, mode):
+    t, k = np.geomspace(1e-3, 300, 7), MODES[mode]
+    melt = fx.KBKZ(SPECTRUM, damping)
+    for l in L:
+        squares = np.array([l**2, l ** (2 * k), l ** (-2 - 2 * k)])
+        h = damping(squares.sum(), (1 / squares).sum())
+        expected = melt.relaxation_modulus(t) * h * (squares[0] - squares[2]) / l
+        assert melt.relaxation(mode, l, t) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("damping", DAMPINGS[:1], ids=str)
+@pytest.mark.parametrize("mode", MODES)
+def test_small_strains_are_linear(damping, mode):
+    """Nominal stress (4 + 2 k) e G where e is put on at once: here at a rate, integral of G(t - t') de."""
+    rate, e, k = 0.7, 1e-5, MODES[mode]
+    G, tau = np.array(SPECTRUM).T
+    expected = (4 + 2 * k) * rate * np.sum(G * tau * (1 - np.exp(-e / rate / tau)))
+    assert fx.KBKZ(SPECTRUM, damping).constant_rate(mode, rate, [np.exp(e)])[0] == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("damping", DAMPINGS, ids=str)
+def test_steady_extension(damping):
+    """After many relaxation times the stress is the integral over all ages: by another rule, and without a start."""
+    from scipy.integrate import quad
+    rate, G, tau = 0.4, 2.0, 1.0
+    melt = fx.KBKZ([(G, tau)], damping)
+
+    def integrand(s):
+        l = np.exp(rate * s)
+        return G / tau * np.exp(-s / tau) * (l**2 - 1 / l) * damping(l**2 + 2 / l, l**-2 + 2 * l)
+    l = np.exp(rate * 40.0)
+    found = melt.constant_rate("uniaxial", rate, [l])[0] * l
+    assert found == pytest.approx(quad(integrand, 0, 60, epsabs=1e-12, epsrel=1e-10, limit=200)[0], rel=1e-6)
+
+
+def test_at_once_and_slow():
+    melt = fx.KBKZ(SPECTRUM, DAMPINGS[0])
+    assert melt.constant_rate("equibiaxial", 1e7, L) == pytest.approx(melt.stress("equibiaxial", L), rel=1e-5)
+    assert melt.stress("uniaxial", 2.0) == pytest.approx(melt.relaxation("uniaxial", 2.0, 0.0))
+    assert "PSM(alpha=12.0" in str(melt)
+
+
+@pytest.mark.slow
+def test_tables_of_the_page(tmp_path):
+    """Every line of the benchmark's tables is in the page."""
+    printed = run("benchmarks/kbkz.py", "--out", tmp_path)
+    rows = [line for line in printed.splitlines() if line.startswith("| ")]
+    page = (ROOT / "docs" / "kbkz.md").read_text()
+    assert len(rows) == 4 * 4 + 6 + 7 and [line for line in rows if line not in page] == []
+
+
+@pytest.mark.parametrize("make, words", [
+    (lambda: fx.KBKZ([]), "at least one"),
+    (lambda: fx.KBKZ([(1.0, 0)]), "tau_1 = 0: must be greater than 0"),
+    (lambda: fx.KBKZ([(1.0,)]), "number 1 is"),
+    (lambda: fx.KBKZ(SPECTRUM, damping=3.0), "must be PSM"),
+    (lambda: fx.PSM(alpha=0, beta=0.1), "alpha = 0: must be greater than 0"),
+    (lambda: fx.PSM(alpha=1, beta=2), "beta = 2: must be from 0 to 1"),
+    (lambda: fx.Wagner(alpha=-1, beta=1), "alpha = -1: must be from 0 to 1"),
+    (lambda: fx.KBKZ(SPECTRUM).stress("shear", [1, 2], times=[0, 1]), "'shear' is not known"),
+    (lambda: fx.KBKZ(SPECTRUM).stress("uniaxial", [1, 2], times=[1, 0]), "times must not fall"),
+    (lambda: fx.KBKZ(SPECTRUM).stress("uniaxial", [1, -2]), "stretch = -2"),
+    (lambda: fx.KBKZ(SPECTRUM).constant_rate("uniaxial", 0, [2.0]), "rate = 0"),
+])
+def test_bad_input(make, words):
+    with pytest.raises(fx.InputError, match=words):
+        make()

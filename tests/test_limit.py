@@ -1,0 +1,51 @@
+"""A run costs little more than its linear algebra."""
+
+import sys
+
+import numpy as np
+from conftest import ROOT
+
+from formingx.discrete.history import MaterialHistory
+
+sys.path.insert(0, str(ROOT / "benchmarks"))
+import limit  # noqa: E402
+
+
+def test_a_run_costs_little_more_than_its_linear_algebra():
+    limit.measure(limit.inflation, (10, 1))                 # imports and forms
+    found = limit.measure(limit.inflation, (40, 2))
+    assert 0.5 < found["ratio"] < 3 and found["iterations"] < 80
+
+
+def test_a_tool_is_looked_at_once_for_the_same_points(monkeypatch):
+    calls, nearest = [0], limit.fx.Tool.nearest
+
+    def counted(self, x):
+        calls[0] += 1
+        return nearest(self, x)
+    monkeypatch.setattr(limit.fx.Tool, "nearest", counted)
+    scene, _ = limit.cup((20, 1))
+    path = limit.fx.trace(scene, until=limit.fx.pressure(8.0), step=limit.fx.StepControl(target=8), progress=False)
+    assert calls[0] < 2 * path.counts.iterations + 12 * len(path)
+
+
+def test_what_materials_remember_is_computed_once_a_step(monkeypatch):
+    calls, after = [0], MaterialHistory._after
+
+    def counted(self, cells):
+        calls[0] += 1
+        return after(self, cells)
+    monkeypatch.setattr(MaterialHistory, "_after", counted)
+    fx = limit.fx
+    mesh = fx.mesh.disc(radius=2.0, inner_radius=1.0, thickness=0.5, elements=(2, 1))
+    scene = fx.Scene(mesh=mesh, materials=fx.Viscoelastic(fx.NeoHookean(c10=0.05), branches=[(0.3, 0.5), (0.4, 5.0)]),
+                     supports=[fx.Symmetry("bottom", "z"), fx.Symmetry("top", "z")], loads=[fx.Pressure("inner")])
+    course = {lambda value: fx.displacement(value, at=(1.0, 0.0), component="r"): [(0, 0), (1, 1)]}
+    path = fx.Process(scene).run([fx.Stage("widen", drive=scene.loads[0], follow=course)], progress=False)
+    assert len(path) > 8 and calls[0] <= path.counts.steps + path.counts.failures + 1
+    before, last = path.states[-2:]
+    with path.problem.at(last) as problem:
+        problem.memory = before.memory
+        problem.advance(last.x, last.control)
+        for name, values in problem.memory[0].values.items():
+            np.testing.assert_array_equal(values, last.memory[0].values[name])
