@@ -293,7 +293,7 @@ def _holders(scene: Scene, target: Target, near: float) -> Iterator[Any]:
     for support in scene.supports:
         for held in support.constraints():
             if isinstance(held, Held) and not held.driven and "rz"[held.component] == words[0][2]:
-                nodes = np.atleast_2d(held.point) if held.on is None else scene.mesh.nodes_of(held.on)
+                nodes = np.array([held.point]) if held.on is None else scene.mesh.nodes_of(held.on)
                 if np.hypot(*(nodes - point).T).min() < near:
                     yield support
 
