@@ -12,6 +12,7 @@ from . import _compat
 from .discrete.elements import place, shape_quality
 from .errors import instance, several
 from .physics.models import DisplacementPenalty
+from .physics.supports import Held
 from .physics.tools import Arc
 from .scene.scene import Scene
 from .solve.targets import Target
@@ -157,6 +158,11 @@ def _layers(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
                                                         f" and one element spans it: use two or more through it")
     hard, soft = (pick(sheet.moduli, key=sheet.moduli.__getitem__) for pick in (max, min))
     ratio = sheet.moduli[hard] / sheet.moduli[soft]
+    heights = np.ptp(sheet.corners[sheet.layer == soft][:, :, 1], axis=1)
+    if 100 < ratio <= 1e5 and heights.max() > 0.99 * sheet.area[sheet.layer == soft].sum() / sheet.length:
+        yield Finding("warning", f"layer {soft!r}", f"it is {ratio:.3g} times softer than {hard!r} and one element"
+                                                    f" spans it: its shear would jump from element to element; use two"
+                                                    f" or more through it")
     if ratio > 1e5:
         yield Finding("warning", "materials", f"layer {hard!r} (shear modulus {sheet.moduli[hard]:.4g}) is {ratio:.2g}"
                                               f" times stiffer than {soft!r} ({sheet.moduli[soft]:.4g}): are the units"
@@ -233,9 +239,10 @@ def _units(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
     """Sizes that belong together and differ by orders of magnitude."""
     natural = max(sheet.moduli.values()) * sheet.thickness / sheet.length
     fixed = [(repr(load), load.value) for load in scene.loads if load.quantity == "pressure" and not load.driven]
-    aimed = [(str(t), t.value) for t in targets if t.name == "pressure"] if not scene.contacts else []
+    aimed = [(str(t), t.value) for t in targets if t.name == "pressure"]
     for name, value in (*fixed, *aimed):
-        if abs(value) > 1e3 * natural or 0 < abs(value) < 1e-6 * natural:
+        large = abs(value) > 1e3 * natural and not (scene.contacts and (name, value) in aimed)   # a mould holds more
+        if large or 0 < abs(value) < 1e-4 * natural:
             yield Finding("warning", name, f"it is {abs(value) / natural:.2g} times shear modulus x thickness"
                           f" / length = {natural:.3g}: are the units of stress the same (Pa, kPa, MPa)?")
     for contact in scene.contacts:
@@ -266,9 +273,29 @@ def _targets(scene: Scene, sheet: _Sheet, targets: Sequence[Target]) -> Iterator
         driven = scene.driven
         if driven is not None and target.name in ("pressure", "travel") and target.name != driven.quantity:
             yield Finding("error", str(target), f"the run drives {scene.driven!r}, which has no {target.name}")
+        if target.name == "travel" and target.value < 0 and driven in scene.contacts:
+            yield Finding("error", str(target), f"it lies behind the start: {driven!r} would move away from the body")
+        if target.name == "pole_stretch" and target.value < 1 and not scene.contacts:
+            yield Finding("warning", str(target), "a sheet starts at 1, and is stretched where it is inflated")
+        for support in _holders(scene, target, 1e-5 * sheet.length):
+            yield Finding("error", str(target), f"{support!r} holds that displacement")
         inside = [c for c in scene.contacts if target.name == "pole_height" and _beyond(c, sheet, target.value, scene)]
         for contact in inside:
             yield Finding("error", str(target), f"it lies inside the tool of {contact!r}")
+
+
+def _holders(scene: Scene, target: Target, near: float) -> Iterator[Any]:
+    """The supports that hold what a `displacement` target (u_r_at_R_Z) wants to move."""
+    words = target.name.split("_at_")
+    if len(words) != 2 or not target.name.startswith("u_") or target.value == 0:
+        return
+    point = np.array([float(x) for x in words[1].split("_")])
+    for support in scene.supports:
+        for held in support.constraints():
+            if isinstance(held, Held) and not held.driven and "rz"[held.component] == words[0][2]:
+                nodes = np.array([held.point]) if held.on is None else scene.mesh.nodes_of(held.on)
+                if np.hypot(*(nodes - point).T).min() < near:
+                    yield support
 
 
 def _beyond(contact: Any, sheet: _Sheet, height: float, scene: Scene) -> bool:

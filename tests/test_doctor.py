@@ -16,6 +16,28 @@ def formed(elements=(40, 1), tool=None, **contact):
                    contacts=[fx.Contact("top", tool or fx.tools.cup(fillet=0.1, **CUP), **contact)])
 
 
+def pushed(moves=(0, -1)):
+    """A sheet under a ball that moves down."""
+    return fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(40, 1)), materials=fx.NeoHookean(c10=2.0),
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                    contacts=[fx.Contact("top", fx.tools.sphere(radius=0.5).moved(z=0.582), moves=moves)])
+
+
+def test_a_tool_on_the_axis_moves_along_it():
+    assert pushed().driven is not None
+    with pytest.raises(fx.InputError, match="moves along R, but its tool covers the axis"):
+        pushed(moves=(1, 0))
+
+
+def test_a_soft_layer_of_one_element():
+    def layered(through):
+        mesh = fx.mesh.disc(radius=1.0, thickness={"a": 0.02, "b": 0.02, "c": 0.02}, elements=(20, (1, through, 1)))
+        hard = fx.NeoHookean(c10=1000.0)
+        return fx.doctor(fx.Scene(mesh=mesh, materials={"a": hard, "b": fx.NeoHookean(c10=1.0), "c": hard},
+                                  supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")]))
+    assert "1e+03 times softer than 'a' and one element spans it" in str(layered(1)) and layered(2).healthy
+
+
 @pytest.mark.parametrize("scene", [
     lambda: treloar(),
     lambda: treloar(elements=(60, 3), support=fx.Clamped("rim"), model=fx.DisplacementPenalty(eps=1e-2)),
@@ -47,6 +69,10 @@ def test_good_scenes(scene):
     (lambda: treloar(), [fx.pressure(4e5)], "warning", "units of stress"),
     (lambda: treloar(), [fx.pole_height(1000.0)], "warning", "units of length"),
     (lambda: treloar(), [fx.travel(1.0)], "error", "has no travel"),
+    (lambda: formed(), [fx.pressure(1e-6)], "warning", "units of stress"),             # MPa for Pa
+    (lambda: treloar(), [fx.pole_stretch(0.5)], "warning", "starts at 1"),
+    (lambda: treloar(support=fx.Clamped("rim")), [fx.displacement(0.1, at=(1.25, 0.041))], "error", "Clamped.* holds"),
+    (lambda: pushed(), [fx.travel(-0.1)], "error", "behind the start"),
 ])
 def test_findings(make, targets, severity, words):
     report = fx.doctor(make(), targets=targets)

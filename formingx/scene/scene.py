@@ -207,6 +207,10 @@ class Scene:
     def _check_contact(self, contact: Contact) -> None:
         """The body starts outside the tool, the face looks at it, and the pressure does not push away from it."""
         mesh, near = self.mesh, 1e-6 * max(self.extent)
+        if self.kinematics.axisymmetric and contact.moves and contact.moves[0] \
+                and contact.tool.outline()[:, 0].min() <= near:
+            raise InputError(f"{contact!r}: it moves along R, but its tool covers the axis: no rigid tool of revolution"
+                             f" does that; must be moves=(0, ...), or PlaneStrain()")
         face = mesh.nodes_of(contact.on)
         comm = mesh.comm
         points = np.concatenate(comm.allgather(mesh.domain.geometry.x[:, :2]))
