@@ -23,14 +23,15 @@ _FIRST, _LAST = 20, 400
 class Fit(NamedTuple):
     """What a fit found.
 
-    material: the material with the fitted constants, in the data's unit of stress.
-    rms: {test: root mean square of the nominal stress' residual}, same unit; tests in time are numbered.
-    rms_total: the same over all points of all tests: what was made small.
-    errors: {constant: its standard error}, from the misfit and the derivatives at the optimum; see `uncertainty`.
-    undetermined: the names of the constants that the tests leave open: with a noise of 1 % of the largest stress, or
-        with the misfit if that is more, the standard error is above half of the constant.
-    points: number of measured stresses.
-    data: the tests, as `fit` takes them.
+    Args:
+        material: the material with the fitted constants, in the data's unit of stress.
+        rms: {test: root mean square of the nominal stress' residual}, same unit; tests in time are numbered.
+        rms_total: the same over all points of all tests: what was made small.
+        errors: {constant: its standard error}, from the misfit and the derivatives at the optimum; see `uncertainty`.
+        undetermined: the names of the constants that the tests leave open: with a noise of 1 % of the largest stress,
+            or with the misfit if that is more, the standard error is above half of the constant.
+        points: number of measured stresses.
+        data: the tests, as `fit` takes them.
     """
 
     material: Material
