@@ -108,7 +108,7 @@ class _Points:
         scale = np.concatenate([np.repeat(c.scale[i], 2) for c, i in zip(contacts, chosen)])
         self._scale = self._gather(scale)
         moved = [self._moved(column, step) for column, step in zip(self._columns.T, steps)]
-        self._C = self._gather(np.array(moved).T.reshape(len(own), -1)) * self._scale
+        self._C = self._gather(np.array(moved).T.reshape(len(own), len(moved))) * self._scale
 
     def solve(self, dx: Any, step: float) -> tuple[np.ndarray, float] | None:
         """How a correction and its step change, own part; None if no consistent state was found."""
