@@ -87,7 +87,7 @@ def main():
     options.add_argument("--elements", type=int, default=8, help="elements along the meridian")
     options.add_argument("--accuracy", type=float, default=2e-5, help="relative error in time")
     args = options.parse_args()
-    n, accuracy = (4, 5e-4) if args.quick else (args.elements, args.accuracy)
+    n, accuracy = (4, 1e-4) if args.quick else (args.elements, args.accuracy)
     summary: dict = {}
     flows, creeps = {}, {}
     for q in FLOWS:
