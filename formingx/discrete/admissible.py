@@ -91,12 +91,14 @@ class Admissible:
         return max(self._forms.comm.allgather(found), key=lambda part: abs(np.log(max(part.value, 1e-300))))
 
     def holds(self) -> bool:
-        """True if all of them are positive at the quadrature points of the energy, all ranks, at the state last set.
+        """True if no point lies beyond the axis, and in-plane determinants are positive where the energy looks.
 
-        (Between them an element that a sharp edge bends strongly may be inside out without harm to what is computed: a
-        coarse mesh under a plug. `least` tells.) Collective.
+        (Between its quadrature points an element that a sharp edge bends strongly may be inside out without harm to
+        what is computed: a coarse mesh under a plug. `least` tells.) All ranks, at the state last set; collective.
         """
-        mine = all(bool(np.all(values[:, :self._n] > 0)) for values in self.quantities().values())
+        found = self.quantities()
+        mine = all(bool(np.all((values if quantity == "hoop stretch" else values[:, :self._n]) > 0))
+                   for quantity, values in found.items())
         return all(self._forms.comm.allgather(mine))
 
     def quantities(self) -> dict[str, np.ndarray]:
