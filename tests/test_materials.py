@@ -251,7 +251,7 @@ NAN, INF = math.nan, math.inf
 @pytest.mark.parametrize("make, words", [
     (lambda: fx.Ogden(mu=1.0, alpha=-2.0), r"mu = 1.0, alpha = -2.0 has mu alpha <= 0.*mu alpha > 0"),
     (lambda: fx.Ogden(mu=1.0, alpha=0.0), "mu alpha <= 0"),
-    (lambda: fx.Ogden(mu=(1.0, INF), alpha=(2.0, 3.0)), "mu = inf: must be a finite number"),
+    (lambda: fx.Ogden(mu=(1.0, INF), alpha=(2.0, 3.0)), "mu2 = inf: must be a finite number"),
     (lambda: fx.MooneyRivlin(c10=NAN, c01=0.1), "c10 = nan: must be a finite number"),
     (lambda: fx.MooneyRivlin(c10=1.0, c01="soft"), "c01 = 'soft': must be a number"),
     (lambda: fx.Yeoh(c10=1.0, c20=0.0, c30=-1e-3), "not stable.*c30 must be at least 0"),
@@ -263,7 +263,7 @@ NAN, INF = math.nan, math.inf
     (lambda: fx.Gent(mu=INF, Jm=1.0), "mu = inf: must be a finite number"),
     (lambda: fx.ArrudaBoyce(mu=1.0, N=1.0), "N = 1.0: must be greater than 1"),
     (lambda: fx.ArrudaBoyce(mu=0.0, N=9.0), "mu = 0.0: must be greater than 0"),
-    (lambda: fx.Hyperelastic(lambda F, a: a * F, of="F", a=1.0), r"must be a scalar, this one has the shape \(3, 3\)"),
+    (lambda: fx.Hyperelastic(lambda F, a: a * F, of="F", a=1.0), r"the energy has the shape \(3, 3\): must be a UFL scalar"),
     (lambda: fx.Hyperelastic(lambda I1, I2, a: a * ufl.bessel_I(0, I1), a=1.0), "contains BesselI"),
     (lambda: fx.Hyperelastic(lambda F, a: a * F[0, 0] ** 2, of="F", a=1.0).stress("uniaxial", 2), "not isotropic"),
     (lambda: fx.NeoHookean(c10=1.0).stress("shear", 2.0), "mode 'shear' is not known; known: 'uniaxial'"),
