@@ -22,11 +22,17 @@ from .state import State
 AHEAD = 1e-6
 """By how much the (dimensionless) control goes on in a jump from a fold."""
 
-_FIRST, _LARGEST, _FALLS, _GROWS = 1e3, 1e10, 0.3, 10.0
-"""Of eta: at first, at most; factors after a success and a failure."""
+_FIRST, _LARGEST, _FALLS, _GROWS = 1e3, 1e10, 0.3, 4.0
+"""Of eta: at first, at most; factors after a solution that took at most `_FEW` iterations, and after none was found."""
 
-_MOST_AT_FOLD, _MOST = 200, 60
-"""Viscous solutions before the body counts as never coming to rest (from a fold, which it leaves slowly)."""
+_FEW, _TOLERANCES = 5, Tolerances(1e-8, 1e-6, settling=12)
+"""Of a viscous solution. (Where contact does not settle soon more viscosity is cheaper than more iterations.)"""
+
+_FAR = 0.1
+"""How far (dimensionless, in the mean) the body is to move in a viscous solution: what is lost depends on it."""
+
+_MOST = 400
+"""Viscous solutions before the body counts as never coming to rest."""
 
 _NEAR_REST = 1e-3
 """Viscous forces (over the support forces) below which the state at rest is looked for."""
@@ -75,14 +81,14 @@ class _Way:
     def __init__(self, curve: Any, old: State, control: float):
         self.curve, self.problem, self.control = curve, curve.problem, control
         self.viscous = _Viscous(curve.problem)
-        self._newton = BorderedNewton(self.viscous, Tolerances(1e-8, 1e-6), curve.norm)
+        self._newton = BorderedNewton(self.viscous, _TOLERANCES, curve.norm)
         self._x, self._drag = curve.problem.x.duplicate(), np.zeros(len(old.x))
         self.at, self.lost, self.solved = old, 0.0, 0
         self.rest, self.near = np.inf, _NEAR_REST           # what is out of balance; little enough to look for rest
         self.settles = False
 
-    def move(self, origin: np.ndarray, eta: float) -> bool:
-        """One viscous solution from `origin`; False if there is none."""
+    def move(self, origin: np.ndarray, eta: float) -> float:
+        """One viscous solution from `origin`; the factor by which eta may change then."""
         viscous = self.viscous
         viscous.eta, viscous.origin = eta, origin
         self._x.array_w[:] = origin
@@ -90,21 +96,22 @@ class _Way:
             _, history = self._newton.correct(self._x, self.control, fixed(self.control), self.at)
         except Failure as failure:
             self.curve.spend(len(failure.history))
-            return False
+            return _GROWS
         self.curve.spend(len(history) - 1)
         if self.problem.folded(self._x, self.control):
-            return False
+            return _GROWS
         x, drag = self._x.array_r.copy(), viscous.drag(self._x.array_r)
         before, self.rest = self.rest, np.sqrt(self._sum(drag * drag)) / (self.problem.force_scale + UNLOADED)
         self.settles = self.rest < min(self.near, before)
         if self.solved or origin is self.at.x:              # what was foretold is no way that the body went
             self._lose(self.at.x, x, drag)
         self._drag = drag
-        by, self.at = x - self.at.x, replace(self.at, x=x, control=self.control)
+        last, self.at = self.at, replace(self.at, x=x, control=self.control)
+        by, far = x - last.x, self.curve.moved(last, self.at) / _FAR
         self.problem.advance(x, self.control)
         self.problem.prepare(x, self.control, by, 0.0, 1.0)
         self.solved += 1
-        return True
+        return max(_FALLS if len(history) - 1 <= _FEW else 1.0, far)
 
     def end(self, old: State) -> State | None:
         """The state at rest, if there is one near."""
@@ -146,15 +153,15 @@ def jump(curve: Any, old: State, by: float) -> State:
     fold = old.kind == "limit point" or old.slope * by <= 0
     way = _Way(curve, old, old.control + by)
     origin = old.x if fold else old.x + by / old.slope * old.direction
-    eta, most = _FIRST, _MOST_AT_FOLD if fold else _MOST
+    eta = _FIRST
     try:
-        while way.solved < most and eta < _LARGEST:
+        while way.solved < _MOST and eta < _LARGEST:
             state = way.end(old) if way.settles else None
             if state is not None:
                 if state.slope * by < 0:
                     state.direction, state.slope = -state.direction, -state.slope
                 return state
-            eta *= _FALLS if way.move(way.at.x if way.solved else origin, eta) else _GROWS
+            eta *= way.move(way.at.x if way.solved else origin, eta)
         raise Failure("no state follows that the body could snap to: it comes to rest nowhere", [])
     except Failure:
         problem.memory = kept

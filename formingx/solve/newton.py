@@ -90,7 +90,7 @@ class Tolerances:
 
     correction: the next correction that quadratic convergence predicts, over the norm of x (and `AT_REST`).
     residual: norm of F over the norm of the support forces.
-    iterations: at most so many.
+    iterations: at most so many on one branch of the problem's kinks; settling: and on all of them, see `SETTLING`.
 
     Raises:
         InputError: a value that is not greater than 0.
@@ -99,11 +99,13 @@ class Tolerances:
     correction: float = 1e-10
     residual: float = 1e-8
     iterations: int = 12
+    settling: int = SETTLING
 
     def __post_init__(self) -> None:
         positive("Tolerances: correction", self.correction)
         positive("Tolerances: residual", self.residual)
         count("Tolerances: iterations", self.iterations)
+        count("Tolerances: settling", self.settling)
 
     def met(self, corrections: list[float], residuals: list[float]) -> bool:
         """True if a state with these corrections behind it, and these residuals (its own last), has converged.
@@ -186,7 +188,7 @@ class BorderedNewton:
             grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
             if grown and not (problem.has_kinks and moved < SMALL):
                 raise Failure("the iteration diverges", history)
-            settling = len(history) - min(kinks.found, 4 * SETTLING) >= SETTLING
+            settling = len(history) - min(kinks.found, 4 * SETTLING) >= self.tolerances.settling
             if len(quiet) >= self.tolerances.iterations or settling:
                 unsettled = settling and len(history) - kinks.changed < 3
                 raise Failure("contact does not settle: " * unsettled + f"no convergence in {len(history)} iterations",
