@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import ConvergenceError
 from .curve import Curve
 from .diagnose import diagnose
-from .jump import AHEAD, jump
+from .jump import jump
 from .newton import Failure
 from .state import Record, State
 from .stepping import StepControl
@@ -28,8 +28,8 @@ from .time_error import TimeError
 
 log = logging.getLogger("formingx")
 
-_JUMPS = 1e-2, 1e-4, 1e-6, 0.0
-"""Lengths of steps below which a failure makes the body try to jump, once each."""
+_AHEAD = 1e-6, 1e-3
+"""By how much the (dimensionless) control goes on at least in a jump, and in the last one that is tried."""
 
 _PATIENCE = 500
 """States that gain less than a thousandth of the way to the target, after which a run gives up."""
@@ -114,6 +114,11 @@ class Run:
         return self.problem.shown(0.0)[0]
 
     @property
+    def _sense(self) -> float:
+        """1 or -1: which way the control goes from the first state."""
+        return np.sign(self.states[0].slope) or 1.0
+
+    @property
     def _falls(self) -> bool:
         """True if what is driven is taken back towards 0, as a pressure that is let off."""
         return isinstance(self._aim, Amplitude) and abs(self.until.value) < abs(self._values[0])
@@ -170,11 +175,13 @@ class Run:
     def _next(self, old: State) -> list[State]:
         """The next states: one at a target within reach, or one step ahead, and what lies on the way to it.
 
-        Failures halve the step; where a short one fails, or the control has its limit, the body jumps.
+        Failures halve the step. Where two of them fail, or the shortest, or the control has its limit, the body jumps.
         """
-        problem, first, jumps, failed = self.problem, self.step.length, list(_JUMPS), 0
-        if old.kind == "limit point" and self._at_fold == "jump":
-            return self._snap(old)
+        problem, first, failed = self.problem, self.step.length, 0
+        if self._at_fold == "jump" and old.kind == "limit point":
+            return self._snap(old, _AHEAD)
+        if self._at_fold == "jump" and old.slope * self._sense < 0:         # a kink that turns the path back
+            return self._snap(old, _AHEAD[1:])
         while True:
             length = problem.reach(old.x, old.control, old.direction, old.slope, self.step.length)
             limited = length < self.step.length
@@ -206,10 +213,9 @@ class Run:
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good = self.step.failed()
                 failed += not isinstance(failure, _Astray)
-                if failed > 1 and length < jumps[0] and self._at_fold == "jump":
-                    jumps.pop(0)
+                if self._at_fold == "jump" and (failed == 2 or not good):
                     with contextlib.suppress(Failure):
-                        return [self._jump(old, reach, first)]
+                        return [self._jump(old, reach, _AHEAD[not good], first)]
                 if not good:
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
                                   failure.attempt)
@@ -223,27 +229,29 @@ class Run:
             raise Inaccurate(error)
         return error
 
-    def _snap(self, old: State) -> list[State]:
-        """The state that the body jumps to from a limit point; none if there is none: a body left alone has snapped."""
-        try:
-            return [self._jump(old, 0.0)]
-        except Failure as failure:
-            if not self.problem.setting.rests:              # what is driven was to go on
-                self._give_up(f"the {self._driven} has a limit point here, and {failure.reason}", failure.attempt)
-            self.record.ended = f"the body snaps at {self.record.describe(old)}: no state follows"
-            return []
+    def _snap(self, old: State, aheads: tuple[float, ...]) -> list[State]:
+        """The state that the body jumps to from a fold; none if there is none: a body left alone has snapped."""
+        alone = self.problem.setting.rests
+        for ahead in aheads[:1] if alone else aheads:
+            try:
+                return [self._jump(old, 0.0, ahead)]
+            except Failure as failure:
+                last = failure
+        if not alone:                                       # what is driven was to go on
+            self._give_up(f"the {self._driven} has a limit point here, and {last.reason}", last.attempt)
+        self.record.ended = f"the body snaps at {self.record.describe(old)}: no state follows"
+        return []
 
-    def _jump(self, old: State, length: float, step: float = 0.0) -> State:
-        """The state that the body snaps to, the control going on as in a step of this length; raises `Failure`.
+    def _jump(self, old: State, length: float, ahead: float, step: float = 0.0) -> State:
+        """The state that the body snaps to; raises `Failure`.
 
-        step: the length of the last step that went well.
+        The control goes on as in a step of this length, and by `ahead` at least; step: length of the last good one.
         """
-        sense = np.sign(self.states[0].slope) or 1.0
-        by = sense * max(AHEAD, length * old.slope * sense)
+        by = self._sense * max(ahead, length * old.slope * self._sense)
         for target, bound in self.open:                      # of the control, which a jump must not pass
             if isinstance(bound, Amplitude) and bound.moves:
-                ahead, now = (self.curve.value(bound, old.x, c) - target.value for c in (old.control + by, old.control))
-                by *= now / (now - ahead) if now * ahead < 0 else 1.0
+                then, now = (self.curve.value(bound, old.x, c) - target.value for c in (old.control + by, old.control))
+                by *= now / (now - then) if now * then < 0 else 1.0
         new = jump(self.curve, old, by)
         new.met = next((target for target, bound in self.open
                         if is_met(target, bound, self.curve.value(bound, new.x, new.control))), None)

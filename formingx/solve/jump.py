@@ -19,10 +19,7 @@ import numpy as np
 from .newton import UNLOADED, BorderedNewton, Failure, Tolerances
 from .state import State
 
-AHEAD = 1e-6
-"""By how much the (dimensionless) control goes on in a jump from a fold."""
-
-_FIRST, _LARGEST, _FALLS, _GROWS = 1e3, 1e10, 0.3, 4.0
+_FIRST, _LARGEST, _FALLS, _GROWS = 1e3, 1e10, 0.3, 3.0
 """Of eta: at first, at most; factors after a solution that took at most `_FEW` iterations, and after none was found."""
 
 _FEW, _TOLERANCES = 5, Tolerances(1e-8, 1e-6, settling=12)
@@ -85,7 +82,7 @@ class _Way:
         self._x, self._drag = curve.problem.x.duplicate(), np.zeros(len(old.x))
         self.at, self.lost, self.solved = old, 0.0, 0
         self.rest, self.near = np.inf, _NEAR_REST           # what is out of balance; little enough to look for rest
-        self.settles = False
+        self.settles, self._falls = False, _FALLS
 
     def move(self, origin: np.ndarray, eta: float) -> float:
         """One viscous solution from `origin`; the factor by which eta may change then."""
@@ -96,10 +93,10 @@ class _Way:
             _, history = self._newton.correct(self._x, self.control, fixed(self.control), self.at)
         except Failure as failure:
             self.curve.spend(len(failure.history))
-            return _GROWS
+            return self._fail()
         self.curve.spend(len(history) - 1)
         if self.problem.folded(self._x, self.control):
-            return _GROWS
+            return self._fail()
         x, drag = self._x.array_r.copy(), viscous.drag(self._x.array_r)
         before, self.rest = self.rest, np.sqrt(self._sum(drag * drag)) / (self.problem.force_scale + UNLOADED)
         self.settles = self.rest < min(self.near, before)
@@ -111,7 +108,13 @@ class _Way:
         self.problem.advance(x, self.control)
         self.problem.prepare(x, self.control, by, 0.0, 1.0)
         self.solved += 1
-        return max(_FALLS if len(history) - 1 <= _FEW else 1.0, far)
+        falls, self._falls = self._falls, _FALLS
+        return max(falls if len(history) - 1 <= _FEW else 1.0, far)
+
+    def _fail(self) -> float:
+        """Not so fast."""
+        self._falls = 1.0
+        return _GROWS
 
     def end(self, old: State) -> State | None:
         """The state at rest, if there is one near."""
@@ -162,6 +165,7 @@ def jump(curve: Any, old: State, by: float) -> State:
                     state.direction, state.slope = -state.direction, -state.slope
                 return state
             eta *= way.move(way.at.x if way.solved else origin, eta)
+            origin = old.x                                  # if nothing was found ahead along the tangent
         raise Failure("no state follows that the body could snap to: it comes to rest nowhere", [])
     except Failure:
         problem.memory = kept
