@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import ConvergenceError
 from .curve import Curve
 from .diagnose import diagnose
-from .jump import jump
+from .jump import AHEAD, jump
 from .newton import Failure
 from .state import Record, State
 from .stepping import StepControl
@@ -28,8 +28,10 @@ from .time_error import TimeError
 
 log = logging.getLogger("formingx")
 
-_AHEAD = 1e-6, 1e-3
-"""By how much the (dimensionless) control goes on at least in a jump, and in the last one that is tried."""
+_JUMPS = 1e-2, 1e-3
+"""Lengths of steps below which a second failure makes the body try to jump, once each (and at the shortest step).
+
+The last is also that of the step ahead where a kink turns the path back, or where no shorter step is left."""
 
 _PATIENCE = 500
 """States that gain less than a thousandth of the way to the target, after which a run gives up."""
@@ -175,13 +177,11 @@ class Run:
     def _next(self, old: State) -> list[State]:
         """The next states: one at a target within reach, or one step ahead, and what lies on the way to it.
 
-        Failures halve the step. Where two of them fail, or the shortest, or the control has its limit, the body jumps.
+        Failures halve the step. Where short ones fail, or the control has its limit, the body jumps.
         """
-        problem, first, failed = self.problem, self.step.length, 0
-        if self._at_fold == "jump" and old.kind == "limit point":
-            return self._snap(old, _AHEAD)
-        if self._at_fold == "jump" and old.slope * self._sense < 0:         # a kink that turns the path back
-            return self._snap(old, _AHEAD[1:])
+        problem, first, jumps, failed = self.problem, self.step.length, [*_JUMPS, 0.0], 0
+        if self._at_fold == "jump" and (old.kind == "limit point" or old.slope * self._sense < 0):
+            return self._snap(old)
         while True:
             length = problem.reach(old.x, old.control, old.direction, old.slope, self.step.length)
             limited = length < self.step.length
@@ -213,9 +213,11 @@ class Run:
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good = self.step.failed()
                 failed += not isinstance(failure, _Astray)
-                if self._at_fold == "jump" and (failed == 2 or not good):
-                    with contextlib.suppress(Failure):
-                        return [self._jump(old, reach, _AHEAD[not good], first)]
+                if self._at_fold == "jump" and (failed > 1 and length < jumps[0] or not good):
+                    jumps.pop(0)
+                    for ahead in (reach,) if good else (_JUMPS[-1], 0.0):
+                        with contextlib.suppress(Failure):
+                            return [self._jump(old, ahead, first)]
                 if not good:
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
                                   failure.attempt)
@@ -229,30 +231,30 @@ class Run:
             raise Inaccurate(error)
         return error
 
-    def _snap(self, old: State, aheads: tuple[float, ...]) -> list[State]:
+    def _snap(self, old: State) -> list[State]:
         """The state that the body jumps to from a fold; none if there is none: a body left alone has snapped."""
-        alone = self.problem.setting.rests
-        for ahead in aheads[:1] if alone else aheads:
-            try:
-                return [self._jump(old, 0.0, ahead)]
-            except Failure as failure:
-                last = failure
-        if not alone:                                       # what is driven was to go on
-            self._give_up(f"the {self._driven} has a limit point here, and {last.reason}", last.attempt)
-        self.record.ended = f"the body snaps at {self.record.describe(old)}: no state follows"
-        return []
+        if old.kind != "limit point":
+            with contextlib.suppress(Failure):
+                return [self._jump(old, _JUMPS[-1])]
+        try:
+            return [self._jump(old, 0.0)]
+        except Failure as failure:
+            if not self.problem.setting.rests:              # what is driven was to go on
+                self._give_up(f"the {self._driven} has a limit point here, and {failure.reason}", failure.attempt)
+            self.record.ended = f"the body snaps at {self.record.describe(old)}: no state follows"
+            return []
 
-    def _jump(self, old: State, length: float, ahead: float, step: float = 0.0) -> State:
-        """The state that the body snaps to; raises `Failure`.
+    def _jump(self, old: State, length: float, step: float = 0.0) -> State:
+        """The state that the body snaps to from a step of this length ahead, or from where it is; raises `Failure`.
 
-        The control goes on as in a step of this length, and by `ahead` at least; step: length of the last good one.
+        step: the length of the last step that went well.
         """
-        by = self._sense * max(ahead, length * old.slope * self._sense)
+        by = self._sense * max(AHEAD, length * abs(old.slope))
         for target, bound in self.open:                      # of the control, which a jump must not pass
             if isinstance(bound, Amplitude) and bound.moves:
                 then, now = (self.curve.value(bound, old.x, c) - target.value for c in (old.control + by, old.control))
                 by *= now / (now - then) if now * then < 0 else 1.0
-        new = jump(self.curve, old, by)
+        new = jump(self.curve, old, by, length > 0)
         new.met = next((target for target, bound in self.open
                         if is_met(target, bound, self.curve.value(bound, new.x, new.control))), None)
         self.step.length = max(self.step.length, step / 2)

@@ -19,7 +19,10 @@ import numpy as np
 from .newton import UNLOADED, BorderedNewton, Failure, Tolerances
 from .state import State
 
-_FIRST, _LARGEST, _FALLS, _GROWS = 1e3, 1e10, 0.3, 3.0
+AHEAD = 1e-6
+"""By how much the (dimensionless) control goes on in a jump from a limit point."""
+
+_FIRST, _LARGEST, _FALLS, _GROWS = 1e3, 1e8, 0.3, 3.0
 """Of eta: at first, at most; factors after a solution that took at most `_FEW` iterations, and after none was found."""
 
 _FEW, _TOLERANCES = 5, Tolerances(1e-8, 1e-6, settling=12)
@@ -143,19 +146,19 @@ class _Way:
         self._x.destroy()
 
 
-def jump(curve: Any, old: State, by: float) -> State:
+def jump(curve: Any, old: State, by: float, ahead: bool) -> State:
     """The state that the body comes to from `old` when the control goes on by a little; of kind "jump".
 
     Args:
         curve: the `Curve`. by: change of the control, dimensionless; its sign is the way that the process drives.
+        ahead: start where the tangent leads to, not where the body is.
 
     Raises:
         Failure: the body comes to rest nowhere; the problem's histories are those of `old`.
     """
     problem, kept = curve.problem, curve.problem.memory
-    fold = old.kind == "limit point" or old.slope * by <= 0
     way = _Way(curve, old, old.control + by)
-    origin = old.x if fold else old.x + by / old.slope * old.direction
+    origin = old.x + by / old.slope * old.direction if ahead else old.x
     eta = _FIRST
     try:
         while way.solved < _MOST and eta < _LARGEST:
@@ -165,7 +168,6 @@ def jump(curve: Any, old: State, by: float) -> State:
                     state.direction, state.slope = -state.direction, -state.slope
                 return state
             eta *= way.move(way.at.x if way.solved else origin, eta)
-            origin = old.x                                  # if nothing was found ahead along the tangent
         raise Failure("no state follows that the body could snap to: it comes to rest nowhere", [])
     except Failure:
         problem.memory = kept
