@@ -1,21 +1,28 @@
 """Friction of a plug, from little to rough: force, wall, and where the sheet snaps (Williams' plug, Song 1993, 6.3).
 
-The sheet of `williams_plug` (neo-Hookean, c10 = 0.448 MPa; r0 = 8.89 cm, h0 = 0.6985 cm; plug radius 1.905 cm, its edge
-rounded) pushed 20 cm under five coefficients of friction. Where points of the sheet leave the edge of the plug there
-may be no state nearby to go on to: the sheet snaps to the next one (`Path.jumps`), marked in the curves. Contact acts
-at four Gauss points of each facet, which slide over the edge more smoothly than nodes. A run that no jump takes further
-ends there, and its summary says so in words. Lengths in cm, forces in N.
+The sheet of `williams_plug` (neo-Hookean, c10 = 0.448 MPa; r0 = 8.89 cm, h0 = 0.6985 cm; plug radius 1.905 cm, its
+edge rounded) pushed 20 cm under five coefficients of friction, beside a membrane that slides over the same edge. Where
+points of the sheet leave the edge of the plug there may be no state nearby to go on to: the sheet snaps to the next
+one (`Path.jumps`), marked in the curves. Contact acts at four Gauss points of each facet, which slide over the edge
+more smoothly than nodes. The less friction, the thinner the sheet under the plug (a membrane under mu = 0.1 is
+stretched 150 times both ways at 20 cm), so elements shrink towards the axis. Lengths in cm, forces in N.
 """
 
+import numpy as np
 import plugs
-from common import parser, save, say, summarise
+from common import parser, save, say, summarise, sweep
+from mpi4py import MPI
+from scipy.interpolate import PchipInterpolator
 from williams_plug import C10, PLUG, RADIUS, THICKNESS, TRAVELS
 
 import formingx as fx
+from formingx.reference_plug import membrane_sliding_over_plug
 from formingx.results import files
 from formingx.results.show import plots
 
 FRICTIONS = (0.1, 0.2, 0.3, 0.5, 1.0)
+NEAR = {0.0: 0.012, 1.5: 0.15, RADIUS: 0.3}
+FACE_STRETCHES = (1.003, 1.01, 1.03, 1.06, 1.1, 1.2, 1.35, 1.5, 1.75, 2, 2.5, 3, 4, 6, 10, 20, 45, 100, 200)
 
 
 def main():
@@ -23,23 +30,50 @@ def main():
     options.add_argument("--fillet", type=float, default=0.35, help="radius of the plug's edge, cm")
     options.add_argument("--refine", type=int, default=1, help="all elements divided by this")
     args = options.parse_args()
-    elements = tuple(n * args.refine for n in ((60, 2) if args.quick else (80, 2)))
-    summary, paths = {}, {}
-    for mu in (0.3,) if args.quick else FRICTIONS:
-        made = plugs.scene(RADIUS, THICKNESS, PLUG, args.fillet, fx.NeoHookean(c10=C10), mu, elements,
-                           points=4, ramp=1e-3)
-        path, end = plugs.push(made, TRAVELS, smallest=1e-3)
-        summary[f"mu_{mu:g}"], paths[mu] = key_numbers(path, end), path
-        tell(mu, summary[f"mu_{mu:g}"])
-        path.to_csv(args.out / f"mu_{mu:g}.csv")
-    save(draw(paths), args.out / "plug_friction.png")
-    summarise(args.out, {**summary, "elements": list(elements), "fillet_cm": args.fillet,
-                         "versions": files.versions()})
+    elements = tuple(n * args.refine for n in ((40, 2) if args.quick else (60, 2)))
+    frictions, travels = ((0.3,), (2, 4, 6, 8)) if args.quick else (FRICTIONS, TRAVELS)
+    args.out.mkdir(parents=True, exist_ok=True)
+    cases = [(mu, args.fillet, elements, travels, args.out) for mu in frictions]
+    runs = dict(zip(frictions, map(run, cases) if args.quick else sweep(run, cases)))
+    for mu, found in runs.items():
+        tell(mu, found["numbers"])
+    save(draw(runs), args.out / "plug_friction.png")
+    summarise(args.out, {**{f"mu_{mu:g}": found["numbers"] for mu, found in runs.items()},
+                         "elements": list(elements), "fillet_cm": args.fillet, "versions": files.versions()})
 
 
-def key_numbers(path, end) -> dict:
+def run(case) -> dict:
+    """One coefficient of friction: its numbers, and what is drawn of it."""
+    mu, fillet, elements, travels, folder = case
+    made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), mu, elements, near=NEAR, points=4,
+                       ramp=1e-3, comm=MPI.COMM_SELF)
+    path, end = plugs.push(made, travels, smallest=1e-4, progress=False)
+    path.to_csv(folder / f"mu_{mu:g}.csv")
+    profile, membrane = path.profile(), membrane_curve(mu, fillet, travels[-1])
+    numbers = key_numbers(path, end, travels)
+    numbers["membrane_force_N_at_travel_cm"] = {f"{t:g}": float(np.interp(t, *membrane)) for t in travels}
+    return {"numbers": numbers, "travel": path["travel"], "force": plugs.NEWTON * path["tool_force"],
+            "jumps": [(state.measures["travel"], plugs.force(state)) for state in path.jumps], "membrane": membrane,
+            "radius": profile.reference_radius, "wall": profile.wall_ratio}
+
+
+def membrane_curve(mu, fillet, last) -> tuple:
+    """(travels, forces) of the membrane, up to a travel."""
+    found = [(0.0, 0.0)]
+    for stretch in FACE_STRETCHES:
+        state = membrane_sliding_over_plug(stretch, radius=RADIUS, plug_radius=PLUG, fillet=fillet,
+                                           thickness=THICKNESS, c10=C10, mu=mu)
+        found.append((state.travel, plugs.NEWTON * state.force))
+        if state.travel > last:
+            break
+    travels, forces = np.transpose(found)
+    fine = np.linspace(0, travels[-1], 400)
+    return fine, PchipInterpolator(travels, forces)(fine)
+
+
+def key_numbers(path, end, travels) -> dict:
     """Forces, walls, jumps and cost of one path."""
-    met = {f"{t:g}": path.met(fx.travel(t)) for t in TRAVELS}
+    met = {f"{t:g}": path.met(fx.travel(t)) for t in travels}
     met = {t: state for t, state in met.items() if state is not None}
     return {
         "force_N_at_travel_cm": {t: plugs.force(state) for t, state in met.items()},
@@ -58,24 +92,23 @@ def key_numbers(path, end) -> dict:
 def tell(mu, n) -> None:
     """The numbers of one run."""
     say(f"mu = {mu:g}: to {n['reached_travel_cm']:.4g} cm, {n['steps']} states, {n['newton_iterations']} Newton"
-        f" iterations, {n['cutbacks']} cut back, {n['jumps']} jumps, {n['solve_seconds']:.1f} s; force, N: "
-        + ", ".join(f"{t} cm {f:.1f}" for t, f in n["force_N_at_travel_cm"].items()),
+        f" iterations, {n['cutbacks']} cut back, {n['jumps']} jumps, {n['solve_seconds']:.1f} s; force (membrane), N: "
+        + ", ".join(f"{t} cm {f:.1f} ({n['membrane_force_N_at_travel_cm'][t]:.0f})"
+                    for t, f in n["force_N_at_travel_cm"].items()),
         *([] if n["ended"] == "done" else [f"  ended before its target: {n['ended'][:200]} ..."]))
 
 
-def draw(paths):
-    """Force over travel, jumps ringed, and the wall at the end."""
+def draw(runs):
+    """Force over travel, jumps ringed, the membrane dashed, and the wall at the end."""
     figure, (forces, walls) = plots.figure(2, width=5.0)
-    for k, (mu, path) in enumerate(paths.items()):
-        forces.plot(path["travel"], plugs.NEWTON * path["tool_force"], color=f"C{k}", label=f"$\\mu$ = {mu:g}")
-        for state in path.jumps:
-            forces.plot(state.measures["travel"], plugs.force(state), "o", color=f"C{k}", fillstyle="none")
-        profile = path.profile()
-        walls.plot(profile.reference_radius, profile.wall_ratio, color=f"C{k}",
-                   label=f"$\\mu$ = {mu:g}, {path.last.measures['travel']:.3g} cm")
-    forces.set(xlabel="travel, cm", ylabel="force on the plug, N", title="force (rings: jumps)", ylim=(0, None))
-    walls.set(xlabel="reference radius R, cm", ylabel="wall / original", title="thickness", ylim=(0, 1.02),
-              xlim=(0, RADIUS))
+    for k, (mu, found) in enumerate(runs.items()):
+        forces.plot(found["travel"], found["force"], color=f"C{k}", label=f"$\\mu$ = {mu:g}")
+        forces.plot(*np.transpose(found["jumps"] or [(0, 0)]), "o", color=f"C{k}", fillstyle="none", markersize=3)
+        forces.plot(*found["membrane"], "--", color=f"C{k}", linewidth=1)
+        walls.semilogy(found["radius"], found["wall"], color=f"C{k}", label=f"$\\mu$ = {mu:g}")
+    forces.set(xlabel="travel, cm", ylabel="force on the plug, N", title="force (rings: jumps; dashed: membrane)",
+               ylim=(0, None), xlim=(0, max(found["travel"].max() for found in runs.values())))
+    walls.set(xlabel="reference radius R, cm", ylabel="wall / original", title="thickness at the end", xlim=(0, RADIUS))
     walls.axvline(PLUG, color="0.7", linewidth=1)
     for axes in (forces, walls):
         axes.grid(alpha=0.3)

@@ -22,10 +22,13 @@ def plug(radius, thickness, fillet, height=60.0):
     return fx.tools.male(radius=radius, height=height, base=-height, fillet=fillet).mirrored().moved(z=thickness)
 
 
-def sheet(radius, thickness, plug_radius, law, elements):
-    """Small elements where the law asks for them: around the edge, or wherever the sheet slides over it."""
-    near = {1.1 * plug_radius: 0.2} if law in ("held", "stick") else {0.65 * plug_radius: 0.2}
-    return fx.mesh.disc(radius=radius, thickness=thickness, elements=elements, concentrate=near)
+def sheet(radius, thickness, plug_radius, law, elements, near=None, comm=COMM):
+    """Small elements where the law asks for them: around the edge, or wherever the sheet slides over it.
+
+    near: {radius: size of the elements there over that of the largest}, if they are to be elsewhere.
+    """
+    near = near or ({1.1 * plug_radius: 0.2} if law in ("held", "stick") else {0.65 * plug_radius: 0.2})
+    return fx.mesh.disc(radius=radius, thickness=thickness, elements=elements, concentrate=near, comm=comm)
 
 
 def name_of(law) -> str:
@@ -33,10 +36,11 @@ def name_of(law) -> str:
     return law if isinstance(law, str) else f"coulomb_{law:g}"
 
 
-def scene(radius, thickness, plug_radius, fillet, material, law, elements, support=None, **options):
+def scene(radius, thickness, plug_radius, fillet, material, law, elements, support=None, near=None, comm=COMM,
+          **options):
     """A sheet held at its rim under a plug that moves down. law: of LAWS, or a coefficient of friction."""
     friction, separates = LAWS.get(law, (law, True))
-    mesh = sheet(radius, thickness, plug_radius, law, elements)
+    mesh = sheet(radius, thickness, plug_radius, law, elements, near, comm)
     return fx.Scene(mesh=mesh, materials=material, supports=[fx.Symmetry("axis"), support or fx.Clamped("rim")],
                     contacts=[fx.Contact("top", plug(plug_radius, thickness, fillet), friction, separates=separates,
                                          moves=(0, -1), **options)])
@@ -51,7 +55,7 @@ def push(made, travels, pole_stretch=None, smallest=1e-6, **options):
     until = targets.pop() if pole_stretch is None else fx.pole_stretch(pole_stretch)
     try:
         return fx.trace(made, until=until, through=targets, step=fx.StepControl(target=6, smallest=smallest),
-                        max_steps=400, **options), "done"
+                        **options), "done"
     except fx.ConvergenceError as error:
         return error.path, str(error)
 

@@ -19,7 +19,7 @@ import plugs
 from common import parser, save, say, summarise
 
 import formingx as fx
-from formingx.reference import membrane_under_plug
+from formingx.reference_plug import membrane_under_plug
 from formingx.results import files
 from formingx.results.show import plots
 

@@ -8,7 +8,7 @@ from conftest import ROOT, treloar
 
 import formingx as fx
 from formingx.errors import InputError
-from formingx.reference import membrane_under_plug
+from formingx.reference_plug import membrane_sliding_over_plug, membrane_under_plug
 from formingx.solve.follow import was_passed
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
@@ -81,3 +81,27 @@ def test_a_path_never_comes_back_to_itself():
     k = next(i for i, s in enumerate(path.states) if s.measures["pole_stretch"] > fallen.measures["pole_stretch"])
     del path.states[k:]
     assert not was_passed(curve, path.states[:-1], path.last, fallen)
+
+
+WILLIAMS = dict(radius=8.89, plug_radius=1.905, thickness=0.6985, c10=0.448)
+
+
+def test_a_membrane_that_slides_over_a_small_edge_is_that_of_the_sharp_one():
+    """Two integrations of their own; the difference falls with the edge's radius."""
+    away = []
+    for fillet in (0.02, 0.005):
+        slides = membrane_sliding_over_plug(1.5, fillet=fillet, mu=0.0, **WILLIAMS)
+        sharp = membrane_under_plug(slides.travel, friction="none", **WILLIAMS)
+        away.append(abs(slides.force / sharp.force - 1))
+    assert away[1] < 0.3 * away[0] < 1e-3
+
+
+def test_friction_makes_the_tension_grow_as_on_a_capstan():
+    """Far drawn, the force without friction is 4 pi rp c10 h0; with it the edge alone makes it about exp(mu pi/2)."""
+    limit = 4 * np.pi * 1.905 * 0.448 * 0.6985
+    smooth, rough = (membrane_sliding_over_plug(20.0, fillet=0.05, mu=mu, **WILLIAMS) for mu in (0.0, 0.1))
+    assert smooth.force == pytest.approx(limit, rel=1e-5)
+    assert rough.force > np.exp(0.1 * np.pi / 2) * limit
+    assert (smooth.wrap, rough.wrap) == pytest.approx((np.pi / 2, np.pi / 2))
+    with pytest.raises(fx.InputError, match="does not draw the membrane so far"):
+        membrane_sliding_over_plug(1e6, fillet=0.05, mu=0.1, **WILLIAMS)

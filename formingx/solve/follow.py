@@ -33,6 +33,9 @@ _JUMPS = 1e-2, 1e-3
 
 The last is also that of the step ahead where a kink turns the path back, or where no shorter step is left."""
 
+_FURTHEST = 1e-3
+"""By how much the (dimensionless) control goes on at most in a jump from where the body is."""
+
 _PATIENCE = 500
 """States that gain less than a thousandth of the way to the target, after which a run gives up."""
 
@@ -64,6 +67,7 @@ class Run:
         self.open = list(targets)
         self.until, self._aim = self.open[-1]
         self._step, self._best, self._began = step, 0.0, time.perf_counter()
+        self._ahead = AHEAD                                 # of a jump: more after jumps without a step between them
         self._values: list[float] = []                      # what is aimed at, in the states of this run
 
     def follow(self, max_steps: int | None, progress: bool, start: State | None) -> None:
@@ -200,7 +204,7 @@ class Run:
                 if was_passed(self.curve, self.states[:-1], old, new):
                     raise _Astray("the iteration fell back to a part of the path that was passed", [])
                 error = self._error_in_time(new)
-                states = self._sorted_into(old, new)
+                states, self._ahead = self._sorted_into(old, new), AHEAD
                 if target is None and not limited:
                     self.step.accepted(len(new.history) - 1, error)
                 return states
@@ -249,12 +253,13 @@ class Run:
 
         step: the length of the last step that went well.
         """
-        by = self._sense * max(AHEAD, length * abs(old.slope))
+        by = self._sense * max(self._ahead, length * abs(old.slope))
         for target, bound in self.open:                      # of the control, which a jump must not pass
             if isinstance(bound, Amplitude) and bound.moves:
                 then, now = (self.curve.value(bound, old.x, c) - target.value for c in (old.control + by, old.control))
                 by *= now / (now - then) if now * then < 0 else 1.0
         new = jump(self.curve, old, by, length > 0)
+        self._ahead = min(10 * self._ahead, _FURTHEST)
         new.met = next((target for target, bound in self.open
                         if is_met(target, bound, self.curve.value(bound, new.x, new.control))), None)
         self.step.length = max(self.step.length, step / 2)
