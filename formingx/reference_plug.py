@@ -15,8 +15,10 @@ kappa = 1/fillet on the edge, 0 on the side; where the membrane is free N = 0 gi
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -53,7 +55,6 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
         InputError: a size or constant that is not allowed; a travel at which the membrane would touch the plug's side,
             or that a frictionless plug does not come to.
     """
-    from scipy.integrate import solve_bvp
     from scipy.optimize import brentq
     travel, radius, thickness = positive("travel", travel), positive("radius", radius), positive("thickness", thickness)
     c10, c01, edge = positive("c10", c10), non_negative("c01", c01), positive("plug_radius", plug_radius) / radius
@@ -79,7 +80,7 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
         l1 = stretch(RN / R, l2)
         return width * np.array([l1 * H / RN, l1 * V / RN, tension(l2, l1)])
 
-    def ends(a, b, p):
+    def ends(depth, a, b, p):
         found = [a[0] - edge, a[1] + depth, b[0] - 1, b[1]]
         if slides:
             found.append(np.hypot(a[2], p[0]) - start(p) * tension(p[1], p[1]))
@@ -92,16 +93,7 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
     y, p = np.array([edge + (1 - edge) * s, share * (s - 1), RN / l1]), [edge * tension(l1, 1.0) * share / (1 - edge)]
     if slides:
         p.append(brentq(lambda l: tension(l, l) - tension(l1, 1.0), 1, l1))
-    goal, depth = depth, share
-    while True:
-        found = solve_bvp(slopes, ends, s, y, p, tol=1e-6, max_nodes=5000)
-        if not found.success:
-            raise InputError(f"travel = {travel!r}: the membrane comes to {depth * radius:.6g} and not further:"
-                             f" {found.message}")
-        if depth == goal:
-            break
-        depth, before = min(1.25 * depth, goal), depth
-        y, p = found.sol(s) * np.array([[1], [depth / before], [1]]), found.p
+    found = _pushed(slopes, ends, s, y, p, share, depth, radius)
     r = found.y[0]
     if r.min() < edge * (1 - 1e-6):
         raise InputError(f"travel = {travel!r}: the membrane would touch the side of the plug")
@@ -110,6 +102,21 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
     force = 4 * np.pi * c10 * thickness * radius * found.p[0]
     return PlugState(float(force), float(found.p[1]) if slides else 1.0, R * radius, r * radius, found.y[1] * radius,
                      R / (l1 * r))
+
+
+def _pushed(slopes: Callable, ends: Callable, s: np.ndarray, y: np.ndarray, p: list, depth: float, goal: float,
+            radius: float) -> Any:
+    """The boundary value problem at a depth, from a guess at a smaller one, step by step."""
+    from scipy.integrate import solve_bvp
+    while True:
+        found = solve_bvp(slopes, functools.partial(ends, depth), s, y, p, tol=1e-6, max_nodes=5000)
+        if not found.success:
+            raise InputError(f"travel = {goal * radius!r}: the membrane comes to {depth * radius:.6g} and not further:"
+                             f" {found.message}")
+        if depth == goal:
+            return found
+        depth, before = min(1.25 * depth, goal), depth
+        y, p = found.sol(s) * np.array([[1], [depth / before], [1]]), found.p
 
 
 @dataclass(frozen=True)

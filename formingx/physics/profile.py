@@ -299,22 +299,8 @@ def _rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) -
                                  f" no corner to round")
             continue
         cut[i] = radius * math.tan(abs(turn) / 2)
-        left = math.copysign(1.0, turn)
-        start = points[i] - cut[i] * np.array([math.cos(come), math.sin(come)])
-        centre = start + left * radius * np.array([-math.sin(come), math.cos(come)])
-        begin, sweep = come - left * math.pi / 2, turn
-        if i not in before:
-            begin, sweep = begin + turn / 2, turn / 2
-        if i not in after:
-            sweep = turn / 2
-        arcs[i] = Arc(centre, radius, begin, sweep)
-    for (i, j), length in lengths.items():
-        if cut[i] + cut[j] > length * (1 + 1e-9):
-            k = i if cut[i] >= cut[j] else j
-            raise InputError(f"Tool: fillet at point {k} = {radii[k]:g} is too large for its corner {_show(points[k])}:"
-                             f" the edge from {_show(points[i])} to {_show(points[j])} is {length:.6g} long and its"
-                             f" fillets take {cut[i] + cut[j]:.6g}; at most"
-                             f" {radii[k] * max(length - cut[i] - cut[j] + cut[k], 0) / cut[k]:.6g} fits")
+        arcs[i] = _fillet(points[i], radius, cut[i], come, turn, i in before, i in after)
+    _check_fit(points, radii, lengths, cut)
     pieces: list[Line | Arc] = [arcs[0]] if 0 in arcs and not closed else []
     for i, j in edges:
         way = (points[j] - points[i]) / lengths[i, j]
@@ -323,6 +309,26 @@ def _rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) -
         if j in arcs:
             pieces.append(arcs[j])
     return pieces
+
+
+def _fillet(corner: np.ndarray, radius: float, cut: float, come: float, turn: float, first: bool, second: bool) -> Arc:
+    """The arc that rounds a corner, which takes `cut` of its edges; at an open end only one half of it."""
+    left = math.copysign(1.0, turn)
+    start = corner - cut * np.array([math.cos(come), math.sin(come)])
+    centre = start + left * radius * np.array([-math.sin(come), math.cos(come)])
+    begin = come - left * math.pi / 2 + (0.0 if first else turn / 2)
+    return Arc(centre, radius, begin, turn if first and second else turn / 2)
+
+
+def _check_fit(points: np.ndarray, radii: list[float], lengths: dict, cut: list[float]) -> None:
+    """Raise an InputError if two fillets take more of an edge than there is."""
+    for (i, j), length in lengths.items():
+        if cut[i] + cut[j] > length * (1 + 1e-9):
+            k = i if cut[i] >= cut[j] else j
+            raise InputError(f"Tool: fillet at point {k} = {radii[k]:g} is too large for its corner {_show(points[k])}:"
+                             f" the edge from {_show(points[i])} to {_show(points[j])} is {length:.6g} long and its"
+                             f" fillets take {cut[i] + cut[j]:.6g}; at most"
+                             f" {radii[k] * max(length - cut[i] - cut[j] + cut[k], 0) / cut[k]:.6g} fits")
 
 
 def _checked(piece: Line | Arc, i: int) -> Line | Arc:

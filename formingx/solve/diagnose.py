@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -223,44 +224,65 @@ def _changes(states: list, usable: list, sign: Any) -> list[tuple]:
 
 def _verdict(facts: dict, fixed_control: bool, pace: str, target: float | None) -> tuple[list[str], list[str]]:
     """What the numbers prove or make likely, and what to try."""
-    causes, advice = [], []
-    what, J, failed_J = facts["what"], facts.get("smallest_J"), facts.get("failed_J")
-    infinite = any(np.isinf(v) for v in facts.get("residual", {}).values())
+    found = [*_of_material(facts), *_of_elements(facts), *_of_limits(facts, fixed_control, target),
+             *_of_branches(facts), *_of_numbers(facts)]
+    if pace and not found:
+        found.append((pace, "more max_steps"))
+    return [cause for cause, _ in found], list(dict.fromkeys(advice for _, advice in found))
+
+
+def _of_material(facts: dict) -> Iterator[tuple[str, str]]:
+    """(cause, advice) of a material near the end of its domain."""
     if (facts.get("I1") or 0) > 0.8:
-        causes.append(f"a material is near the end of its domain: I1 - 3 is {100 * facts['I1']:.3g} % of what its limit"
-                      f" allows at {facts['limit']}")
-        advice.append("a target that needs less stretch there, a larger limit of the material, or shorter steps"
-                      " (StepControl(largest=...))")
+        yield (f"a material is near the end of its domain: I1 - 3 is {100 * facts['I1']:.3g} % of what its limit"
+               f" allows at {facts['limit']}",
+               "a target that needs less stretch there, a larger limit of the material, or shorter steps"
+               " (StepControl(largest=...))")
+
+
+def _of_elements(facts: dict) -> Iterator[tuple[str, str]]:
+    """(cause, advice) of an element that turns inside out."""
+    J, failed_J = facts.get("smallest_J"), facts.get("failed_J")
+    infinite = any(np.isinf(v) for v in facts.get("residual", {}).values())
     inverted = failed_J is not None and failed_J <= 0
     if J is not None and (J < 0.3 or facts["shape"] < 0.1 and (inverted or infinite)):
         now = f"J = {J:.3g}" if J < 0.3 else f"its shape is {facts['shape']:.2g} of what it was at rest"
-        causes.append(f"an element is about to turn inside out: {now} in the last good state, at {facts['at_J']}"
-                      + (f" (in the failed attempt J = {failed_J:.3g})" if inverted else ""))
         R, Z = facts["at_J"].R, facts["at_J"].Z
-        advice.append(f"smaller elements around (R, Z) = ({R:.4g}, {Z:.4g}), in a disc with concentrate={{{R:.4g}:"
-                      f" 0.2}}, or elements that start long in the direction in which they are squeezed there")
-    limits = facts.get("limit_points", ())
+        yield (f"an element is about to turn inside out: {now} in the last good state, at {facts['at_J']}"
+               + (f" (in the failed attempt J = {failed_J:.3g})" if inverted else ""),
+               f"smaller elements around (R, Z) = ({R:.4g}, {Z:.4g}), in a disc with concentrate={{{R:.4g}: 0.2}}, or"
+               f" elements that start long in the direction in which they are squeezed there")
+
+
+def _of_limits(facts: dict, fixed_control: bool, target: float | None) -> Iterator[tuple[str, str]]:
+    """(cause, advice) of a limit point before the target."""
+    what, limits = facts["what"], facts.get("limit_points", ())
     if target is not None and limits and abs(target) > max(map(abs, limits)):
-        causes.append(f"the {what} has its maximum, {max(limits, key=abs):.6g}, at a limit point that was passed, and"
-                      f" {target:.6g} lies beyond it")
-        advice.append("a target that grows beyond a limit point (pole_height, pole_stretch, enclosed_volume)")
+        yield (f"the {what} has its maximum, {max(limits, key=abs):.6g}, at a limit point that was passed, and"
+               f" {target:.6g} lies beyond it",
+               "a target that grows beyond a limit point (pole_height, pole_stretch, enclosed_volume)")
     ahead, aimed = facts.get("limit_ahead"), facts.get("aimed")
     if ahead is not None and fixed_control:
-        causes.append(f"a limit point lies ahead: the {what} can rise no further than about {ahead:.6g}, as the slope"
-                      f" of the path tells" + (f"; {aimed:.6g} was asked for" if aimed is not None else ""))
-        advice.append("`trace`, which passes limit points, or a lower target")
+        yield (f"a limit point lies ahead: the {what} can rise no further than about {ahead:.6g}, as the slope"
+               f" of the path tells" + (f"; {aimed:.6g} was asked for" if aimed is not None else ""),
+               "`trace`, which passes limit points, or a lower target")
+
+
+def _of_branches(facts: dict) -> Iterator[tuple[str, str]]:
+    """(cause, advice) of another branch, and of contact that does not settle."""
+    what = facts["what"]
     for a, b in facts.get("turned", ()):
-        causes.append(f"the tangent lost definiteness between {what} {a:.6g} and {b:.6g} without a limit point: another"
-                      f" branch starts there, possibly buckling")
-        advice.append(f"a small imperfection in the load or the mesh, or a target before {what} {b:.6g}")
+        yield (f"the tangent lost definiteness between {what} {a:.6g} and {b:.6g} without a limit point: another"
+               f" branch starts there, possibly buckling",
+               f"a small imperfection in the load or the mesh, or a target before {what} {b:.6g}")
     if facts.get("flipped"):
-        causes.append(f"contact does not settle: {facts['flipped']} nodes changed state in the last iteration")
-        advice.append("smaller elements along the face in contact, a wider ramp or a lower penalty (Contact)")
+        yield (f"contact does not settle: {facts['flipped']} nodes changed state in the last iteration",
+               "smaller elements along the face in contact, a wider ramp or a lower penalty (Contact)")
+
+
+def _of_numbers(facts: dict) -> Iterator[tuple[str, str]]:
+    """(cause, advice) of round-off."""
     if (facts.get("condition") or 0) > 1e14:
-        causes.append(f"round-off: the condition number of the tangent is {facts['condition']:.1g}, next to nothing of"
-                      f" 16 digits is left")
-        advice.append("a larger eps, a lower contact penalty, or layers less different in stiffness")
-    if pace and not causes:
-        causes.append(pace)
-        advice.append("more max_steps")
-    return causes, list(dict.fromkeys(advice))
+        yield (f"round-off: the condition number of the tangent is {facts['condition']:.1g}, next to nothing of"
+               f" 16 digits is left",
+               "a larger eps, a lower contact penalty, or layers less different in stiffness")

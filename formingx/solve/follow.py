@@ -183,31 +183,14 @@ class Run:
 
         Failures halve the step. Where short ones fail, or the control has its limit, the body jumps.
         """
-        problem, first, jumps, failed = self.problem, self.step.length, [*_JUMPS, 0.0], 0
+        first, jumps, failed = self.step.length, [*_JUMPS, 0.0], 0
         if self._at_fold == "jump" and (old.kind == "limit point" or old.slope * self._sense < 0):
             return self._snap(old)
         while True:
-            length = problem.reach(old.x, old.control, old.direction, old.slope, self.step.length)
-            limited = length < self.step.length
+            length = self.problem.reach(old.x, old.control, old.direction, old.slope, self.step.length)
             target, bound, reach = self._within_reach(old, length)
-            problem.prepare(old.x, old.control, old.direction, old.slope, reach)
             try:
-                if target is None:
-                    new = self.curve.step(old, length)
-                else:
-                    new = self.curve.step_to(old, reach, bound.equation(target.value))
-                    if not 0 < self.curve.progress(old, new) < 2 * length:
-                        raise _Astray("the target was met on a far part of the path", [])
-                    new.met = target
-                if problem.too_far(old.x, old.control, new.x, new.control):
-                    raise _Astray("too much came into contact in one step", [])
-                if was_passed(self.curve, self.states[:-1], old, new):
-                    raise _Astray("the iteration fell back to a part of the path that was passed", [])
-                error = self._error_in_time(new)
-                states, self._ahead = self._sorted_into(old, new), AHEAD
-                if target is None and not limited:
-                    self.step.accepted(len(new.history) - 1, error)
-                return states
+                return self._take(old, length, target, bound, reach)
             except Inaccurate as found:
                 self.record.counts.failures += 1
                 self.step.length = found.share * reach
@@ -225,6 +208,26 @@ class Run:
                 if not good:
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
                                   failure.attempt)
+
+    def _take(self, old: State, length: float, target: Target | None, bound: Any, reach: float) -> list[State]:
+        """One step of a length, or to a target that is within reach; raises `Failure` or `Inaccurate`."""
+        self.problem.prepare(old.x, old.control, old.direction, old.slope, reach)
+        if target is None:
+            new = self.curve.step(old, length)
+        else:
+            new = self.curve.step_to(old, reach, bound.equation(target.value))
+            if not 0 < self.curve.progress(old, new) < 2 * length:
+                raise _Astray("the target was met on a far part of the path", [])
+            new.met = target
+        if self.problem.too_far(old.x, old.control, new.x, new.control):
+            raise _Astray("too much came into contact in one step", [])
+        if was_passed(self.curve, self.states[:-1], old, new):
+            raise _Astray("the iteration fell back to a part of the path that was passed", [])
+        error = self._error_in_time(new)
+        states, self._ahead = self._sorted_into(old, new), AHEAD
+        if target is None and length == self.step.length:   # not one that contact has made shorter
+            self.step.accepted(len(new.history) - 1, error)
+        return states
 
     def _error_in_time(self, new: State) -> float:
         """Of the step to a state, over what is allowed; raises `Inaccurate` if it is much more."""

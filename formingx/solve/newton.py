@@ -184,15 +184,7 @@ class BorderedNewton:
             kinks.look(moved)
             if points:
                 points.look()
-            quiet = history[kinks.changed:]
-            grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
-            if grown and not (problem.has_kinks and moved < SMALL):
-                raise Failure("the iteration diverges", history)
-            settling = len(history) - min(kinks.found, 4 * SETTLING) >= self.tolerances.settling
-            if len(quiet) >= self.tolerances.iterations or settling:
-                unsettled = settling and len(history) - kinks.changed < 3
-                raise Failure("contact does not settle: " * unsettled + f"no convergence in {len(history)} iterations",
-                              history)
+            self._check(history, kinks, moved)
             step = self._correction(x, control, constraint, history)
             share = kinks.share
             if points and kinks.changed == len(history) >= _UNSETTLED:
@@ -210,6 +202,18 @@ class BorderedNewton:
             history.append(Iteration(residual, correction, work / work0))
             self.reached = control, step
             problem.residual(x, control, self.F)
+
+    def _check(self, history: list[Iteration], kinks: _Kinks, moved: float) -> None:
+        """Raise `Failure` if the iteration diverges, or takes too long."""
+        quiet = history[kinks.changed:]
+        grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
+        if grown and not (self.problem.has_kinks and moved < SMALL):
+            raise Failure("the iteration diverges", history)
+        settling = len(history) - min(kinks.found, 4 * SETTLING) >= self.tolerances.settling
+        if len(quiet) >= self.tolerances.iterations or settling:
+            unsettled = settling and len(history) - kinks.changed < 3
+            raise Failure("contact does not settle: " * unsettled + f"no convergence in {len(history)} iterations",
+                          history)
 
     def _correction(self, x: PETSc.Vec, control: float, constraint: Any, history: list) -> float:
         """Solve for the correction `self.a` of x and that of the control, which is returned."""
