@@ -19,7 +19,7 @@ from petsc4py import PETSc
 from ufl.algorithms.analysis import extract_constants
 
 from .. import _compat
-from ..errors import InputError
+from ..errors import together
 from ..physics import kinematics as kin
 from .history import History, MaterialHistory
 from .loaded_body import LoadedBody
@@ -151,14 +151,7 @@ class Formulation(ABC):
         Raises:
             InputError: a constant has no value at a temperature.
         """
-        refused = None
-        for terms in dict.fromkeys(self._terms.values()):
-            try:
-                terms.take_temperature()
-            except InputError as error:
-                refused = refused or str(error)
-        for message in filter(None, self.comm.allgather(refused)):          # all ranks refuse, with one message
-            raise InputError(message)
+        together(self.comm, [terms.take_temperature for terms in dict.fromkeys(self._terms.values())])
 
     def cells_of(self, layers: list[str]) -> np.ndarray:
         """The cells of `mesh` in which some layers are, this rank's own and ghosts, ascending local numbers."""

@@ -184,7 +184,7 @@ class CoolingHistory:
         if self._problem.comm.allreduce(int(not same)):
             self._seen = here[:] = T
             self._T.x.scatter_forward()
-            self._forms.take_temperature()
+            self._problem.take_temperature()
 
 
 def _extremes(temperatures: list[float], laws: Sequence[Any]) -> tuple[float, float]:

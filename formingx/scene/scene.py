@@ -205,7 +205,11 @@ class Scene:
                 raise InputError(f"{thing!r}: boundary {on!r} is empty: no facet of the mesh carries it")
 
     def _check_contact(self, contact: Contact) -> None:
-        """The body starts outside the tool, the face looks at it, and the pressure does not push away from it."""
+        """The body starts outside the tool, the face looks at it, and the pressure does not push away from it.
+
+        Friction has a value at the temperature of the face.
+        """
+        contact.friction_at(None if self.temperature is None else self.temperature.on(contact.on))
         mesh, near = self.mesh, 1e-6 * max(self.extent)
         if self.kinematics.axisymmetric and contact.moves and contact.moves[0] \
                 and contact.tool.outline()[:, 0].min() <= near:
