@@ -91,9 +91,11 @@ class Conduction:
 
     def start(self) -> list[np.ndarray]:
         """The state that `T` and the tools have now, faces that are held at theirs: [T, owned part, *lines]."""
-        T = self.T.x.array[: self._n].copy()
-        T[self._held] = self._held_at.x.array[: self._n][self._held]
-        return [T, *(touch.start() for touch in self.touches)]
+        return [self.held(self.T.x.array[: self._n]), *(touch.start() for touch in self.touches)]
+
+    def held(self, T: np.ndarray) -> np.ndarray:
+        """A temperature, owned part, with the faces that are held at theirs."""
+        return np.where(self._held, self._held_at.x.array[: self._n], T)
 
     def update(self) -> None:
         """The displacement or what touches has changed: take up where faces are and how large they are."""

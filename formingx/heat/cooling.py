@@ -127,6 +127,7 @@ class CoolingHistory:
             depth = contact.contact.tool.signed_distance(touch.points + u[touch.dofs] - contact.travelled(control))
             touch.conductance[:] = conductance * (contact.present & (depth > -_NEAR * contact.thickness))
         self._body.update()
+        self._state[0] = self._body.held(self._state[0])
         self._go(until)
         self._take(self._state[0])
 
