@@ -79,6 +79,40 @@ def test_a_part_that_is_let_go_shrinks_to_its_free_size():
     assert np.abs(path.stress().at_quadrature_points().cauchy).max() < 1e-6 * C10
 
 
+def drawn_and_let_go(branches):
+    """(stretch of a sheet when its rim is let go, having been drawn hot by 1.5 and chilled to 20 C; the path)."""
+    sheet = fx.Viscoelastic(fx.NeoHookean(c10=1.0), branches, shift=fx.Arrhenius(250e3, HOT, unit="C"))
+    body = fx.mesh.disc(radius=4e-3, thickness=1e-3, elements=(3, 1))
+    cold = [fx.Convection(face, h=2000.0, air=20.0) for face in ("top", "bottom")]
+    grip = fx.Displaced("rim", "r", name="grip")
+    scene = fx.Scene(mesh=body, materials=sheet, temperature=HOT, expansion=SHRINKS,
+                     heat=fx.Cooling(SHEET, cold, unit="C", tolerance=1.0),
+                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"), grip])
+    draw = fx.Stage("draw", drive="grip", until=fx.travel(2e-3))
+    path = fx.Process(scene).run([draw, fx.Stage("chill", duration=15.0), fx.Stage("let go", without=["grip"])],
+                                 progress=False, accuracy="draft")
+    return path.profile().top[-1, 0] / 4e-3, path
+
+
+def test_what_has_set_keeps_its_shape_and_shrinks():
+    """A branch that is glassy when cold (200 times as stiff) and has no time when hot freezes a sheet as it is drawn.
+
+    Let go, it springs back by the small strain at which the frozen branch bears what the rubber pulls with, and by
+    what it shrinks below the temperature at which it froze; the rubber alone goes back to where it began, less J_T.
+    """
+    set_stretch, path = drawn_and_let_go([(200.0, 1e-4)])
+    rubber, _ = drawn_and_let_go([(1e-6, 1e-4)])
+    free = float(SHRINKS.stretch(20.0))
+    assert rubber == pytest.approx(free, rel=2e-3)
+    assert 1.5 * free < set_stretch < 1.5
+    in_grip = [s for s in path.states if s.stage == "chill"][-1]
+    residual = path.stress(in_grip).at_quadrature_points().cauchy[:, 0, 0]
+    assert residual.min() > 1.0                                # in the grip it pulls, let go it does not on the whole
+    gone = path.stress().at_quadrature_points()
+    weights = gone.points[:, 0]
+    assert abs(np.average(gone.cauchy[:, 0, 0], weights=weights)) < 0.05 * residual.mean()
+
+
 @pytest.mark.parametrize("heights, moduli", [((0.5, 0.5), (1.0, 1.0)), ((0.3, 0.7), (3.0, 0.5))])
 def test_a_strip_of_two_layers_warps_as_timoshenko_says(heights, moduli):
     """Timoshenko, J. Opt. Soc. Am. 11 (1925) 233, eq. (4); in plane strain E/(1 - nu^2) and (1 + nu) times expansion.

@@ -141,8 +141,12 @@ class Formulation(ABC):
         self.histories: list[History] = [MaterialHistory(self, terms) for terms in changing]
         self.potential = self._energy(MaterialTerms.step_energy)
         self.energy = self._energy(MaterialTerms.stored_energy) if changing else self.potential
-        self.dissipation = sum(self.weighted(self._scale * terms.dissipation(self.elastic_F), terms.names)
-                               for terms in changing) if changing else None
+        self.dissipation = self.dissipated(self._scale) if changing else None
+
+    def dissipated(self, factor: Any) -> Any:
+        """The integral (UFL) of a factor times the power that is dissipated per reference volume."""
+        return sum(self.weighted(factor * terms.dissipation(self.elastic_F), terms.names)
+                   for terms in dict.fromkeys(self._terms.values()) if terms.internal)
 
     def elastic(self, F: Any) -> Any:
         """What strains the material of a deformation gradient F (UFL, shape (3, 3)): all but thermal expansion."""
