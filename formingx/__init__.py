@@ -10,6 +10,7 @@ from .heat.result import HeatRun
 from .heat.run import heat
 from .materials.constants import entropic, of_temperature
 from .materials.data import treloar1944
+from .materials.expansion import ThermalExpansion
 from .materials.fit import Fit, fit
 from .materials.fit_in_time import TimedTest
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh

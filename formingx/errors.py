@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from numbers import Complex, Real
 from pathlib import Path
 from typing import Any
@@ -133,3 +133,15 @@ def known(kind: str, name: Any, names: Any) -> None:
     """An InputError that lists the known names unless `name` is one of them."""
     if not isinstance(name, Hashable) or name not in names:
         raise InputError(f"{kind} {name!r} is not known; known: {', '.join(map(repr, names)) or 'none'}")
+
+
+def together(comm: Any, calls: Iterable[Callable[[], Any]]) -> None:
+    """Call them; an InputError of one of them, on whatever rank, is raised on all, with one message; collective."""
+    refused = None
+    for call in calls:
+        try:
+            call()
+        except InputError as error:
+            refused = refused or str(error)
+    for message in filter(None, comm.allgather(refused)):
+        raise InputError(message)

@@ -1,18 +1,54 @@
-"""Time-temperature superposition: how much slower a material relaxes at another temperature."""
+"""Functions of the temperature, and time-temperature superposition: how much slower a material relaxes at another."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import ufl
 
 from .errors import InputError, finite, known, positive
+from .tables import Table
 
 ABSOLUTE_ZERO = {"C": -273.15, "K": 0.0}
 """By unit of temperature."""
 GAS_CONSTANT = 8.31446261815324
 """J/(mol K)."""
+
+
+class FunctionOfTemperature:
+    """f(T) of the temperature of the scene; arrays of shape (n,) go in and come out.
+
+    Args:
+        function: f. words: what it is called in messages.
+    """
+
+    def __init__(self, function: Callable, words: str | None = None):
+        self.function = function
+        self._words = words or (repr(function) if isinstance(function, Table)
+                                else f"of_temperature({getattr(function, '__qualname__', repr(function))})")
+
+    def __call__(self, temperature: Any) -> np.ndarray:
+        """Values at temperatures, of their shape, all finite."""
+        T = np.asarray(temperature, dtype=float)
+        if isinstance(self.function, Table):
+            self.function.check(T, "temperature")
+        try:
+            found = np.broadcast_to(np.asarray(self.function(T), dtype=float), T.shape)
+        except (TypeError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"the constant {self!r} must be a function of an array of temperatures, shape (n,):"
+                             f" {error}") from None
+        wrong = ~np.isfinite(found)
+        if np.any(wrong):
+            raise InputError(f"the constant {self!r} is {found[wrong].flat[0]} at a temperature of"
+                             f" {T[wrong].flat[0]:.6g}")
+        return found
+
+    def __repr__(self) -> str:
+        return self._words
 
 
 class WLF:

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from conftest import run
+from conftest import drawn, run
 
 TIMES = {"heating": {"convection": (5, 10, 20, 40, 80, 160), "two_sides": (5, 10, 20, 40, 80, 160),
                      "radiation_400_400": (10, 20, 40, 60, 80, 100), "radiation_450_350": (10, 20, 40, 60, 80, 100),
@@ -31,3 +31,34 @@ def test_keys(demo, options, allowed, tmp_path):
         assert found["largest_error_over_span"][case] < allowed
         assert (tmp_path / f"{case}.csv").stat().st_size > 2000
     assert len(list(tmp_path.glob("through_*.png"))) == 1
+
+
+def test_cold_plug_quick(tmp_path):
+    """A plug that chills leaves a thicker base than one that does not, and that a thicker one than no plug."""
+    run("demos/cold_plug.py", "--out", tmp_path, "--quick")
+    found = json.loads((tmp_path / "summary.json").read_text())
+    hot, cold = (found["plugs"][name] for name in ("150_C_0_W_per_m2K", "30_C_1000_W_per_m2K"))
+    for n in (hot, cold, found["beside"]["straight vacuum"]):
+        assert "stopped" not in n and 0 < n["least"] <= n["corner"]
+    assert cold["base"] > 1.5 * hot["base"] > 3 * found["beside"]["straight vacuum"]["base"]
+    assert 60 < cold["base_C_at_plug"] < 75 < 140 < cold["base_C_on_top"] and abs(hot["base_C_at_plug"] - 150) < 1e-9
+    assert drawn(tmp_path / "cold_plug.png")
+
+
+@pytest.mark.slow
+def test_cold_plug(tmp_path):
+    """What the gallery says of it."""
+    run("demos/cold_plug.py", "--out", tmp_path)
+    found = json.loads((tmp_path / "summary.json").read_text())
+    plugs, bases = found["plugs"], {name: n["base"] for name, n in found["factors"].items()}
+    assert plugs["150_C_1000_W_per_m2K"]["base"] == pytest.approx(plugs["150_C_0_W_per_m2K"]["base"], rel=1e-6)
+    exact = {"none of the three": 0.055, "friction": 0.057, "chill": 0.161, "chill + friction": 0.119,
+             "relaxation": 0.037, "relaxation + friction": 0.157, "relaxation + chill": 0.256,
+             "relaxation + chill + friction": 0.260}
+    assert bases == pytest.approx(exact, abs=2e-3)
+    assert found["beside"]["straight vacuum"]["base"] == pytest.approx(0.054, abs=1e-3)
+    order = [plugs[f"{name}_W_per_m2K"]["base"] for name in ("150_C_0", "100_C_200", "100_C_1000", "30_C_1000")]
+    assert order == sorted(order)
+    effects = found["effects"]
+    assert effects["chill"]["base"] > effects["relaxation"]["base"] > effects["friction"]["base"] > 0
+    assert len((tmp_path / "factors.csv").read_text().splitlines()) == 9

@@ -40,9 +40,12 @@ class ContactNodes:
         self.solid, self.contact = solid, contact
         self._comm, self._length = solid.comm, solid.length
         self._place(assemble)
+        self._warm: Any = None                              # nodes of the temperature that friction depends on
+        if contact.warm:
+            self._warm = solid.scene.temperature.nodes(self._nodes())
         self.thickness = solid.thickness(contact.on)
         self.law = contact.law(contact.penalty * solid.stress / self.thickness, contact.ramp * self.thickness,
-                               self.points)
+                               self.points, self._temperatures())
         self._scale = solid.length / (solid.stress * solid.volume) * self.area
         self._motion = solid.length * np.array(contact.moves or (0.0, 0.0))
         self.base, self.rate = 0.0, float(contact.driven)   # of the travel by the control (`Setting`)
@@ -81,6 +84,23 @@ class ContactNodes:
     def _between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
         """Stiffness of the points, shape (n, 2, 2), as that of their unknowns."""
         return stiffness
+
+    def _nodes(self) -> np.ndarray:
+        """Reference positions of the nodes of the face that the points take a temperature from, length."""
+        return self.points
+
+    def _temperatures(self) -> np.ndarray | None:
+        """Of the body at the points now, shape (n,); None where friction does not depend on them."""
+        return None if self._warm is None else self.solid.scene.temperature.at_nodes(self._warm)
+
+    def take_temperature(self) -> None:
+        """The scene's temperature has changed: friction follows it.
+
+        Raises:
+            InputError: friction has no value at a temperature.
+        """
+        if self._warm is not None:
+            self.law, self._last = self.law.with_friction(self.contact.friction_at(self._temperatures())), None
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Nodes seen from the tool, shape (n, 2), length; `fields`: owned unknowns."""

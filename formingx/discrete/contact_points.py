@@ -38,10 +38,20 @@ class ContactPoints(ContactNodes):
         slopes = np.column_stack([4 * s - 3, 4 * s - 1, 4 - 8 * s])
         self.dofs = np.repeat(numbers[nodes].reshape(-1, 6), q, axis=0)
         self.shapes = np.tile(shapes, (len(nodes), 1))
+        self._corners = np.repeat(X[nodes], q, axis=0)
         self.points = np.einsum("qa,fai->fqi", shapes, X[nodes]).reshape(-1, 2)
         along = np.einsum("qa,fai->fqi", slopes, X[nodes]).reshape(-1, 2)
         self.lengths = np.hypot(*along.T) * np.tile(weights / 2, len(nodes))
         self.area = self.lengths * solid.scene.kinematics.weight(self.points.T)
+
+    def _nodes(self) -> np.ndarray:
+        """Three for each point, shape (n, 3, 2)."""
+        return self._corners
+
+    def _temperatures(self) -> np.ndarray | None:
+        """See `ContactNodes`; a face that is as hot all over stays so to the last bit."""
+        T = super()._temperatures()
+        return None if T is None else T[:, 0] + np.einsum("na,na->n", self.shapes[:, 1:], T[:, 1:] - T[:, :1])
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
         """See `ContactNodes`."""

@@ -19,8 +19,9 @@ from petsc4py import PETSc
 from ufl.algorithms.analysis import extract_constants
 
 from .. import _compat
-from ..errors import InputError
+from ..errors import together
 from ..physics import kinematics as kin
+from .free_stretch import FreeStretch
 from .history import History, MaterialHistory
 from .loaded_body import LoadedBody
 from .material_terms import MaterialTerms
@@ -37,7 +38,7 @@ class Formulation(ABC):
         space, w: the mixed `FunctionSpace` and the `Function` of all fields (dimensionless), displacement first.
         displacement_element: the scalar element of a displacement component.
         u, X: displacement and reference position (UFL, user's unit of length, shape (2,)).
-        F, J: deformation gradient (UFL, shape (3, 3)) and its determinant.
+        F: deformation gradient (UFL, shape (3, 3)); elastic_F: less thermal expansion; J: determinant of that.
         dx, weight: weight * dx is the element of reference volume.
         control: the `Constant` of the dimensionless control; time: process time (UFL), which follows it.
         scales: the user's value (pressure, travel, ...) over the amplitude (`Setting`), for every thing of the scene;
@@ -76,7 +77,9 @@ class Formulation(ABC):
         self.volume = self.integral(self.weight * self.dx)
         self._scale = self.constant(1 / (self.stress * self.volume))
         self.F = self._deformation_gradient()
-        self.J = kin.volume_ratio(self.F)
+        self._free = FreeStretch(self, scene.expansion) if scene.expansion else None
+        self.elastic_F = self.elastic(self.F)
+        self.J = kin.volume_ratio(self.elastic_F)
         body = LoadedBody(self)
         self.scales = [load.unit(body) if load.driven else self.length for load in scene.loads]
         self.scales += [self.length] * (len(scene.things) - len(self.scales)) + [1.0]
@@ -138,8 +141,16 @@ class Formulation(ABC):
         self.histories: list[History] = [MaterialHistory(self, terms) for terms in changing]
         self.potential = self._energy(MaterialTerms.step_energy)
         self.energy = self._energy(MaterialTerms.stored_energy) if changing else self.potential
-        self.dissipation = sum(self.weighted(self._scale * terms.dissipation(self.F), terms.names)
-                               for terms in changing) if changing else None
+        self.dissipation = self.dissipated(self._scale) if changing else None
+
+    def dissipated(self, factor: Any) -> Any:
+        """The integral (UFL) of a factor times the power that is dissipated per reference volume."""
+        return sum(self.weighted(factor * terms.dissipation(self.elastic_F), terms.names)
+                   for terms in dict.fromkeys(self._terms.values()) if terms.internal)
+
+    def elastic(self, F: Any) -> Any:
+        """What strains the material of a deformation gradient F (UFL, shape (3, 3)): all but thermal expansion."""
+        return F if self._free is None else self._free.elastic(F)
 
     def temperatures(self, terms: MaterialTerms) -> np.ndarray:
         """The scene's temperature at the quadrature points of a material, shape (cells, points)."""
@@ -151,14 +162,8 @@ class Formulation(ABC):
         Raises:
             InputError: a constant has no value at a temperature.
         """
-        refused = None
-        for terms in dict.fromkeys(self._terms.values()):
-            try:
-                terms.take_temperature()
-            except InputError as error:
-                refused = refused or str(error)
-        for message in filter(None, self.comm.allgather(refused)):          # all ranks refuse, with one message
-            raise InputError(message)
+        following: list[Any] = [*dict.fromkeys(self._terms.values()), *([self._free] if self._free else [])]
+        together(self.comm, [one.take_temperature for one in following])
 
     def cells_of(self, layers: list[str]) -> np.ndarray:
         """The cells of `mesh` in which some layers are, this rank's own and ghosts, ascending local numbers."""

@@ -58,7 +58,7 @@ class MaterialHistory:
         topology = forms.domain.topology
         self._own = self._cells[self._cells < topology.index_map(topology.dim).size_local]
         self._numbers = topology.original_cell_index[self._own]     # in the script's mesh, whatever the ranks
-        updated = terms.updated(forms.F)
+        updated = terms.updated(forms.elastic_F)
         self._sizes = {name: int(np.prod(f.ufl_shape, dtype=int)) for name, f in terms.internal.items()}
         flat = [ufl.as_ufl(updated[name])[i] if i else ufl.as_ufl(updated[name])
                 for name, f in terms.internal.items() for i in np.ndindex(f.ufl_shape)]

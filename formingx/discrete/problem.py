@@ -16,6 +16,7 @@ from dolfinx import fem, la
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..errors import together
 from ..scene.scene import Scene
 from .admissible import Admissible, Least
 from .constraints import Active, Constraints
@@ -303,6 +304,14 @@ class Problem:
             else:
                 history.advance(x[: self._n], control)
         self._foretold = None, {}
+
+    def take_temperature(self) -> None:
+        """The scene's temperature has changed: constants and friction follow it; collective.
+
+        Raises:
+            InputError: a constant or friction has no value at a temperature.
+        """
+        together(self.comm, [self.forms.take_temperature, *(contact.take_temperature for contact in self.contacts)])
 
     def foretell(self, x: np.ndarray, control: float) -> dict[int, Any]:
         """{number of a material's history: what it would remember, were a state accepted}."""

@@ -131,6 +131,7 @@ class Solid(Formulation):
         The energy of the material, then what keeps the volume: W(F) - rest_stress ln J, and p (J - 1) or a penalty.
         `of`: see `_energy`.
         """
+        F = self.elastic(F)
         model, terms, J = self.scene.model, self._terms[names[0]], kin.volume_ratio(F)
         W = of(terms, F)
         if model.stress_free:

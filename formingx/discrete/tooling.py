@@ -56,4 +56,8 @@ def _contact(data: dict[str, Any]) -> Contact:
         pieces.append((Line if len(values) == 2 else Arc)(*values))
     moves = data["moves"] and tuple(data["moves"])
     more = {name: data[name] for name in ("penalty", "ramp", "separates", "nodes_per_step", "name")}
-    return Contact(data["on"], Tool.of_pieces(pieces, shape["closed"]), data["friction"], moves=moves, **more)
+    words = isinstance(data["friction"], str) and data["friction"] not in ("stick", "none")
+    found = Contact(data["on"], Tool.of_pieces(pieces, shape["closed"]), "stick" if words else data["friction"],
+                    moves=moves, **more)
+    found.friction = data["friction"]                       # a function of the temperature can only be told
+    return found

@@ -52,6 +52,7 @@ class Conduction:
         mesh, comm: where. space: P2. T: the `Function` that the forms see. points: of its nodes, (R, Z), owned part.
         capacity: of the whole body, heat per degree; volume: of the reference body.
         touches: [`Touch`], one for each ContactWithTool; who changes a conductance in it calls `update`.
+        power: heat that is given at the nodes per time, over `capacity`, owned part, shape (n,), or 0.
         names: of what gives heat: boundaries and sources, in the order of `Stage.heats`.
     """
 
@@ -67,6 +68,7 @@ class Conduction:
         self._X, self._v = ufl.SpatialCoordinate(domain), ufl.TestFunction(self.space)
         self._dx = ufl.Measure("dx", domain, subdomain_data=mesh.cells, metadata={"quadrature_degree": 6})
         self._scale, self._c = self.constant(1.0), self.constant(1.0)
+        self.power: Any = 0.0
         self._buffer = la.vector(self.space.dofmap.index_map, 1)
         self._factored_for: float | None = None
         self._displaced: Any = None
@@ -91,9 +93,11 @@ class Conduction:
 
     def start(self) -> list[np.ndarray]:
         """The state that `T` and the tools have now, faces that are held at theirs: [T, owned part, *lines]."""
-        T = self.T.x.array[: self._n].copy()
-        T[self._held] = self._held_at.x.array[: self._n][self._held]
-        return [T, *(touch.start() for touch in self.touches)]
+        return [self.held(self.T.x.array[: self._n]), *(touch.start() for touch in self.touches)]
+
+    def held(self, T: np.ndarray) -> np.ndarray:
+        """A temperature, owned part, with the faces that are held at theirs."""
+        return np.where(self._held, self._held_at.x.array[: self._n], T)
 
     def update(self) -> None:
         """The displacement or what touches has changed: take up where faces are and how large they are."""
@@ -298,6 +302,14 @@ class Conduction:
         X, u = (np.concatenate(self.comm.allgather(a)) for a in (self.points[own], u[own]))
         return line + u[cKDTree(X).query(line)[1]]
 
+    def source(self, make: Any) -> Any:
+        """A compiled form for `assembled`: make(v) is an integral (UFL) of heat per time, times v."""
+        return self._form(make(self._scale * self._v))
+
+    def assembled(self, form: Any) -> np.ndarray:
+        """What such a form gives now, as `power`."""
+        return self._assemble(form)
+
     def _form(self, form: Any) -> Any:
         return fem.form(form, jit_options=_compat.JIT_OPTIONS)
 
@@ -315,7 +327,7 @@ class Conduction:
         """R(T) without what touches, owned part; leaves T in `T`."""
         self.T.x.array[: self._n] = T
         self.T.x.scatter_forward()
-        return self._assemble(self._rate_form)
+        return self._assemble(self._rate_form) + self.power
 
     def _mass(self, change: np.ndarray) -> np.ndarray:
         self._change.x.array[: self._n] = change

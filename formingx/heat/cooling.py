@@ -45,12 +45,17 @@ class Cooling:
         tools: {name of a contact of the scene: (conductance, tool)}, see `ToolHeat`.
         unit: of all temperatures, "C" or "K".
         tolerance: the largest estimated error of one step in time of the heat equation, degrees.
+        work_to_heat: heat that comes of a unit of the work that materials dissipate, in the units of the two: 1 in
+            SI, 1e-3 for MPa, mm and W, less where a part of it is stored. None: work does not heat. (That of friction
+            on tools never does.)
     """
 
     def __init__(self, materials: ThermalProperties | Mapping[str, ThermalProperties], boundaries: Sequence[Any] = (),
-                 *, unit: str, tools: Mapping[str, Any] | None = None, tolerance: float = 0.05):
+                 *, unit: str, tools: Mapping[str, Any] | None = None, tolerance: float = 0.05,
+                 work_to_heat: float | None = None):
         known("Cooling: unit", unit, ABSOLUTE_ZERO)
         self.materials, self.unit, self.tolerance = materials, unit, positive("Cooling: tolerance", tolerance)
+        self.work_to_heat = None if work_to_heat is None else positive("Cooling: work_to_heat", work_to_heat)
         self.boundaries = several("Cooling: boundaries", boundaries, "boundaries, such as Convection(...)")
         self.tools = {name: ToolHeat(*given) for name, given in (tools or {}).items()}
 
@@ -60,6 +65,9 @@ class Cooling:
             raise InputError("Scene: heat: the body needs a temperature to begin with: temperature=...")
         if not scene.model.solid:
             raise InputError("Scene: heat: a membrane has no thickness to conduct through: use a solid model")
+        if self.work_to_heat and not any(material.internal for material in scene.materials.values()):
+            raise InputError(f"Scene: heat: work_to_heat = {self.work_to_heat:g}: no material of the scene dissipates"
+                             f" work: give one that relaxes, or leave it out")
         zero = ABSOLUTE_ZERO[self.unit]
         checked_materials(scene.mesh, self.materials)
         checked_boundaries(scene.mesh, [*self.boundaries, *self._touches(scene)], zero)
@@ -78,11 +86,14 @@ class Cooling:
 
 class Memory(NamedTuple):
     """Process time, and the state of the heat equation: {"temperature": T from absolute zero, own part, shape (n, 1)},
-    and the lines of each tool."""
+    and the lines of each tool; the step in time to go on with, if there is one; heat of dissipated work
+    (`Conduction.power`), own part, or None."""
 
     time: float
     values: dict[str, np.ndarray]
     lines: list[np.ndarray]
+    step: float | None
+    power: np.ndarray | None
 
 
 class CoolingHistory:
@@ -107,19 +118,25 @@ class CoolingHistory:
         self._first = scene.temperature.first[: self._n].copy()
         self._seen: Any = None                              # by the constants of this problem
         ends = problem.comm.allgather((self._first.min(initial=np.inf), self._first.max(initial=-np.inf)))
-        scene.temperature.limits = _extremes([*np.ravel(ends)], [*cooling.boundaries, *touches])
-        self._dt: float | None = None
+        low, high = _extremes([*np.ravel(ends)], [*cooling.boundaries, *touches])
+        scene.temperature.limits = low, np.inf if cooling.work_to_heat else high
+        self._dissipated = self._body.source(forms.dissipated) if cooling.work_to_heat else None
         self.start()
 
     def start(self) -> None:
         """See `History`."""
         self._time = 0.0
+        self._dt: float | None = None
+        self._power: Any = None if self._dissipated is None else np.zeros(self._n)
         self._take(self._first)
         self._state = [self._first.copy(), *(touch.start() for touch in self._body.touches)]
 
     def advance(self, x: np.ndarray, control: float) -> None:
         """See `History`."""
         until = self._forms.time_at(control)
+        if self._power is not None:                         # the materials have advanced
+            power = self._cooling.work_to_heat * self._body.assembled(self._dissipated)
+            self._body.power, self._power = (self._power + power) / 2, power
         if until <= self._time:
             return
         u = self._body.displacements()
@@ -127,6 +144,7 @@ class CoolingHistory:
             depth = contact.contact.tool.signed_distance(touch.points + u[touch.dofs] - contact.travelled(control))
             touch.conductance[:] = conductance * (contact.present & (depth > -_NEAR * contact.thickness))
         self._body.update()
+        self._state[0] = self._body.held(self._state[0])
         self._go(until)
         self._take(self._state[0])
 
@@ -148,11 +166,11 @@ class CoolingHistory:
     def get(self) -> Memory:
         """See `History`."""
         return Memory(self._time, {"temperature": (self._state[0] - self._zero)[:, None]},
-                      [lines.copy() for lines in self._state[1:]])
+                      [lines.copy() for lines in self._state[1:]], self._dt, self._power)
 
     def put(self, memory: Memory) -> None:
         """See `History`."""
-        self._time = memory.time
+        self._time, self._dt, self._power = memory.time, memory.step, memory.power
         T = memory.values["temperature"][:, 0] + self._zero
         self._state = [T, *(lines.copy() for lines in memory.lines)]
         self._take(T)
@@ -161,17 +179,22 @@ class CoolingHistory:
         """See `History`."""
         def plain(own):
             return self._gathered(own).tolist()
-        return {"time": memory.time, "points": plain(self._body.points),
+        return {"time": memory.time, "step": memory.step, "points": plain(self._body.points),
                 "temperature": plain(memory.values["temperature"][:, 0]),
+                **({} if memory.power is None else {"power": plain(memory.power)}),
                 "lines": [{"points": plain(touch.points), "above_back": plain(lines)}
                           for touch, lines in zip(self._body.touches, memory.lines, strict=True)]}
 
     def load(self, data: dict[str, Any]) -> Memory:
         """See `History`."""
-        T = np.array(data["temperature"])[_rows(self._body.points, data["points"])]
+        rows = _rows(self._body.points, data["points"])
+        if ("power" in data) != (self._dissipated is not None):
+            raise InputError("what is remembered of the temperature is of another work_to_heat")
+        power = np.array(data["power"])[rows] if "power" in data else None
         lines = [np.array(d["above_back"])[_rows(touch.points, d["points"])].reshape(len(touch.points), -1)
                  for touch, d in zip(self._body.touches, data["lines"], strict=True)]
-        return Memory(float(data["time"]), {"temperature": T[:, None]}, lines)
+        return Memory(float(data["time"]), {"temperature": np.array(data["temperature"])[rows, None]}, lines,
+                      data["step"], power)
 
     def _gathered(self, own: np.ndarray) -> np.ndarray:
         """Of all ranks, one after the other."""
@@ -184,7 +207,7 @@ class CoolingHistory:
         if self._problem.comm.allreduce(int(not same)):
             self._seen = here[:] = T
             self._T.x.scatter_forward()
-            self._forms.take_temperature()
+            self._problem.take_temperature()
 
 
 def _extremes(temperatures: list[float], laws: Sequence[Any]) -> tuple[float, float]:

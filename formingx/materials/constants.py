@@ -17,7 +17,7 @@ from dolfinx import fem
 
 from ..errors import InputError, finite, known
 from ..tables import Table
-from ..time_temperature import ABSOLUTE_ZERO
+from ..time_temperature import ABSOLUTE_ZERO, FunctionOfTemperature
 
 
 class Sample(NamedTuple):
@@ -83,35 +83,8 @@ class OfPosition(Varying):
         return getattr(self.function, "__qualname__", repr(self.function))
 
 
-class OfTemperature(Varying):
-    """f(T) of the temperature of the scene; arrays of shape (n,) go in and come out.
-
-    Args:
-        function: f. words: what it is called in messages.
-    """
-
-    def __init__(self, function: Callable, words: str | None = None):
-        self.function = function
-        self._words = words or (repr(function) if isinstance(function, Table)
-                                else f"of_temperature({getattr(function, '__qualname__', repr(function))})")
-
-    def __call__(self, temperature: Any) -> np.ndarray:
-        """Values at temperatures, of their shape, all finite."""
-        T = np.asarray(temperature, dtype=float)
-        if isinstance(self.function, Table):
-            self.function.check(T, "temperature")
-        try:
-            found = np.broadcast_to(np.asarray(self.function(T), dtype=float), T.shape)
-        except (TypeError, ValueError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"the constant {self!r} must be a function of an array of temperatures, shape (n,):"
-                             f" {error}") from None
-        wrong = ~np.isfinite(found)
-        if np.any(wrong):
-            raise InputError(f"the constant {self!r} is {found[wrong].flat[0]} at a temperature of"
-                             f" {T[wrong].flat[0]:.6g}")
-        return found
+class OfTemperature(FunctionOfTemperature, Varying):
+    """A constant that depends on the temperature of the scene, see `FunctionOfTemperature`."""
 
     def values(self, sample):
         if sample.temperature is None:
@@ -121,12 +94,9 @@ class OfTemperature(Varying):
     def expression(self, fields):
         return fields.of_temperature(self)
 
-    def __repr__(self) -> str:
-        return self._words
-
 
 def of_temperature(function: Callable) -> OfTemperature:
-    """A constant of a material that depends on the temperature of the scene.
+    """A constant of a material, or a coefficient of friction, that depends on the temperature of the scene.
 
     Args:
         function: f(T), called with an array of temperatures, shape (n,), in the unit that the scene's are given in.

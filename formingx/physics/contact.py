@@ -21,11 +21,13 @@ for the lumped area), or at Gauss points of the facets: history is read where it
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import InputError, count, instance, non_negative, pair, positive
+from ..tables import Table
+from ..time_temperature import FunctionOfTemperature
 from .part import Part
 from .tools import Nearest, Tool
 
@@ -51,7 +53,8 @@ class Contact(Part):
         on: name of the boundary that faces the tool.
         tool: a `Tool`, see `formingx.tools`.
         friction: "stick" (a point that touches stays where it touched), "none", or the coefficient mu of Coulomb's
-            law (5.9), from 0 (none).
+            law (5.9), from 0 (none). One that depends on the temperature of the body where it touches: a `table`
+            {T: mu}, or what `of_temperature` returns; it is that of the last accepted state.
         penalty: k over shear modulus / thickness of the sheet; default 2e4, without friction 2e5.
         ramp: theta over thickness of the sheet; default 1e-5, without friction 1e-7.
         separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
@@ -69,24 +72,22 @@ class Contact(Part):
 
     quantity = "travel"
     on: str
+    mu: Any
 
-    def __init__(self, on: str, tool: Tool, friction: str | float = "stick", *, penalty: float | None = None,
+    def __init__(self, on: str, tool: Tool, friction: Any = "stick", *, penalty: float | None = None,
                  ramp: float | None = None, separates: bool = True, nodes_per_step: int = 1,
                  points: str | int = "nodes",
                  moves: tuple[float, float] | None = None, name: str | None = None):
         self.name, name = name, f"Contact({on!r})"
         if not isinstance(tool, Tool):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
-        words = {"none": 0.0, "stick": math.inf}
-        if isinstance(friction, str) and friction not in words:
-            raise InputError(f"{name}: friction = {friction!r}: must be 'stick', 'none' or a coefficient of friction")
         self.on, self.tool, self.friction = on, tool, friction
-        self.mu = words[friction] if isinstance(friction, str) else non_negative(f"{name}: friction", friction)
+        self.mu = _coefficient(f"{name}: friction", friction)
         self.separates = instance(f"{name}: separates", separates, bool, "True or False")
         usual = _SMOOTH if self.symmetric else _ROUGH
         self.penalty = positive(f"{name}: penalty", usual[0] if penalty is None else penalty)
         self.ramp = positive(f"{name}: ramp", usual[1] if ramp is None else ramp)
-        if not separates and 0 < self.mu < math.inf:
+        if not separates and (self.warm or 0 < self.mu < math.inf):
             raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
                              f" Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = count(f"{name}: nodes_per_step", nodes_per_step)
@@ -101,18 +102,61 @@ class Contact(Part):
         return self.moves is not None
 
     @property
+    def warm(self) -> bool:
+        """True if friction depends on the temperature."""
+        return isinstance(self.mu, FunctionOfTemperature)
+
+    @property
     def symmetric(self) -> bool:
         """True without friction or memory: contact then has an energy."""
-        return self.mu == 0 and self.separates
+        return not self.warm and self.mu == 0 and self.separates
 
-    def law(self, k: float, theta: float, points: np.ndarray) -> Law:
-        """Tractions for a penalty k (stress/length) and a ramp theta (length), at points, shape (n, 2)."""
+    def friction_at(self, temperature: np.ndarray | None) -> Any:
+        """mu: a number, or at the temperatures of n points, shape (n,).
+
+        Raises:
+            InputError: it has no value there, or one below 0.
+        """
+        if not self.warm:
+            return self.mu
+        if temperature is None:
+            raise InputError(f"{self!r}: friction depends on the temperature: give Scene a temperature=...")
+        try:
+            mu = self.mu(temperature)
+        except InputError as error:
+            raise InputError(f"Contact({self.on!r}): friction: {error}") from None
+        for i in np.flatnonzero(mu < 0)[:1]:
+            raise InputError(f"{self!r}: friction = {mu[i]:.6g} at a temperature of {temperature[i]:.6g}: must be at"
+                             f" least 0")
+        return mu
+
+    def law(self, k: float, theta: float, points: np.ndarray, temperature: np.ndarray | None = None) -> Law:
+        """Tractions for a penalty k (stress/length) and a ramp theta (length), at points, shape (n, 2).
+
+        temperature: of the body there, shape (n,), if friction depends on it.
+        """
         foot = (1 - _AT_FOOT * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)
-        return Law(self.tool, self.mu, k, theta, shift, self.separates)
+        return Law(self.tool, self.friction_at(temperature), k, theta, shift, self.separates)
 
     def __repr__(self) -> str:
         return f"Contact({self.on!r}, {self.tool!r}, {self.friction!r})"
+
+
+def _coefficient(name: str, friction: Any) -> Any:
+    """mu, infinite for what sticks, or a function of the temperature; an InputError for anything else."""
+    words = {"none": 0.0, "stick": math.inf}
+    if isinstance(friction, str) and friction in words:
+        return words[friction]
+    if isinstance(friction, Table):
+        non_negative(f"{name} = {friction!r}: its least value", float(friction.y.min()))   # monotone between its points
+        return FunctionOfTemperature(friction)
+    if isinstance(friction, FunctionOfTemperature):
+        return friction
+    if isinstance(friction, str) or callable(friction):
+        raise InputError(f"{name} = {friction!r}: must be 'stick', 'none' or a coefficient of friction: a number"
+                         f" or, by temperature, table({{T: mu, ...}}) or of_temperature(f)")
+    return non_negative(name, friction)
 
 
 class Touch(NamedTuple):
@@ -171,24 +215,32 @@ class Motion(NamedTuple):
 class Law:
     """Tractions at points, a function of their positions and of what they remember.
 
+    mu: of friction, a number, or one for each point, shape (n,).
+
     Distances are less by `shift`, shape (n,), length: a point that touches from the start begins at the foot of the
     ramp, free of stress.
     """
 
-    def __init__(self, tool: Tool, mu: float, k: float, theta: float, shift: np.ndarray | float = 0.0,
+    def __init__(self, tool: Tool, mu: np.ndarray | float, k: float, theta: float, shift: np.ndarray | float = 0.0,
                  separates: bool = True):
+        self.rubs = np.ndim(mu) > 0 or bool(mu > 0)
         self.tool, self.mu, self.k, self.theta, self.shift, self.separates = tool, mu, k, theta, shift, separates
         self._near: tuple[np.ndarray, Nearest] | None = None        # points last asked for, and what was found
 
     def part(self, points: np.ndarray | slice) -> Law:
         """The law of some of its points."""
         shift = self.shift[points] if isinstance(self.shift, np.ndarray) else self.shift
-        return Law(self.tool, self.mu, self.k, self.theta, shift, self.separates)
+        mu = self.mu[points] if isinstance(self.mu, np.ndarray) else self.mu
+        return Law(self.tool, mu, self.k, self.theta, shift, self.separates)
+
+    def with_friction(self, mu: np.ndarray | float) -> Law:
+        """The same law with other coefficients of friction."""
+        return Law(self.tool, mu, self.k, self.theta, self.shift, self.separates)
 
     @property
     def remembers(self) -> bool:
         """True if tractions depend on what points remember."""
-        return self.mu > 0 or not self.separates
+        return self.rubs or not self.separates
 
     def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
         """Which points at x touch, or are held, shape (n,)."""
@@ -255,17 +307,17 @@ class Law:
         stiffness = _outer(k * slope, n, n) + _outer(pressed * bend, t, t)
         zero: np.ndarray = np.zeros(len(x))
         kept_at = np.where(held, np.maximum(d, 0.0), d)         # held for ever
-        if self.mu == 0:
+        if not self.rubs:
             return Tractions(force, stiffness, _touch(x, kept_at, zero), N, zero, zero)
         assert old is not None
         g, dg = self._slip(x, near, old)
         rising = (np.abs(at) < self.theta) * k / (2 * self.theta) * self.separates
-        kt = k * min(SOFTER * max(self.mu, 1.0), 1.0)
-        rising *= kt / k
+        kt = k * np.minimum(SOFTER * np.maximum(self.mu, 1.0), 1.0)
+        rising = rising * (kt / k)
         T, dT = (kt * slope + rising * ahead) * g, (kt * slope)[:, None] * dg
         dT += (rising * g)[:, None] * n
         sense_now, bent = zero, T
-        if math.isfinite(self.mu):
+        if np.all(np.isfinite(self.mu)):
             trial = kt * slope * (g if expected is None else expected.slip)
             turned = False if sense is None else np.sign(trial) * sense < 0
             sliding, limit = (np.abs(trial) > self.mu * pressed) & ~np.asarray(turned), np.sign(trial) * self.mu

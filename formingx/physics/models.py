@@ -38,6 +38,8 @@ class Membrane(Model):
             if support.holds_rotation:
                 raise InputError(f"Scene: {support!r} with model=Membrane(): a membrane has no bending stiffness, its"
                                  f" rim cannot be clamped; use SimplySupported({support.on!r}), or a solid model")
+        if scene.expansion:
+            raise InputError("Scene: expansion: a membrane keeps its volume: use a solid model, MixedPressure()")
         if scene.contacts:
             raise InputError(f"Scene: {scene.contacts[0]!r}: a membrane has no contact yet: use a solid model,"
                              f" MixedPressure() for one")
@@ -115,6 +117,9 @@ class DisplacementPenalty(Model):
         self.points = points
 
     def check(self, scene):
+        if scene.expansion:
+            raise InputError(f"Scene: expansion: with model={type(self).__name__}(): its reduced rule knows no field of"
+                             f" temperature; use MixedPressure()")
         for layer, material in scene.materials.items():
             if material.varies or material.internal:
                 raise InputError(f"Scene: layer {layer!r}: {material} with model={type(self).__name__}(): its reduced"

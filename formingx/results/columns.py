@@ -92,13 +92,14 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     """The measures that every run records, by column name.
 
     pressure (or travel: a length), pole_height (length), pole_stretch, enclosed_volume (length^3), strain_energy
-    (stress length^3), mass_error (volume over its original value, minus 1), volume_error (root mean square of
-    J - 1). Pole and volume are there where the scene has an axis and a driven pressure. With contacts: contact_length
-    (reference length in touch), penetration (of the deepest node, length), tool_force (along Z, of the body on all
-    tools). With a driven support: support_force (of the body on it, along its component). Where several things can be
-    driven each has its column, plug_travel for one named "plug" (`Scene.column`), a support plug_force; and where there
-    are several contacts those with a name have a force, plug_force. `timed`: process_time too. With materials that
-    relax: dissipated_power (stress length^3 over time), and from it, in a run, dissipated_energy (stress length^3).
+    (stress length^3), mass_error (volume over its original value, minus 1), volume_error (root mean square of J - 1),
+    both over what thermal expansion makes of the volume. Pole and volume are there where the scene has an axis and a
+    driven pressure. With contacts: contact_length (reference length in touch), penetration (of the deepest node,
+    length), tool_force (along Z, of the body on all tools). With a driven support: support_force (of the body on it,
+    along its component). Where several things can be driven each has its column, plug_travel for one named "plug"
+    (`Scene.column`), a support plug_force; and where there are several contacts those with a name have a force,
+    plug_force. `timed`: process_time too. With materials that relax: dissipated_power (stress length^3 over time), and
+    from it, in a run, dissipated_energy (stress length^3).
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
     found: dict[str, Bound] = {"process_time": Amplitude(problem, -1)} if timed else {}

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
-from ..errors import InputError, count, known, several
+from ..errors import InputError, count, known, several, together
+from ..materials.expansion import ThermalExpansion
 from ..materials.hyperelastic import Material
 from ..mesh.mesh import Mesh
 from ..physics.contact import Contact
@@ -38,6 +41,7 @@ class Scene:
         temperature: of the body, which constants of materials may depend on: a number, a `table` over R, a function of
             arrays (R, Z), a CSV file with columns R, Z, T, what `formingx.heat` returned, or a DOLFINx Function.
         heat: `Cooling(...)`: the temperature changes as time goes by.
+        expansion: a `ThermalExpansion` for all layers, or {layer: `ThermalExpansion`}: what is cold is smaller.
 
     Raises:
         InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, or whose
@@ -46,7 +50,7 @@ class Scene:
 
     def __init__(self, *, mesh: Mesh, materials: Material | Mapping[str, Material], supports: Sequence[Any],
                  loads: Sequence[Any] = (), contacts: Sequence[Contact] = (), model: Any = None, kinematics: Any = None,
-                 quadrature_degree: int = 5, temperature: Any = None, heat: Any = None):
+                 quadrature_degree: int = 5, temperature: Any = None, heat: Any = None, expansion: Any = None):
         if not isinstance(mesh, Mesh):
             raise InputError(f"Scene: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")
         if isinstance(materials, Material):
@@ -68,6 +72,8 @@ class Scene:
         self.quadrature_degree = count("Scene: quadrature_degree", quadrature_degree)
         if temperature is not None:
             self.temperature = BodyTemperature(temperature, mesh)
+        if expansion is not None:
+            self.expansion = self._checked_expansion(expansion)
         self._check_names()
         self._check_materials()
         self._check_boundaries()
@@ -83,6 +89,7 @@ class Scene:
 
     temperature: BodyTemperature | None = None
     heat: Any = None
+    expansion: Mapping[str, ThermalExpansion] = MappingProxyType({})
 
     @property
     def things(self) -> list[Part]:
@@ -191,6 +198,19 @@ class Scene:
             raise InputError(f"Scene: layer {layer!r}: {message}")
         return max(modulus for _, modulus in found)
 
+    def _checked_expansion(self, given: Any) -> dict[str, ThermalExpansion]:
+        """{layer: its expansion}, which is known at the temperature of every point."""
+        laws = dict.fromkeys(self.mesh.layers, given) if isinstance(given, ThermalExpansion) else given
+        if not isinstance(laws, Mapping) or not all(isinstance(law, ThermalExpansion) for law in laws.values()):
+            raise InputError(f"Scene: expansion = {given!r}: must be ThermalExpansion(...), or {{layer: ...}}")
+        if self.temperature is None:
+            raise InputError("Scene: expansion: depends on the temperature: give Scene a temperature=...")
+        for layer, law in laws.items():
+            known("Scene: expansion: layer", layer, self.mesh.layers)
+            looked_at = sample(self.mesh, layer, self.quadrature_degree, self.temperature).temperature
+            together(self.mesh.comm, [partial(law.stretch, looked_at)])
+        return dict(laws)
+
     def shear_modulus(self, layer: str) -> float:
         """Modulus of small shear of a layer, stress; of constants that vary the largest in it, all ranks."""
         return self._moduli[layer]
@@ -205,7 +225,11 @@ class Scene:
                 raise InputError(f"{thing!r}: boundary {on!r} is empty: no facet of the mesh carries it")
 
     def _check_contact(self, contact: Contact) -> None:
-        """The body starts outside the tool, the face looks at it, and the pressure does not push away from it."""
+        """The body starts outside the tool, the face looks at it, and the pressure does not push away from it.
+
+        Friction has a value at the temperature of the face.
+        """
+        contact.friction_at(None if self.temperature is None else self.temperature.on(contact.on))
         mesh, near = self.mesh, 1e-6 * max(self.extent)
         if self.kinematics.axisymmetric and contact.moves and contact.moves[0] \
                 and contact.tool.outline()[:, 0].min() <= near:

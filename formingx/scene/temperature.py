@@ -51,5 +51,19 @@ class BodyTemperature:
         """Temperatures at points, shape (n, 2), of this rank's own choice, shape (n,); collective."""
         return np.clip(fields.values_at(self.T, np.asarray(points, dtype=float), self._mesh), *self.limits)
 
+    def nodes(self, points: np.ndarray) -> np.ndarray:
+        """Local numbers of the nodes of T that lie at points of this rank's cells, shape (..., 2), shape (...)."""
+        from scipy.spatial import cKDTree
+        return cKDTree(self.T.function_space.tabulate_dof_coordinates()[:, :2]).query(points)[1]
+
+    def at_nodes(self, nodes: np.ndarray) -> np.ndarray:
+        """Temperatures at nodes of T, local numbers of any shape, without error."""
+        return np.clip(self.T.x.array[nodes], *self.limits)
+
+    def on(self, boundary: str) -> np.ndarray:
+        """Temperatures as given at the nodes of T on a boundary, shape (n,), all ranks; collective."""
+        nodes = fem.locate_dofs_topological(self.T.function_space, 1, self._mesh.facets_of(boundary))
+        return np.concatenate(self._mesh.comm.allgather(self.first[nodes]))
+
     def __repr__(self) -> str:
         return self._text

@@ -1,0 +1,114 @@
+"""A body that cools while it is formed: dissipated work as heat, other ranks, restarts."""
+
+import numpy as np
+import pytest
+from conftest import run_json
+from test_restart import same
+
+import formingx as fx
+
+POLYMER = fx.ThermalProperties(conductivity=0.17, density=2.0, heat_capacity=3.0)
+RELAXING = fx.Viscoelastic(fx.NeoHookean(c10=0.2), [(1.0, 0.5), (0.4, 3.0)])
+
+
+def pulled(material=RELAXING, boundaries=(), work_to_heat: float | None = 1.0):
+    """A disc that is pulled at its rim: a homogeneous deformation."""
+    mesh = fx.mesh.disc(radius=1.0, thickness=0.4, elements=(3, 2))
+    return fx.Scene(mesh=mesh, materials=material, temperature=20.0,
+                    heat=fx.Cooling(POLYMER, boundaries, unit="C", tolerance=0.01, work_to_heat=work_to_heat),
+                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
+                              fx.Displaced("rim", "r", name="rim")])
+
+
+def pull(scene, **options):
+    stages = [fx.Stage("pull", drive="rim", until=fx.travel(1.0), duration=1.0), fx.Stage("wait", duration=4.0)]
+    return fx.Process(scene).run(stages, progress=False, **options)
+
+
+def test_adiabatic_work_becomes_heat():
+    """rho c dT = what is dissipated, all over the body; the work done is what is stored and what is dissipated."""
+    scene = pulled()
+    path = pull(scene, accuracy="fine")
+    volume = np.pi * 0.4
+    with path.problem.at(path.last):
+        T = scene.temperature.T.x.array.copy()
+    assert np.ptp(T) < 1e-8
+    lost = path.last.measures["dissipated_energy"]
+    assert 6.0 * volume * (T.mean() - 20.0) == pytest.approx(lost, rel=1e-9) and T.mean() > 20.1
+    force, travel = path["support_force"], path["rim_travel"] if "rim_travel" in path.columns else path["travel"]
+    work = np.sum(np.diff(travel) * (force[1:] + force[:-1]) / 2)
+    assert abs(work) == pytest.approx(path.last.measures["strain_energy"] + lost, rel=5e-3)
+
+
+def test_half_of_the_work_heats_half_as_much_and_none_not_at_all():
+    rises = {}
+    for share in (1.0, 0.5, None):
+        scene = pulled(work_to_heat=share)
+        path = pull(scene, accuracy="draft")
+        with path.problem.at(path.last):
+            rises[share] = scene.temperature.T.x.array.mean() - 20.0
+    assert rises[0.5] == pytest.approx(rises[1.0] / 2, rel=1e-9) and abs(rises[None]) < 1e-9
+
+
+def test_what_does_not_dissipate_is_refused():
+    with pytest.raises(fx.InputError, match="no material of the scene dissipates work"):
+        pulled(fx.NeoHookean(c10=1.0))
+    with pytest.raises(fx.InputError, match="work_to_heat = -1"):
+        pulled(work_to_heat=-1.0)
+
+
+def pressed():
+    """A hot relaxing sheet under a cold conducting plug, with friction by temperature and work as heat."""
+    tool = fx.tools.male(radius=0.4, height=1.0, base=-1.0, fillet=0.2).mirrored().moved(z=0.05)
+    wall = fx.ConductingTool(thickness=0.2, conductivity=1.0, heat_capacity=4.0, back=30.0, elements=6, finest=1e-2)
+    stiff = fx.table({20.0: 3.0, 90.0: 1.4, 150.0: 1.0, 180.0: 0.8})
+    sheet = fx.Viscoelastic(fx.NeoHookean(c10=stiff), [(stiff, 0.5)], shift=fx.Arrhenius(40e3, 150.0, unit="C"))
+    return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1)), materials=sheet, temperature=150.0,
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                    expansion=fx.ThermalExpansion(linear=1e-4, stress_free=150.0),
+                    heat=fx.Cooling(fx.ThermalProperties(conductivity=0.01, density=1.0, heat_capacity=1.0),
+                                    [fx.Convection("bottom", h=1e-3, air=60.0)], unit="C", tolerance=0.5,
+                                    tools={"plug": (0.3, wall)}, work_to_heat=1e-3),
+                    contacts=[fx.Contact("top", tool, fx.table({20.0: 0.1, 150.0: 0.5, 180.0: 0.5}), moves=(0, -1),
+                                         name="plug")])
+
+
+def press(scene, **options):
+    push = fx.Stage("push", drive="plug", until=fx.travel(0.15), duration=0.5)
+    return fx.Process(scene).run([push, fx.Stage("hold", duration=0.5)], progress=False, accuracy="draft", **options)
+
+
+def told(scene, path):
+    """Numbers of the last state: forces, temperatures of the sheet, wall."""
+    with path.problem.at(path.last):
+        T = scene.temperature.at(np.array([[R, Z] for R in (0.0, 0.3, 0.7) for Z in (0.0, 0.05)]))
+    m = path.last.measures
+    return [*T.tolist(), m["tool_force"], m["pole_height"], m["dissipated_energy"], *path.profile().thickness_ratio[:3],
+            float(len(path))]
+
+
+def test_a_restart_goes_on_as_if_it_had_never_stopped(tmp_path):
+    scene = pressed()
+    whole = press(scene, checkpoint=tmp_path / "run")
+    assert told(scene, whole)[1] < 120 and whole.last.measures["tool_force"] != 0
+    for number in (len(whole) // 2, len(whole) - 2):
+        start = fx.load(tmp_path / "run", scene, state=number)
+        again = press(scene, start=start)
+        same(again, whole, rel=1e-9)
+        assert told(scene, again) == pytest.approx(told(scene, whole), rel=1e-9)
+
+
+RANKS = """
+import json, sys
+sys.path.insert(0, "tests")
+from test_cooling import press, pressed, told
+scene = pressed()
+found = told(scene, press(scene))
+if scene.mesh.comm.rank == 0:
+    print(json.dumps(found))
+"""
+
+
+def test_two_ranks_are_one():
+    one, two = (run_json(RANKS, ranks) for ranks in (1, 2))
+    assert two == pytest.approx(one, rel=1e-9)
