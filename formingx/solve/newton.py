@@ -14,22 +14,22 @@ from .direct import DirectSolver
 from .settle import Settling
 
 UNLOADED = 1e-5
-"""Support forces (over stress times volume over length) below which a body counts as unloaded."""
+"""Floor of the support forces (over stress times volume over length) in the relative residual."""
 
 AT_REST = 1e-2
-"""Displacements (dimensionless) below which corrections are measured against this: where a body comes back to rest on
-a tool, the tool's force vanishes as the square of the depth, and no correction is as small as the displacements."""
+"""Floor of the displacements (dimensionless) in the relative correction: near the state of rest on a tool, whose force
+grows as the square of the penetration, corrections are no smaller than the displacements themselves."""
 
 SETTLING = 40
-"""At most so many iterations, points touching and letting go on the way; those that come to a new branch by a `SMALL`
-correction do not count: a slack sheet lies on a flat plug with a hundred points, which let go one or two at a time.
+"""Iterations allowed while the active set of contact still changes. Those with a `SMALL` correction that find an active
+set for the first time do not count: of a slack sheet on a flat plug a hundred points let go one or two at a time.
 (With a history, which depends on the step, a shorter step is better.)"""
 
 _UNSETTLED = 2
-"""Iterations after which points with a history that still change their minds are settled by themselves."""
+"""Iterations after which contact points with a history whose status still changes are solved for by themselves."""
 
 SMALL = 1e-3
-"""Corrections (dimensionless displacement) below which growth is no sign of divergence: points touch and let go."""
+"""Corrections (dimensionless displacement) that may grow without a sign of divergence while the active set changes."""
 
 
 class Iteration(NamedTuple):
@@ -53,13 +53,13 @@ class Failure(Exception):
         self.attempt: Any = None                            # where it ended (`diagnosis.Attempt`), if that is known
 
 
-class _Kinks:
-    """Which branch of its kinks a problem is on, iteration by iteration.
+class _ActiveSet:
+    """The active set of contact, iteration by iteration.
 
     Attributes:
-        changed: the iteration that came to the branch it is on; share: of a correction to take: less when an iteration
-            comes back to a branch that it had left, for then it would go round for ever.
-        found: how often a small correction came to a branch that was new.
+        changed: the iteration at which it changed last; share: of a correction to take, halved when an active set comes
+            back: full corrections would cycle.
+        found: how often a small correction led to an active set for the first time.
     """
 
     def __init__(self, problem: Any):
@@ -90,7 +90,7 @@ class Tolerances:
 
     correction: the next correction that quadratic convergence predicts, over the norm of x (and `AT_REST`).
     residual: norm of F over the norm of the support forces.
-    iterations: at most so many on one branch of the problem's kinks; settling: and on all of them, see `SETTLING`.
+    iterations: at most so many with one active set of contact; settling: and while it changes, see `SETTLING`.
 
     Raises:
         InputError: a value that is not greater than 0.
@@ -171,7 +171,7 @@ class BorderedNewton:
         self.a.set(0)
         self.reached = control, 0.0
         work0 = moved = 0.0
-        kinks = _Kinks(problem)
+        active = _ActiveSet(problem)
         points = Settling(problem) if problem.has_history else None
         while True:
             residual = self.F.norm() / (problem.force_scale + UNLOADED)
@@ -181,13 +181,13 @@ class BorderedNewton:
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
             problem.linearise(x, control, self.F)
-            kinks.look(moved)
+            active.look(moved)
             if points:
                 points.look()
-            self._check(history, kinks, moved)
+            self._check(history, active, moved)
             step = self._correction(x, control, constraint, history)
-            share = kinks.share
-            if points and kinks.changed == len(history) >= _UNSETTLED:
+            share = active.share
+            if points and active.changed == len(history) >= _UNSETTLED:
                 step, share = points.correct(self.solver, self.a, step, self._border), 1.0
                 if points.failed == 2:
                     raise Failure("contact does not settle: no state of the points that change is consistent", history)
@@ -203,15 +203,15 @@ class BorderedNewton:
             self.reached = control, step
             problem.residual(x, control, self.F)
 
-    def _check(self, history: list[Iteration], kinks: _Kinks, moved: float) -> None:
+    def _check(self, history: list[Iteration], active: _ActiveSet, moved: float) -> None:
         """Raise `Failure` if the iteration diverges, or takes too long."""
-        quiet = history[kinks.changed:]
+        quiet = history[active.changed:]
         grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
         if grown and not (self.problem.has_kinks and moved < SMALL):
             raise Failure("the iteration diverges", history)
-        settling = len(history) - min(kinks.found, 4 * SETTLING) >= self.tolerances.settling
+        settling = len(history) - min(active.found, 4 * SETTLING) >= self.tolerances.settling
         if len(quiet) >= self.tolerances.iterations or settling:
-            unsettled = settling and len(history) - kinks.changed < 3
+            unsettled = settling and len(history) - active.changed < 3
             raise Failure("contact does not settle: " * unsettled + f"no convergence in {len(history)} iterations",
                           history)
 

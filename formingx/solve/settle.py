@@ -1,12 +1,13 @@
-"""Which points of a contact with friction stick, slide or let go: a small problem of its own.
+"""The status (free, stick, slide) of the few contact points for which it changes between iterations.
 
-An iteration of Newton's method takes every point to do what the iteration before foretold. Where points decide each
-other's lot that can go round for ever. Seen from the few points that change their minds, the body is a compliance C:
-moved by y (to first order, seen from the tool) they want
+An iteration of Newton's method linearises the law of contact of every point at its status of the iteration before.
+Where the statuses of points depend on each other that can cycle. For the few points whose status changes the body is a
+compliance C (the inverse tangent, condensed to them): their motions y, to first order, satisfy
 
     y - y0 + C (f(y) - f0 - S0 y) = 0,
 
-f the law of contact, f0 + S0 y what the iteration took it to be, which led to y0. It is solved for by itself.
+f the law of contact, f0 + S0 y its linearisation in the iteration, which led to y0. This small problem is solved for
+by itself.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _ITERATIONS = 15
 
 
 class Settling:
-    """The points that changed their minds in one run of Newton's method.
+    """The points whose status changed in one run of Newton's method.
 
     Attributes:
         failed: how often no consistent state of them was found.
@@ -45,7 +46,7 @@ class Settling:
         self._active = now
 
     def correct(self, solver: DirectSolver, dx: Any, step: float, border: Any) -> float:
-        """Change a correction (dx, in place, and step, of the control) to one that suits the law; returns the step.
+        """Make a correction (dx, in place, and step, of the control) consistent with the law; returns the step.
 
         border(v, w): what a solution v = K^-1 e becomes in the bordered system, in place; returns that of the control.
         """
@@ -66,7 +67,7 @@ class Settling:
         return step + by
 
     def _others(self, dx: np.ndarray, step: float) -> bool:
-        """Mark more points that change their minds on the way; True if there are any."""
+        """Mark more points whose status changes on the way; True if there are any."""
         found = False
         for contact, mark, active in zip(self._contacts, self._marked, self._active):
             law = contact.foretold(contact.moved(dx, step))
