@@ -1,5 +1,6 @@
 """A run costs little more than its linear algebra."""
 
+import subprocess
 import sys
 
 import numpy as np
@@ -9,6 +10,13 @@ from formingx.discrete.history import MaterialHistory
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import limit  # noqa: E402
+
+
+def test_importing_loads_nothing_that_only_some_scripts_use():
+    code = "import sys, formingx; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
+    assert "formingx.heat" in loaded
+    assert {"gmsh", "matplotlib", "plotly", "pyvista", "scipy", "tqdm"}.isdisjoint(loaded)
 
 
 def test_a_run_costs_little_more_than_its_linear_algebra():
