@@ -89,23 +89,25 @@ def table(found, codes, sizes):
             if row := found.get((size, code)):
                 own = found.get((size, "formingx"))
                 ratio = f"{row['path_cpu'] / own['path_cpu']:.2g}" if own else ""
+                error = f"{row['error']:.1e}" if row["error"] else "-"
                 yield (f"| {size.replace('x', ' x ')} | {code} | {row['unknowns']:.0f} | {row['iterations']:.0f} |"
                        f" {row['setup_cpu']:.2g} | {row['path_cpu']:.3g} | {row['setup_wall'] + row['path_wall']:.3g} |"
-                       f" {row['error'] or float('nan'):.1e} | {row['memory']:.0f} | {ratio} |")
+                       f" {error} | {row['memory']:.0f} | {ratio} |")
 
 
 def at_equal_error(found, codes, errors=(1e-3, 1e-4, 1e-5)):
-    """Markdown: CPU seconds of the path alone at an error, between the runs on logarithmic axes."""
+    """Markdown: CPU seconds of the path at those errors that lie between runs, on logarithmic axes."""
     yield "| error |" + "".join(f" {code}, s |" for code in codes)
     yield "|---|" + "---|" * len(codes)
     for error in errors:
-        cells = []
+        cells: list[str] = []
         for code in codes:
             rows = sorted((row["error"], row["path_cpu"]) for (_, other), row in found.items()
                           if other == code and row["error"])
             inside = len(rows) > 1 and rows[0][0] <= error <= rows[-1][0]
             cells.append(f" {np.exp(np.interp(np.log(error), *np.log(np.array(rows)).T)):.3g} |" if inside else " |")
-        yield f"| {error:g} |" + "".join(cells)
+        if any(cell != " |" for cell in cells):
+            yield f"| {error:g} |" + "".join(cells)
 
 
 def draw(results, file):
@@ -113,16 +115,13 @@ def draw(results, file):
     from formingx.results.show import plots
     figure, (left, right) = plots.figure(2)
     for code in PACKAGES:
-        for case, axes in (("treloar", left), ("loading", right)):
-            rows = [row for (_, other), row in results.get(case, {}).items() if other == code]
-            rows = [row for row in rows if row["error"]] if case == "treloar" else rows
-            x = [row["path_cpu"] for row in rows] if case == "treloar" else [row["unknowns"] for row in rows]
-            y = [row["error"] if case == "treloar" else row["path_cpu"] / row["iterations"] for row in rows]
-            axes.loglog(x, y, "o-", label=code)
-    left.set(xlabel="CPU of the path, s", ylabel="error of the pressure at the end", title="Treloar's sheet")
+        rows = [row for row in results.get("treloar", []) if row["code"] == code and row["error"]]
+        left.loglog([row["path_cpu"] for row in rows], [row["error"] for row in rows], "o-", label=code)
+        rows = [row for row in results.get("loading", []) if row["code"] == code]
+        right.loglog([row["unknowns"] for row in rows], [row["path_cpu"] / row["iterations"] for row in rows], "o-")
+    left.set(xlabel="CPU of the path, s", ylabel="error of the last pressure", title="Treloar's sheet")
     right.set(xlabel="unknowns", ylabel="CPU of an iteration, s", title="a disc under pressure")
     left.legend(frameon=False)
-    file.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(file, dpi=150)
 
 
@@ -132,20 +131,21 @@ def main():
     options.add_argument("--codes", nargs="+", choices=PACKAGES, default=list(PACKAGES))
     options.add_argument("--sizes", nargs="+", help="elements along the radius and through the thickness, as 40x2")
     options.add_argument("--repeat", type=int, default=3)
-    options.add_argument("--out", type=Path, default=Path("results/peers"))
+    options.add_argument("--out", type=Path, default=Path("results/peers"), help="keeps what other runs left there")
     args = options.parse_args()
-    results: dict = {}
+    args.out.mkdir(parents=True, exist_ok=True)
+    summary = args.out / "summary.json"
+    results = json.loads(summary.read_text()) if summary.exists() else {}
     print(f"Load of the machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     for case in args.only:
         sizes = args.sizes or SIZES[case]
         codes = [code for code in args.codes if script(code, case).exists()]
-        found = results[case] = measure(case, codes, sizes, args.repeat)
+        found = measure(case, codes, sizes, args.repeat)
+        results[case] = [{"size": size, "code": code, **row} for (size, code), row in found.items()]
         print(f"\n{case}\n", *table(found, codes, sizes), "", *at_equal_error(found, codes), sep="\n", flush=True)
     print(f"\nLoad of the machine: {os.getloadavg()[0]:.1f}")
+    summary.write_text(json.dumps(results, indent=2))
     draw(results, args.out / "peers.png")
-    plain = {case: [{"size": size, "code": code, **row} for (size, code), row in found.items()]
-             for case, found in results.items()}
-    (args.out / "summary.json").write_text(json.dumps(plain, indent=2))
 
 
 if __name__ == "__main__":
