@@ -49,7 +49,7 @@ def main():
         for name, states, iterations in paths(json.loads(summary.read_text())):
             if states:
                 found.append(iterations / states)
-                print(f"{demo + ' ' + name:60}{states:6d}{iterations:7d}{found[-1]:8.2f}", flush=True)
+                print(f"{demo + ' ' + name:60}{states:6g}{iterations:7g}{found[-1]:8.2f}", flush=True)
     print(f"{len(found)} paths: median {median(found):.2f}, from {min(found):.2f} to {max(found):.2f}")
 
 
