@@ -5,17 +5,23 @@ rest goes. CPU seconds of one process: what else runs on the machine hardly ente
 """
 
 import argparse
+import contextlib
 import cProfile
 import pstats
 import sys
 import time
 from pathlib import Path
+from unittest import mock
+
+import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
 from common import COMM, say  # noqa: E402
 
 import formingx as fx  # noqa: E402
+from formingx.discrete.problem import Problem  # noqa: E402
 from formingx.results import files  # noqa: E402
+from formingx.solve.direct import DirectSolver  # noqa: E402
 
 SIZES = {"inflation": [(20, 1), (40, 2), (80, 4)], "cup": [(30, 1), (60, 2)]}
 LARGE = {"inflation": [(160, 8), (320, 16)], "cup": []}
@@ -37,45 +43,47 @@ def cup(elements):
                     contacts=[fx.Contact("top", mould, "stick")]), fx.pressure(30.0)
 
 
-def unit(path, times=5):
-    """CPU seconds of one iteration's linear algebra at states along a path: {part: mean}."""
-    parts = dict.fromkeys(("tangent", "factors", "two solves"), 0.0)
-    states = [path.states[round(k * (len(path) - 1) / times)] for k in range(1, times + 1)]
-    for state in states:
-        newton = path.record.curve.newton
-        with path.problem.at(state) as problem:
-            at = [time.process_time()]
-            problem.tangent(problem.x, state.control)
-            at.append(time.process_time())
-            newton.solver.factorise()
-            at.append(time.process_time())
-            newton.solver.solve(newton.F, newton.a)
-            newton.solver.solve(newton.F_control, newton.b)
-            at.append(time.process_time())
-        for part, a, b in zip(parts, at, at[1:]):
-            parts[part] += (b - a) / times
-    return parts
+@contextlib.contextmanager
+def clocked(*methods):
+    """CPU seconds of each call of some methods, (class, name), while open: {name: list}."""
+    spent = {name: [] for _, name in methods}
+
+    def with_clock(function, calls):
+        def called(*args, **options):
+            began = time.process_time()
+            try:
+                return function(*args, **options)
+            finally:
+                calls.append(time.process_time() - began)
+        return called
+    with contextlib.ExitStack() as patches:
+        for of, name in methods:
+            patches.enter_context(mock.patch.object(of, name, with_clock(getattr(of, name), spent[name])))
+        yield spent
 
 
 def measure(case, elements, profile=None):
     """What a run costs: set-up and path (CPU seconds), its iterations, one iteration's linear algebra, and the ratio.
 
+    Set-up: all that a run to the state at rest takes (forms, columns, the first factorisation with its analysis). What
+    linear algebra costs is measured in the run itself, where what comes between empties the caches.
+
     profile: a `cProfile.Profile` that looks on, or None.
     """
     scene, target = case(elements)
     began = time.process_time()
-    rest = fx.trace(scene, until=fx.pressure(0.0), progress=False)
-    ready = time.process_time()
-    if profile:
-        profile.enable()
-    path = fx.trace(scene, until=target, step=fx.StepControl(target=8) if scene.contacts else None, start=rest,
-                    progress=False)
-    if profile:
-        profile.disable()
-    spent = time.process_time() - ready
-    parts, n = unit(path), path.counts.iterations
-    return {"unknowns": path.problem.n_unknowns, "states": len(path), "iterations": n, "set-up": ready - began,
-            "path": spent, **parts, "ratio": spent / (n * sum(parts.values()))}
+    fx.trace(scene, until=fx.pressure(0.0), progress=False)
+    setup = time.process_time() - began
+    with clocked((Problem, "tangent"), (DirectSolver, "factorise"), (DirectSolver, "solve")) as spent, \
+            profile or contextlib.nullcontext():
+        began = time.process_time()
+        path = fx.trace(scene, until=target, step=fx.StepControl(target=8) if scene.contacts else None, progress=False)
+        spent_on_path = time.process_time() - began - setup
+    tangent, factors, solve = (np.mean(calls[1:]) for calls in spent.values())      # the first one is set-up
+    n = path.counts.iterations
+    return {"unknowns": path.problem.n_unknowns, "states": len(path), "iterations": n, "set-up": setup,
+            "path": spent_on_path, "tangent": tangent, "factors": factors, "two solves": 2 * solve,
+            "ratio": spent_on_path / (n * (tangent + factors + 2 * solve))}
 
 
 def main():

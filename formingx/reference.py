@@ -63,16 +63,16 @@ def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
     k = c01 / positive("c10", c10)
 
     def slopes(R, y):                         # lengths over R0 p/(c10 h0), tensions over c10 h0: pressure is 1
-        l1, r, _, theta = y
+        l1, r, _, theta = y.tolist()          # floats: several times faster here than NumPy's scalars
         l2 = r / R
         l3 = 1 / (l1 * l2)
         a1, a2 = 1 + k * l2**2, 1 + k * l1**2
         T1, T2 = 2 * l3 * (l1**2 - l3**2) * a1, 2 * l3 * (l2**2 - l3**2) * a2
-        dr = l1 * np.cos(theta)
+        dr = l1 * math.cos(theta)
         T1_1 = 2 / l2 * (1 + 3 / (l1**4 * l2**2)) * a1
         T1_2 = 2 * (-l1 / l2**2 + 3 / (l1**3 * l2**4)) * a1 + 4 * k * l2 * l3 * (l1**2 - l3**2)
         dl1 = ((T2 - T1) * dr / r - T1_2 * (dr - l2) / R) / T1_1
-        return [dl1, dr, -l1 * np.sin(theta), l1 * (1 - T2 * np.sin(theta) / r) / T1]
+        return [dl1, dr, -l1 * math.sin(theta), l1 * (1 - T2 * math.sin(theta) / r) / T1]
 
     def rim(R, y):
         return y[1] / R - 1
@@ -140,19 +140,23 @@ def meridional_stretch(n: Any, l2: Any) -> Any:
 def membrane_limit_point(*, radius: float, thickness: float, c10: float,
                          c01: float = 0.0) -> tuple[float, MembraneState] | None:
     """(pole stretch, state) of the first pressure maximum below a pole stretch of 12, or None if there is none."""
-    from scipy.optimize import minimize_scalar
-
     def state(stretch):
         return membrane_inflation(stretch, radius=radius, thickness=thickness, c10=c10, c01=c01)
 
-    stretches = np.geomspace(1.2, 12, 40)
-    pressures = [state(s).pressure for s in stretches]
-    i = next((i for i in range(1, 39) if pressures[i - 1] < pressures[i] > pressures[i + 1]), None)
-    if i is None:
+    def pressures(stretches):
+        return np.array([state(s).pressure for s in stretches])
+
+    stretches, found = np.geomspace(1.2, 12, 40), []
+    for stretch in stretches:
+        found.append(state(stretch).pressure)
+        if len(found) > 2 and found[-3] < found[-2] > found[-1]:
+            break
+    else:
         return None
-    found = minimize_scalar(lambda s: -state(s).pressure, bounds=(stretches[i - 1], stretches[i + 1]),
-                            method="bounded", options={"xatol": 1e-8})
-    return float(found.x), state(found.x)
+    p = np.polynomial.Chebyshev.interpolate(pressures, 8, stretches[[len(found) - 3, len(found) - 1]])
+    s = next(r.real for r in p.deriv().roots() if not r.imag and abs(p.mapparms()[0] + p.mapparms()[1] * r.real) <= 1
+             and p.deriv(2)(r.real) < 0)
+    return float(s), state(s)
 
 
 @dataclass(frozen=True)

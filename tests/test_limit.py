@@ -1,14 +1,24 @@
 """A run costs little more than its linear algebra."""
 
+import json
+import subprocess
 import sys
 
 import numpy as np
-from conftest import ROOT
+import pytest
+from conftest import ROOT, run
 
 from formingx.discrete.history import MaterialHistory
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import limit  # noqa: E402
+
+
+def test_importing_loads_nothing_that_only_some_scripts_use():
+    code = "import sys, formingx; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
+    assert "formingx.heat" in loaded
+    assert {"gmsh", "matplotlib", "plotly", "pyvista", "scipy", "tqdm"}.isdisjoint(loaded)
 
 
 def test_a_run_costs_little_more_than_its_linear_algebra():
@@ -49,3 +59,12 @@ def test_what_materials_remember_is_computed_once_a_step(monkeypatch):
         problem.advance(last.x, last.control)
         for name, values in problem.memory[0].values.items():
             np.testing.assert_array_equal(values, last.memory[0].values[name])
+
+
+def test_peers_measures_what_is_there(tmp_path):
+    printed = run("benchmarks/peers.py", "--codes", "formingx", "--only", "treloar", "--sizes", "10x1", "20x1",
+                  "--repeat", "1", "--out", tmp_path)
+    coarse, fine = json.loads((tmp_path / "summary.json").read_text())["treloar"]
+    assert 1e-4 < coarse["error"] < 2e-3 and fine["error"] == 0
+    assert fine["limit"] == pytest.approx(0.493271, abs=5e-6) and fine["pressure"] == pytest.approx(0.33387, rel=1e-4)
+    assert "| 20 x 1 | formingx | 448 |" in printed and (tmp_path / "peers.png").exists()

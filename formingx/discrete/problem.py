@@ -357,10 +357,12 @@ class Problem:
         """Put the fields of x and the control where the forms see them; returns the multipliers, all ranks."""
         self.forms.control.value = control
         self.set_fields(x)
-        if not self._stage.active.rows:
-            return np.zeros(0)
-        last = self.comm.size - 1
-        return self.comm.bcast(x.array_r[self._n:].copy() if self.comm.rank == last else None, root=last)
+        multipliers, last = np.zeros(len(self._stage.active.rows)), self.comm.size - 1
+        if self.comm.rank == last:
+            multipliers[:] = x.array_r[self._n:]
+        if last and len(multipliers):
+            self.comm.Bcast(multipliers, root=last)
+        return multipliers
 
     def set_fields(self, x: PETSc.Vec) -> None:
         """Put the fields of x where the forms see them."""

@@ -1,0 +1,57 @@
+"""Newton iterations for each state, over all paths of all demos: what step control and contact cost.
+
+    ./fx python3 benchmarks/iterations.py [--demos treloar cup] [--full]
+
+Runs each demo with --quick (unless its summary is in the folder already) and reads states and iterations of each path
+from its summary.json; what was cut back counts.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+from pathlib import Path
+from statistics import median
+
+DEMOS = Path(__file__).parents[1] / "demos"
+SECONDS = 600                                               # that a demo may take
+
+
+def paths(summary, name=""):
+    """(name, states, iterations) of every path in a summary."""
+    if isinstance(summary, dict):
+        if "steps" in summary and "newton_iterations" in summary:
+            yield name, summary["steps"], summary["newton_iterations"]
+        for key, value in summary.items():
+            yield from paths(value, f"{name} {key}".strip())
+    elif isinstance(summary, list):
+        for k, value in enumerate(summary):
+            yield from paths(value, f"{name} {k}")
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    names = sorted(file.stem for file in DEMOS.glob("*.py") if "main()" in file.read_text())
+    options.add_argument("--demos", nargs="+", choices=names, default=names)
+    options.add_argument("--full", action="store_true", help="not --quick")
+    options.add_argument("--out", type=Path, default=Path("results/iterations"), help="where the demos' results are")
+    args = options.parse_args()
+    found = []
+    for demo in args.demos:
+        summary = args.out / demo / "summary.json"
+        if not summary.exists():
+            command = [sys.executable, DEMOS / f"{demo}.py", "--out", summary.parent, *["--quick"] * (not args.full)]
+            try:
+                subprocess.run(command, check=True, capture_output=True, text=True, timeout=SECONDS)
+            except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
+                print(f"{demo}: left out: {(error.stderr or str(error)).strip().splitlines()[-1]}", flush=True)
+                continue
+        for name, states, iterations in paths(json.loads(summary.read_text())):
+            if states:
+                found.append(iterations / states)
+                print(f"{demo + ' ' + name:60}{states:6g}{iterations:7g}{found[-1]:8.2f}", flush=True)
+    print(f"{len(found)} paths: median {median(found):.2f}, from {min(found):.2f} to {max(found):.2f}")
+
+
+if __name__ == "__main__":
+    main()
