@@ -7,6 +7,7 @@ from scipy import integrate, optimize
 import formingx as fx
 from formingx import tools
 from formingx.physics.contact import SOFTER
+from formingx.results.show import plots
 from formingx.solve import jump
 
 
@@ -152,3 +153,11 @@ def test_at_fold_is_one_of_three():
         fx.trace(plug(), until=fx.travel(1.0), at_fold="leap")
     with pytest.raises(fx.InputError, match="at_fold"):
         fx.Stage("push", drive="plug", until=fx.travel(1.0), at_fold="leap")
+
+
+def test_pictures_and_reports_mark_jumps(rough, tmp_path):
+    axes = plots.curve(rough, "tool_force", "travel")
+    marks = [line for line in axes.lines if line.get_marker() == "D"]
+    assert [list(line.get_xdata()) for line in marks] == [[s.measures["travel"] for s in rough.jumps]]
+    fx.report([rough], tmp_path / "report.html")
+    assert f"{len(rough.jumps)} jump" in (tmp_path / "report.html").read_text()

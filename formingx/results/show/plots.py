@@ -8,15 +8,16 @@ from ...figures import figure
 
 
 def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
-    """Column y over column x of a path: the states as dots, the path as a line, limit points ringed.
+    """Column y over column x of a path: the states as dots, the path as a line, limit points ringed, jumps as diamonds.
 
     Returns the axes; `axes.figure.savefig` saves.
     """
     axes = axes if axes is not None else figure()[1]
     drawn, = axes.plot(*path.curve(x, y), **style)
     axes.plot(path[x], path[y], ".", color=drawn.get_color())
-    for state in path.limit_points:
-        axes.plot(state.measures[x], state.measures[y], "o", color=drawn.get_color(), fillstyle="none", markersize=9)
+    for states, mark in ((path.limit_points, "o"), (path.jumps, "D")):
+        axes.plot([s.measures[x] for s in states], [s.measures[y] for s in states], mark, color=drawn.get_color(),
+                  fillstyle="none", markersize=9)
     axes.set_xlabel(axes.get_xlabel() or x.replace("_", " "))
     axes.set_ylabel(axes.get_ylabel() or y.replace("_", " "))
     return axes

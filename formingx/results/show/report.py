@@ -183,6 +183,9 @@ def _lead(record: Record, units: Units) -> str:
     how = f"{len(record.kinds) - 1} states after the start"
     if counts:
         how += f", {counts['iterations']} Newton iterations, {counts['seconds']:.1f} s"
+    jumps = record.kinds.count("jump")
+    if jumps:
+        how += f", {jumps} jump{'s' * (jumps > 1)}, where the body snapped to its next equilibrium"
     said = f"Lengths in {units.length}, stresses in {units.stress}, forces in {units.force}." if units.force else \
         "Units are those of the script."
     return html.escape(f"{how}. {'Axisymmetric' if record.axisymmetric else 'Plane strain'}. {said}")
