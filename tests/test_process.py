@@ -229,6 +229,23 @@ def test_a_tool_that_leaves():
         run(plugged("stick"), air("blow", 0.02, without=["plug"]), plug("again", 1.0))
 
 
+def test_a_load_that_is_left_out_reads_nothing(tmp_path):
+    """It leaves and comes back gradually, and its columns say what acts; its value waits for it."""
+    path = run(plugged(), air("on", 0.05), Stage("off", without=["air"], step=STEP), plug("down", 0.5, without=["air"]),
+               plug("up", 0.0, without=["air"]), Stage("on again", step=STEP))
+    found = {stage: np.array([s.measures["air_pressure"] for s in path.states if s.stage == stage])
+             for stage in ("off", "down", "on again")}
+    assert found["off"][0] == 0.05 == found["on again"][-1] and not found["down"].any()
+    assert np.all(np.diff(found["off"]) < 0) and found["off"][-1] == 0
+    assert np.all(np.diff(found["on again"]) > 0) and found["on again"][0] == 0
+    assert same(path.last, run(plugged(), air("on", 0.05)).last)
+    half = path.at(fx.pressure(0.025, of="air"), after=end(path, "down"))
+    assert half.stage == "on again" and half.measures["air_pressure"] == pytest.approx(0.025, abs=1e-10)
+    path.to_csv(tmp_path / "off.csv")
+    rows = [line.split(",") for line in (tmp_path / "off.csv").read_text().splitlines()]
+    assert {row[rows[0].index("air_pressure")] for row in rows if row[0] == "down"} <= {"0", "0.0"}
+
+
 def gripped():
     return fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom", name="air")],
                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim"), fx.Clamped("rim")])

@@ -28,7 +28,8 @@ class Stage:
             not from here); with `follow` a `process_time`, or None: the end of the tables.
         through: more targets to hit exactly on the way; those that are not met are left out.
         without: what is not there during the stage, itself or its name: a support that is open, a tool that is away, a
-            load that is off. A support takes hold of the body where it is when it comes back.
+            load that is off. A support takes hold of the body where it is when it comes back; a load comes back with
+            its value, and its column reads what acts of it: 0 while it is away.
         follow: instead of `drive`: {thing: [(time, value), ...]}, piecewise linear in time, values in the user's units
             (the last one stays). A table that begins later than the stage is reached in a straight line from
             where the thing stands. With `drive`, instead of a thing a function that makes targets, such as

@@ -32,10 +32,14 @@ class Bound:
 
 
 class Amplitude(Bound):
-    """Of a thing that can be driven (by its number in the scene), of the process time (-1), or the control (None)."""
+    """Of a thing that can be driven (by its number in the scene), of the process time (-1), or the control (None).
+
+    Of a load it is what acts: nothing of one that a stage leaves out.
+    """
 
     def __init__(self, problem: Any, number: int | None):
         self._problem, self._number = problem, number
+        self._acts = number is not None and 0 <= number < len(problem.scene.loads)
         self._scale = self.size = 1.0 if number is None else problem.forms.scales[number]
 
     @property
@@ -46,13 +50,19 @@ class Amplitude(Bound):
     def _amplitude(self, control: float) -> float:
         if self._number == -1:
             return self._problem.forms.time_at(control)
-        return control if self._number is None else self._problem.setting.amplitude(self._number, control)
+        if self._number is None:
+            return control
+        setting = self._problem.setting
+        return (setting.acting if self._acts else setting.amplitude)(self._number, control)
 
     def value(self, x, control):
         return self._scale * self._amplitude(control)
 
     def equation(self, target):
-        slope = 1.0 if self._number is None else self._problem.setting.rate[self._number]
+        setting = self._problem.setting
+        slope = 1.0 if self._number is None else setting.rate[self._number]
+        if self._acts and setting.fading:                    # it leaves or comes in as the control goes from 0 to 1
+            slope = self._amplitude(1.0) - self._amplitude(0.0)
 
         def c(x, control, gradient):
             gradient.set(0)
