@@ -15,7 +15,7 @@ from .physics.contact import Contact
 from .results.columns import Measure
 from .results.files.checkpoint import Checkpoint, holds_states, read
 from .results.path import Path
-from .scene import clearance
+from .scene import aims, clearance
 from .scene.scene import Scene
 from .solve.curve import Curve
 from .solve.fixed import FixedControlCurve
@@ -55,8 +55,9 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
         resume: go on from what the checkpoint holds, which must be of this scene; if it holds nothing, begin.
 
     Raises:
-        InputError: nothing is driven, a target needs something that the scene does not have, `start` is of another
-            scene, or the checkpoint holds another run.
+        InputError: nothing is driven, a target needs something that the scene does not have or cannot be met (it is
+            held, inside a tool, behind the start, beyond what a material can bear), `start` is of another scene, or the
+            checkpoint holds another run.
         ConvergenceError: the target was not reached. It carries the path so far and says what to try.
         OSError: the checkpoint cannot be written; the states in it are kept.
     """
@@ -71,6 +72,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     max_steps = None if max_steps is None else count("trace: max_steps", max_steps)
     known("trace: at_fold =", at_fold, AT_FOLD)
     scene.only_driven("trace")
+    aims.check(scene, [until, *through])
     if start is not None and (not isinstance(start, Path) or start.problem.scene is not scene or not start.states):
         raise InputError("trace: start: must be a path of this very scene: fx.load(folder, scene), or what trace gave"
                          " back")

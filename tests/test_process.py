@@ -11,6 +11,7 @@ import formingx as fx
 from formingx.discrete.formulation import Formulation
 from formingx.discrete.problem import Problem
 from formingx.discrete.schedule import Setting
+from formingx.results.show.plots import main_columns
 from formingx.solve.state import State
 
 Stage, tools = fx.Stage, fx.tools
@@ -203,10 +204,36 @@ def test_forces_balance(friction):
 def test_tools_on_both_faces_with_their_own_friction():
     path = run(plugged(0.2, (20, 2), more=[FLOOR]), plug("down", 1.8), air("vacuum", -0.02))
     last = path.last.measures
-    assert last["floor_force"] < -0.1 and last["plug_force"] > 0.1
-    assert last["tool_force"] == pytest.approx(last["floor_force"] + last["plug_force"])
-    assert support_force(path.problem, path.last, 1) - 0.02 * np.pi * 100 == pytest.approx(last["tool_force"], rel=1e-5)
+    assert last["floor_force"] < -0.1 and last["plug_force"] > 0.1 and "tool_force" not in path.columns
+    assert support_force(path.problem, path.last, 1) - 0.02 * np.pi * 100 == pytest.approx(
+        last["floor_force"] + last["plug_force"], rel=1e-5)
     assert end(path, "down").measures["floor_force"] < 0
+
+
+def test_forces_of_tools_balance(tmp_path):
+    """A plug from below, a mould above, both with names: the plug resists its travel, and all forces are in balance."""
+    mould = tools.cup(radius=9.0, depth=4.0, mouth=0.5, fillet=1.0, lip=0.5)
+    scene = fx.Scene(mesh=disc((20, 2)), materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom", name="air")],
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", mould, "stick", name="mould"),
+                               fx.Contact("bottom", tools.male(radius=4.0, height=20.0, base=-20.0, fillet=1.0), "none",
+                                          moves=(0, 1), name="plug")])
+    path = run(scene, plug("up", 3.8), air("blow", 0.3), tolerances=fx.Tolerances(residual=1e-10))
+    assert [c for c in path.columns if c.endswith("force")] == ["plug_force", "mould_force"]
+    for state in (end(path, "up"), path.last):
+        with path.problem.at(state):
+            found, clamp = state.measures, support_force(path.problem, state, 1)     # of the clamp on the body, along Z
+        pressure = found["air_pressure"] * np.pi * 100                           # inside a clamped rim
+        assert found["plug_force"] - found["mould_force"] + clamp + pressure == pytest.approx(
+            0, abs=1e-6 * max(found["plug_force"], pressure))
+    assert end(path, "up").measures["plug_force"] > 1 and path.last.measures["mould_force"] > 1
+    forces = path.tool_forces()
+    assert list(forces) == ["mould", "plug"] and np.array_equal(forces["plug"], path["plug_force"])
+    path.to_csv(tmp_path / "pot.csv")
+    assert {"plug_force", "mould_force"} < set((tmp_path / "pot.csv").read_text().splitlines()[0].split(","))
+    path.report(tmp_path / "pot.html")
+    assert "plug force" in (text := (tmp_path / "pot.html").read_text()) and "mould force" in text
+    assert path.plot(*main_columns(path.columns)[::-1]).get_ylabel() == "plug force"
 
 
 def test_two_tools_on_one_face():

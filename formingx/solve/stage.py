@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError, finite, instance, known, positive, several
+from ..scene import aims
 from ..scene.scene import Scene
 from .stepping import StepControl
 from .targets import Target
@@ -151,7 +152,8 @@ def plan(scene: Scene, stage: Stage) -> Plan:
     """A stage by the numbers of the things of its scene.
 
     Raises:
-        InputError: it drives or leaves out something that is not there, or leaves the body free to move.
+        InputError: it drives or leaves out something that is not there, leaves the body free to move, or aims at what
+            cannot be met.
     """
     who = stage.who
     off = sorted({i for thing in stage.without for i in scene.together(scene.number(f"{who}: without", thing))})
@@ -171,6 +173,7 @@ def plan(scene: Scene, stage: Stage) -> Plan:
         supports = [t for t in there if t in scene.supports]
         scene.check_held(supports, any(t in there for t in scene.contacts))
         scene.check_driven(supports)
+        aims.check(scene, [t for t in (stage.until, stage.hold, *stage.through) if t is not None], off)
     except InputError as error:
         raise InputError(f"{who}: {error}") from None
     tables = [(i, table) for number, (_, table) in zip(numbers, stage.tables) for i in scene.together(number)]

@@ -174,15 +174,7 @@ def pole_stretch(value: float) -> Target:
 
     A run raises an InputError if no material of the scene can be stretched so far (Gent, Arruda-Boyce).
     """
-    def bind(problem):
-        if problem.scene.kinematics.dimension_of_volume == 3:
-            limits = {m.largest_stretch("equibiaxial"): m for m in problem.scene.materials.values()}
-            largest = max(limits)
-            if value >= largest:
-                raise InputError(f"pole_stretch = {value:g}: must be less than {largest:.6g}, where I1 comes to the"
-                                 f" limit {limits[largest].largest_I1:g} of {limits[largest]}")
-        return bind_pole_stretch(problem)
-    return Target("pole_stretch", positive("pole_stretch", value), bind, signed=False)
+    return Target("pole_stretch", positive("pole_stretch", value), bind_pole_stretch, signed=False)
 
 
 def enclosed_volume(value: float) -> Target:
