@@ -69,6 +69,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
             scene.check_travel(scene.driven, target.value)
     instance("trace: step", step, StepControl | None, "a StepControl or None")
     instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
+    instance("trace: progress", progress, bool, "True or False")
     max_steps = None if max_steps is None else count("trace: max_steps", max_steps)
     known("trace: at_fold =", at_fold, AT_FOLD)
     scene.only_driven("trace")
@@ -109,6 +110,9 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     instance("solve: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     scene.only_driven("solve")
     to, increments = finite("solve: to", to), count("solve: increments", increments)
+    max_steps = count("solve: max_steps", max_steps)
+    if increments > max_steps:
+        raise InputError(f"solve: increments = {increments}: must be at most max_steps = {max_steps}")
     if to == 0:
         raise InputError("solve: to = 0: the body is at rest there")
     problem = Problem(scene)
@@ -120,7 +124,7 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     with _carried(path):
         increment = abs(to / problem.forms.control_scale) / increments
         step = StepControl(length=1.01 * increment, largest=1.01 * increment, smallest=1e-5 * increment)
-        Run(path.record, targets, step).follow(count("solve: max_steps", max_steps), False, begin(curve))
+        Run(path.record, targets, step).follow(max_steps, False, begin(curve))
     return path
 
 
@@ -167,6 +171,7 @@ class Process:
         stages = self._checked(stages)
         instance("Process: step", step, StepControl | None, "a StepControl or None")
         instance("Process: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
+        instance("Process: progress", progress, bool, "True or False")
         instance("Process: start", start, Path | State | None, "a path, a state or None")
         allowed = allowed_error("Process", accuracy)
         plans = [plan(self.scene, stage) for stage in stages]

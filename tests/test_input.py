@@ -92,6 +92,15 @@ def test_scene(change, words):
         scene(**change)
 
 
+def test_runs():
+    with pytest.raises(fx.InputError, match="progress = .*must be True or False"):
+        fx.trace(scene(), until=fx.pressure(0.1), progress=np.zeros(2))
+    with pytest.raises(fx.InputError, match="increments = 1000000000000: must be at most max_steps = 1000"):
+        fx.solve(scene(), to=0.1, increments=10**12)
+    with pytest.raises(fx.InputError, match="pressure = -1e.99: it is 5e.98 times the shear modulus, 2"):
+        fx.trace(scene(), until=fx.pressure(-1e99), progress=False)
+
+
 def test_plane_strain_needs_three_motions_held():
     with pytest.raises(fx.InputError, match="too little support.*translation along Z"):
         scene(supports=[fx.Symmetry("axis")], kinematics=fx.PlaneStrain())

@@ -13,6 +13,7 @@ from ..physics.supports import Held
 from .scene import Scene
 
 _NEAR = 1e-5           # of the body's length: a point is on a boundary
+_MOST = 1e9            # of the largest shear modulus, or of the body's length
 
 
 def check(scene: Scene, targets: Iterable[Any], off: Collection[int] | None = None) -> None:
@@ -44,11 +45,23 @@ def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -
         holds = _holder(scene, name, [t for t in there if t in scene.supports])
         if holds is not None:
             return f"{holds!r} holds that displacement"
+    if name.endswith(("pressure", "travel")):
+        return beyond_all(scene, name.split("_")[-1], value)
     if name == "pole_height":
         for contact in (t for t in there if t in scene.contacts and not t.driven):
             if _beyond(scene, contact, value):
                 return f"it lies inside the tool of {contact!r}"
     return None
+
+
+def beyond_all(scene: Scene, quantity: str | None, value: float) -> str | None:
+    """What is absurd about a pressure or a travel, in words, or None."""
+    units = {"pressure": ("the shear modulus", max(scene.shear_modulus(name) for name in scene.mesh.layers)),
+             "travel": ("the length of the body", float(max(scene.extent)))}
+    if quantity not in units:
+        return None
+    what, unit = units[quantity]
+    return f"it is {abs(value) / unit:.2g} times {what}, {unit:.4g}" if abs(value) > _MOST * unit else None
 
 
 def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:

@@ -176,5 +176,9 @@ def plan(scene: Scene, stage: Stage) -> Plan:
         aims.check(scene, [t for t in (stage.until, stage.hold, *stage.through) if t is not None], off)
     except InputError as error:
         raise InputError(f"{who}: {error}") from None
+    for number, (_, table) in zip(numbers, stage.tables):
+        thing, most = scene.things[number], float(np.abs(table[:, 1]).max())
+        if (why := aims.beyond_all(scene, thing.quantity, most)) is not None:
+            raise InputError(f"{who}: the table of {thing!r} goes to {most:g}: {why}")
     tables = [(i, table) for number, (_, table) in zip(numbers, stage.tables) for i in scene.together(number)]
     return Plan(stage, scene.together(numbers[0]) if stage.drive is not None else [], tables, off)
