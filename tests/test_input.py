@@ -37,6 +37,7 @@ def test_mesh(change, words):
     (lambda: fx.NeoHookean(c10=math.inf), "finite"),
     (lambda: fx.MooneyRivlin(c10=1.0, c01=-0.1), "not stable.*c01"),
     (lambda: fx.MooneyRivlin(c10=0.0, c01=0.0), "no stiffness"),
+    (lambda: fx.Yeoh(c10=1.0, c20=-1e300, c30=0.1), "c20 greater than .* = -0.547"),
     (lambda: fx.Ogden(mu=(1.0, 1.0), alpha=(2.0,)), "as many"),
     (lambda: fx.Ogden(mu=(1.0, 0.1), alpha=(2.0, -2.0)), "not stable.*mu alpha > 0"),
     (lambda: fx.Hyperelastic(lambda I1, I2, a: a * (3 - I1), a=1.0), "no stiffness"),
