@@ -4,7 +4,7 @@ A sheet of 40 mm radius and 1.2 mm (Mooney, 0.35 and 0.05 MPa: a soft sheet, as 
 it into a cup mould 60 mm deep, vacuum lifts it off the plug and lays it on the mould, where it stays. An elastic sheet
 remembers the plug only through what the friction of the plug held back and what the mould holds. Evenness is the least
 wall over the mean wall of the part, trimmed at 38 mm. Lengths in mm, stresses in MPa. The 60 runs take
-143 s of processor time, shared by the cores. (The design stops at a friction of 0.45: with 0.6 five of the eight runs
+120 s of processor time, shared by the cores. (The design stops at a friction of 0.45: with 0.6 five of the eight runs
 at travels of 48 and 54 ended as the vacuum began, where contact did not settle.)
 """
 
