@@ -73,9 +73,10 @@ def rows(quick):
                        {"model": fx.DisplacementPenalty(eps=eps, points=points), "elements": (10, 1), "until": 2.5,
                         "max_steps": 400}, limit, ordinary, "the default, 40x2")
     for ratio in (2, 2000) if quick else (2, 5, 10, 20, 50, 200, 500, 1000, 2000):
+        square = {"elements": (40, 14)} if ratio == 2 else {}          # a scene refuses 40 x 2, which lock
         for support in (fx.SimplySupported("rim"), fx.Clamped("rim")):
             yield ("thickness", f"r0/h0 {ratio}, {type(support).__name__}",
-                   {"ratio": ratio, "support": support, "until": 8.5}, limit,
+                   {"ratio": ratio, "support": support, "until": 8.5, **square}, limit,
                    lambda r=ratio: membrane_limit_point(radius=1, thickness=1 / r, c10=1)[1].pressure,
                    "membrane theory")
     for stretch in (10,) if quick else (10, 20, 50, 100):

@@ -15,7 +15,7 @@ from .physics.contact import Contact
 from .results.columns import Measure
 from .results.files.checkpoint import Checkpoint, holds_states, read
 from .results.path import Path
-from .scene import clearance
+from .scene import aims, clearance
 from .scene.scene import Scene
 from .solve.curve import Curve
 from .solve.fixed import FixedControlCurve
@@ -55,8 +55,9 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
         resume: go on from what the checkpoint holds, which must be of this scene; if it holds nothing, begin.
 
     Raises:
-        InputError: nothing is driven, a target needs something that the scene does not have, `start` is of another
-            scene, or the checkpoint holds another run.
+        InputError: nothing is driven, a target needs something that the scene does not have or cannot be met (it is
+            held, inside a tool, behind the start, beyond what a material can bear), `start` is of another scene, or the
+            checkpoint holds another run.
         ConvergenceError: the target was not reached. It carries the path so far and says what to try.
         OSError: the checkpoint cannot be written; the states in it are kept.
     """
@@ -68,9 +69,11 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
             scene.check_travel(scene.driven, target.value)
     instance("trace: step", step, StepControl | None, "a StepControl or None")
     instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
+    instance("trace: progress", progress, bool, "True or False")
     max_steps = None if max_steps is None else count("trace: max_steps", max_steps)
     known("trace: at_fold =", at_fold, AT_FOLD)
     scene.only_driven("trace")
+    aims.check(scene, [until, *through])
     if start is not None and (not isinstance(start, Path) or start.problem.scene is not scene or not start.states):
         raise InputError("trace: start: must be a path of this very scene: fx.load(folder, scene), or what trace gave"
                          " back")
@@ -107,6 +110,9 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     instance("solve: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     scene.only_driven("solve")
     to, increments = finite("solve: to", to), count("solve: increments", increments)
+    max_steps = count("solve: max_steps", max_steps)
+    if increments > max_steps:
+        raise InputError(f"solve: increments = {increments}: must be at most max_steps = {max_steps}")
     if to == 0:
         raise InputError("solve: to = 0: the body is at rest there")
     problem = Problem(scene)
@@ -118,7 +124,7 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     with _carried(path):
         increment = abs(to / problem.forms.control_scale) / increments
         step = StepControl(length=1.01 * increment, largest=1.01 * increment, smallest=1e-5 * increment)
-        Run(path.record, targets, step).follow(count("solve: max_steps", max_steps), False, begin(curve))
+        Run(path.record, targets, step).follow(max_steps, False, begin(curve))
     return path
 
 
@@ -165,6 +171,7 @@ class Process:
         stages = self._checked(stages)
         instance("Process: step", step, StepControl | None, "a StepControl or None")
         instance("Process: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
+        instance("Process: progress", progress, bool, "True or False")
         instance("Process: start", start, Path | State | None, "a path, a state or None")
         allowed = allowed_error("Process", accuracy)
         plans = [plan(self.scene, stage) for stage in stages]

@@ -120,10 +120,21 @@ class Study(Sheet):
         return sorted(front, key=lambda run: run.measures[a])
 
     def effects(self, measure: str) -> dict[str, dict[float, float]]:
-        """Main effects: {variable: {level: mean of the measure over the runs at that level}}."""
+        """Main effects: {variable: {level: mean of the measure over the runs at that level}}.
+
+        Where runs failed, the means are those of the sum of effects that fits the others best (least squares): else a
+        level would be judged by what failed beside it.
+        """
         self._known(measure)
-        return {name: {level: float(np.mean([run.measures[measure] for run in self.good if run.values[name] == level]))
-                       for level in sorted({run.values[name] for run in self.good})} for name in self.variables}
+        values = np.array([run.measures[measure] for run in self.good])
+        levels = {name: sorted({run.values[name] for run in self.good}) for name in self.variables}
+        there = {name: np.array([[run.values[name] == level for level in of] for run in self.good], dtype=float)
+                 for name, of in levels.items()}
+        parts = np.split(np.linalg.lstsq(np.hstack(list(there.values())), values)[0],
+                         np.cumsum([len(of) for of in levels.values()])[:-1])
+        usual = [float(column.mean(0) @ part) for column, part in zip(there.values(), parts)]
+        return {name: {level: float(value + sum(usual) - own) for level, value in zip(of, part)}
+                for (name, of), part, own in zip(levels.items(), parts, usual)}
 
     def plot_effects(self, measure: str) -> Any:
         """Draw the main effects on a measure, and every run; returns the matplotlib figure."""

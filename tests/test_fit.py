@@ -175,6 +175,7 @@ GENT = fx.Gent(mu=1.0, Jm=1.0)
     ((fx.NeoHookean, {"shear": (L, P)}), "test 'shear' is not known; known: 'uniaxial'"),
     ((fx.NeoHookean, {"uniaxial": (L, P[:2])}), r"stretch has the shape \(3,\), stress \(2,\)"),
     ((fx.NeoHookean, {"uniaxial": L}), "'uniaxial'.*must be .stretch, nominal stress"),
+    ((fx.NeoHookean, {"uniaxial": ([10**400], [1.0])}), "'uniaxial'.*must be .stretch, nominal stress"),
     ((fx.NeoHookean, {"uniaxial": ([], [])}), r"shape \(0,\)"),
     ((fx.NeoHookean, {"uniaxial": (L, [0.1, math.nan, 1])}), "point 1: stretch = 1.5, stress = nan: must be finite"),
     ((fx.NeoHookean, {"uniaxial": ([1.0, -0.5], [0, 1])}), "point 1: stretch = -0.5.*greater than 0"),

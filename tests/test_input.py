@@ -37,6 +37,7 @@ def test_mesh(change, words):
     (lambda: fx.NeoHookean(c10=math.inf), "finite"),
     (lambda: fx.MooneyRivlin(c10=1.0, c01=-0.1), "not stable.*c01"),
     (lambda: fx.MooneyRivlin(c10=0.0, c01=0.0), "no stiffness"),
+    (lambda: fx.Yeoh(c10=1.0, c20=-1e300, c30=0.1), "c20 greater than .* = -0.547"),
     (lambda: fx.Ogden(mu=(1.0, 1.0), alpha=(2.0,)), "as many"),
     (lambda: fx.Ogden(mu=(1.0, 0.1), alpha=(2.0, -2.0)), "not stable.*mu alpha > 0"),
     (lambda: fx.Hyperelastic(lambda I1, I2, a: a * (3 - I1), a=1.0), "no stiffness"),
@@ -90,6 +91,15 @@ def scene(**change):
 def test_scene(change, words):
     with pytest.raises(fx.InputError, match=words):
         scene(**change)
+
+
+def test_runs():
+    with pytest.raises(fx.InputError, match="progress = .*must be True or False"):
+        fx.trace(scene(), until=fx.pressure(0.1), progress=np.zeros(2))
+    with pytest.raises(fx.InputError, match="increments = 1000000000000: must be at most max_steps = 1000"):
+        fx.solve(scene(), to=0.1, increments=10**12)
+    with pytest.raises(fx.InputError, match="pressure = -1e.99: it is 5e.98 times the shear modulus, 2"):
+        fx.trace(scene(), until=fx.pressure(-1e99), progress=False)
 
 
 def test_plane_strain_needs_three_motions_held():

@@ -11,6 +11,7 @@ import formingx as fx
 from formingx.discrete.formulation import Formulation
 from formingx.discrete.problem import Problem
 from formingx.discrete.schedule import Setting
+from formingx.results.show.plots import main_columns
 from formingx.solve.state import State
 
 Stage, tools = fx.Stage, fx.tools
@@ -203,10 +204,36 @@ def test_forces_balance(friction):
 def test_tools_on_both_faces_with_their_own_friction():
     path = run(plugged(0.2, (20, 2), more=[FLOOR]), plug("down", 1.8), air("vacuum", -0.02))
     last = path.last.measures
-    assert last["floor_force"] < -0.1 and last["plug_force"] > 0.1
-    assert last["tool_force"] == pytest.approx(last["floor_force"] + last["plug_force"])
-    assert support_force(path.problem, path.last, 1) - 0.02 * np.pi * 100 == pytest.approx(last["tool_force"], rel=1e-5)
+    assert last["floor_force"] < -0.1 and last["plug_force"] > 0.1 and "tool_force" not in path.columns
+    assert support_force(path.problem, path.last, 1) - 0.02 * np.pi * 100 == pytest.approx(
+        last["floor_force"] + last["plug_force"], rel=1e-5)
     assert end(path, "down").measures["floor_force"] < 0
+
+
+def test_forces_of_tools_balance(tmp_path):
+    """A plug from below, a mould above, both with names: the plug resists its travel, and all forces are in balance."""
+    mould = tools.cup(radius=9.0, depth=4.0, mouth=0.5, fillet=1.0, lip=0.5)
+    scene = fx.Scene(mesh=disc((20, 2)), materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom", name="air")],
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", mould, "stick", name="mould"),
+                               fx.Contact("bottom", tools.male(radius=4.0, height=20.0, base=-20.0, fillet=1.0), "none",
+                                          moves=(0, 1), name="plug")])
+    path = run(scene, plug("up", 3.8), air("blow", 0.3), tolerances=fx.Tolerances(residual=1e-10))
+    assert [c for c in path.columns if c.endswith("force")] == ["plug_force", "mould_force"]
+    for state in (end(path, "up"), path.last):
+        with path.problem.at(state):
+            found, clamp = state.measures, support_force(path.problem, state, 1)     # of the clamp on the body, along Z
+        pressure = found["air_pressure"] * np.pi * 100                           # inside a clamped rim
+        assert found["plug_force"] - found["mould_force"] + clamp + pressure == pytest.approx(
+            0, abs=1e-6 * max(found["plug_force"], pressure))
+    assert end(path, "up").measures["plug_force"] > 1 and path.last.measures["mould_force"] > 1
+    forces = path.tool_forces()
+    assert list(forces) == ["mould", "plug"] and np.array_equal(forces["plug"], path["plug_force"])
+    path.to_csv(tmp_path / "pot.csv")
+    assert {"plug_force", "mould_force"} < set((tmp_path / "pot.csv").read_text().splitlines()[0].split(","))
+    path.report(tmp_path / "pot.html")
+    assert "plug force" in (text := (tmp_path / "pot.html").read_text()) and "mould force" in text
+    assert path.plot(*main_columns(path.columns)[::-1]).get_ylabel() == "plug force"
 
 
 def test_two_tools_on_one_face():
@@ -227,6 +254,23 @@ def test_a_tool_that_leaves():
     assert end(path, "gone").measures["tool_force"] == 0 < path.last.measures["tool_force"]
     with pytest.raises(fx.InputError, match="Stage 'again'.*comes in where the body is, which reaches 2.51"):
         run(plugged("stick"), air("blow", 0.02, without=["plug"]), plug("again", 1.0))
+
+
+def test_a_load_that_is_left_out_reads_nothing(tmp_path):
+    """It leaves and comes back gradually, and its columns say what acts; its value waits for it."""
+    path = run(plugged(), air("on", 0.05), Stage("off", without=["air"], step=STEP), plug("down", 0.5, without=["air"]),
+               plug("up", 0.0, without=["air"]), Stage("on again", step=STEP))
+    found = {stage: np.array([s.measures["air_pressure"] for s in path.states if s.stage == stage])
+             for stage in ("off", "down", "on again")}
+    assert found["off"][0] == 0.05 == found["on again"][-1] and not found["down"].any()
+    assert np.all(np.diff(found["off"]) < 0) and found["off"][-1] == 0
+    assert np.all(np.diff(found["on again"]) > 0) and found["on again"][0] == 0
+    assert same(path.last, run(plugged(), air("on", 0.05)).last)
+    half = path.at(fx.pressure(0.025, of="air"), after=end(path, "down"))
+    assert half.stage == "on again" and half.measures["air_pressure"] == pytest.approx(0.025, abs=1e-10)
+    path.to_csv(tmp_path / "off.csv")
+    rows = [line.split(",") for line in (tmp_path / "off.csv").read_text().splitlines()]
+    assert {row[rows[0].index("air_pressure")] for row in rows if row[0] == "down"} <= {"0", "0.0"}
 
 
 def gripped():
@@ -313,6 +357,10 @@ AT_REST = Stage("up", drive="air", until=fx.pressure(0.1))
     (lambda: Stage("", drive="plug", until=fx.travel(1)), "must be a word"),
     (lambda: Stage("a", follow={"air": [(0, 0), (2, 1), (1, 2)]}), "goes back in time.*1 after 2"),
     (lambda: Stage("a", follow={"air": [(0, 0), (0, 1)]}), "goes back in time"),
+    (lambda: run(plugged(), Stage("a", follow={"air": [(0, 0), (1, 1e166)]})),
+     r"the table of Pressure.* goes to 1e\+166: it is 5e\+165 times the shear modulus, 2"),
+    (lambda: run(plugged(), plug("a", 1e12)), "travel = 1e.12: it is 1e.11 times the length of the body, 10"),
+    (lambda: fx.Process(plugged()).run([plug("a", 1.0)], progress=np.zeros((2, 2))), "must be True or False"),
     (lambda: Stage("a", follow={"air": [(0, 0, 1)]}), r"must be \[\(time, value\)"),
     (lambda: Stage("a", follow={}), "must be {thing"),
     (lambda: Stage("a", follow={"air": [(0, 0), (1, 1)]}, until=fx.pressure(1)), "until a process_time"),

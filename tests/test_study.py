@@ -47,7 +47,9 @@ def test_all_combinations(here, tmp_path):
     found = run(here)
     assert [run.values for run in found.runs] == [{"x": x, "y": y} for x in (0, 1, 2) for y in (1, 2)]
     assert found.best.values == {"x": 1, "y": 2} and found.best.measures == {"f": 0, "g": 1}
-    assert found.effects("f") == {"x": {0: -2.5, 1: -1.5, 2: -2.5}, "y": {1: -11 / 3, 2: -2 / 3}}
+    effects = found.effects("f")
+    assert effects["x"] == pytest.approx({0: -2.5, 1: -1.5, 2: -2.5})
+    assert effects["y"] == pytest.approx({1: -11 / 3, 2: -2 / 3})
     assert [run.values for run in found.pareto("f", "g")] == [{"x": 0, "y": 2}, {"x": 1, "y": 2}]
     found.to_csv(tmp_path / "all.csv")
     assert (tmp_path / "all.csv").read_text().splitlines()[:2][0] == "x,y,f,g,seconds,error"
@@ -55,6 +57,15 @@ def test_all_combinations(here, tmp_path):
     assert (tmp_path / "all.html").read_text().count("data:image/png") == 3
     with pytest.raises(fx.InputError, match="measure 'h' is not known"):
         found.effects("h")
+
+
+def test_effects_are_not_those_of_what_failed(here):
+    """The best runs at y = 2 are missing: y = 2 is better by 3 all the same, as in each pair of runs."""
+    found = run(here)
+    found.runs = [one for one in found.runs if one.values not in ({"x": 1, "y": 2}, {"x": 2, "y": 2})]
+    effects = found.effects("f")
+    assert effects["y"][2] - effects["y"][1] == pytest.approx(3)
+    assert effects["x"][1] - effects["x"][0] == pytest.approx(1) == effects["x"][1] - effects["x"][2]
 
 
 def test_a_run_that_fails_ends_nothing(here):

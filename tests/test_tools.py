@@ -231,6 +231,7 @@ def test_gmsh_models(tmp_path, kind):
     (lambda: tools.Tool(np.array(1.0)), "must be a list of points"),
     (lambda: tools.cup(radius=1, depth=5, draft=20), "leaves no floor"),
     (lambda: tools.cone(half_angle=90), "below 90"),
+    (lambda: tools.cone(half_angle=5e-324), "at least 0.01"),
     (lambda: tools.bottle(radius=1, height=1, neck=2, shoulder=1, neck_height=1), "below radius"),
 ])
 def test_bad_profiles(build, message):

@@ -1,4 +1,4 @@
-"""The elements of a body in a state: determinants, shapes, and where their worst places are."""
+"""The elements of a body in a state: determinants and shapes."""
 
 from __future__ import annotations
 
@@ -9,47 +9,9 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from ..mesh import Mesh
+from ..mesh.triangles import shape_quality
 
 _OUTLINE = [0, 5, 1, 3, 2, 4]          # nodes of a P2 triangle around its edge, DOLFINx order
-
-
-class Place(NamedTuple):
-    """A point of the body: reference (R, Z), length; the layer it is in ("" if that is not known); the nearest named
-    boundary and its distance, length."""
-
-    R: float
-    Z: float
-    layer: str
-    boundary: str
-    distance: float
-
-    def __str__(self) -> str:
-        layer = f" in layer {self.layer!r}" if self.layer else ""
-        if not self.boundary:
-            return f"(R, Z) = ({self.R:.6g}, {self.Z:.6g}){layer}"
-        near = f", {self.distance:.3g} from boundary {self.boundary!r}" if self.distance else f", on {self.boundary!r}"
-        return f"(R, Z) = ({self.R:.6g}, {self.Z:.6g}){layer}{near}"
-
-
-def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
-    """A point, shape (2,), the same on all ranks, with the nearest boundary of the mesh; collective."""
-    best, size = ("", np.inf), 0.0
-    for name in mesh.boundaries:
-        nodes = mesh.nodes_of(name)
-        if len(nodes):
-            away = float(np.hypot(*(nodes - point).T).min())
-            best, size = (name, away) if away < best[1] else best, max(size, float(np.abs(nodes).max()))
-    R, Z, distance = (0.0 if abs(v) < 1e-9 * size else float(v) for v in (*point, best[1]))
-    return Place(R, Z, layer, best[0], distance)
-
-
-def shape_quality(corners: np.ndarray) -> np.ndarray:
-    """4 sqrt(3) area / (sum of squared edges) of triangles, corners (n, 3, 2): 1 equilateral, 0 flat, < 0 inverted."""
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
-    squares = sum(((p - q) ** 2).sum(1) for p, q in ((a, b), (b, c), (c, a)))
-    return 4 * np.sqrt(3) * area / squares
 
 
 class Body(NamedTuple):

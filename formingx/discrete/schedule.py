@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 
@@ -15,6 +15,7 @@ class Setting:
         off: numbers of the things that take no part.
         fading: the control takes away, from 0 to 1, the forces that what has changed left without balance.
         stage, piece: number of the stage in its process, and of the piece of it that has one control.
+        changed: numbers of the things that leave or come in while it fades.
     """
 
     base: list[float]
@@ -23,6 +24,7 @@ class Setting:
     fading: bool = False
     stage: int = 0
     piece: int = 0
+    changed: list[int] = field(default_factory=list)
 
     @classmethod
     def first(cls, scene: Any) -> Setting:
@@ -45,6 +47,13 @@ class Setting:
     def amplitude(self, number: int, control: float) -> float:
         """Of a thing, or with -1 the process time."""
         return self.base[number] + self.rate[number] * control
+
+    def acting(self, number: int, control: float) -> float:
+        """The part of a load's amplitude that acts: none of one that takes no part, all once what has changed did."""
+        there = float(number not in self.off)
+        if self.fading and number in self.changed:
+            there = control if there else 1 - control
+        return there * self.amplitude(number, control)
 
     def standing(self, control: float) -> list[float]:
         """Amplitudes at a control, of the things and the time."""

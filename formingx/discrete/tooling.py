@@ -34,6 +34,19 @@ class Tooling(NamedTuple):
         return cls([_contact(dict(data)) for data in scene["contacts"]], len(scene["loads"]) + len(scene["supports"]),
                    scene["mesh"]["length"])
 
+    @property
+    def names(self) -> list[str]:
+        """Of the tool of each contact; one without a name is "tool 1" and so on, by its (first) contact."""
+        first: dict[Any, int] = {}
+        alike = [k if c.moves is None else c.moves for k, c in enumerate(self.contacts)]   # what moves alike is one
+        return [c.name or f"tool {first.setdefault(alike[k], k) + 1}" for k, c in enumerate(self.contacts)]
+
+    @property
+    def force_columns(self) -> dict[str, str]:
+        """{tool: the column of its force}: "tool_force" of the only one, else "plug_force" of one named "plug"."""
+        names = list(dict.fromkeys(self.names))
+        return {name: "tool_force" if len(names) == 1 else f"{name}_force".replace(" ", "_") for name in names}
+
     def travels(self, setting: dict[str, Any], control: float) -> list[float | None]:
         """How far each has come (length) in a state of this setting and control; None: it takes no part."""
         if not setting:

@@ -185,7 +185,7 @@ def _checked(data: Any) -> tuple[np.ndarray, np.ndarray, dict[str, slice]]:
         known("fit: data: test", mode, homogeneous.MODES)
         try:
             l, P = (np.asarray(x, float) for x in columns)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InputError(f"fit: data[{mode!r}]: must be (stretch, nominal stress), numbers") from None
         if l.ndim != 1 or l.shape != P.shape or not len(l):
             raise InputError(f"fit: data[{mode!r}]: stretch has the shape {l.shape}, stress {P.shape}: must be (n,),"

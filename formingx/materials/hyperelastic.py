@@ -85,9 +85,10 @@ class Yeoh(Material):
         super().check_constants(**constants)
         c10, c20, c30 = constants.values()
         positive(f"{self}: c10", c10)
-        if c30 < 0 or c20 < 0 and c20**2 >= 3 * c10 * c30:
+        least = -math.sqrt(3 * c10 * max(c30, 0.0))
+        if c30 < 0 or c20 < 0 and c20 <= least:
             raise InputError(f"{self} is not stable: its energy does not grow with I1 everywhere; c30 must be at least"
-                             f" 0 and c20 greater than -sqrt(3 c10 c30) = {-math.sqrt(max(3 * c10 * c30, 0)):.6g}")
+                             f" 0 and c20 greater than -sqrt(3 c10 c30) = {least:.6g}")
 
     def strain_energy(self, F, c10, c20, c30):
         x = ufl.inner(F, F) - 3

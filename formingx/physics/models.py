@@ -13,6 +13,25 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError, finite, known, non_negative, positive
+from ..mesh.triangles import Place, Triangles
+
+_SLIM = 3.0                                # slenderness of triangles that can do harm
+_TOO_STIFF, _WRONG = 0.003, 0.02           # expected error that is worth a word, and with which no run is worth it
+
+
+class Locking(NamedTuple):
+    """Triangles in which "P1dg" locks: the error that is expected, relative, the most slender one, and where it is."""
+
+    error: float
+    slenderness: float
+    at: Place
+
+    def __str__(self) -> str:
+        by = "several" if self.error > _WRONG else "about one"
+        return (f"triangles are up to {self.slenderness:.3g} times taller than wide across the thickness (at"
+                f" {self.at}): the default element locks in them, and bending comes out too stiff, by {by} per cent:"
+                f" use more elements through the thickness (at most 1.5 times taller than wide), fewer along the"
+                f" sheet, or MixedPressure(space='P1')")
 
 
 class Model:
@@ -22,6 +41,10 @@ class Model:
 
     def check(self, scene: Any) -> None:
         """Raise an InputError if the scene has what this model cannot have."""
+
+    def locking(self, mesh: Any) -> Locking | None:
+        """Triangles of a mesh in which its elements lock so that a word is due, or None; collective."""
+        return None
 
 
 class Membrane(Model):
@@ -75,7 +98,8 @@ class MixedPressure(Model):
         space: "P1": continuous in each layer (Taylor-Hood); "P0": one value in each element, cheap, displacements
             converge with order 2 instead of 3; "P1dg": linear in each element, the P2 displacement enriched by a cubic
             bubble (Crouzeix and Raviart 1973). Both of these keep the volume of each element. Triangles of "P1dg" must
-            not be slim across a thick sheet: its inf-sup constant falls as their width over height, and it locks.
+            not be slim across a thick sheet: its inf-sup constant falls as their width over height, and it locks
+            (`locking`); a scene whose triangles would make it wrong by 2 % is refused.
     """
 
     stress_free = True
@@ -86,6 +110,27 @@ class MixedPressure(Model):
             raise InputError(f"MixedPressure: eps = {eps!r}: must be at most 1 (thesis: 2e-2 to 1e-7)")
         known("MixedPressure: space", space, _SPACES)
         self.space, self.pressure = space, _SPACES[space]
+
+    def check(self, scene):
+        found = self.locking(scene.mesh)
+        if found is not None and found.error > _WRONG:
+            raise InputError(f"Scene: {found}")
+
+    def locking(self, mesh):
+        """Triangles so slim across a thick sheet that its bending is too stiff by more than 0.3 %; collective.
+
+        Its inf-sup constant falls as 2 width/height. Hinged sheets 2 to 15 times wider than thick came out wrong by
+        up to 0.3 (height/width) (height/length of the body)^2.5, at most (benchmarks/thickness.py), clamped ones, and
+        blocks that stick between plates, by more; along a thin sheet slim triangles do no harm, and where one of them
+        spans the sheet every pressure space is as wrong.
+        """
+        if not self.pressure.bubble:
+            return None
+        body = Triangles(mesh)
+        across = (body.edge < body.thickness) & (body.slenderness > _SLIM)
+        error = np.where(across, 0.3 * body.slenderness * (body.edge / body.length) ** 2.5, 0.0)
+        mean, worst = float((error * body.area).sum() / body.area.sum()), int(np.argmax(error))
+        return Locking(mean, float(body.slenderness[worst]), body.place(worst)) if mean > _TOO_STIFF else None
 
     def terms(self, J, p, modulus, eps):
         """[(energy density, quadrature metadata)] for J = det F, pressure p and the layer's shear modulus."""

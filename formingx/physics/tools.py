@@ -90,13 +90,15 @@ def cone(*, half_angle: float, z: float = 0.0, tip: float = 0.0, size: float = 1
     """A cone that points down.
 
     Args:
-        half_angle: between its surface and the Z axis, degrees, between 0 and 90.
+        half_angle: between its surface and the Z axis, degrees, from 0.01 to below 90.
         z: of its lowest point; tip: radius of the rounded tip, length.
         size: a length to draw it at (the cone has no end).
     """
     a = math.radians(positive("cone: half_angle", half_angle))
     if a >= math.pi / 2:
         raise InputError(f"cone: half_angle = {half_angle!r}: must be below 90 degrees")
+    if half_angle < 0.01:
+        raise InputError(f"cone: half_angle = {half_angle!r}: must be at least 0.01 degrees")
     tip, size, z = non_negative("cone: tip", tip), positive("cone: size", size), finite("cone: z", z)
     size = max(size, 4 * tip)
     apex = z - tip * (1 / math.sin(a) - 1)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ..discrete.tooling import Tooling
 from ..errors import InputError
+from ..solve.forces import resisting
 from ..solve.targets import Amplitude, Bound, Target, bind_pole_height, bind_pole_stretch, bind_volume
 
 Measure = Target | Callable[[Any], float]
@@ -95,11 +97,12 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     (stress length^3), mass_error (volume over its original value, minus 1), volume_error (root mean square of J - 1),
     both over what thermal expansion makes of the volume. Pole and volume are there where the scene has an axis and a
     driven pressure. With contacts: contact_length (reference length in touch), penetration (of the deepest node,
-    length), tool_force (along Z, of the body on all tools). With a driven support: support_force (of the body on it,
-    along its component). Where several things can be driven each has its column, plug_travel for one named "plug"
-    (`Scene.column`), a support plug_force; and where there are several contacts those with a name have a force,
-    plug_force. `timed`: process_time too. With materials that relax: dissipated_power (stress length^3 over time), and
-    from it, in a run, dissipated_energy (stress length^3).
+    length) and the force of the body on each tool: along its travel, positive when it resists; of a tool that stays
+    along Z, positive when the body pushes it up. It is plug_force for one named "plug" (tool_1_force for one without a
+    name), and tool_force where there is one tool. With a driven support: support_force (of the body on it, along its
+    component). Where several things can be driven each has its column, plug_travel for one named "plug"
+    (`Scene.column`), a support plug_force. `timed`: process_time too. With materials that relax: dissipated_power
+    (stress length^3 over time), and from it, in a run, dissipated_energy (stress length^3).
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
     found: dict[str, Bound] = {"process_time": Amplitude(problem, -1)} if timed else {}
@@ -123,9 +126,12 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     if problem.contacts:
         found["contact_length"] = _Nodal(problem, lambda c, *at: c.contact_length(*at), sum)
         found["penetration"] = _Nodal(problem, lambda c, *at: c.largest_penetration(*at), max)
-        found["tool_force"] = _Nodal(problem, lambda c, *at: c.force(*at)[1], sum)
-        names = [c.contact.name for c in problem.contacts]
-        for name in dict.fromkeys(filter(None, names)) if len(set(names)) > 1 else ():
-            of_tool = [c for c in problem.contacts if c.contact.name == name]
-            found[f"{name}_force"] = _Nodal(problem, lambda c, *at: c.force(*at)[1], sum, of_tool)
+        tooling = Tooling.of_problem(problem)
+        tools = {name: [c for c, tool in zip(problem.contacts, tooling.names, strict=True) if tool == name]
+                 for name in tooling.force_columns}
+        for name in sorted(tools, key=lambda tool: tools[tool][0].contact.moves is None):    # what moves comes first
+            force = _Nodal(problem, lambda c, *at: c.force(*at) @ resisting(c.contact), sum, tools[name])
+            found[tooling.force_columns[name]] = force
+            if tools[name][0].contact.name:
+                found[f"{name}_force"] = force
     return found

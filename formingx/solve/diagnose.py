@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from ..discrete.elements import Body, Place, body, place
+from ..discrete.elements import Body, body
 from ..discrete.tooling import Tooling
+from ..mesh.triangles import Place, place
 from .diagnosis import Diagnosis
 from .direct import DirectSolver, condition
 

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from .. import figures
-from ..discrete.elements import Body, Place
+from ..discrete.elements import Body
 from ..errors import InputError
+from ..mesh.triangles import Place
 
 
 @dataclass(frozen=True)

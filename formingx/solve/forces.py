@@ -12,6 +12,11 @@ from ..errors import InputError, finite, known
 from .targets import Bound, Target
 
 
+def resisting(contact: Any) -> np.ndarray:
+    """Unit vector (r, z) along which the force of the body on a tool counts: against its travel, or +Z if it stays."""
+    return np.array([0.0, 1.0]) if contact.moves is None else -np.array(contact.moves) / np.hypot(*contact.moves)
+
+
 def force(value: float, *, of: str | None = None) -> Target:
     """The force on what is driven, or on what is called `of`, reaches `value` (stress length^2).
 
@@ -71,9 +76,8 @@ class _ToolForce(Bound):
     smooth = False
 
     def __init__(self, problem: Any, contacts: list[Any]):
-        forms, moves = problem.forms, np.array(contacts[0].contact.moves)
-        self._problem, self._contacts = problem, contacts
-        self._way = -moves / np.hypot(*moves)
+        forms = problem.forms
+        self._problem, self._contacts, self._way = problem, contacts, resisting(contacts[0].contact)
         self._scale = self.size = forms.stress * forms.volume / forms.length
 
     def value(self, x, control):

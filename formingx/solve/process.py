@@ -110,7 +110,8 @@ class Execution:
         return setting.amplitude(number, control) * self.problem.forms.scales[number]
 
     def _enter(self, base: list[float], rate: list[float], piece: int, control: float, fading: bool = False) -> None:
-        setting = Setting(base, rate, self._off, fading, self._k, piece)
+        changed = sorted(set(self.problem.setting.off) ^ set(self._off)) if fading else []
+        setting = Setting(base, rate, self._off, fading, self._k, piece, changed)
         self.problem.enter(setting, self._standing()[1], control)
 
     def _resumed(self, control: float) -> State:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError, finite, instance, known, positive, several
+from ..scene import aims
 from ..scene.scene import Scene
 from .stepping import StepControl
 from .targets import Target
@@ -28,7 +29,8 @@ class Stage:
             not from here); with `follow` a `process_time`, or None: the end of the tables.
         through: more targets to hit exactly on the way; those that are not met are left out.
         without: what is not there during the stage, itself or its name: a support that is open, a tool that is away, a
-            load that is off. A support takes hold of the body where it is when it comes back.
+            load that is off. A support takes hold of the body where it is when it comes back; a load comes back with
+            its value, and its column reads what acts of it: 0 while it is away.
         follow: instead of `drive`: {thing: [(time, value), ...]}, piecewise linear in time, values in the user's units
             (the last one stays). A table that begins later than the stage is reached in a straight line from
             where the thing stands. With `drive`, instead of a thing a function that makes targets, such as
@@ -150,7 +152,8 @@ def plan(scene: Scene, stage: Stage) -> Plan:
     """A stage by the numbers of the things of its scene.
 
     Raises:
-        InputError: it drives or leaves out something that is not there, or leaves the body free to move.
+        InputError: it drives or leaves out something that is not there, leaves the body free to move, or aims at what
+            cannot be met.
     """
     who = stage.who
     off = sorted({i for thing in stage.without for i in scene.together(scene.number(f"{who}: without", thing))})
@@ -170,7 +173,12 @@ def plan(scene: Scene, stage: Stage) -> Plan:
         supports = [t for t in there if t in scene.supports]
         scene.check_held(supports, any(t in there for t in scene.contacts))
         scene.check_driven(supports)
+        aims.check(scene, [t for t in (stage.until, stage.hold, *stage.through) if t is not None], off)
     except InputError as error:
         raise InputError(f"{who}: {error}") from None
+    for number, (_, table) in zip(numbers, stage.tables):
+        thing, most = scene.things[number], float(np.abs(table[:, 1]).max())
+        if (why := aims.beyond_all(scene, thing.quantity, most)) is not None:
+            raise InputError(f"{who}: the table of {thing!r} goes to {most:g}: {why}")
     tables = [(i, table) for number, (_, table) in zip(numbers, stage.tables) for i in scene.together(number)]
     return Plan(stage, scene.together(numbers[0]) if stage.drive is not None else [], tables, off)

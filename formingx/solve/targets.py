@@ -32,10 +32,14 @@ class Bound:
 
 
 class Amplitude(Bound):
-    """Of a thing that can be driven (by its number in the scene), of the process time (-1), or the control (None)."""
+    """Of a thing that can be driven (by its number in the scene), of the process time (-1), or the control (None).
+
+    Of a load it is what acts: nothing of one that a stage leaves out.
+    """
 
     def __init__(self, problem: Any, number: int | None):
         self._problem, self._number = problem, number
+        self._acts = number is not None and 0 <= number < len(problem.scene.loads)
         self._scale = self.size = 1.0 if number is None else problem.forms.scales[number]
 
     @property
@@ -46,13 +50,19 @@ class Amplitude(Bound):
     def _amplitude(self, control: float) -> float:
         if self._number == -1:
             return self._problem.forms.time_at(control)
-        return control if self._number is None else self._problem.setting.amplitude(self._number, control)
+        if self._number is None:
+            return control
+        setting = self._problem.setting
+        return (setting.acting if self._acts else setting.amplitude)(self._number, control)
 
     def value(self, x, control):
         return self._scale * self._amplitude(control)
 
     def equation(self, target):
-        slope = 1.0 if self._number is None else self._problem.setting.rate[self._number]
+        setting = self._problem.setting
+        slope = 1.0 if self._number is None else setting.rate[self._number]
+        if self._acts and setting.fading:                    # it leaves or comes in as the control goes from 0 to 1
+            slope = self._amplitude(1.0) - self._amplitude(0.0)
 
         def c(x, control, gradient):
             gradient.set(0)
@@ -164,15 +174,7 @@ def pole_stretch(value: float) -> Target:
 
     A run raises an InputError if no material of the scene can be stretched so far (Gent, Arruda-Boyce).
     """
-    def bind(problem):
-        if problem.scene.kinematics.dimension_of_volume == 3:
-            limits = {m.largest_stretch("equibiaxial"): m for m in problem.scene.materials.values()}
-            largest = max(limits)
-            if value >= largest:
-                raise InputError(f"pole_stretch = {value:g}: must be less than {largest:.6g}, where I1 comes to the"
-                                 f" limit {limits[largest].largest_I1:g} of {limits[largest]}")
-        return bind_pole_stretch(problem)
-    return Target("pole_stretch", positive("pole_stretch", value), bind, signed=False)
+    return Target("pole_stretch", positive("pole_stretch", value), bind_pole_stretch, signed=False)
 
 
 def enclosed_volume(value: float) -> Target:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...discrete.tooling import Tooling
 from ...errors import InputError
 from ..files.sheet import Sheet
 
@@ -124,17 +125,7 @@ def tool_forces(path: Any) -> dict[str, np.ndarray]:
     Of a tool that moves along its travel, positive when it resists the travel; of one that stays along Z, positive when
     the body pushes it up.
     """
-    forces: dict[str, np.ndarray] = {}
-    for k, contact in enumerate(path.problem.contacts):
-        name = contact.contact.name or f"tool {k + 1}"
-        moves = contact.contact.moves
-        way = np.array([0.0, 1.0]) if moves is None else -np.array(moves) / np.hypot(*moves)
-        forces.setdefault(name, np.zeros(len(path)))
-        for n, state in enumerate(path.states):
-            with path.problem.at(state) as problem:
-                if contact in problem.touching:
-                    forces[name][n] += contact.force(problem.x.array_r, state.control) @ way
-    return forces
+    return {name: path[column] for name, column in Tooling.of_problem(path.problem).force_columns.items()}
 
 
 def _tangents(points: np.ndarray) -> np.ndarray:

@@ -24,8 +24,7 @@ def work(path: Any) -> dict[str, np.ndarray]:
     tooling = Tooling.of_problem(path.problem)
     travels = [tooling.travels(s.setting, s.control) for s in path.states]
     forces = tool_forces(path)
-    for k, contact in enumerate(tooling.contacts):
-        name = contact.name or f"tool {k + 1}"
+    for k, (contact, name) in enumerate(zip(tooling.contacts, tooling.names, strict=True)):
         if contact.moves is not None and name not in found:
             travelled = [0.0]
             for row in travels:                              # a tool that takes no part goes nowhere

@@ -34,7 +34,7 @@ from ...solve.targets import Target
 from .. import files
 from .description import describe, differences, summary
 
-FORMAT = 2
+FORMAT = 3
 _FIELDS = ("x", "direction")
 
 

@@ -85,10 +85,10 @@ def _tools(record: Record) -> list[dict[str, Any]]:
     shapes = [p for p in record.profiles if p is not None]
     size = max((np.ptp(np.vstack([p.bottom, p.top]), axis=0).max() for p in shapes), default=1.0)
     found = []
-    for k, contact in enumerate(record.tooling.contacts):
+    for k, (contact, name) in enumerate(zip(record.tooling.contacts, record.tooling.names)):
         line = contact.tool.outline()
         shell = line + 0.02 * size * contact.tool.nearest(line).normal
-        found.append({"name": contact.name or f"tool {k + 1}", "line": _rounded(line.T), "shell": _rounded(shell.T),
+        found.append({"name": name, "line": _rounded(line.T), "shell": _rounded(shell.T),
                       "moves": list(contact.moves or (0.0, 0.0)),
                       "travel": [None if t[k] is None else float(f"{t[k]:.7g}") for t in record.travels]})
     return found
@@ -118,7 +118,8 @@ def _driven(record: Record, stage: slice) -> list[tuple[str, str, np.ndarray, np
             continue
         if column.endswith("travel"):
             name = column.removesuffix("travel").rstrip("_")
-            force = record.forces.get(name) if name or len(record.forces) != 1 else next(iter(record.forces.values()))
+            moving = {n for n, c in zip(record.tooling.names, record.tooling.contacts) if c.moves is not None}
+            force = record.forces.get(name or min(moving, default=""))      # one travel without a name: one tool moves
             if force is None:
                 force = measures.get(f"{name}_force" if name else "support_force")
             if force is not None:

@@ -39,7 +39,9 @@ def main_columns(columns: list[str]) -> tuple[str, str]:
     """(x, y) of the loading curve: what is driven over how far the body has gone, or its force over the travel."""
     travel = next((c for c in columns if c.endswith("travel")), None)
     if travel:
-        return travel, next(c for c in ("tool_force", "support_force", "pole_height", "strain_energy") if c in columns)
+        own = travel.replace("travel", "force")
+        forces = [c for c in columns if c.endswith("_force")]       # tools that move come first
+        return travel, next(c for c in (own, *forces, "pole_height", "strain_energy") if c in columns)
     return (next(c for c in ("pole_height", "enclosed_volume", "strain_energy") if c in columns),
             next(c for c in columns if c.endswith("pressure")))
 

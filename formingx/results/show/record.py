@@ -157,13 +157,14 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
     """The record of what `formingx.checkpoint.contents` gives."""
     stepping: dict = next((s["stepping"] for s in reversed(states) if s["stepping"]), {})
     tooling = Tooling.of_description(about["scene"])
+    measures = {c: np.array([s["measures"][c] for s in states]) for c in states[0]["measures"]}
     profiles = [s["profile"] and Profile(**{k: np.array(v) for k, v in s["profile"].items()}) for s in states]
     return Record(about["summary"], about["versions"], about["scene"]["kinematics"]["kind"] == "Axisymmetric",
                   [s["kind"] for s in states], [s["stage"] for s in states],
-                  {c: np.array([s["measures"][c] for s in states]) for c in states[0]["measures"]},
-                  [s["history"] for s in states], profiles, stepping.get("counts", {}), stepping.get("until"), tooling,
+                  measures, [s["history"] for s in states], profiles, stepping.get("counts", {}),
+                  stepping.get("until"), tooling,
                   [tooling.travels(s.get("setting", {}), s["control"]) for s in states],
-                  _forces_of(tooling, {c: np.array([s["measures"][c] for s in states]) for c in states[0]["measures"]}),
+                  {name: measures[column] for name, column in tooling.force_columns.items() if column in measures},
                   [{} for _ in states], {})
 
 
@@ -189,17 +190,6 @@ def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray
 def words(name: str) -> str:
     """A column's name for people."""
     return name.replace("_", " ")
-
-
-def _forces_of(tooling: Tooling, measures: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """`Record.forces` from the columns of a path, which are along Z, of the body on the tool."""
-    found = {}
-    for k, contact in enumerate(tooling.contacts):
-        column = "tool_force" if len(tooling.contacts) == 1 else f"{contact.name}_force"
-        if column in measures:
-            sign = 1.0 if contact.moves is None else -np.sign(contact.moves[1])
-            found[contact.name or f"tool {k + 1}"] = sign * measures[column]
-    return found
 
 
 def _fields(path: Any, profiles: list) -> list[dict[str, np.ndarray]]:

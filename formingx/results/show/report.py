@@ -228,8 +228,8 @@ def _stages(record: Record, units: Units) -> str:
 def _tools(record: Record, units: Units) -> str:
     """Every contact, and where its tool is in the last state."""
     rows = []
-    for k, (contact, travel) in enumerate(zip(record.tooling.contacts, record.travels[-1])):
-        force = record.forces.get(contact.name or f"tool {k + 1}")
+    for contact, name, travel in zip(record.tooling.contacts, record.tooling.names, record.travels[-1]):
+        force = record.forces.get(name)
         moves = "stays" if contact.moves is None else "moves along ({:g}, {:g})".format(*contact.moves)
         where = "takes no part" if travel is None else page.number(travel) if contact.moves else ""
         rows.append([contact.name or "", contact.on, repr(contact.tool)[5:-1],

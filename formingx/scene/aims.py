@@ -1,0 +1,87 @@
+"""Whether a run can come to what it aims at: before anything is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..mesh.triangles import Triangles
+from ..physics.supports import Held
+from .scene import Scene
+
+_NEAR = 1e-5           # of the body's length: a point is on a boundary
+_MOST = 1e9            # of the largest shear modulus, or of the body's length
+
+
+def check(scene: Scene, targets: Iterable[Any], off: Collection[int] | None = None) -> None:
+    """An InputError if one of these targets cannot be met, see `unreachable`."""
+    for target in targets:
+        why = unreachable(scene, target, off)
+        if why is not None:
+            raise InputError(f"{target}: {why}")
+
+
+def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -> str | None:
+    """Why no run can meet a target (its `name` and `value`), in words; None: nothing speaks against it.
+
+    off: numbers of the things that a stage leaves out; None: a run from rest that drives the only thing that can be.
+    """
+    name, value, driven = target.name, target.value, scene.driven
+    there = [thing for i, thing in enumerate(scene.things) if i not in (off or ())]
+    if name == "pole_stretch" and scene.kinematics.axisymmetric:
+        largest, material = max(((m.largest_stretch("equibiaxial"), m) for m in scene.materials.values()),
+                                key=lambda found: found[0])
+        if value >= largest:
+            return f"must be less than {largest:.6g}, where I1 comes to the limit {material.largest_I1:g} of {material}"
+    if off is None and driven is not None and name in ("pressure", "travel"):
+        if name != driven.quantity:
+            return f"the run drives {driven!r}, which has no {name}"
+        if value < 0 and driven in scene.contacts and driven.separates:
+            return f"it lies behind the start: {driven!r} would move away from the body"
+    if name.startswith("u_") and "_at_" in name and value != 0:
+        holds = _holder(scene, name, [t for t in there if t in scene.supports])
+        if holds is not None:
+            return f"{holds!r} holds that displacement"
+    if name.endswith(("pressure", "travel")):
+        return beyond_all(scene, name.split("_")[-1], value)
+    if name == "pole_height":
+        for contact in (t for t in there if t in scene.contacts and not t.driven):
+            if _beyond(scene, contact, value):
+                return f"it lies inside the tool of {contact!r}"
+    return None
+
+
+def beyond_all(scene: Scene, quantity: str | None, value: float) -> str | None:
+    """What is absurd about a pressure or a travel, in words, or None."""
+    units = {"pressure": ("the shear modulus", max(scene.shear_modulus(name) for name in scene.mesh.layers)),
+             "travel": ("the length of the body", float(max(scene.extent)))}
+    if quantity not in units:
+        return None
+    what, unit = units[quantity]
+    return f"it is {abs(value) / unit:.2g} times {what}, {unit:.4g}" if abs(value) > _MOST * unit else None
+
+
+def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:
+    """The support that holds what a `displacement` target (u_r_at_R_Z) wants to move, or None."""
+    component, place = name.removeprefix("u_").split("_at_")
+    point, near = np.array([float(x) for x in place.split("_")]), _NEAR * max(scene.extent)
+    for support in supports:
+        for held in support.constraints():
+            if isinstance(held, Held) and not held.driven and "rz"[held.component] == component:
+                nodes = np.array([held.point]) if held.on is None else scene.mesh.nodes_of(held.on)
+                if np.hypot(*(nodes - point).T).min() < near:
+                    return support
+    return None
+
+
+def _beyond(scene: Scene, contact: Any, height: float) -> bool:
+    """True if the contact's face, moved to a pole height, has its pole deeper in the tool than the body is thick."""
+    nodes = scene.mesh.nodes_of(contact.on)
+    pole = nodes[np.argmin(nodes[:, 0])]
+    if pole[0] > 1e-9 * max(scene.extent):
+        return False
+    depth = contact.tool.signed_distance((pole + [0.0, height])[None])[0]
+    return float(depth) > Triangles(scene.mesh).thickness
