@@ -26,7 +26,7 @@ _FIRST, _LARGEST, _FALLS, _GROWS = 1e3, (1e7, 1e11), 0.3, 3.0
 """Of eta: at first, at most (before and after the body has begun to move); factors after a solution that took at most
 `_FEW` iterations, and after none was found."""
 
-_FEW, _TOLERANCES = 5, Tolerances(1e-8, 1e-6, settling=12)
+_FEW, _TOLERANCES = 5, Tolerances(1e-8, 1e-6, settling=8)
 """Of a viscous solution. (Where contact does not settle soon more viscosity is cheaper than more iterations.)"""
 
 _FAR = 0.1
