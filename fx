@@ -21,6 +21,7 @@ export PETSC_OPTIONS="-no_signal_handler${PETSC_OPTIONS:+ $PETSC_OPTIONS}"   # s
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 export OMPI_MCA_btl="${OMPI_MCA_btl:-self,sm}"
 export OMPI_MCA_topo="${OMPI_MCA_topo:-basic}"       # open-mpi/ompi#13918: the other one hangs now and then
+export OMPI_MCA_mpi_yield_when_idle="${OMPI_MCA_mpi_yield_when_idle:-1}"     # ranks that wait leave the core to others
 export PRTE_MCA_rmaps_default_mapping_policy="${PRTE_MCA_rmaps_default_mapping_policy:-:oversubscribe}"
 
 way=${FX:-}
@@ -287,7 +288,7 @@ case $way in
         # read-only: what would be lost with the container fails
         exec "$way" run --rm -i $tty $keep --init --shm-size=1g --user "$user" --security-opt label=disable \
             --read-only --tmpfs /run -w "$PWD" -e HOME="${HOME:-/tmp}" -e PYTHONNOUSERSITE=1 -e TMPDIR -e PYTHONPATH -e XDG_CACHE_HOME -e MPLCONFIGDIR \
-            -e OMP_NUM_THREADS -e PETSC_OPTIONS -e OMPI_MCA_btl -e OMPI_MCA_topo -e OMPI_ALLOW_RUN_AS_ROOT -e OMPI_ALLOW_RUN_AS_ROOT_CONFIRM \
+            -e OMP_NUM_THREADS -e PETSC_OPTIONS -e OMPI_MCA_btl -e OMPI_MCA_topo -e OMPI_MCA_mpi_yield_when_idle -e OMPI_ALLOW_RUN_AS_ROOT -e OMPI_ALLOW_RUN_AS_ROOT_CONFIRM \
             -e PRTE_MCA_rmaps_default_mapping_policy "$@" ;;
 esac
 [ "$way" != root ] || namespaces || way=copy

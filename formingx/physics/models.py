@@ -16,7 +16,7 @@ from ..errors import InputError, finite, known, non_negative, positive
 from ..mesh.triangles import Place, Triangles
 
 _SLIM = 3.0                                # slenderness of triangles that can do harm
-_TOO_STIFF, _WRONG = 0.003, 0.02           # expected error that is worth a word, and with which no run is worth it
+_TOO_STIFF, _WRONG = 0.003, 0.05           # expected error that is worth a word, and with which no run is worth it
 
 
 class Locking(NamedTuple):
@@ -99,7 +99,7 @@ class MixedPressure(Model):
             converge with order 2 instead of 3; "P1dg": linear in each element, the P2 displacement enriched by a cubic
             bubble (Crouzeix and Raviart 1973). Both of these keep the volume of each element. Triangles of "P1dg" must
             not be slim across a thick sheet: its inf-sup constant falls as their width over height, and it locks
-            (`locking`); a scene whose triangles would make it wrong by 2 % is refused.
+            (`locking`); a scene whose triangles would make it wrong by 5 % is refused.
     """
 
     stress_free = True

@@ -120,6 +120,11 @@ class Run:
         return self.problem.shown(0.0)[0]
 
     @property
+    def _jumps(self) -> bool:
+        """True if the body may jump: at folds, or, where a fold is followed, where a history leaves no next state."""
+        return self._at_fold == "jump" or self._at_fold == "follow" and self.problem.has_history
+
+    @property
     def _sense(self) -> float:
         """1 or -1: which way the control goes from the first state."""
         return np.sign(self.states[0].slope) or 1.0
@@ -200,7 +205,7 @@ class Run:
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good = self.step.failed()
                 failed += not isinstance(failure, _Astray)
-                if self._at_fold == "jump" and (failed > 1 and length < jumps[0] or not good):
+                if self._jumps and (not good or self._at_fold == "jump" and failed > 1 and length < jumps[0]):
                     jumps.pop(0)
                     for ahead in (reach,) if good else (_JUMPS[-1], 0.0):
                         with contextlib.suppress(Failure):

@@ -1,0 +1,84 @@
+"""Runs with friction that go on wherever the process does: through folds, kinks and snaps."""
+
+import sys
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+import formingx as fx
+from formingx import tools
+
+sys.path.insert(0, str(ROOT / "demos"))
+import plugs  # noqa: E402
+
+R, H = 10.0, 0.3
+MATERIAL = fx.MooneyRivlin(c10=0.4, c01=0.04)
+
+
+def scene(contacts, loads=(), mesh=None, materials=MATERIAL, supports=None):
+    return fx.Scene(mesh=mesh or fx.mesh.disc(radius=R, thickness=H, elements=(60, 2)), materials=materials,
+                    supports=[fx.Symmetry("axis"), *(supports or [fx.Clamped("rim")])], loads=loads, contacts=contacts)
+
+
+def law_is_kept(path, contact=0):
+    """Largest |T| over mu N of all states."""
+    most = 0.0
+    for state in path.states:
+        with path.problem.at(state) as problem:
+            found = problem.contacts[contact].tractions(state.x[: problem.forms.space.dofmap.index_map.size_local],
+                                                        state.control)
+        pressed = found.normal > 0
+        limit = problem.contacts[contact].law.mu * found.normal[pressed]
+        most = max(most, (np.abs(found.tangential[pressed]) / limit).max(initial=0.0))
+    return most
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fillet", [0.0, 0.1 * H])
+def test_vacuum_over_a_male_mould_with_a_sharp_edge(fillet):
+    mould = tools.Tool([(R, 0), (R, -4.05), (3, -4.05), (3, -0.05), (0, -0.05)], [0, 0.5, 0.5, fillet, 0])
+    path = fx.trace(scene([fx.Contact("bottom", mould, 0.3)], [fx.Pressure("top")]), until=fx.pressure(0.4))
+    profile = path.profile()
+    top = np.interp(1.5, profile.reference_radius, profile.bottom[:, 1])
+    assert (top, profile.bottom[:, 1].min()) == pytest.approx((-0.05, -4.05), abs=1e-4)
+    assert all(state.jump["dissipated"] > 0 for state in path.jumps)
+    assert law_is_kept(path) < 1 + 1e-6
+
+
+@pytest.mark.slow
+def test_a_cup_three_and_a_half_radii_deep():
+    mould = tools.cup(radius=R, depth=35.0, mouth=H, fillet=2.0)
+    path = fx.trace(scene([fx.Contact("top", mould, 0.3)], [fx.Pressure("bottom")]), until=fx.pressure(1.0))
+    assert path["pole_height"][-1] == pytest.approx(35.0 - H / 2, rel=0.01)
+    assert law_is_kept(path) < 1 + 1e-6
+
+
+@pytest.mark.slow
+def test_a_stiff_layer_between_soft_ones_in_a_cup():
+    mesh = fx.mesh.disc(radius=R, thickness={"a": 0.1, "b": 0.1, "c": 0.1}, elements=(60, 1))
+    stiff = fx.MooneyRivlin(c10=400.0, c01=40.0)
+    mould = tools.cup(radius=R, depth=5.0, mouth=H, fillet=2.0)
+    path = fx.trace(scene([fx.Contact("top", mould, 0.3)], [fx.Pressure("bottom")], mesh,
+                          {"a": MATERIAL, "b": stiff, "c": MATERIAL}), until=fx.pressure(200.0))
+    assert path["pressure"][-1] == pytest.approx(200.0, rel=1e-12)
+    assert law_is_kept(path) < 1 + 1e-6
+
+
+@pytest.mark.slow
+def test_a_block_pressed_to_a_fifth_of_its_height():
+    plate = tools.plane(1.0)
+    path = fx.trace(scene([fx.Contact(face, plate, 0.2, moves=(0, -1)) for face in ("top", "rim")],
+                          mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(10, 10)),
+                          supports=[fx.Symmetry("bottom", normal="z")]), until=fx.travel(0.8))
+    assert path["travel"][-1] == pytest.approx(0.8, rel=1e-12)
+    assert law_is_kept(path) < 1 + 1e-6
+
+
+@pytest.mark.slow
+def test_a_flat_rough_plug_comes_back():
+    made = plugs.scene(R, H, 5.0, 1.5, MATERIAL, "stick", (40, 1), name="plug")
+    path = fx.Process(made).run([fx.Stage("push", drive="plug", until=fx.travel(3.5)),
+                                 fx.Stage("back", drive="plug", until=fx.travel(0.0))])
+    assert path["pole_height"][-1] == pytest.approx(0.0, abs=1e-8)
+    assert path["tool_force"][-1] == pytest.approx(0.0, abs=1e-8)
