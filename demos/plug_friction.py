@@ -30,7 +30,7 @@ def main():
     options.add_argument("--fillet", type=float, default=0.35, help="radius of the plug's edge, cm")
     options.add_argument("--refine", type=int, default=1, help="all elements divided by this")
     args = options.parse_args()
-    elements = tuple(n * args.refine for n in ((40, 2) if args.quick else (60, 2)))
+    elements = tuple(n * args.refine for n in ((40, 2) if args.quick else (54, 2)))
     frictions, travels = ((0.3,), (2, 4, 6, 8)) if args.quick else (FRICTIONS, TRAVELS)
     args.out.mkdir(parents=True, exist_ok=True)
     cases = [(mu, args.fillet, elements, travels, args.out) for mu in frictions]
