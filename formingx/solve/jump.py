@@ -22,9 +22,9 @@ from .state import State
 AHEAD = 1e-6
 """By how much the (dimensionless) control goes on in a jump from a limit point."""
 
-_FIRST, _LARGEST, _FALLS, _GROWS = 1e3, (1e7, 1e11), 0.3, 3.0
-"""Of eta: at first, at most (before and after the body has begun to move); factors after a solution that took at most
-`_FEW` iterations, and after none was found."""
+_FIRST, _LARGEST, _LEAST, _FALLS, _GROWS = 1e3, (1e7, 1e11), 1e-9, 0.3, 3.0
+"""Of eta: at first, at most (before and after the body has begun to move), at least; factors after a solution that took
+at most `_FEW` iterations, and after none was found."""
 
 _FEW, _TOLERANCES = 5, Tolerances(1e-8, 1e-6, settling=8)
 """Of a viscous solution. (Where contact does not settle soon more viscosity is cheaper than more iterations.)"""
@@ -162,7 +162,7 @@ def jump(curve: Any, old: State, by: float, ahead: bool) -> State:
     origin = old.x + by / old.slope * old.direction if ahead else old.x
     eta = _FIRST
     try:
-        while way.solved < _MOST and eta < _LARGEST[way.solved > 0]:
+        while way.solved < _MOST and _LEAST < eta < _LARGEST[way.solved > 0]:
             state = way.end(old) if way.settles else None
             if state is not None:
                 if state.slope * by < 0:
