@@ -183,10 +183,12 @@ def value_at(function, point):
 @pytest.mark.slow
 def test_a_corner_that_creases_turns_the_path_back():
     """Clamped on 60 x 3 elements: the default arrives; Taylor-Hood creases at the corner, stops and says so."""
-    scene = treloar((60, 3), fx.Clamped("rim"))
-    limit, = fx.trace(scene, until=fx.pole_stretch(8.5), progress=False).limit_points
-    assert limit.measures["pressure"] == pytest.approx(0.5052, abs=1e-3)
+    coarse, fine = (fx.trace(treloar(elements, fx.Clamped("rim")), until=fx.pole_stretch(8.5), progress=False)
+                    for elements in ((40, 2), (60, 3)))
+    (a,), (b,) = coarse.limit_points, fine.limit_points
+    assert a.measures["pressure"] == pytest.approx(b.measures["pressure"], rel=1e-3)
     with pytest.raises(fx.ConvergenceError, match="turned back") as error:
         fx.trace(treloar((60, 3), fx.Clamped("rim"), model=fx.MixedPressure(space="P1")), until=fx.pole_stretch(8.5),
                  max_steps=100, progress=False)
-    assert 1.5 < error.value.path["pole_stretch"].max() < 2.2 and error.value.path["pressure"].min() >= 0
+    stretch = error.value.path["pole_stretch"]
+    assert stretch[-1] < stretch.max() < 8.5 and error.value.path["pressure"].min() >= 0
