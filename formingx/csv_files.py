@@ -94,7 +94,7 @@ def read(file: Any) -> Table:
     cells = [(n, [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]) for n, line in lines]
     heads = [_name_and_unit(cell) for cell in cells[0][1]]
     names = [head for head, _ in heads]
-    if all(_is_number(cell) for cell in cells[0][1]):
+    if all(is_number(cell) for cell in cells[0][1]):
         raise InputError(f"table {name!r}: the first line must name the columns; it reads {lines[0][1].strip()!r}")
     if len(set(names)) < len(names):
         raise InputError(f"table {name!r}: a column name stands twice in the header: {', '.join(names)}")
@@ -104,8 +104,8 @@ def read(file: Any) -> Table:
     if len(cells) < 3:
         raise InputError(f"table {name!r}: {len(cells) - 1} rows of data; a curve needs at least 2")
     text = {head: [row[k] for _, row in cells[1:]] for k, head in enumerate(names)}
-    columns = {head: np.array([float(c) if _is_number(c) else np.nan for c in column]) for head, column in text.items()
-               if any(_is_number(c) for c in column)}
+    columns = {head: np.array([float(c) if is_number(c) else np.nan for c in column]) for head, column in text.items()
+               if any(is_number(c) for c in column)}
     return Table(name, columns, {head: unit for head, unit in heads if head in columns}, text.get("kind"))
 
 
@@ -131,7 +131,8 @@ def _name_and_unit(cell: str) -> tuple[str, str | None]:
     return found[1], None if found[2] in ("", "-", "1") else found[2]
 
 
-def _is_number(cell: str) -> bool:
+def is_number(cell: str) -> bool:
+    """True if a cell can be read as a number."""
     try:
         float(cell)
     except ValueError:

@@ -40,9 +40,9 @@ class ContactNodes:
         self.solid, self.contact = solid, contact
         self._comm, self._length = solid.comm, solid.length
         self._place(assemble)
-        self._warm: Any = None                              # nodes of the temperature that friction depends on
-        if contact.warm:
-            self._warm = solid.scene.temperature.nodes(self._nodes())
+        self._temperature_nodes: Any = None                 # of the temperature that friction depends on
+        if contact.friction_by_temperature:
+            self._temperature_nodes = solid.scene.temperature.nodes(self._nodes())
         self.thickness = solid.thickness(contact.on)
         self.law = contact.law(contact.penalty * solid.stress / self.thickness, contact.ramp * self.thickness,
                                self.points, self._temperatures())
@@ -91,7 +91,8 @@ class ContactNodes:
 
     def _temperatures(self) -> np.ndarray | None:
         """Of the body at the points now, shape (n,); None where friction does not depend on them."""
-        return None if self._warm is None else self.solid.scene.temperature.at_nodes(self._warm)
+        nodes = self._temperature_nodes
+        return None if nodes is None else self.solid.scene.temperature.at_nodes(nodes)
 
     def take_temperature(self) -> None:
         """The scene's temperature has changed: friction follows it.
@@ -99,7 +100,7 @@ class ContactNodes:
         Raises:
             InputError: friction has no value at a temperature.
         """
-        if self._warm is not None:
+        if self._temperature_nodes is not None:
             self.law, self._last = self.law.with_friction(self.contact.friction_at(self._temperatures())), None
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:

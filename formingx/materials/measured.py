@@ -5,10 +5,10 @@ from __future__ import annotations
 import csv
 import itertools
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from ..csv_files import is_number
 from ..errors import InputError, known
 from .homogeneous import MODES
 
@@ -28,7 +28,7 @@ def read_tests(file: Path) -> list[tuple[str, np.ndarray]]:
     lines = [line if line.split("#")[0].strip() else "" for line in text.splitlines()]
     cells = list(csv.reader(lines, delimiter=";" if any(";" in line for line in lines) else ","))
     rows = [(n, [c.strip() for c in row]) for n, row in enumerate(cells, 1) if row]
-    if rows and rows[0][1][0] not in MODES and len(rows[0][1]) > 1 and not _is_number(rows[0][1][1]):
+    if rows and rows[0][1][0] not in MODES and len(rows[0][1]) > 1 and not is_number(rows[0][1][1]):
         rows = rows[1:]                                                                  # names of the columns
     if not rows:
         raise InputError(f"fit: data: {file}: has no rows of test, stretch, stress")
@@ -45,7 +45,7 @@ def _numbers(where: str, row: list[str], width: int) -> list[float]:
                          f" time, the same in all lines")
     known(f"{where}: test", row[0], MODES)
     for i, cell in enumerate(row[1:], 1):
-        if not _is_number(cell) and not (cell == "" and i == 2 and width == 4):
+        if not is_number(cell) and not (cell == "" and i == 2 and width == 4):
             raise InputError(f"{where}: {cell!r}: must be a number with a decimal point")
     return [float(cell or "nan") for cell in row[1:]]
 
@@ -57,11 +57,3 @@ def _counted(points: list[tuple[str, list[float]]]) -> list[int]:
         n += mode != before or len(row) == 3 and row[2] < last[2]
         found.append(n)
     return found
-
-
-def _is_number(cell: Any) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True

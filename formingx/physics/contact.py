@@ -87,7 +87,7 @@ class Contact(Part):
         usual = _SMOOTH if self.symmetric else _ROUGH
         self.penalty = positive(f"{name}: penalty", usual[0] if penalty is None else penalty)
         self.ramp = positive(f"{name}: ramp", usual[1] if ramp is None else ramp)
-        if not separates and (self.warm or 0 < self.mu < math.inf):
+        if not separates and (self.friction_by_temperature or 0 < self.mu < math.inf):
             raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
                              f" Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = count(f"{name}: nodes_per_step", nodes_per_step)
@@ -102,14 +102,14 @@ class Contact(Part):
         return self.moves is not None
 
     @property
-    def warm(self) -> bool:
+    def friction_by_temperature(self) -> bool:
         """True if friction depends on the temperature."""
         return isinstance(self.mu, FunctionOfTemperature)
 
     @property
     def symmetric(self) -> bool:
         """True without friction or memory: contact then has an energy."""
-        return not self.warm and self.mu == 0 and self.separates
+        return not self.friction_by_temperature and self.mu == 0 and self.separates
 
     def friction_at(self, temperature: np.ndarray | None) -> Any:
         """mu: a number, or at the temperatures of n points, shape (n,).
@@ -117,7 +117,7 @@ class Contact(Part):
         Raises:
             InputError: it has no value there, or one below 0.
         """
-        if not self.warm:
+        if not self.friction_by_temperature:
             return self.mu
         if temperature is None:
             raise InputError(f"{self!r}: friction depends on the temperature: give Scene a temperature=...")
@@ -223,7 +223,7 @@ class Law:
 
     def __init__(self, tool: Tool, mu: np.ndarray | float, k: float, theta: float, shift: np.ndarray | float = 0.0,
                  separates: bool = True):
-        self.rubs = np.ndim(mu) > 0 or bool(mu > 0)
+        self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
         self.tool, self.mu, self.k, self.theta, self.shift, self.separates = tool, mu, k, theta, shift, separates
         self._near: tuple[np.ndarray, Nearest] | None = None        # points last asked for, and what was found
 
@@ -240,7 +240,7 @@ class Law:
     @property
     def remembers(self) -> bool:
         """True if tractions depend on what points remember."""
-        return self.rubs or not self.separates
+        return self.has_friction or not self.separates
 
     def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
         """Which points at x touch, or are held, shape (n,)."""
@@ -307,7 +307,7 @@ class Law:
         stiffness = _outer(k * slope, n, n) + _outer(pressed * bend, t, t)
         zero: np.ndarray = np.zeros(len(x))
         kept_at = np.where(held, np.maximum(d, 0.0), d)         # held for ever
-        if not self.rubs:
+        if not self.has_friction:
             return Tractions(force, stiffness, _touch(x, kept_at, zero), N, zero, zero)
         assert old is not None
         g, dg = self._slip(x, near, old)

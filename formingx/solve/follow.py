@@ -67,7 +67,7 @@ class Run:
         self.open = list(targets)
         self.until, self._aim = self.open[-1]
         self._step, self._best, self._began = step, 0.0, time.perf_counter()
-        self._ahead = AHEAD                                 # of a jump: more after jumps without a step between them
+        self._ahead = AHEAD                                 # by how much the control goes on in a jump
         self._values: list[float] = []                      # what is aimed at, in the states of this run
 
     def follow(self, max_steps: int | None, progress: bool, start: State | None) -> None:
@@ -120,7 +120,7 @@ class Run:
         return self.problem.shown(0.0)[0]
 
     @property
-    def _jumps(self) -> bool:
+    def _may_jump(self) -> bool:
         """True if the body may jump: at folds, or, where a fold is followed, where a history leaves no next state."""
         return self._at_fold == "jump" or self._at_fold == "follow" and self.problem.has_history
 
@@ -205,7 +205,7 @@ class Run:
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good = self.step.failed()
                 failed += not isinstance(failure, _Astray)
-                if self._jumps and (not good or self._at_fold == "jump" and failed > 1 and length < jumps[0]):
+                if self._may_jump and (not good or self._at_fold == "jump" and failed > 1 and length < jumps[0]):
                     jumps.pop(0)
                     for ahead in (reach,) if good else (_JUMPS[-1], 0.0):
                         with contextlib.suppress(Failure):

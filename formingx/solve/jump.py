@@ -97,10 +97,10 @@ class _Way:
             _, history = self._newton.correct(self._x, self.control, fixed(self.control), self.at)
         except Failure as failure:
             self.curve.spend(len(failure.history))
-            return self._fail()
+            return self._hold_back()
         self.curve.spend(len(history) - 1)
         if self.problem.folded(self._x, self.control):
-            return self._fail()
+            return self._hold_back()
         x, drag = self._x.array_r.copy(), viscous.drag(self._x.array_r)
         before, self.rest = self.rest, np.sqrt(self._sum(drag * drag)) / (self.problem.force_scale + UNLOADED)
         self.settles = self.rest < min(self.near, before)
@@ -115,8 +115,8 @@ class _Way:
         falls, self._falls = self._falls, _FALLS
         return max(falls if len(history) - 1 <= _FEW else 1.0, far)
 
-    def _fail(self) -> float:
-        """Not so fast."""
+    def _hold_back(self) -> float:
+        """No solution was found: the factor by which eta grows; it does not fall right after the next one."""
         self._falls = 1.0
         return _GROWS
 
