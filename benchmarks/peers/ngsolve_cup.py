@@ -6,46 +6,22 @@ pardiso. Pressure steps by hand: a guess along the last two states, half the ste
 
 from clock import Clock, report, sizes
 from cup import C01, C10, DEPTH, FILLET, PENALTY, PRESSURE, RADIUS, THICKNESS
-from ngsolve import (
-    H1,
-    BilinearForm,
-    Det,
-    Grad,
-    GridFunction,
-    Id,
-    IfPos,
-    InnerProduct,
-    Parameter,
-    Variation,
-    VectorH1,
-    ds,
-    dx,
-    log,
-    sqrt,
-    x,
-    y,
-)
-from ngsolve.meshes import MakeStructured2DMesh
+from ngsolve import H1, BilinearForm, GridFunction, IfPos, Parameter, Variation, VectorH1, ds, dx, sqrt, x, y
+from ngsolve_sheet import energy, load, triangles
 
 clock = Clock()
-n, m = sizes()
-mesh = MakeStructured2DMesh(quads=False, nx=n, ny=m, mapping=lambda s, t: (RADIUS * s, THICKNESS * t))
+mesh = triangles(sizes(), RADIUS, THICKNESS)
 fes = VectorH1(mesh, order=2, dirichletx="left|right", dirichlety="right") * H1(mesh, order=1)
 (u, p), (v, q) = fes.TnT()
-F, hoop, along = Id(2) + Grad(u), 1 + u[0] / x, Grad(u).Trace()
-J, in_plane = Det(F) * hoop, InnerProduct(F, F)
-mooney = C10 * (in_plane + hoop**2 - 3) + C01 * (Det(F) ** 2 + hoop**2 * in_plane - 3)
-energy = (mooney - 2 * (C10 + 2 * C01) * log(J) + p * (J - 1)) * x                           # no stress at rest
-load = (x + u[0]) * (-along[1, 0] * v[0] + (1 + along[0, 0]) * v[1])            # n da = r (-dz/dR, dr/dR) dR
 to_wall, to_floor = RADIUS - (x + u[0]), THICKNESS + DEPTH - (y + u[1])
 round_the_edge = FILLET - sqrt((FILLET - to_wall) ** 2 + (FILLET - to_floor) ** 2 + 1e-30)
 flat = IfPos(to_wall - to_floor, to_floor, to_wall)
 gap = IfPos(FILLET - to_wall, IfPos(FILLET - to_floor, round_the_edge, flat), flat)
 pressure = Parameter(0)
 form = BilinearForm(fes)
-form += Variation(energy.Compile() * dx)
+form += Variation(energy(u, p, C10, C01).Compile() * dx)
 form += Variation((PENALTY / 2 * IfPos(gap, 0, gap**2) * x).Compile() * ds("top"))
-form += (-pressure * load).Compile() * ds("bottom")
+form += (-pressure * load(u, v)).Compile() * ds("bottom")
 state = GridFunction(fes)
 form.AssembleLinearization(state.vec)
 inverse = form.mat.Inverse(fes.FreeDofs(), inverse="pardiso")       # its analysis, once

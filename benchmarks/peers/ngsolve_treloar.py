@@ -9,10 +9,7 @@ from clock import Clock, maximum, report, sizes
 from ngsolve import (
     H1,
     BilinearForm,
-    Det,
-    Grad,
     GridFunction,
-    Id,
     InnerProduct,
     LinearForm,
     NumberSpace,
@@ -21,29 +18,23 @@ from ngsolve import (
     VectorH1,
     ds,
     dx,
-    log,
     x,
 )
-from ngsolve.meshes import MakeStructured2DMesh
+from ngsolve_sheet import energy, load, triangles
 from treloar import C10, HEIGHT, RADIUS, THICKNESS
 
 clock = Clock()
-n, m = sizes()
-mesh = MakeStructured2DMesh(quads=False, nx=n, ny=m, mapping=lambda s, t: (RADIUS * s, THICKNESS * t))
+mesh = triangles(sizes(), RADIUS, THICKNESS)
 fes = VectorH1(mesh, order=2, dirichletx="left") * H1(mesh, order=1) * NumberSpace(mesh) * NumberSpace(mesh)
 (u, p, hold_r, hold_z), (v, q, test_r, test_z) = fes.TnT()
-F, hoop, along = Id(2) + Grad(u), 1 + u[0] / x, Grad(u).Trace()
-J = Det(F) * hoop
-energy = (C10 * (InnerProduct(F, F) + hoop**2 - 3) - 2 * C10 * log(J) + p * (J - 1)) * x     # no stress at rest
-load = (x + u[0]) * (-along[1, 0] * v[0] + (1 + along[0, 0]) * v[1])            # n da = r (-dz/dR, dr/dR) dR
 hinge = (hold_r * v[0] + hold_z * v[1] + test_r * u[0] + test_z * u[1]) * x
 pressure = Parameter(0)
 form = BilinearForm(fes)
-form += Variation(energy.Compile() * dx)
+form += Variation(energy(u, p, C10).Compile() * dx)
 form += hinge.Compile() * ds("right")
-form += (-pressure * load).Compile() * ds("bottom")
+form += (-pressure * load(u, v)).Compile() * ds("bottom")
 push = BilinearForm(fes)
-push += load.Compile() * ds("bottom")
+push += load(u, v).Compile() * ds("bottom")
 metric = BilinearForm(InnerProduct(u, v) * x * dx).Assemble().mat
 pole = LinearForm(fes)
 pole += v[1](0, THICKNESS / 2)
