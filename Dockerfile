@@ -2,19 +2,25 @@
 ARG SUITE=trixie
 FROM debian:${SUITE}-slim
 ARG PACKAGES="\
+    ffmpeg \
+    furo \
     python3-adios4dolfinx \
     python3-dolfinx \
     python3-ezdxf \
     python3-gmsh \
+    python3-ipykernel \
     python3-matplotlib \
     python3-myst-parser \
+    python3-nbconvert \
     python3-openpyxl \
     python3-pip \
     python3-plotly \
     python3-pytest \
+    python3-pytest-xdist \
     python3-pyvista \
     python3-scipy \
     python3-sphinx \
+    python3-sphinx-gallery \
     python3-tqdm \
     python3-venv \
     libopenblas0-pthread \
