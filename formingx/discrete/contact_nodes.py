@@ -14,6 +14,12 @@ from ..physics.contact import Contact, Motion, Touch, Tractions
 HOVERING = 1e-3
 """Distances (over thickness) at which a node is as good as in touch."""
 
+_AT_END = 0.95
+"""Part of a step from which on what arrives has no friction until the next."""
+
+_SLIDES = 1e-2
+"""How far (over the length of face that is its own) a node may slide so."""
+
 
 class Memory(NamedTuple):
     """What the nodes of a face remember of the last accepted state.
@@ -273,8 +279,8 @@ class ContactNodes:
         times = self._arrivals(start, velocity, length)
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         if self._memory is not None:
-            touch = self._memory.touch._replace(arrival=start + times[:, None] * velocity)
-            self.put(self._memory._replace(touch=touch))
+            arrival = np.where((times < _AT_END * length)[:, None], start + times[:, None] * velocity, np.nan)
+            self.put(self._memory._replace(touch=self._memory.touch._replace(arrival=arrival)))
 
     def _arrivals(self, start: np.ndarray, velocity: np.ndarray, length: float) -> np.ndarray:
         """Arc length at which free nodes meet the ramp, `length` if they do not before, shape (n,)."""
@@ -294,6 +300,25 @@ class ContactNodes:
         a, b = (self.law.distance(self.positions(f, c)) for f, c in ((old, old_control), (new, control)))
         found = int(np.sum((a <= -self.law.theta - HOVERING * self.thickness) & (b > -self.law.theta)))
         return self._comm.allreduce(found, MPI.SUM) > 2 * max(self._allowed, self._foreseen) + 2
+
+    def touches_by(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float,
+                   direction: np.ndarray, slope: float, length: float) -> float:
+        """Part of a step by which the first of the nodes touched that slid too far without friction; 1 if none did.
+
+        Since a node touched, its pressure has grown as it does at the end of the step, along (direction, slope).
+        """
+        if self._memory is None:
+            return 1.0
+        end = self.positions(new, control)
+        near = self.law.nearest(end)
+        F, grows = self.law.ramp(near.distance)
+        velocity = self._length * self.displacement(direction) - slope * self.rate * self._motion
+        rate = np.maximum(grows * np.einsum("ni,ni->n", near.normal, velocity), 0.0)
+        since = np.minimum(np.divide(F, rate, out=np.full(len(F), np.inf), where=rate > 0) / length, 1.0)
+        along = np.einsum("ni,ni->n", end - self.positions(old, old_control), near.tangent)
+        came = np.isnan(self._memory.touch.arrival[:, 0]) & (self._memory.touch.distance <= -self.law.theta) & (F > 0)
+        late = came & (since * np.abs(along) > _SLIDES * self.lengths)
+        return self._comm.allreduce(1 - float(since[late].max(initial=0.0)), MPI.MIN)
 
     def touching(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Which nodes touch, or are held, shape (n,)."""

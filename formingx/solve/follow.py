@@ -39,6 +39,9 @@ _FURTHEST = 1e-3
 _PATIENCE = 500
 """States that gain less than a thousandth of the way to the target, after which a run gives up."""
 
+_SHORT = 1e-4
+"""Lengths of steps that are never too long for what comes into contact."""
+
 _TOO_MUCH = 2.0
 """Errors in time, over what is allowed, at which a step is taken again."""
 
@@ -188,14 +191,17 @@ class Run:
 
         Failures halve the step. Where short ones fail, or the control has its limit, the body jumps.
         """
-        first, jumps, failed = self.step.length, [*_JUMPS, 0.0], 0
+        first, jumps, failed, most = self.step.length, [*_JUMPS, 0.0], 0, np.inf
         if self._at_fold == "jump" and (old.kind == "limit point" or old.slope * self._sense < 0):
             return self._snap(old)
         while True:
-            length = self.problem.reach(old.x, old.control, old.direction, old.slope, self.step.length)
+            length = self.problem.reach(old.x, old.control, old.direction, old.slope, min(self.step.length, most))
             target, bound, reach = self._within_reach(old, length)
             try:
                 return self._take(old, length, target, bound, reach)
+            except _Late as late:
+                self.record.counts.failures += 1
+                most = late.part * reach
             except Inaccurate as found:
                 self.record.counts.failures += 1
                 self.step.length = found.share * reach
@@ -215,7 +221,7 @@ class Run:
                                   failure.attempt)
 
     def _take(self, old: State, length: float, target: Target | None, bound: Any, reach: float) -> list[State]:
-        """One step of a length, or to a target that is within reach; raises `Failure` or `Inaccurate`."""
+        """One step of a length, or to a target that is within reach; raises `Failure`, `Inaccurate` or `_Late`."""
         self.problem.prepare(old.x, old.control, old.direction, old.slope, reach)
         if target is None:
             new = self.curve.step(old, length)
@@ -226,6 +232,9 @@ class Run:
             new.met = target
         if self.problem.too_far(old.x, old.control, new.x, new.control):
             raise _Astray("too much came into contact in one step", [])
+        part = self.problem.touches_by(old.x, old.control, new.x, new.control, new.direction, new.slope, reach)
+        if part < 0.999 and reach > _SHORT:
+            raise _Late(part)
         if was_passed(self.curve, self.states[:-1], old, new):
             raise _Astray("the iteration fell back to a part of the path that was passed", [])
         error = self._error_in_time(new)
@@ -387,6 +396,14 @@ class Inaccurate(Exception):
     def __init__(self, error: float):
         super().__init__(error)
         self.share = max(0.8 * error ** (-1 / 3), 0.1)
+
+
+class _Late(Exception):
+    """Something came into contact too long before the end of a step; part: of its length, that will do."""
+
+    def __init__(self, part: float):
+        super().__init__(part)
+        self.part = max(1.001 * part, 0.1)
 
 
 class _Astray(Failure):
