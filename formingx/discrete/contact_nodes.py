@@ -272,14 +272,19 @@ class ContactNodes:
         allowed = self._allowed if touching > 1 else 1
         return min(1.001 * times[allowed - 1], length) if len(times) >= allowed else length
 
-    def prepare(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> None:
-        """A step of this length along a tangent is about to be taken: foretell where nodes arrive."""
+    def prepare(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float,
+                ends: bool) -> None:
+        """A step of this length along a tangent is about to be taken: foretell where nodes arrive.
+
+        ends: it is to end where a node touches (see `touches_by`), which has no friction before.
+        """
         start = self.positions(fields, control)
         velocity = self._length * self.displacement(direction) - slope * self.rate * self._motion
         times = self._arrivals(start, velocity, length)
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         if self._memory is not None:
-            arrival = np.where((times < _AT_END * length)[:, None], start + times[:, None] * velocity, np.nan)
+            at_end = ends & (times >= _AT_END * length)
+            arrival = np.where(at_end[:, None], np.nan, start + times[:, None] * velocity)
             self.put(self._memory._replace(touch=self._memory.touch._replace(arrival=arrival)))
 
     def _arrivals(self, start: np.ndarray, velocity: np.ndarray, length: float) -> np.ndarray:

@@ -328,11 +328,15 @@ class Problem:
         n = self._n
         return min([c.reach(x[:n], control, direction[:n], slope, length) for c in self.touching], default=length)
 
-    def prepare(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> None:
-        """A step of this length from x along (direction, slope) is about to be taken. Arrays: own part."""
+    def prepare(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float,
+                ends: bool = False) -> None:
+        """A step of this length from x along (direction, slope) is about to be taken. Arrays: own part.
+
+        ends: it is to end where something comes into contact, see `touches_by`.
+        """
         n = self._n
         for contact in self.touching:
-            contact.prepare(x[:n], control, direction[:n], slope, length)
+            contact.prepare(x[:n], control, direction[:n], slope, length, ends)
 
     def too_far(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """True if more happened between two states than one step may bring. Arrays: own part."""

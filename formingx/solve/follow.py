@@ -222,7 +222,7 @@ class Run:
 
     def _take(self, old: State, length: float, target: Target | None, bound: Any, reach: float) -> list[State]:
         """One step of a length, or to a target that is within reach; raises `Failure`, `Inaccurate` or `_Late`."""
-        self.problem.prepare(old.x, old.control, old.direction, old.slope, reach)
+        self.problem.prepare(old.x, old.control, old.direction, old.slope, reach, ends=True)
         if target is None:
             new = self.curve.step(old, length)
         else:
