@@ -17,6 +17,7 @@ import numpy as np
 import ufl
 
 from ..errors import InputError, finite, known, positive
+from ..figures import figure
 from . import homogeneous
 from .constants import OfTemperature, Sample, Varying, varying
 from .homogeneous import MODES, Response, Stability
@@ -189,14 +190,11 @@ class Material:
             stretches: the stretches, shape (n,); default 1 to 6, and to 95 % of the limit where there is one.
             unit: the constants' unit of stress, for the label.
         """
-        import matplotlib.pyplot as plt
-        if axes is None:
-            axes = plt.subplots(layout="constrained")[1]
+        axes = figure()[1] if axes is None else axes
         for mode in MODES:
             l = np.linspace(1, min(6.0, 0.95 * self.largest_stretch(mode)), 200) if stretches is None else stretches
             axes.plot(l, self.stress(mode, l), label=mode.replace("_", " "))
         axes.set(xlabel="stretch", ylabel="nominal stress" + f" ({unit})" * bool(unit), title=str(self))
-        axes.grid(alpha=0.3)
         axes.legend()
         return axes
 

@@ -20,6 +20,7 @@ import numpy as np
 import ufl
 
 from ..errors import InputError, instance, known, positive, several
+from ..figures import figure
 from ..physics import kinematics
 from . import branches as tests
 from .constants import OfTemperature, Sample, varying
@@ -214,9 +215,8 @@ class RelaxingMaterial(HistoryTests, Material):
             mode: the test.
             rates: 1/time; default from 0.1 over the longest tau to 10 over the shortest, by decades.
         """
-        import matplotlib.pyplot as plt
         known(f"{self}: plot: mode", mode, MODES)
-        axes = plt.subplots(layout="constrained")[1] if axes is None else axes
+        axes = figure()[1] if axes is None else axes
         l = np.linspace(1, min(6.0, 0.95 * self.largest_stretch(mode)), 200) if stretches is None else stretches
         if rates is None:
             tau = [tau for _, tau in self.branches]
@@ -228,7 +228,6 @@ class RelaxingMaterial(HistoryTests, Material):
             axes.plot(l, rest.stress(mode, l), "k--", label="relaxed")
         axes.set(xlabel="stretch", ylabel="nominal stress" + f" ({unit})" * bool(unit),
                  title=f"{mode.replace('_', ' ')} tension at constant Hencky rates")
-        axes.grid(alpha=0.3)
         axes.legend()
         return axes
 

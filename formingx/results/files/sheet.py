@@ -10,9 +10,11 @@ from ...errors import InputError
 from ...units import NONE, Units
 from . import tabular
 
+_SHOWN = 10           # rows that are printed: the first and the last
+
 
 class Sheet:
-    """A table with named columns, one row to a place; `comm`: its rank 0 writes."""
+    """A table with named columns, one row to a place; `comm`: its rank 0 writes. Prints its first and last rows."""
 
     comm: Any
 
@@ -46,6 +48,18 @@ class Sheet:
             sheet.append([v.item() if isinstance(v, np.generic) else v for v in row])
         sheet.freeze_panes = "A2"
         tabular.on_root(self.comm, lambda: tabular.replace(file, book.save, "wb"))
+
+    def __str__(self) -> str:
+        rows = [[f"{v:.5g}" if isinstance(v, float) else str(v) for v in row] for row in self._rows()]
+        n, half = len(rows), _SHOWN // 2
+        if n > _SHOWN + 1:
+            rows[half:n - half] = [["..."] * len(self.columns)]
+        lines = [list(self.columns), *rows]
+        widths = [max(map(len, column)) for column in zip(*lines)]
+        return "\n".join("  ".join(f"{cell:>{w}}" for cell, w in zip(line, widths)) for line in lines) + f"\n{n} rows"
+
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:        # in a notebook
+        printer.text(str(self))
 
     def _header(self, units: Units) -> list[str]:
         return [f"{name} [{unit}]" if (unit := units.of(name)) else name for name in self.columns]
