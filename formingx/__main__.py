@@ -1,4 +1,4 @@
-"""The command line: python -m formingx [demo NAME | doctor SCRIPT | compare OURS THEIRS | open FOLDER | report FOLDER]."""
+"""The command line: python -m formingx [demo NAME | doctor SCRIPT | compare OURS THEIRS | open or report FOLDER]."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def main(arguments: list[str] | None = None) -> int:
             _demo(words[1:])
         else:
             options = _parser().parse_args(words)
-            {"compare": _compare, "doctor": _doctor, "open": _open, "report": _report, None: lambda _: _say(_overview())}[
-                options.command](options)
+            {"compare": _compare, "doctor": _doctor, "open": _open, "report": _report,
+             None: lambda _: _say(_overview())}[options.command](options)
     except (InputError, OSError) as error:
         if MPI.COMM_WORLD.rank == 0:
             print(f"formingx: {error}", file=sys.stderr)
@@ -43,9 +43,9 @@ def _parser() -> argparse.ArgumentParser:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     commands.add_parser("demo", help="run a demo: demo NAME [its options]")
-    check = commands.add_parser("doctor", help="look over the scene of a script", description="Look over the first scene"
-                                " that a script runs, and its targets: the script is executed up to there, and nothing"
-                                " is solved.")
+    check = commands.add_parser("doctor", help="look over the scene of a script", description="Look over the first"
+                                " scene that a script runs, and its targets: the script is executed up to there, and"
+                                " nothing is solved.")
     check.add_argument("script", metavar="SCRIPT", help="a Python file")
     check.add_argument("arguments", nargs=argparse.REMAINDER, help="its own options")
     two = commands.add_parser("compare", help="compare two curves",

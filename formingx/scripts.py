@@ -26,7 +26,7 @@ class _Looked(BaseException):
 
 
 def look_over(script: Any, arguments: Sequence[str] = ()) -> Report:
-    """What `doctor` says of the first scene that a script runs (`trace`, `solve`, `Process`, `study`); nothing is solved.
+    """What `doctor` says of the first scene that a script runs, by whichever way; nothing is solved.
 
     Args:
         script: a Python file; what it does before its first run is done, also heating (`heat`).
@@ -64,7 +64,7 @@ def _no_runs() -> Iterator[None]:
 
     def run(process, stages, **_):
         raise _Looked(doctor(process.scene, targets=[stage.until for stage in stages if stage.until]))
-    kept = [(formingx, name, getattr(formingx, name)) for name in ("trace", "solve", "study")]
+    kept: list[tuple[Any, str, Any]] = [(formingx, name, getattr(formingx, name)) for name in ("trace", "solve", "study")]
     kept.append((Process, "run", Process.run))
     try:
         for (owner, name, _), other in zip(kept, (trace, solve, study, run), strict=True):

@@ -420,15 +420,15 @@ def test_open_shows_a_screenful(plugged, tmp_path, capsys):
     """The ends of the stages, limit points, states between them; what is driven by its own name."""
     path = fx.trace(treloar((6, 1)), until=fx.pole_stretch(3.0), step=fx.StepControl(largest=0.05), progress=False)
     (limit,), rows = path.limit_points, []
-    for run, folder in ((path, tmp_path / "long"), (plugged, tmp_path / "staged")):
-        run.save(folder)
+    for one, folder in ((path, tmp_path / "long"), (plugged, tmp_path / "staged")):
+        one.save(folder)
         assert main(["open", str(folder)]) == 0
         text = capsys.readouterr().out
         rows = [line.split() for line in text.splitlines() if line[:5].strip().isdigit()]
-        shown, left = {int(row[0]) for row in rows}, len(run) - len(rows)
-        assert {0, len(run) - 1} <= shown and len(rows) <= 24
-        assert (f"({left} more states)" in text) == (left > 0) == (run is path)
-        assert run is plugged or path.states.index(limit) in shown
+        shown, left = {int(row[0]) for row in rows}, len(one) - len(rows)
+        assert {0, len(one) - 1} <= shown and len(rows) <= 24
+        assert (f"({left} more states)" in text) == (left > 0) == (one is path)
+        assert one is plugged or path.states.index(limit) in shown
     assert "plug travel" in text and [row[-1] for row in rows] == [state.stage for state in plugged.states]
     assert main(["report", str(folder)]) == 0
     assert str(folder / "report.html") in capsys.readouterr().out

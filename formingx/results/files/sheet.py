@@ -43,7 +43,7 @@ class Sheet:
         except ImportError:
             raise InputError("to_excel: needs openpyxl, which is not installed; to_csv needs nothing") from None
         book = Workbook()
-        sheet = book.active
+        sheet: Any = book.active
         for row in (self._header(units), *self._rows()):
             sheet.append([v.item() if isinstance(v, np.generic) else v for v in row])
         sheet.freeze_panes = "A2"
