@@ -64,12 +64,12 @@ def _no_runs() -> Iterator[None]:
 
     def run(process, stages, **_):
         raise _Looked(doctor(process.scene, targets=[stage.until for stage in stages if stage.until]))
-    kept: list[tuple[Any, str, Any]] = [(formingx, name, getattr(formingx, name)) for name in ("trace", "solve", "study")]
-    kept.append((Process, "run", Process.run))
+    others: list[Any] = [(formingx, trace), (formingx, solve), (formingx, study), (Process, run)]
+    kept = [getattr(owner, other.__name__) for owner, other in others]
     try:
-        for (owner, name, _), other in zip(kept, (trace, solve, study, run), strict=True):
-            setattr(owner, name, other)
+        for owner, other in others:
+            setattr(owner, other.__name__, other)
         yield
     finally:
-        for owner, name, original in kept:
-            setattr(owner, name, original)
+        for (owner, other), original in zip(others, kept):
+            setattr(owner, other.__name__, original)
