@@ -1,9 +1,10 @@
-"""Every code block of the pages runs, one after the other; Sphinx builds them without a warning."""
+"""Every code block of the pages runs, one after the other, and prints what stands below it; Sphinx builds them all."""
 
 import re
 
 import pytest
 from conftest import ROOT, run
+from printed import assert_shows
 
 DOCS = ROOT / "docs"
 PAGES = [p for p in sorted(DOCS.rglob("*.md")) if "_build" not in p.parts and "```python" in p.read_text()]
@@ -13,9 +14,9 @@ PAGES = [p for p in sorted(DOCS.rglob("*.md")) if "_build" not in p.parts and "`
 def test_blocks_run(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     names: dict = {}
-    for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.S):
+    for block, shown in re.findall(r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", page.read_text(), re.S):
         exec(compile(block, page.name, "exec"), names)
-    assert capsys.readouterr().out
+        assert_shows(shown, capsys.readouterr().out)
 
 
 @pytest.mark.quick

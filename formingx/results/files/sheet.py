@@ -50,7 +50,7 @@ class Sheet:
         tabular.on_root(self.comm, lambda: tabular.replace(file, book.save, "wb"))
 
     def __str__(self) -> str:
-        rows = [[f"{v:.5g}" if isinstance(v, float) else str(v) for v in row] for row in self._rows()]
+        rows = [list(row) for row in zip(*map(_words, self.columns.values()), strict=True)]
         n, half = len(rows), _SHOWN // 2
         if n > _SHOWN + 1:
             rows[half:n - half] = [["..."] * len(self.columns)]
@@ -66,3 +66,12 @@ class Sheet:
 
     def _rows(self) -> list[tuple]:
         return list(zip(*self.columns.values(), strict=True))
+
+
+def _words(column: Any) -> list[str]:
+    """Numbers with five digits, and what is round-off beside the others as 0; words as they are."""
+    values = np.asarray(column)
+    if values.dtype.kind != "f":
+        return [str(v) for v in values]
+    least = 1e-12 * np.abs(values).max(initial=0.0)
+    return [f"{v:.5g}" for v in np.where(np.abs(values) <= least, 0.0, values)]
