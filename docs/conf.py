@@ -1,5 +1,7 @@
 """Sphinx: ./fx python3 -m sphinx docs docs/_build"""
 
+from pathlib import Path
+
 project, author, copyright = "formingx", "the formingx authors", "the formingx authors"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 myst_enable_extensions = ["dollarmath"]
@@ -12,3 +14,18 @@ html_static_path = ["static"]
 html_css_files = ["formingx.css"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
+
+
+def notebooks_as_pages(app):
+    """Write each notebook of docs/notebooks, with the output that it holds, as Markdown beside it."""
+    from nbconvert import MarkdownExporter
+    for file in Path(app.srcdir).glob("notebooks/*.ipynb"):
+        text, held = MarkdownExporter().from_filename(file, resources={"unique_key": file.stem, "output_files_dir": "output"})
+        for name, data in held["outputs"].items():
+            (file.parent / name).parent.mkdir(exist_ok=True)
+            (file.parent / name).write_bytes(data)
+        file.with_suffix(".md").write_text(f"{text}\nThis page is {{download}}`a notebook <{file.name}>`.\n", encoding="utf-8")
+
+
+def setup(app):
+    app.connect("config-inited", lambda app, config: notebooks_as_pages(app))

@@ -58,8 +58,8 @@ class Sheet:
         widths = [max(map(len, column)) for column in zip(*lines)]
         return "\n".join("  ".join(f"{cell:>{w}}" for cell, w in zip(line, widths)) for line in lines) + f"\n{n} rows"
 
-    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:        # in a notebook
-        printer.text(str(self))
+    def __repr__(self) -> str:                               # what a notebook shows
+        return str(self)
 
     def _header(self, units: Units) -> list[str]:
         return [f"{name} [{unit}]" if (unit := units.of(name)) else name for name in self.columns]
