@@ -8,6 +8,7 @@ import shutil
 import subprocess
 from dataclasses import replace
 from html.parser import HTMLParser
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -204,6 +205,17 @@ def test_every_stage_has_its_frames(plugged):
     """Frames are even in the process: the plug goes down by 1 and up by 0.5."""
     shown = [b.stage for _, b, _ in animation.spread(plugged, 60)]
     assert 30 <= shown.count("down") <= 50 and shown.count("up") >= 10
+
+
+def test_every_stage_has_its_curve():
+    """What a stage drives: a plug's force against its travel, a pressure against the height; else the plug's."""
+    rows = [("plug", 0, 0, 0, 0), ("plug", 5, 2, 0, 5), ("air", 5, 1, 0.1, 6), ("air", 5, 0, 0.2, 9),
+            ("hold", 5, 0, 0.2, 9), ("hold", 5, 0, 0.2, 9)]
+    names = ["plug_travel", "plug_force", "pressure", "pole_height"]
+    states = [SimpleNamespace(stage=stage, measures=dict(zip(names, values))) for stage, *values in rows]
+    assert animation.columns_of_stages(SimpleNamespace(states=states, columns=names)) == {
+        "plug": ("plug_travel", "plug_force"), "air": ("pole_height", "pressure"),
+        "hold": ("plug_travel", "plug_force")}
 
 
 def test_solids_are_closed_and_hold_the_volume(formed, tmp_path):
