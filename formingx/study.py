@@ -250,7 +250,8 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
     with _pool(executor, min(workers or os.cpu_count() or 1, max(len(todo), 1))) as pool:
         if isinstance(pool, futures.ProcessPoolExecutor):
             _check_importable(task)
-        for run in tqdm(_finished(pool, task, todo), total=len(todo), disable=not progress, desc="study", unit="run"):
+        runs = _finished(pool, task, todo)
+        for run in tqdm(runs, total=len(todo), disable=not (progress and todo), desc="study", unit="run"):
             found._keep(run)
     order = {tuple(case.items()): k for k, case in enumerate(cases)}
     found.runs.sort(key=lambda run: order.get(tuple(run.values.items()), len(order)))

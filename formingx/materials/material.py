@@ -271,7 +271,13 @@ class Material:
                     f" less than {self.largest_I1:.6g}, stretches less than {self.largest_stretch(mode):.6g}")
         return f"{self}: the stress at a stretch of {stretch:.6g} in {mode} tension is not a finite number"
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{k}={v!r}' for k, v in self.parameters.items())})"
 
-    __repr__ = __str__
+    def __str__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{k}={brief(v)}' for k, v in self.parameters.items())})"
+
+
+def brief(value: Any) -> str:
+    """A constant for people: a number with six digits."""
+    return repr(float(f"{value:.6g}")) if isinstance(value, float) else repr(value)

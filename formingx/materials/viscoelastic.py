@@ -26,7 +26,7 @@ from . import branches as tests
 from .constants import OfTemperature, Sample, varying
 from .homogeneous import MODES
 from .in_time import HistoryTests
-from .material import Material
+from .material import Material, brief
 
 Entries = tuple[Any, Any, Any, Any]
 _IDENTITY = (1.0, 1.0, 0.0, 1.0)
@@ -272,10 +272,12 @@ class RelaxingMaterial(HistoryTests, Material):
         """f of `branches` for elastic strains w; shapes (branches, 3)."""
         raise NotImplementedError
 
-    def __str__(self) -> str:
-        return f"{type(self).__name__}({self.equilibrium}, branches={self.branches!r})"
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.equilibrium!r}, branches={self.branches!r})"
 
-    __repr__ = __str__
+    def __str__(self) -> str:
+        branches = ", ".join(f"({brief(mu)}, {brief(tau)})" for mu, tau in self.branches)
+        return f"{type(self).__name__}({self.equilibrium}, branches=[{branches}])"
 
 
 class Viscoelastic(RelaxingMaterial):

@@ -1,6 +1,6 @@
 """The forming as a moving picture: section and loading curve, frame by frame, evenly spread over the process.
 
-The curve is that of what the stage drives: the force of a plug against its travel, a pressure against the pole's height.
+The curve is that of what the stage drives: a plug's force against its travel, a pressure against the pole's height.
 """
 
 from __future__ import annotations
