@@ -272,10 +272,11 @@ def page(file):
 
 
 @pytest.mark.quick
-def test_report_is_one_file(inflated, tmp_path):
-    inflated.report(tmp_path / "run.html", title="A <test>")
-    assert [f.name for f in tmp_path.iterdir()] == ["run.html"]
-    text = page(tmp_path / "run.html")
+def test_report_is_one_file(inflated, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = inflated.report(title="A <test>")
+    assert [f.name for f in tmp_path.iterdir()] == ["report.html"] == [str(file)]
+    text = page(tmp_path / file)
     for words in ("A <test>", "NeoHookean(c10=2.0)", "SimplySupported('rim')", "Pressure('bottom') (driven)",
                   "limit point 1", f"{inflated.limit_points[0].measures['pressure']:.6g}", "dolfinx", "No warnings"):
         assert words in text
@@ -357,7 +358,8 @@ def test_report_draws_what_was_computed(plugged, tmp_path):
 
 
 def test_runs_side_by_side(inflated, formed, tmp_path):
-    fx.report([inflated, formed], tmp_path / "two.html", "Two", names=["sheet", "cup"])
+    file = fx.report([inflated, formed], tmp_path / "two.html", "Two", names=["sheet", "cup"])
+    assert file == tmp_path / "two.html"
     text, data = page(tmp_path / "two.html"), drawn(tmp_path / "two.html")
     assert [run["name"] for run in data["runs"]] == ["sheet", "cup"] and "MooneyRivlin" in text
     walls = next(chart for chart in data["charts"] if chart["title"].startswith("Wall against arc"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -314,9 +315,11 @@ class Path:
         animation.animate(self, file, frames, seconds)
         return Picture(file)
 
-    def report(self, file: Any, title: str = "", failure: Any = None, *, units: Any = None,
-               density: float | None = None, trim: Any = None) -> None:
+    def report(self, file: Any = "report.html", title: str = "", failure: Any = None, *, units: Any = None,
+               density: float | None = None, trim: Any = None) -> FilePath:
         """Write one HTML file that shows the run: the part, the process, curves, inputs, warnings (rank 0 writes).
+
+        Returns where it is.
 
         Args:
             title: its heading.
@@ -329,7 +332,7 @@ class Path:
         """
         from ..units import NONE
         from .show import report
-        report.write(report.of_path(self), file, title, failure, self.problem.comm, units or NONE, density, trim)
+        return report.write(report.of_path(self), file, title, failure, self.problem.comm, units or NONE, density, trim)
 
     def plot(self, y: str, x: str, axes: Any = None, **style: Any) -> Any:
         """Draw column `y` over column `x`; returns the matplotlib axes."""
