@@ -6,7 +6,9 @@ NUMBER = r"-?\d+(?:\.\d*)?(?:e[-+]?\d+)?"
 
 
 def digit(number):
-    """One in the last digit of a number as it is written."""
+    """One in the last digit of a number as it is written; 0 of one that counts."""
+    if number.lstrip("-").isdigit():
+        return 0.0
     mantissa, _, exponent = number.partition("e")
     return 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
 

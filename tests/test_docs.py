@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from contextlib import nullcontext
 
 import pytest
 from conftest import ROOT, run
@@ -20,6 +21,16 @@ def test_blocks_run(page, tmp_path, monkeypatch, capsys):
     for block, shown in re.findall(r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", page.read_text(), re.S):
         exec(compile(block, page.name, "exec"), names)
         assert_shows(shown, capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("shown, printed, same", [
+    ("force 1.23 N", "force 1.2345 N", True), ("force 1.23 N", "force 1.2501 N", False), ("1.5e-06", "1.59e-06", True),
+    ("force 1 N", "force  1\nN", True), ("force 1 N", "forces 1 N", False), ("", "1", False),
+    ("2 runs, ... s", "2 runs, 7 s", True),
+    ("2 runs, ... s", "3 runs, 7 s", False), ("[1. 2.]", "[1. 2. 3.]", False), ("-1.5", "1.5", False)])
+def test_what_is_shown_is_compared(shown, printed, same):
+    with nullcontext() if same else pytest.raises(AssertionError):
+        assert_shows(shown, printed)
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
