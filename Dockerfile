@@ -20,7 +20,6 @@ ARG PACKAGES="\
     python3-pyvista \
     python3-scipy \
     python3-sphinx \
-    python3-sphinx-gallery \
     python3-tqdm \
     python3-venv \
     libopenblas0-pthread \

@@ -59,7 +59,7 @@ engine() {           # a container engine that answers (a client without a daemo
 
 image() {
     "$1" image inspect "formingx:$key" >/dev/null 2>&1 && return 0
-    say "building the image formingx:$key with $1, once (about 700 packages, 4 GB; several minutes)"
+    say "building the image formingx:$key with $1, once (about 900 packages, 4 GB; several minutes)"
     "$1" build --build-arg SUITE="$suite" -t "formingx:$key" - < "$here/Dockerfile" >&2 &&
         "$1" run --rm --security-opt label=disable -v "$here:$here" "formingx:$key" test -e "$here/fx" >&2 && return 0
     say "$1 cannot build the image, or run it here"      # an engine on another machine does not see the checkout
@@ -75,8 +75,8 @@ build_root() {
         { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
             mmdebstrap debian-archive-keyring; } >&2 </dev/null || die "cannot install mmdebstrap with apt-get"
     }
-    say "building a Debian $suite root in $root, once: about 700 packages, 0.6 GB to download, 1.7 GB on disk;"
-    say "this takes 2 to 5 minutes"
+    say "building a Debian $suite root in $root, once: about 900 packages, 0.7 GB to download, 2.2 GB on disk;"
+    say "this takes 2 to 7 minutes"
     began=$(date +%s)
     remove "$root.part"
     set --

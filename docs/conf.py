@@ -1,14 +1,29 @@
 """Sphinx: ./fx python3 -m sphinx docs docs/_build"""
 
+from pathlib import Path
+
 project, author, copyright = "formingx", "the formingx authors", "the formingx authors"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 myst_enable_extensions = ["dollarmath"]
 exclude_patterns = ["_build"]
-html_theme = "alabaster"
-html_theme_options = {"description": "How polymers are formed, simulated", "page_width": "1180px",
-                      "body_max_width": "900px", "sidebar_width": "230px", "fixed_sidebar": True, "font_size": "16px"}
-html_sidebars = {"**": ["about.html", "searchfield.html", "navigation.html"]}
+html_theme, html_title = "furo", "formingx"
 html_static_path = ["static"]
 html_css_files = ["formingx.css"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
+
+
+def notebooks_as_pages(app):
+    """Write each notebook of docs/notebooks, with the output that it holds, as Markdown beside it."""
+    from nbconvert import MarkdownExporter
+    for file in Path(app.srcdir).glob("notebooks/*.ipynb"):
+        text, held = MarkdownExporter().from_filename(file, {"unique_key": file.stem, "output_files_dir": "output"})
+        for name, data in held["outputs"].items():
+            (file.parent / name).parent.mkdir(exist_ok=True)
+            (file.parent / name).write_bytes(data)
+        file.with_suffix(".md").write_text(f"{text}\nThis page is {{download}}`a notebook <{file.name}>`.\n", "utf-8")
+
+
+def setup(app):
+    """What Sphinx calls first."""
+    app.connect("config-inited", lambda app, config: notebooks_as_pages(app))

@@ -1,4 +1,4 @@
-"""The command line: python -m formingx [demo NAME ... | compare OURS THEIRS ... | open FOLDER | report FOLDER ...]."""
+"""The command line: python -m formingx [demo NAME | doctor SCRIPT | compare OURS THEIRS | open or report FOLDER]."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ import runpy
 import sys
 from pathlib import Path
 
+import numpy as np
 from mpi4py import MPI
 
 from . import InputError, compare
 from .results.files import checkpoint
 from .results.show import report
 
+_ROWS = 20                    # of states that `open` shows, about
 _COMPARE = """Compare a run's CSV file with another program's curve: differences, limit points, a picture.
 The header of THEIRS names its columns and may state units: pressure [psi]."""
 
@@ -27,8 +29,8 @@ def main(arguments: list[str] | None = None) -> int:
             _demo(words[1:])
         else:
             options = _parser().parse_args(words)
-            {"compare": _compare, "open": _open, "report": _report, None: lambda _: _say(_overview())}[
-                options.command](options)
+            {"compare": _compare, "doctor": _doctor, "open": _open, "report": _report,
+             None: lambda _: _say(_overview())}[options.command](options)
     except (InputError, OSError) as error:
         if MPI.COMM_WORLD.rank == 0:
             print(f"formingx: {error}", file=sys.stderr)
@@ -41,6 +43,11 @@ def _parser() -> argparse.ArgumentParser:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     commands.add_parser("demo", help="run a demo: demo NAME [its options]")
+    check = commands.add_parser("doctor", help="look over the scene of a script", description="Look over the first"
+                                " scene that a script runs, and its targets: the script is executed up to there, and"
+                                " nothing is solved.")
+    check.add_argument("script", metavar="SCRIPT", help="a Python file")
+    check.add_argument("arguments", nargs=argparse.REMAINDER, help="its own options")
     two = commands.add_parser("compare", help="compare two curves",
                               formatter_class=argparse.RawDescriptionHelpFormatter, description=_COMPARE)
     two.add_argument("ours", metavar="OURS", help="CSV file of a run (Path.to_csv)")
@@ -65,6 +72,7 @@ def _parser() -> argparse.ArgumentParser:
 def _overview() -> str:
     lines = ["formingx: how polymers are formed, simulated with finite elements.", "", "Commands:",
              "  demo NAME [OPTIONS]        run a demo (demo NAME --help: its options)",
+             "  doctor SCRIPT              look over the scene of a script before it runs",
              "  compare OURS THEIRS        compare two curves (compare --help)",
              "  open FOLDER                say what is in a checkpoint",
              "  report FOLDER              make one HTML file of a checkpoint (report --help)", ""]
@@ -110,6 +118,11 @@ def _demo(words: list[str]) -> None:
         sys.argv, sys.path[:] = before
 
 
+def _doctor(options: argparse.Namespace) -> None:
+    from .scripts import look_over
+    _say(str(look_over(options.script, options.arguments)))
+
+
 def _compare(options: argparse.Namespace) -> None:
     comm = MPI.COMM_WORLD
     columns = {our: their or our for our, their in (_pair("--columns", word, False) for word in options.columns)}
@@ -132,14 +145,21 @@ def _open(options: argparse.Namespace) -> None:
     record = report.of_checkpoint(about, states)
     width = max(map(len, record.summary))
     lines = [f"{part:{width}}  {line}" for part, line in record.summary.items()]
-    columns = [c for c in ("pressure", "travel", "pole_height", "pole_stretch", "contact_length")
-               if c in record.measures]
-    extra = [key for key in ("stage",) if any(state.get(key) for state in states)]
-    lines += ["", f"{'state':>5}  {'kind':12}" + "".join(f"{c.replace('_', ' '):>16}" for c in columns)
-              + "".join(f"  {key}" for key in extra)]
-    lines += [f"{k:5}  {kind:12}" + "".join(f"{record.measures[c][k]:16.8g}" for c in columns)
-              + "".join(f"  {states[k].get(key)}" for key in extra) for k, kind in enumerate(record.kinds)]
-    _say("\n".join([*lines, "", *record.warnings()]).rstrip())
+    _say("\n".join([*lines, "", *_states(record), "", *record.warnings()]).rstrip())
+
+
+def _states(record: report.Record) -> list[str]:
+    """States as rows, a screenful: evenly spread ones, limit points, jumps, and the last of each stage."""
+    ends = ("process_time", "pressure", "travel", "displacement", "pole_height", "pole_stretch", "contact_length")
+    columns = [c for end in ends for c in record.measures if c.endswith(end)][:6]
+    n, stages = len(record.kinds), record.stages
+    marked = [k for k in range(n) if record.kinds[k] in ("limit point", "jump") or stages[k:k + 2] != [stages[k]] * 2]
+    room = max(_ROWS - len(marked), 2)
+    shown = sorted({*marked, *np.linspace(0, n - 1, min(n, room)).round().astype(int).tolist()})
+    lines = [f"{'state':>5}  {'kind':12}" + "".join(f"{c.replace('_', ' '):>16}" for c in columns)]
+    lines += [f"{k:5}  {record.kinds[k]:12}" + "".join(f"{record.measures[c][k]:16.8g}" for c in columns)
+              + f"  {stages[k]}".rstrip() for k in shown]
+    return lines + [f"({n - len(shown)} more states)"] * (len(shown) < n)
 
 
 def _report(options: argparse.Namespace) -> None:

@@ -1,4 +1,4 @@
-"""Empty figures, drawn without a screen, and the tools of a scene in them."""
+"""Empty figures, drawn without a screen and shown by notebooks, and the tools of a scene in them."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: An
            rows: int = 1) -> tuple[Any, Any]:
     """(figure, axes, row by row) with `columns` plots side by side, widths in `ratios`; saving needs no screen."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    drawing = Figure(figsize=(width * columns, height * rows), layout="constrained")
+
+    from .notebook import ShownAxes, ShownFigure
+    drawing = ShownFigure(figsize=(width * columns, height * rows), layout="constrained")
     FigureCanvasAgg(drawing)
-    axes = drawing.subplots(rows, columns, squeeze=False, width_ratios=ratios).ravel()
+    axes = drawing.subplots(rows, columns, squeeze=False, width_ratios=ratios,
+                            subplot_kw={"axes_class": ShownAxes}).ravel()
     for a in axes:
         a.grid(True, color="0.9", linewidth=0.7)
         a.set_axisbelow(True)

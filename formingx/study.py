@@ -238,7 +238,7 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
         InputError: an argument that is not allowed; a folder of another study. A run that fails raises nothing.
     """
     from tqdm import tqdm
-    cases = _cases(variables)
+    cases = design(variables)
     task, ways = _Task(build, _measures(build, measure)), dict(goal or {})
     for name, way in ways.items():
         known("study: goal", name, task.measure)
@@ -250,7 +250,8 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
     with _pool(executor, min(workers or os.cpu_count() or 1, max(len(todo), 1))) as pool:
         if isinstance(pool, futures.ProcessPoolExecutor):
             _check_importable(task)
-        for run in tqdm(_finished(pool, task, todo), total=len(todo), disable=not progress, desc="study", unit="run"):
+        runs = _finished(pool, task, todo)
+        for run in tqdm(runs, total=len(todo), disable=not (progress and todo), desc="study", unit="run"):
             found._keep(run)
     order = {tuple(case.items()): k for k, case in enumerate(cases)}
     found.runs.sort(key=lambda run: order.get(tuple(run.values.items()), len(order)))
@@ -274,7 +275,8 @@ def _pool(executor: futures.Executor | None, workers: int) -> Any:
     return futures.ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
 
 
-def _cases(variables: Any) -> list[dict[str, float]]:
+def design(variables: Any) -> list[dict[str, float]]:
+    """The sets of numbers of a study, one {name: value} for each run; see `study`."""
     if isinstance(variables, Mapping):
         levels = {str(name): [finite(f"study: {name}", v) for v in several(f"study: {name}", values, "numbers")]
                   for name, values in variables.items()}

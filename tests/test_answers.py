@@ -143,6 +143,13 @@ def test_tables_are_read_back(formed, tmp_path):
     assert np.array(rows[1:], float)[:, 5] == pytest.approx(wall.wall, rel=1e-12)
 
 
+def test_tables_print_their_ends(formed):
+    head, *rows, count = str(formed.wall()).splitlines()
+    assert head.split() == list(formed.wall().columns) and count == f"{len(formed.wall().wall)} rows"
+    assert len(rows) == 11 and rows[5].split() == ["..."] * len(head.split())
+    assert float(rows[-1].split()[5]) == pytest.approx(formed.wall().wall[-1], rel=1e-4)
+
+
 def test_wrong_names_are_refused(formed, tmp_path):
     for write, name, words in ((formed.wall().to_csv, "pot.xlsx", "must end in .csv; to_excel writes that"),
                                (formed.to_csv, "pot.xlsx", "must end in .csv"),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from conftest import ROOT, drawn, run
 
+import formingx as fx
 from formingx.__main__ import main
 
 
@@ -55,6 +56,40 @@ def test_errors_in_plain_words(tmp_path, capsys, words, message):
     assert main([ours if word == "OURS" else word for word in words]) == 2
     error = capsys.readouterr().err
     assert message in error and error.startswith("formingx: ") and "Traceback" not in error
+
+
+SCENE = """import sys
+import formingx as fx
+print("options", sys.argv[1:])
+sheet = fx.mesh.disc(radius=10.0, thickness=0.3, elements=(20, 1))
+mould = fx.tools.cup(radius=10.0, depth=5.0, mouth=0.3, fillet=0.1)
+scene = fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                 loads=[fx.Pressure("bottom", name="air")], contacts=[fx.Contact("top", mould)])
+"""
+RUNS = {"trace": "fx.trace(scene, until=fx.pole_height(900.0))", "solve": "fx.solve(scene, to=1.0)",
+        "process": "fx.Process(scene).run([fx.Stage('blow', drive='air', until=fx.pole_height(900.0))])",
+        "study": "fx.study(lambda p: fx.trace(scene, until=fx.pressure(p)), {'p': [1, 2]}, {'p': 'pressure'})"}
+
+
+@pytest.mark.parametrize("way", RUNS)
+def test_doctor_looks_at_the_first_run(way, tmp_path, capsys):
+    """The fillet is too small for the mesh, a target too far away; nothing is solved, whatever runs the scene."""
+    (tmp_path / "script.py").write_text(SCENE + RUNS[way] + "\nprint('solved')\n")
+    before = fx.trace, fx.solve, fx.study, fx.Process.run
+    assert main(["doctor", str(tmp_path / "script.py"), "--fast"]) == 0
+    assert (fx.trace, fx.solve, fx.study, fx.Process.run) == before
+    text = capsys.readouterr().out
+    assert "options ['--fast']" in text and "solved" not in text and "its fillet of radius 0.1" in text
+    assert ("pole height = 900" in text) == (way in ("trace", "process"))
+
+
+def test_doctor_of_no_scene(tmp_path, capsys):
+    (tmp_path / "script.py").write_text("print(1)")
+    assert main(["doctor", str(tmp_path / "script.py")]) == 2 == main(["doctor", str(tmp_path / "absent.py")])
+    error = capsys.readouterr().err
+    assert "script.py' runs no scene" in error and "absent.py' is not there" in error
+    (tmp_path / "script.py").write_text("import formingx as fx\nfx.NeoHookean(c10=-1)")
+    assert main(["doctor", str(tmp_path / "script.py")]) == 2 and "NeoHookean(c10=-1" in capsys.readouterr().err
 
 
 def test_unknown_command():

@@ -1,21 +1,70 @@
-"""Every code block of the pages runs, one after the other; Sphinx builds them without a warning."""
+"""Every code block of the pages runs, one after the other, and prints what stands below it; Sphinx builds them all."""
 
 import re
+import shutil
+from contextlib import nullcontext
 
 import pytest
 from conftest import ROOT, run
+from printed import assert_shows
 
 DOCS = ROOT / "docs"
-PAGES = [p for p in sorted(DOCS.rglob("*.md")) if "_build" not in p.parts and "```python" in p.read_text()]
+MADE = {"_build", "notebooks"}
+PAGES = [p for p in sorted(DOCS.rglob("*.md")) if not MADE & {*p.parts} and "```python" in p.read_text()]
+NOTEBOOKS = sorted(DOCS.glob("notebooks/*.ipynb"))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(DOCS).with_suffix("").as_posix())
 def test_blocks_run(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     names: dict = {}
-    for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.S):
+    for block, shown in re.findall(r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", page.read_text(), re.S):
         exec(compile(block, page.name, "exec"), names)
-    assert capsys.readouterr().out
+        assert_shows(shown, capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("shown, printed, same", [
+    ("force 1.23 N", "force 1.2345 N", True), ("force 1.23 N", "force 1.2501 N", False), ("1.5e-06", "1.59e-06", True),
+    ("force 1 N", "force  1\nN", True), ("force 1 N", "forces 1 N", False), ("", "1", False),
+    ("2 runs, ... s", "2 runs, 7 s", True),
+    ("2 runs, ... s", "3 runs, 7 s", False), ("[1. 2.]", "[1. 2. 3.]", False), ("-1.5", "1.5", False)])
+def test_what_is_shown_is_compared(shown, printed, same):
+    with nullcontext() if same else pytest.raises(AssertionError):
+        assert_shows(shown, printed)
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda p: p.stem)
+def test_notebook(file, tmp_path):
+    """It runs, and shows what it holds: the same words and numbers, and things of the same kinds."""
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    held = nbformat.read(file, as_version=4)
+    run = nbclient.NotebookClient(nbformat.from_dict(held), resources={"metadata": {"path": tmp_path}}).execute()
+    shown = 0
+    for one, other in zip(held.cells, run.cells, strict=True):
+        for a, b in zip(one.get("outputs", []), other.get("outputs", []), strict=True):
+            kinds = set(a.get("data", {}))
+            assert kinds == set(b.get("data", {}))
+            shown += len(kinds - {"text/plain"})
+            if kinds <= {"text/plain"}:
+                assert_shows(*(o.get("text") or o["data"]["text/plain"] for o in (a, b)))
+    assert shown == 4
+
+
+def test_every_demo_is_in_the_gallery():
+    """With a picture, a line and its command; the pictures are there, and its script is where the links lead."""
+    rows = [[cell.strip() for cell in line.strip().strip("|").split("|")]
+            for line in (DOCS / "gallery.md").read_text().splitlines() if line.startswith("| [")]
+    found = {}
+    for pictures, lines in zip(rows[::2], rows[1::2], strict=True):
+        for picture, line in zip(filter(None, pictures), filter(None, lines), strict=True):
+            file, script = re.fullmatch(r"\[!\[[^]]+\]\((.+\.png)\)\]\((.+)\)", picture).groups()
+            name, linked, command = re.fullmatch(r"\[(\w+)\]\((.+?)\): .+ <br> `(.+)`", line).groups()
+            assert (DOCS / file).is_file() and script == linked == f"../demos/{name}.py"
+            assert command == f"./fx python3 demos/{name}.py"
+            found[name] = DOCS / linked
+    demos = {f.stem: f for f in (ROOT / "demos").glob("*.py") if "\ndef main(" in f.read_text()}
+    assert sorted(found) == sorted(demos) and all(f.is_file() for f in found.values())
 
 
 @pytest.mark.quick

@@ -5,8 +5,10 @@ import gzip
 import json
 import re
 import shutil
+import subprocess
 from dataclasses import replace
 from html.parser import HTMLParser
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -14,6 +16,7 @@ import pytest
 import test_process
 from conftest import run, treloar
 from mpi4py import MPI
+from PIL import Image
 from test_contact import cup
 
 import formingx as fx
@@ -24,6 +27,7 @@ from formingx.results.files.description import describe
 from formingx.results.files.fields import Fields
 from formingx.results.files.solid import solid
 from formingx.results.show import animation, report
+from formingx.results.show.picture import Picture
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +151,6 @@ def test_on_two_ranks(inflated, tmp_path):
 
 @pytest.mark.quick
 def test_animation(formed, tmp_path):
-    from PIL import Image
     formed.animate(tmp_path / "run.gif", frames=7, seconds=2.0)
     with Image.open(tmp_path / "run.gif") as film:
         assert film.n_frames == 7 and film.size == (1000, 420)
@@ -163,15 +166,56 @@ def test_animation(formed, tmp_path):
             formed.animate(tmp_path / "run.gif", **given)
     with pytest.raises(fx.InputError, match="must end in .gif or .mp4"):
         formed.animate(tmp_path / "run.avi")
-    if shutil.which("ffmpeg") is None:
-        with pytest.raises(fx.InputError, match="needs the program ffmpeg"):
-            formed.animate(tmp_path / "run.mp4")
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
+def test_a_film_is_mp4(formed, tmp_path):
+    """Seven moving frames in two seconds, and the last one for a second more, as ffmpeg's own programs read them."""
+    formed.animate(tmp_path / "run.mp4", frames=7, seconds=2.0)
+    film = json.loads(subprocess.run(["ffprobe", "-v", "error", "-show_streams", "-of", "json", tmp_path / "run.mp4"],
+                                     capture_output=True, check=True).stdout)["streams"][0]
+    assert (film["codec_name"], film["pix_fmt"], film["width"], film["height"]) == ("h264", "yuv420p", 1000, 420)
+    assert int(film["nb_frames"]) == 10 and float(film["duration"]) == pytest.approx(10 * 2 / 7, rel=1e-3)
+    data = subprocess.run(["ffmpeg", "-v", "error", "-i", tmp_path / "run.mp4", "-f", "rawvideo", "-pix_fmt", "gray",
+                           "-"], capture_output=True, check=True).stdout
+    frames = np.frombuffer(data, np.uint8).reshape(10, 420, 1000).astype(float)
+    change = np.abs(np.diff(frames, axis=0)).mean((1, 2))
+    assert change[:6].min() > 0.1 and change[6:].max() < 0.02
+
+
+def test_mp4_without_ffmpeg(formed, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(fx.InputError, match="needs the program ffmpeg"):
+        formed.animate(tmp_path / "run.mp4")
+
+
+def test_notebooks_show_pictures(inflated, tmp_path):
+    """Axes show their figure, a picture or a film shows its file, a table its first and last rows."""
+    drawn = inflated.plot("pressure", "pole_stretch")
+    assert drawn._repr_png_() == drawn.figure._repr_png_() and drawn._repr_png_().startswith(b"\x89PNG")
+    Image.new("RGB", (3, 2)).save(tmp_path / "a.png")
+    shown = Picture(tmp_path / "a.png")._repr_mimebundle_()
+    assert base64.b64decode(shown["image/png"]) == (tmp_path / "a.png").read_bytes()
+    (tmp_path / "b.gif").write_bytes(b"GIF")
+    assert 'src="data:image/gif;base64,R0lG"' in Picture(tmp_path / "b.gif")._repr_mimebundle_()["text/html"]
+    assert Picture(tmp_path / "c.mp4")._repr_mimebundle_() == {}
 
 
 def test_every_stage_has_its_frames(plugged):
     """Frames are even in the process: the plug goes down by 1 and up by 0.5."""
     shown = [b.stage for _, b, _ in animation.spread(plugged, 60)]
     assert 30 <= shown.count("down") <= 50 and shown.count("up") >= 10
+
+
+def test_every_stage_has_its_curve():
+    """What a stage drives: a plug's force against its travel, a pressure against the height; else the plug's."""
+    rows = [("plug", 0, 0, 0, 0), ("plug", 5, 2, 0, 5), ("air", 5, 1, 0.1, 6), ("air", 5, 0, 0.2, 9),
+            ("hold", 5, 0, 0.2, 9), ("hold", 5, 0, 0.2, 9)]
+    names = ["plug_travel", "plug_force", "pressure", "pole_height"]
+    states = [SimpleNamespace(stage=stage, measures=dict(zip(names, values))) for stage, *values in rows]
+    assert animation.columns_of_stages(SimpleNamespace(states=states, columns=names)) == {
+        "plug": ("plug_travel", "plug_force"), "air": ("pole_height", "pressure"),
+        "hold": ("plug_travel", "plug_force")}
 
 
 def test_solids_are_closed_and_hold_the_volume(formed, tmp_path):
@@ -228,10 +272,11 @@ def page(file):
 
 
 @pytest.mark.quick
-def test_report_is_one_file(inflated, tmp_path):
-    inflated.report(tmp_path / "run.html", title="A <test>")
-    assert [f.name for f in tmp_path.iterdir()] == ["run.html"]
-    text = page(tmp_path / "run.html")
+def test_report_is_one_file(inflated, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = inflated.report(title="A <test>")
+    assert [f.name for f in tmp_path.iterdir()] == ["report.html"] == [str(file)]
+    text = page(tmp_path / file)
     for words in ("A <test>", "NeoHookean(c10=2.0)", "SimplySupported('rim')", "Pressure('bottom') (driven)",
                   "limit point 1", f"{inflated.limit_points[0].measures['pressure']:.6g}", "dolfinx", "No warnings"):
         assert words in text
@@ -313,7 +358,8 @@ def test_report_draws_what_was_computed(plugged, tmp_path):
 
 
 def test_runs_side_by_side(inflated, formed, tmp_path):
-    fx.report([inflated, formed], tmp_path / "two.html", "Two", names=["sheet", "cup"])
+    file = fx.report([inflated, formed], tmp_path / "two.html", "Two", names=["sheet", "cup"])
+    assert file == tmp_path / "two.html"
     text, data = page(tmp_path / "two.html"), drawn(tmp_path / "two.html")
     assert [run["name"] for run in data["runs"]] == ["sheet", "cup"] and "MooneyRivlin" in text
     walls = next(chart for chart in data["charts"] if chart["title"].startswith("Wall against arc"))
@@ -375,13 +421,31 @@ def test_command_line(inflated, tmp_path, capsys):
     assert main(["open", str(folder)]) == 0
     text = capsys.readouterr().out
     assert "NeoHookean(c10=2.0)" in text and text.count("limit point") == 1
-    assert f"{inflated.last.measures['pressure']:.8g}" in text
+    assert f"{inflated.last.measures['pressure']:.8g}" in text and "more states" not in text
     assert main(["report", str(folder), "--title", "From a checkpoint"]) == 0
     assert "From a checkpoint" in page(folder / "report.html") and "SimplySupported" in page(folder / "report.html")
     assert main(["report", str(folder), "--out", "/proc/report.html"]) == 2
     assert main(["open", str(tmp_path / "nothing")]) == 2
     error = capsys.readouterr().err
     assert "'/proc/report.html' could not be written" in error and "is not there" in error and "Trace" not in error
+
+
+def test_open_shows_a_screenful(plugged, tmp_path, capsys):
+    """The ends of the stages, limit points, states between them; what is driven by its own name."""
+    path = fx.trace(treloar((6, 1)), until=fx.pole_stretch(3.0), step=fx.StepControl(largest=0.05), progress=False)
+    (limit,), rows = path.limit_points, []
+    for one, folder in ((path, tmp_path / "long"), (plugged, tmp_path / "staged")):
+        one.save(folder)
+        assert main(["open", str(folder)]) == 0
+        text = capsys.readouterr().out
+        rows = [line.split() for line in text.splitlines() if line[:5].strip().isdigit()]
+        shown, left = {int(row[0]) for row in rows}, len(one) - len(rows)
+        assert {0, len(one) - 1} <= shown and len(rows) <= 24
+        assert (f"({left} more states)" in text) == (left > 0) == (one is path)
+        assert one is plugged or path.states.index(limit) in shown
+    assert "plug travel" in text and [row[-1] for row in rows] == [state.stage for state in plugged.states]
+    assert main(["report", str(folder)]) == 0
+    assert str(folder / "report.html") in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name, states, message", [

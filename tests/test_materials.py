@@ -236,13 +236,10 @@ def test_convex_energies_are_stable(material):
 
 
 def test_plot():
-    matplotlib = pytest.importorskip("matplotlib")
-    matplotlib.use("Agg")
     axes = fx.Gent(mu=0.3, Jm=80.0).plot(unit="MPa")
     assert [line.get_label() for line in axes.lines] == ["uniaxial", "pure shear", "equibiaxial"]
     assert axes.get_ylabel() == "nominal stress (MPa)" and axes.get_xlabel() == "stretch"
     assert fx.NeoHookean(c10=1.0).plot(axes, stretches=[1, 2]) is axes
-    matplotlib.pyplot.close("all")
 
 
 NAN, INF = math.nan, math.inf

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..figures import figure
 
 
 def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -> Any:
     """See `Fit.plot`."""
-    import matplotlib.pyplot as plt
     held = [] if isinstance(data, dict) else [np.ptp(test.stretches) == 0 for test in data]
     count = 1 + (any(held) and not all(held))
     if axes is None:
-        axes = plt.subplots(1, count, figsize=(6.4 * count, 4.8), layout="constrained")[1]
+        axes = figure(count)[1]
     panels = np.ravel(axes)
     if len(panels) != count:
         raise InputError(f"Fit.plot: axes: {len(panels)} given: these tests need {count}, one for tests that are held,"
@@ -28,7 +28,6 @@ def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -
     for i, panel in enumerate(panels):
         in_time = any(held) and i == 0
         panel.set(xlabel=f"time ({unit_of_time})" if in_time else "stretch", ylabel=label)
-        panel.grid(alpha=0.3)
         panel.legend()
     return axes
 

@@ -17,6 +17,7 @@ import numpy as np
 import ufl
 
 from ..errors import InputError, finite, known, positive
+from ..figures import figure
 from . import homogeneous
 from .constants import OfTemperature, Sample, Varying, varying
 from .homogeneous import MODES, Response, Stability
@@ -189,14 +190,11 @@ class Material:
             stretches: the stretches, shape (n,); default 1 to 6, and to 95 % of the limit where there is one.
             unit: the constants' unit of stress, for the label.
         """
-        import matplotlib.pyplot as plt
-        if axes is None:
-            axes = plt.subplots(layout="constrained")[1]
+        axes = figure()[1] if axes is None else axes
         for mode in MODES:
             l = np.linspace(1, min(6.0, 0.95 * self.largest_stretch(mode)), 200) if stretches is None else stretches
             axes.plot(l, self.stress(mode, l), label=mode.replace("_", " "))
         axes.set(xlabel="stretch", ylabel="nominal stress" + f" ({unit})" * bool(unit), title=str(self))
-        axes.grid(alpha=0.3)
         axes.legend()
         return axes
 
@@ -273,7 +271,13 @@ class Material:
                     f" less than {self.largest_I1:.6g}, stretches less than {self.largest_stretch(mode):.6g}")
         return f"{self}: the stress at a stretch of {stretch:.6g} in {mode} tension is not a finite number"
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{k}={v!r}' for k, v in self.parameters.items())})"
 
-    __repr__ = __str__
+    def __str__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{k}={brief(v)}' for k, v in self.parameters.items())})"
+
+
+def brief(value: Any) -> str:
+    """A constant for people: a number with six digits."""
+    return repr(float(f"{value:.6g}")) if isinstance(value, float) else repr(value)

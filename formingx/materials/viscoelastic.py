@@ -20,12 +20,13 @@ import numpy as np
 import ufl
 
 from ..errors import InputError, instance, known, positive, several
+from ..figures import figure
 from ..physics import kinematics
 from . import branches as tests
 from .constants import OfTemperature, Sample, varying
 from .homogeneous import MODES
 from .in_time import HistoryTests
-from .material import Material
+from .material import Material, brief
 
 Entries = tuple[Any, Any, Any, Any]
 _IDENTITY = (1.0, 1.0, 0.0, 1.0)
@@ -214,9 +215,8 @@ class RelaxingMaterial(HistoryTests, Material):
             mode: the test.
             rates: 1/time; default from 0.1 over the longest tau to 10 over the shortest, by decades.
         """
-        import matplotlib.pyplot as plt
         known(f"{self}: plot: mode", mode, MODES)
-        axes = plt.subplots(layout="constrained")[1] if axes is None else axes
+        axes = figure()[1] if axes is None else axes
         l = np.linspace(1, min(6.0, 0.95 * self.largest_stretch(mode)), 200) if stretches is None else stretches
         if rates is None:
             tau = [tau for _, tau in self.branches]
@@ -228,7 +228,6 @@ class RelaxingMaterial(HistoryTests, Material):
             axes.plot(l, rest.stress(mode, l), "k--", label="relaxed")
         axes.set(xlabel="stretch", ylabel="nominal stress" + f" ({unit})" * bool(unit),
                  title=f"{mode.replace('_', ' ')} tension at constant Hencky rates")
-        axes.grid(alpha=0.3)
         axes.legend()
         return axes
 
@@ -273,10 +272,12 @@ class RelaxingMaterial(HistoryTests, Material):
         """f of `branches` for elastic strains w; shapes (branches, 3)."""
         raise NotImplementedError
 
-    def __str__(self) -> str:
-        return f"{type(self).__name__}({self.equilibrium}, branches={self.branches!r})"
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.equilibrium!r}, branches={self.branches!r})"
 
-    __repr__ = __str__
+    def __str__(self) -> str:
+        branches = ", ".join(f"({brief(mu)}, {brief(tau)})" for mu, tau in self.branches)
+        return f"{type(self).__name__}({self.equilibrium}, branches=[{branches}])"
 
 
 class Viscoelastic(RelaxingMaterial):

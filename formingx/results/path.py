@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from ..solve.targets import Bound, Target, is_met
 from . import columns as standard_columns
 from .evaluate.profile import Profile, Profiles
 from .evaluate.stress import Stresses, StressField
+from .show.picture import Picture
 
 
 class _View:
@@ -297,8 +299,10 @@ class Path:
         from .files import fields
         fields.to_xdmf(self, file, states)
 
-    def animate(self, file: Any, frames: int = 60, seconds: float = 5.0) -> None:
+    def animate(self, file: Any, frames: int = 60, seconds: float = 5.0) -> Picture:
         """Draw the forming as a moving picture, a GIF or an MP4: the sheet's section and the loading curve (rank 0).
+
+        Returns the file, which a notebook shows.
 
         The frames are evenly spread over the process (`formingx.results.show.record.progress`), on the (cubic) path
         through the states; the last one stands for a second more.
@@ -309,10 +313,13 @@ class Path:
         """
         from .show import animation
         animation.animate(self, file, frames, seconds)
+        return Picture(file)
 
-    def report(self, file: Any, title: str = "", failure: Any = None, *, units: Any = None,
-               density: float | None = None, trim: Any = None) -> None:
+    def report(self, file: Any = "report.html", title: str = "", failure: Any = None, *, units: Any = None,
+               density: float | None = None, trim: Any = None) -> FilePath:
         """Write one HTML file that shows the run: the part, the process, curves, inputs, warnings (rank 0 writes).
+
+        Returns where it is.
 
         Args:
             title: its heading.
@@ -325,7 +332,7 @@ class Path:
         """
         from ..units import NONE
         from .show import report
-        report.write(report.of_path(self), file, title, failure, self.problem.comm, units or NONE, density, trim)
+        return report.write(report.of_path(self), file, title, failure, self.problem.comm, units or NONE, density, trim)
 
     def plot(self, y: str, x: str, axes: Any = None, **style: Any) -> Any:
         """Draw column `y` over column `x`; returns the matplotlib axes."""
@@ -337,14 +344,15 @@ class Path:
         from .show import plots
         return plots.convergence(self, axes)
 
-    def view3d(self, file: Any, state: State | None = None) -> None:
-        """Draw the sheet of a state (default: the last), coloured by thickness, as PNG.
+    def view3d(self, file: Any, state: State | None = None) -> Picture:
+        """Draw the sheet of a state (default: the last), coloured by thickness, as PNG; returns it, for a notebook.
 
         It is revolved about the axis, or, in plane strain, extruded.
         """
         from .show import views
         axisymmetric = self.problem.scene.kinematics.axisymmetric
         (views.revolved if axisymmetric else views.extruded)(self.profile(state), file, self.problem.comm)
+        return Picture(file)
 
     def wall(self, state: State | None = None) -> Any:
         """The wall of the part at a state (default: the last), place by place (`Wall`): to_csv, to_excel."""

@@ -12,7 +12,7 @@ from ...errors import InputError
 from ..files.sheet import Sheet
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ContactTable(Sheet):
     """A face that meets a tool, at its n nodes, by R at rest.
 

@@ -23,7 +23,7 @@ class Corner(NamedTuple):
     radius: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Filling(Sheet):
     """The gaps in the k corners of a tool, in n states.
 

@@ -63,12 +63,12 @@ class Stress:
     deformation_gradient: np.ndarray
     second_piola: np.ndarray
 
-    @property
+    @cached_property
     def first_piola(self) -> np.ndarray:
         """P = F S, force per reference area (row: of the force, column: of the face), shape (n, 3, 3)."""
         return self.deformation_gradient @ self.second_piola
 
-    @property
+    @cached_property
     def cauchy(self) -> np.ndarray:
         """sigma = P F^T / J, tension positive, shape (n, 3, 3), stress."""
         F = self.deformation_gradient
@@ -197,7 +197,7 @@ class StressField:
             R = fitted.points[:, :, 0].mean(1)
             mine &= (low <= R) & (high >= R)
         errors = np.sqrt(((fitted.smooth - fitted.raw) ** 2).sum((2, 3))).max(1, initial=0.0)
-        cells = [np.concatenate(comm.allgather(v[mine])) for v in (fitted.largest, fitted.at, errors)]
+        cells = [np.concatenate(comm.allgather(v[mine])) for v in (*self._recovery.at_corners(fitted), errors)]
         if not len(cells[0]):
             raise InputError(f"stress peak: radii = {radii!r}: no cell has its middle between them")
         peak = StressPeak.among(*cells)
@@ -270,22 +270,24 @@ class Stresses:
         order = np.argsort(np.concatenate([self._owned(layer) for layer in self.cells]))
         points, values, volume = (np.concatenate([part[k] for part in parts])[order] for k in range(3))
         domain, own = self.problem.forms.domain, order.size
-        corners = _compat.cell_nodes(domain)[:own, :3]
         if self._patches is None:
+            corners = _compat.cell_nodes(domain)[:own, :3]
             numbers = domain.geometry.index_map().local_to_global(corners.ravel()).reshape(-1, 3)
             layer = np.concatenate([np.full(len(self._owned(name)), k) for k, name in enumerate(self.cells)])[order]
             first = comm.exscan(own) or 0
             points_of_all, numbers, layer = (np.concatenate(comm.allgather(v)) for v in (points, numbers, layer))
             self._patches = Patches(points_of_all, numbers, layer, np.arange(first, first + own))
         cubics = self._patches.fit(np.concatenate(comm.allgather(values)))
+        return Fitted(points, volume, _cauchy(values), _cauchy(self._patches.at(cubics, points)), cubics)
 
-        def cauchy(values):
-            flat = values.reshape(-1, _COUNT)
-            return _unpack(np.zeros((len(flat), 2)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
-        X = domain.geometry.x[corners, :2]
-        largest = np.linalg.eigvalsh(cauchy(self._patches.at(cubics, X)))[..., -1]
+    def at_corners(self, fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
+        """The largest sigma_1 of sigma* at the corners of this rank's cells, (m,), and the corner (R, Z), (m, 2)."""
+        domain, own = self.problem.forms.domain, len(fitted.cubics)
+        X = domain.geometry.x[_compat.cell_nodes(domain)[:own, :3], :2]
+        assert self._patches is not None
+        largest = np.linalg.eigvalsh(_cauchy(self._patches.at(fitted.cubics, X)))[..., -1]
         top = (np.arange(own), largest.argmax(1))
-        return Fitted(points, volume, cauchy(values), cauchy(self._patches.at(cubics, points)), largest[top], X[top])
+        return largest[top], X[top]
 
     def of_layer(self, name: str | None) -> np.ndarray:
         """Which of this rank's own cells are of a layer (None: of any), shape (m,)."""
@@ -388,6 +390,12 @@ class Stresses:
 def _det(F: np.ndarray) -> np.ndarray:
     """Determinant in the plane, of gradients (n, 3, 3), shape (n,)."""
     return F[:, 0, 0] * F[:, 1, 1] - F[:, 0, 1] * F[:, 1, 0]
+
+
+def _cauchy(values: np.ndarray) -> np.ndarray:
+    """Cauchy stress, shape (m, q, 3, 3), of F and S, shape (m, q, _COUNT)."""
+    flat = values.reshape(-1, _COUNT)
+    return _unpack(np.zeros((len(flat), 2)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
 
 
 def _unpack(points: np.ndarray, values: np.ndarray) -> Stress:

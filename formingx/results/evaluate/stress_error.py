@@ -94,22 +94,20 @@ def _show(point: np.ndarray) -> str:
 
 
 class Fitted(NamedTuple):
-    """What the fitted F and S of this rank's m cells say, at q quadrature points of each and at their corners.
+    """What the fitted F and S of this rank's m cells say, at q quadrature points of each.
 
     Attributes:
         points: reference points (R, Z), shape (m, q, 2), length.
         volume: reference volumes that belong to them, shape (m, q).
         raw, smooth: sigma_h and sigma*, shape (m, q, 3, 3), stress.
-        largest: sigma_1 of sigma*, the largest at the corners of the cell, shape (m,), stress.
-        at: that corner, shape (m, 2), length.
+        cubics: what they were fitted by (`Patches`), shape (m, 10, k).
     """
 
     points: np.ndarray
     volume: np.ndarray
     raw: np.ndarray
     smooth: np.ndarray
-    largest: np.ndarray
-    at: np.ndarray
+    cubics: np.ndarray
 
     def error(self, exact: Callable | None = None) -> StressError:
         """See `StressField.error`."""

@@ -16,7 +16,7 @@ from ..files.sheet import Sheet
 from .profile import Profile, distance_to_line
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Wall(Sheet):
     """The wall at the n nodes of the bottom (inner) face of a sheet, from the axis to the rim, in one state.
 

@@ -173,16 +173,19 @@ class _Body:
             MPI.COMM_SELF, cells=np.arange(cells * nodes, dtype=np.int64).reshape(cells, nodes),
             x=points.reshape(-1, 2), e=element)
         self._order = self.mesh.topology.original_cell_index
+        self._spaces: dict[int, fem.FunctionSpace] = {}
         self._functions: dict[str, fem.Function] = {}
 
     def functions(self, values: dict[str, np.ndarray]) -> list[fem.Function]:
         """P2 functions with these values, shape (cells, nodes, components) each."""
         for name, array in values.items():
             n = array.shape[-1]
-            if name not in self._functions:
+            if n not in self._spaces:
                 shape: dict[str, Any] = {} if n == 1 else {"shape": (n,)}
                 element = basix.ufl.element("Lagrange", self.mesh.topology.cell_name(), 2, **shape)
-                self._functions[name] = fem.Function(fem.functionspace(self.mesh, element), name=name)
+                self._spaces[n] = fem.functionspace(self.mesh, element)
+            if name not in self._functions:
+                self._functions[name] = fem.Function(self._spaces[n], name=name)
             f = self._functions[name]
             f.x.array.reshape(-1, n)[f.function_space.dofmap.list] = array[self._order]
         return [self._functions[name] for name in values]

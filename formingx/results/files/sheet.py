@@ -10,9 +10,11 @@ from ...errors import InputError
 from ...units import NONE, Units
 from . import tabular
 
+_SHOWN = 10           # rows that are printed: the first and the last
+
 
 class Sheet:
-    """A table with named columns, one row to a place; `comm`: its rank 0 writes."""
+    """A table with named columns, one row to a place; `comm`: its rank 0 writes. Prints its first and last rows."""
 
     comm: Any
 
@@ -41,14 +43,35 @@ class Sheet:
         except ImportError:
             raise InputError("to_excel: needs openpyxl, which is not installed; to_csv needs nothing") from None
         book = Workbook()
-        sheet = book.active
+        sheet: Any = book.active
         for row in (self._header(units), *self._rows()):
             sheet.append([v.item() if isinstance(v, np.generic) else v for v in row])
         sheet.freeze_panes = "A2"
         tabular.on_root(self.comm, lambda: tabular.replace(file, book.save, "wb"))
+
+    def __str__(self) -> str:
+        rows = [list(row) for row in zip(*map(_words, self.columns.values()), strict=True)]
+        n, half = len(rows), _SHOWN // 2
+        if n > _SHOWN + 1:
+            rows[half:n - half] = [["..."] * len(self.columns)]
+        lines = [list(self.columns), *rows]
+        widths = [max(map(len, column)) for column in zip(*lines)]
+        return "\n".join("  ".join(f"{cell:>{w}}" for cell, w in zip(line, widths)) for line in lines) + f"\n{n} rows"
+
+    def __repr__(self) -> str:                               # what a notebook shows
+        return str(self)
 
     def _header(self, units: Units) -> list[str]:
         return [f"{name} [{unit}]" if (unit := units.of(name)) else name for name in self.columns]
 
     def _rows(self) -> list[tuple]:
         return list(zip(*self.columns.values(), strict=True))
+
+
+def _words(column: Any) -> list[str]:
+    """Numbers with five digits, and what is round-off beside the others as 0; words as they are."""
+    values = np.asarray(column)
+    if values.dtype.kind != "f":
+        return [str(v) for v in values]
+    least = 1e-12 * np.abs(values).max(initial=0.0)
+    return [f"{v:.5g}" for v in np.where(np.abs(values) <= least, 0.0, values)]

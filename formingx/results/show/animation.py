@@ -1,4 +1,7 @@
-"""The forming as a moving picture: section and loading curve, frame by frame, evenly spread over the process."""
+"""The forming as a moving picture: section and loading curve, frame by frame, evenly spread over the process.
+
+The curve is that of what the stage drives: a plug's force against its travel, a pressure against the pole's height.
+"""
 
 from __future__ import annotations
 
@@ -25,18 +28,18 @@ def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
     frames, seconds = count("animate: frames", frames), positive("animate: seconds", seconds)
     if len(path) < 2:
         raise InputError(f"animate: the path has {len(path)} states: nothing moves")
-    x, y = plots.main_columns(path.columns)
-    shapes, tools, now, tooling = [], [], [], Tooling.of_problem(path.problem)
+    shapes, tools, now, tooling, shown = [], [], [], Tooling.of_problem(path.problem), columns_of_stages(path)
     for a, b, fraction in spread(path, frames):
         at = path.between(a, b, fraction)
         shapes.append(path.profile(at))
-        now.append([a.measures[c] + fraction * (b.measures[c] - a.measures[c]) for c in (x, y)])
+        names = shown[b.stage]
+        now.append((names, [a.measures[c] + fraction * (b.measures[c] - a.measures[c]) for c in names]))
         tools.append(tooling.placed(tooling.travels(at.setting, at.control)))
-    curve = path.curve(x, y)
+    curves = {names: path.curve(*names) for names in shown.values()}
     axisymmetric = path.problem.scene.kinematics.dimension_of_volume == 3
 
     def draw():
-        pictures = _draw(shapes, tools, np.array(now), curve, (x, y), axisymmetric)
+        pictures = _draw(shapes, tools, now, curves, axisymmetric)
         save = _save_gif if file.suffix.lower() == ".gif" else _save_mp4
         files.replace(file, lambda stream: save(pictures, seconds, stream), "wb")
     files.on_root(path.problem.comm, draw)
@@ -53,7 +56,18 @@ def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
     return found
 
 
-def _draw(shapes: list, tools: list, now: np.ndarray, curve: list, names: tuple, axisymmetric: bool) -> list[Any]:
+def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
+    """{stage: (x, y) of its curve}: what stands still is not it."""
+    found = {}
+    for stage in dict.fromkeys(state.stage for state in path.states):
+        values = {c: [s.measures[c] for s in path.states if s.stage == stage] for c in path.columns}
+        moving = [c for c, v in values.items() if np.ptp(v) > 0 or not c.endswith(("travel", "pressure"))]
+        driven = any(c.endswith(("travel", "pressure")) for c in moving)
+        found[stage] = plots.main_columns(moving if driven else path.columns)
+    return found
+
+
+def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool) -> list[Any]:
     """The frames, each a picture."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -67,25 +81,32 @@ def _draw(shapes: list, tools: list, now: np.ndarray, curve: list, names: tuple,
     figure, (left, right) = plots.figure(2, width=5.0, height=4.2, ratios=(1.5, 1))
     bar = figure.colorbar(ScalarMappable(colours, "viridis_r"), ax=left, shrink=0.8, label="thickness / original")
     bar.outline.set_visible(False)
-    right.plot(*curve, color="0.6")
-    right.set(xlabel=names[0].replace("_", " "), ylabel=names[1].replace("_", " "))
-    dot, = right.plot([], [], "o", color="tab:red")
-    text = right.set_title("", fontsize=10)
     pictures: list[Any] = []
-    for shape, ratio, tool, at in zip(shapes, ratios, tools, now):
+    for shape, ratio, tool, (names, at) in zip(shapes, ratios, tools, now):
         left.clear()
         left.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="r", ylabel="z", aspect="equal")
         left.spines[["top", "right"]].set_visible(False)
         figures.tools(left, tool, low, high, mirror=len(sides) == 2)
         for side in sides:
             plots.section(left, shape, (side, 1), colormaps["viridis_r"](colours(ratio)))
-        dot.set_data(at[:1], at[1:])
-        text.set_text(f"{names[1].replace('_', ' ')} {at[1]:.4g}")
+        _curve(right, names, curves[names], at)
         figure.canvas.draw()
         if not pictures:
             figure.set_layout_engine("none")                # or the axes would shift from frame to frame
         pictures.append(Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB"))
     return pictures
+
+
+def _curve(axes: Any, names: tuple[str, str], curve: list, at: list[float]) -> None:
+    """The loading curve, and a dot where the body is on it."""
+    x, y = (name.replace("_", " ") for name in names)
+    axes.clear()
+    axes.grid(True, color="0.9", linewidth=0.7)
+    axes.plot(*curve, color="0.6")
+    axes.plot(*at, "o", color="tab:red")
+    axes.set(xlabel=x, ylabel=" ")                          # which keeps room for the numbers of the next stage
+    value = at[1] if abs(at[1]) > 1e-9 * np.abs(curve[1]).max() else 0.0
+    axes.set_title(f"{y} {value:.4g}", fontsize=10)
 
 
 def _save_gif(pictures: list[Any], seconds: float, stream: Any) -> None:

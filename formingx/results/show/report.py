@@ -28,9 +28,9 @@ from . import interactive, page, plots
 from .record import Record, of_checkpoint, of_path, words
 
 
-def report(runs: Sequence[Any], file: Any, title: str = "", *, names: Sequence[str] | None = None, units: Units = NONE,
-           density: float | None = None, trim: Any = None) -> None:
-    """Write one HTML file that shows runs side by side (rank 0 writes).
+def report(runs: Sequence[Any], file: Any = "report.html", title: str = "", *, names: Sequence[str] | None = None,
+           units: Units = NONE, density: float | None = None, trim: Any = None) -> FilePath:
+    """Write one HTML file that shows runs side by side (rank 0 writes); returns where it is.
 
     Args:
         runs: paths, or folders of checkpoints.
@@ -50,11 +50,11 @@ def report(runs: Sequence[Any], file: Any, title: str = "", *, names: Sequence[s
         raise InputError(f"report: {len(runs)} runs and {len(names)} names: give at least one run, and a name for each")
     records = [of_path(run) if hasattr(run, "problem") else of_checkpoint(*checkpoint.contents(run)) for run in runs]
     comm = next((run.problem.comm for run in runs if hasattr(run, "problem")), MPI.COMM_WORLD)
-    write(records, file, title or "Runs side by side", None, comm, units, density, trim, names)
+    return write(records, file, title or "Runs side by side", None, comm, units, density, trim, names)
 
 
 def write(records: Record | list[Record], file: Any, title: str, failure: Any, comm: Any, units: Units = NONE,
-          density: float | None = None, trim: Any = None, names: list[str] | None = None) -> None:
+          density: float | None = None, trim: Any = None, names: list[str] | None = None) -> FilePath:
     """See `report` and `Path.report`."""
     records = [records] if isinstance(records, Record) else records
     names = names or [title or "run"]
@@ -64,6 +64,7 @@ def write(records: Record | list[Record], file: Any, title: str, failure: Any, c
         text = _page(records, names, parts, title or "Report of a run", failure, units)
         files.replace(file, lambda stream: stream.write(text))
     files.on_root(comm, make)
+    return FilePath(file)
 
 
 def _part(record: Record, units: Units, density: float | None, trim: Any) -> Part | None:

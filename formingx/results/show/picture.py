@@ -1,0 +1,34 @@
+"""A picture or a film that was written to a file, which shows itself at the end of a notebook's cell."""
+
+from __future__ import annotations
+
+import base64
+import os
+from pathlib import Path
+from typing import Any
+
+
+class Picture(os.PathLike):
+    """A picture (.png, .gif) or a film (.mp4) that was written; a notebook shows it as it is at that moment.
+
+    Attributes:
+        file: where it is (`pathlib.Path`).
+    """
+
+    def __init__(self, file: Any):
+        self.file = Path(file)
+
+    def __fspath__(self) -> str:
+        return os.fspath(self.file)
+
+    def __repr__(self) -> str:
+        return f"Picture({os.fspath(self.file)!r})"
+
+    def _repr_mimebundle_(self, **_: Any) -> dict[str, str]:
+        if not self.file.is_file():                          # on other ranks, for one
+            return {}
+        data, kind = base64.b64encode(self.file.read_bytes()).decode(), self.file.suffix[1:].lower()
+        if kind == "png":
+            return {"image/png": data}
+        source = f'src="data:{"video" if kind == "mp4" else "image"}/{kind};base64,{data}" style="max-width: 100%"'
+        return {"text/html": f"<video controls loop {source}></video>" if kind == "mp4" else f"<img {source}>"}
