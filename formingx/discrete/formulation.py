@@ -47,8 +47,8 @@ class Formulation(ABC):
         histories: what the forms depend on besides fields, control and time (`History`).
         potential: of a step, over stress times volume (UFL, rank 0); energy: the energy stored, likewise: the same
             without histories. dissipation: power, over stress times volume (UFL, rank 0), or None.
-        residual: dpotential/dw - external virtual work (UFL, rank 1); control_derivative: its derivative by the
-            control, or None.
+        residual: dpotential/dw - external virtual work (UFL, rank 1); control_derivative, time_derivative: its
+            derivative by the control, in the loads and by way of the time in materials, or None.
         slack_at_rest: True if the body at rest has no stiffness in some direction.
     """
 
@@ -85,7 +85,7 @@ class Formulation(ABC):
         self.scales += [self.length] * (len(scene.things) - len(self.scales)) + [1.0]
         self.control_scale = next((s for s, t in zip(self.scales, scene.things) if t is scene.driven), self.length)
         self._take_materials()
-        self.residual, self.control_derivative = self._residual(body)
+        self.residual, self.control_derivative, self.time_derivative = self._residual(body)
 
     @abstractmethod
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
@@ -256,12 +256,13 @@ class Formulation(ABC):
         for constant, value in zip(self._time, (setting.base[-1], setting.rate[-1])):
             constant.value = value
 
-    def _residual(self, body: LoadedBody) -> tuple[Any, Any]:
-        """See `residual` and `control_derivative`; the control stands in driven loads, and in materials by the time."""
+    def _residual(self, body: LoadedBody) -> tuple[Any, Any, Any]:
+        """`residual`, `control_derivative` and `time_derivative`."""
         v, control = self.test_function(), self._control
         residual = ufl.derivative(self.potential, self.w, v)
         timed = ufl.Form([i for i in self.potential.integrals() if self.control in extract_constants(i.integrand())])
-        terms = [ufl.derivative(ufl.diff(timed, control), self.w, v)] if timed.integrals() else []
+        by_time = ufl.derivative(ufl.diff(timed, control), self.w, v) if timed.integrals() else None
+        terms = []
         self._loads = []
         for load, scale in zip(self.scene.loads, self.scales):
             base, rate = self.constant(0.0 if load.driven else load.value), self.constant(0.0)
@@ -271,4 +272,4 @@ class Formulation(ABC):
             residual -= self._scale * work
             if load.driven:
                 terms.append(-self._scale * ufl.diff(work, control))
-        return residual, sum(terms[1:], terms[0]) if terms else None
+        return residual, sum(terms[1:], terms[0]) if terms else None, by_time
