@@ -28,6 +28,10 @@ set for the first time do not count: of a slack sheet on a flat plug a hundred p
 _UNSETTLED = 2
 """Iterations after which contact points with a history whose status still changes are solved for by themselves."""
 
+CONTRACTION = 0.02
+"""Fall of the residual in an iteration up to which the next one of a step in time keeps the tangent (a chord iteration):
+it costs a residual and a solve, a seventh of what a tangent and its factors cost."""
+
 SMALL = 1e-3
 """Corrections (dimensionless displacement) that may grow without a sign of divergence while the active set changes."""
 
@@ -36,12 +40,18 @@ class Iteration(NamedTuple):
     """One Newton iteration: what it found and what it did. The last entry of a history is the converged state.
 
     residual: |F| before it, over the norm of the support forces; correction: |dx|/(|x| + AT_REST), criterion (3.5.1);
-    work: |F . dx| over its first value, criterion (3.5.2).
+    work: |F . dx| over its first value, criterion (3.5.2). chord: with the tangent of an iteration before it.
     """
 
     residual: float
     correction: float
     work: float
+    chord: bool = False
+
+
+def tangents(history: list[Iteration]) -> int:
+    """How many iterations had a tangent of their own; the last entry is the converged state."""
+    return sum(not iteration.chord for iteration in history[:-1])
 
 
 class Failure(Exception):
@@ -107,8 +117,11 @@ class Tolerances:
         count("Tolerances: iterations", self.iterations)
         count("Tolerances: settling", self.settling)
 
-    def met(self, corrections: list[float], residuals: list[float]) -> bool:
+    def met(self, corrections: list[float], residuals: list[float], chord: bool = False) -> bool:
         """True if a state with these corrections behind it, and these residuals (its own last), has converged.
+
+        `chord`: the last correction was one of a chord iteration, which converges linearly: the next one is foretold
+        from the fall of residuals and corrections, and doubled.
 
         Corrections that no longer shrink, below 1e-7, or that are below 1e-11, have met round-off (a flat thin sheet:
         near 1e-8): then nothing better is to be had, and the residual may be what round-off leaves. A
@@ -118,7 +131,8 @@ class Tolerances:
         if not corrections:
             return False
         residual, last, before = residuals[-1], corrections[-1], corrections[-2] if len(corrections) > 1 else 1.0
-        ahead = last * min(1.0, last / before) ** 2
+        fall = max(residual / residuals[-2], last / before)
+        ahead = last * (2 * fall if chord else min(1.0, last / before) ** 2)
         if ahead < self.correction and residual < self.residual:
             return True
         if last < self.correction and residual > 0.3 * residuals[-2]:
@@ -154,12 +168,15 @@ class BorderedNewton:
         self.b.scale(-1)
         return bool(np.isfinite(self.b.norm()))
 
-    def correct(self, x: PETSc.Vec, control: float, constraint: Any, old: Any = None) -> tuple[float, list[Iteration]]:
+    def correct(self, x: PETSc.Vec, control: float, constraint: Any, old: Any = None,
+                chords: bool = False) -> tuple[float, list[Iteration]]:
         """Iterate x (in place) and control to convergence; returns the control and the history.
 
-        `old`: the state that they are a guess ahead of, if there is one.
+        `old`: the state that they are a guess ahead of, if there is one. `chords`: keep the tangent after the
+        first iteration while the residual falls by `CONTRACTION` in one (Ortega and Rheinboldt 1970, section 7.1).
 
-        Afterwards `self.b` is dx/dcontrol at the solution (to the accuracy of the last correction).
+        Afterwards `self.b` is dx/dcontrol at the solution (to the accuracy of the last correction, or of the tangent
+        that was kept).
 
         Raises:
             Failure: no convergence; x is then worthless.
@@ -170,6 +187,7 @@ class BorderedNewton:
         problem.residual(x, control, self.F)
         self.a.set(0)
         self.reached = control, 0.0
+        chords = chords and not problem.has_kinks
         work0 = moved = 0.0
         active = _ActiveSet(problem)
         points = Settling(problem) if problem.has_history else None
@@ -177,7 +195,8 @@ class BorderedNewton:
             residual = self.F.norm() / (problem.force_scale + UNLOADED)
             if not np.isfinite(residual):
                 raise Failure(f"the forces are not finite: {problem.why_not_finite}", history)
-            if self.tolerances.met([i.correction for i in history], [*(i.residual for i in history), residual]):
+            if self.tolerances.met([i.correction for i in history], [*(i.residual for i in history), residual],
+                                   bool(history) and history[-1].chord):
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
             problem.linearise(x, control, self.F)
@@ -185,6 +204,9 @@ class BorderedNewton:
             if points:
                 points.look()
             self._check(history, active, moved)
+            chord = chords and bool(history) and residual < CONTRACTION * history[-1].residual
+            if not chord and not self.tangent(x, control):
+                raise Failure("the tangent matrix is singular", history)
             step = self._correction(x, control, constraint, history)
             share = active.share
             if points and active.changed == len(history) >= _UNSETTLED:
@@ -199,7 +221,7 @@ class BorderedNewton:
             correction = moved / (self._norm(x, control) + AT_REST)
             if not np.isfinite(correction):
                 raise Failure("the tangent matrix is singular", history)
-            history.append(Iteration(residual, correction, work / work0))
+            history.append(Iteration(residual, correction, work / work0, chord))
             self.reached = control, step
             problem.residual(x, control, self.F)
 
@@ -217,8 +239,6 @@ class BorderedNewton:
 
     def _correction(self, x: PETSc.Vec, control: float, constraint: Any, history: list) -> float:
         """Solve for the correction `self.a` of x and that of the control, which is returned."""
-        if not self.tangent(x, control):
-            raise Failure("the tangent matrix is singular", history)
         c, c_control = constraint(x, control, self.gradient)
         self.solver.solve(self.F, self.a)
         self.a.scale(-1)
