@@ -2,7 +2,8 @@
 
 Processor time of a step, all included (limit points, columns, error in time), of two bodies: Treloar's sheet
 as a solid, blown up by a flow and held at its volume, and a block that is stretched at once and held. The elastic
-material has the same instantaneous modulus; it is blown up by arc length, or stretched. Readings, medians of repetitions:
+material has the same instantaneous modulus; it is blown up by arc length, or stretched. Readings, by medians of
+repetitions:
 
     iteration        one iteration with branches, put on at once, over one elastic iteration
     step             one step in time over one elastic iteration

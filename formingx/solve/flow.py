@@ -94,7 +94,7 @@ class Flow(Run):
         if len(past) == 1:
             return self._along(old, value)
         w = extrapolate.weights(past, time)
-        return w @ [s.x for s in past], w @ [s.control for s in past]
+        return w @ [s.x for s in past], float(w @ [s.control for s in past])
 
     def _along(self, old: State, value: float) -> tuple[np.ndarray, float]:
         """Where the tangent of a state has a value of the measure; the state itself if it has it nowhere near."""

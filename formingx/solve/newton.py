@@ -10,6 +10,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..errors import count, positive
+from .chords import Chords
 from .direct import DirectSolver
 from .settle import Settling
 
@@ -27,10 +28,6 @@ set for the first time do not count: of a slack sheet on a flat plug a hundred p
 
 _UNSETTLED = 2
 """Iterations after which contact points with a history whose status still changes are solved for by themselves."""
-
-CONTRACTION = 0.02
-"""Fall of the residual in an iteration up to which the next one of a step in time keeps the tangent (a chord iteration):
-it costs a residual and a solve, a seventh of what a tangent and its factors cost."""
 
 SMALL = 1e-3
 """Corrections (dimensionless displacement) that may grow without a sign of divergence while the active set changes."""
@@ -131,8 +128,10 @@ class Tolerances:
         if not corrections:
             return False
         residual, last, before = residuals[-1], corrections[-1], corrections[-2] if len(corrections) > 1 else 1.0
-        fall = max(residual / residuals[-2], last / before)
-        ahead = last * (2 * fall if chord else min(1.0, last / before) ** 2)
+        if chord:
+            ahead = 2 * last * max(residual / residuals[-2], last / before)
+            return ahead < self.correction and residual < self.residual
+        ahead = last * min(1.0, last / before) ** 2
         if ahead < self.correction and residual < self.residual:
             return True
         if last < self.correction and residual > 0.3 * residuals[-2]:
@@ -154,6 +153,7 @@ class BorderedNewton:
         new = problem.x.duplicate
         self.F, self.F_control, self.gradient, self.a, self.b = new(), new(), new(), new(), new()
         self.reached = 0.0, 0.0                             # control and its last correction in `correct`
+        self._chords = Chords()
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> bool:
         """`self.b` = dx/dcontrol along the path at a solution; False if the tangent matrix is singular.
@@ -161,7 +161,9 @@ class BorderedNewton:
         `ahead`: see `Problem.tangent`.
         """
         self.problem.tangent(x, control, ahead)
-        if not self.solver.factorise():
+        good = self.solver.factorise()
+        self._chords.made(self.problem.setting if good else None)
+        if not good:
             return False
         self.problem.control_derivative(x, control, self.F_control, ahead)
         self.solver.solve(self.F_control, self.b)
@@ -172,8 +174,8 @@ class BorderedNewton:
                 chords: bool = False) -> tuple[float, list[Iteration]]:
         """Iterate x (in place) and control to convergence; returns the control and the history.
 
-        `old`: the state that they are a guess ahead of, if there is one. `chords`: keep the tangent after the
-        first iteration while the residual falls by `CONTRACTION` in one (Ortega and Rheinboldt 1970, section 7.1).
+        `old`: the state that they are a guess ahead of, if there is one. `chords`: tangents may be kept where
+        that costs less and no contact has kinks (see `Chords`).
 
         Afterwards `self.b` is dx/dcontrol at the solution (to the accuracy of the last correction, or of the tangent
         that was kept).
@@ -187,7 +189,7 @@ class BorderedNewton:
         problem.residual(x, control, self.F)
         self.a.set(0)
         self.reached = control, 0.0
-        chords = chords and not problem.has_kinks
+        self._chords.begin(problem.setting, chords and not problem.has_kinks)
         work0 = moved = 0.0
         active = _ActiveSet(problem)
         points = Settling(problem) if problem.has_history else None
@@ -195,6 +197,8 @@ class BorderedNewton:
             residual = self.F.norm() / (problem.force_scale + UNLOADED)
             if not np.isfinite(residual):
                 raise Failure(f"the forces are not finite: {problem.why_not_finite}", history)
+            if history:
+                self._chords.took(history[-1].chord, residual / (history[-1].residual or 1.0))
             if self.tolerances.met([i.correction for i in history], [*(i.residual for i in history), residual],
                                    bool(history) and history[-1].chord):
                 history.append(Iteration(residual, 0.0, 0.0))
@@ -204,7 +208,7 @@ class BorderedNewton:
             if points:
                 points.look()
             self._check(history, active, moved)
-            chord = chords and bool(history) and residual < CONTRACTION * history[-1].residual
+            chord = self._chords.serve(residual, self.tolerances.residual)
             if not chord and not self.tangent(x, control):
                 raise Failure("the tangent matrix is singular", history)
             step = self._correction(x, control, constraint, history)
