@@ -43,6 +43,7 @@ class Formulation(ABC):
         control: the `Constant` of the dimensionless control; time: process time (UFL), which follows it.
         scales: the user's value (pressure, travel, ...) over the amplitude (`Setting`), for every thing of the scene;
             last, 1 for the time. control_scale: that of the only driven thing, or L.
+        terms: of each material of the scene its `MaterialTerms`.
         coefficients: {(layer, name): `Constant` or UFL coefficient} of the materials' constants.
         histories: what the forms depend on besides fields, control and time (`History`).
         potential: of a step, over stress times volume (UFL, rank 0); energy: the energy stored, likewise: the same
@@ -137,7 +138,8 @@ class Formulation(ABC):
                        for terms in [MaterialTerms(self, material, names)] for name in names}
         self.coefficients = {(layer, name): c for layer, terms in self._terms.items()
                              for name, c in terms.constants.items()}
-        changing = [terms for terms in dict.fromkeys(self._terms.values()) if terms.internal]
+        self.terms = list(dict.fromkeys(self._terms.values()))
+        changing = [terms for terms in self.terms if terms.internal]
         self.histories: list[History] = [MaterialHistory(self, terms) for terms in changing]
         self.potential = self._energy(MaterialTerms.step_energy)
         self.energy = self._energy(MaterialTerms.stored_energy) if changing else self.potential
@@ -146,7 +148,7 @@ class Formulation(ABC):
     def dissipated(self, factor: Any) -> Any:
         """The integral (UFL) of a factor times the power that is dissipated per reference volume."""
         return sum(self.weighted(factor * terms.dissipation(self.elastic_F), terms.names)
-                   for terms in dict.fromkeys(self._terms.values()) if terms.internal)
+                   for terms in self.terms if terms.internal)
 
     def elastic(self, F: Any) -> Any:
         """What strains the material of a deformation gradient F (UFL, shape (3, 3)): all but thermal expansion."""
@@ -162,7 +164,7 @@ class Formulation(ABC):
         Raises:
             InputError: a constant has no value at a temperature.
         """
-        following: list[Any] = [*dict.fromkeys(self._terms.values()), *([self._free] if self._free else [])]
+        following: list[Any] = [*self.terms, *([self._free] if self._free else [])]
         together(self.comm, [one.take_temperature for one in following])
 
     def cells_of(self, layers: list[str]) -> np.ndarray:
