@@ -33,7 +33,7 @@ class Chords:
 
     def serve(self, residual: float, wanted: float) -> bool:
         """True if the tangent serves for the next iteration, from this residual to the one wanted."""
-        return self._allowed and self._fall < _SLOW and residual * self._fall**_SEVERAL < wanted
+        return bool(self._allowed and self._fall < _SLOW and residual * self._fall**_SEVERAL < wanted)
 
     def took(self, chord: bool, fall: float) -> None:
         """An iteration, with a tangent that was kept or not, made the residual fall by a factor."""

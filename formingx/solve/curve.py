@@ -154,8 +154,18 @@ class Curve:
 
     def _solve_from(self, x: np.ndarray, control: float, constraint: Callable, kind: str, old: State,
                     foretold: Callable | None) -> State:
-        guess = foretold(control) if foretold else None
-        return self.solve(x if guess is None else guess, control, constraint, kind, old, foretold is not None)
+        """`solve`; in time with a foretold guess and kept tangents, but not near a fold, which tangents locate."""
+        if foretold is None or not self._runs_along_control(old.slope):
+            return self.solve(x, control, constraint, kind, old)
+        guess = foretold(control)
+        new = self.solve(x if guess is None else guess, control, constraint, kind, old, chords=True)
+        if self._runs_along_control((new.control - old.control) / self.distance(old, new)):
+            return new
+        return self.solve(new.x, new.control, constraint, kind, old)
+
+    def _runs_along_control(self, slope: float) -> bool:
+        """True if the control makes the greater part of a path of this slope, whose fold is then not near."""
+        return slope**2 * CONTROL_WEIGHT > 0.5
 
     def unit_slope(self, state: State) -> float:
         """dcontrol by arc length at a state."""
