@@ -1,7 +1,8 @@
-"""How far a body has relaxed: stress at the pole over that in equilibrium, elastic stretches, tangents that are kept."""
+"""How far a body has relaxed: stress over that in equilibrium, elastic stretches of branches; what its steps cost."""
 
 import csv
 
+import ffcx.codegeneration.jit
 import numpy as np
 import pytest
 
@@ -99,3 +100,11 @@ def test_tangents_that_are_kept_change_no_result():
     assert max(state.history[-1].residual for state in kept.states[1:]) < 1e-8
     for column in ("pressure", "pole_stretch", "dissipated_energy"):
         assert kept[column] == pytest.approx(exact[column], rel=1e-7, abs=1e-12)
+
+
+def test_nothing_is_compiled_for_other_constants(monkeypatch):
+    run(block(), AT_ONCE, Stage("hold", duration=1.0))
+    monkeypatch.setattr(ffcx.codegeneration.jit, "_compile_objects", lambda *_, **__: pytest.fail("a form is compiled"))
+    other = fx.Viscoelastic(fx.NeoHookean(c10=0.2), [(1.0, 2.0), (3.0, 4.0)])
+    path = run(block(other), AT_ONCE, Stage("hold", duration=1.0))
+    assert path["pole_stress_ratio"][0] == pytest.approx(11.0, rel=1e-9)
