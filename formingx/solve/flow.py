@@ -90,7 +90,7 @@ class Flow(Run):
 
     def _foretold(self, old: State, time: float, value: float) -> tuple[np.ndarray, float]:
         """(x, control) at a time: on the polynomial through the last states, or along the tangent of the first."""
-        past = extrapolate.before(self.states, time, self._order + 1)
+        past = extrapolate.before(self.states, time, extrapolate.CUBIC - self.problem.has_kinks)
         if len(past) == 1:
             return self._along(old, value)
         w = extrapolate.weights(past, time)

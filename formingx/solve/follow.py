@@ -238,19 +238,14 @@ class Run:
     @property
     def _foretold(self) -> Callable | None:
         """Of a step in which a body relaxes: x at a control, or None where the tangent of the last state is better."""
-        if self._time_error is None or not self.problem.setting.rate[-1]:
+        if self._time_error is None or not self.problem.setting.rate[-1] or self.problem.has_kinks:
             return None
 
         def x(control: float) -> np.ndarray | None:
             time = self.problem.forms.time_at(control)
-            past = extrapolate.before(self.states, time, self._order + 1)
+            past = extrapolate.before(self.states, time, extrapolate.CUBIC)
             return extrapolate.weights(past, time) @ [s.x for s in past] if len(past) > 2 else None
         return x
-
-    @property
-    def _order(self) -> int:
-        """Of the polynomial on which states in time are foretold: contact has kinks."""
-        return 2 if self.problem.has_kinks else 3
 
     def _error_in_time(self, new: State) -> float:
         """Of the step to a state, over what is allowed; raises `Inaccurate` if it is much more."""
