@@ -9,7 +9,9 @@ import pytest
 import formingx as fx
 from formingx import Stage
 from formingx.results.files.fields import Fields
+from formingx.solve import extrapolate
 from formingx.solve.newton import Tolerances
+from formingx.solve.state import State
 
 RUBBER = fx.NeoHookean(c10=0.05)
 BRANCHES = [(0.3, 0.5), (0.4, 5.0)]
@@ -84,6 +86,18 @@ def test_a_layer_without_branches_has_no_elastic_stretch():
     fields = Fields(path)
     found, low = fields.of(path.last)["elastic_stretch_1"][..., 0], fields.points[..., 1].mean(axis=1) < 0.5
     assert np.isnan(found[~low]).all() and np.all(found[low] > 1)
+
+
+def test_a_cubic_in_time_is_foretold_exactly():
+    """From states far enough apart, and none from before a jump."""
+    def state(time, **kind):
+        return State(np.array([time**3 - time, 2.0]), 0.0, np.zeros(2), 1.0, time=time, **kind)
+    states = [state(t) for t in (0.0, 0.3, 0.7, 1.2, 1.2 + 1e-9)]
+    past = extrapolate.before(states, 1.6, extrapolate.CUBIC)
+    assert [s.time for s in past] == [0.0, 0.3, 0.7, 1.2 + 1e-9]
+    assert extrapolate.weights(past, 1.6) @ [s.x for s in past] == pytest.approx([1.6**3 - 1.6, 2.0], rel=1e-12)
+    states[2] = state(0.7, kind="jump")
+    assert [s.time for s in extrapolate.before(states, 1.6, extrapolate.CUBIC)] == [0.7, 1.2 + 1e-9]
 
 
 def test_tangents_that_are_kept_change_no_result():
