@@ -1,7 +1,13 @@
-"""What time costs: a step of a material with two branches over an iteration of the elastic one, in processor time.
+"""What time costs: a step of a material with two branches over an iteration, and a step, of the elastic one.
 
-Treloar's sheet as a solid, blown up through its pressure maximum by a flow (relaxing; its steps are those of the
-default accuracy) and by arc length (elastic, the same instantaneous modulus).
+Processor time of a step, all included (limit points, columns, error in time), of two bodies: Treloar's sheet
+as a solid, blown up by a flow and held at its volume, and a block that is stretched at once and held. The elastic
+material has the same instantaneous modulus; it is blown up by arc length, or stretched. Readings, by medians of
+repetitions:
+
+    iteration        one iteration with branches, put on at once, over one elastic iteration
+    step             one step in time over one elastic iteration
+    step_over_step   the same over one elastic step
 """
 
 import argparse
@@ -9,12 +15,14 @@ import json
 import time
 from pathlib import Path
 
+import numpy as np
+
 import formingx as fx
 
 RUBBER = fx.NeoHookean(c10=0.05)
 RELAXING = fx.Viscoelastic(RUBBER, branches=[(0.3, 0.5), (0.4, 5.0)])
 ELASTIC = fx.NeoHookean(c10=0.4)
-VOLUME = 2.0
+VOLUME, STRETCH = 2.0, 2.0
 
 
 def sheet(material, elements):
@@ -23,12 +31,58 @@ def sheet(material, elements):
                     loads=[fx.Pressure("bottom", name="air")])
 
 
-def cost(material, stage, elements, accuracy):
-    """(seconds of the processor, steps, iterations) from the first state on."""
-    path = fx.Process(sheet(material, elements)).run([stage], accuracy=accuracy, max_steps=5000, progress=False,
-                                                     record={"cpu": lambda problem: time.process_time()})
-    seconds = path["cpu"][-1] - path["cpu"][0]
-    return seconds, path.counts.steps + path.counts.failures, path.counts.iterations
+def block(material, elements):
+    side = round((elements[0] * elements[1]) ** 0.5)
+    return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(side, side)), materials=material,
+                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
+                              fx.Displaced("top", "z", name="pull")])
+
+
+def stages(body):
+    """(at once, in time) for a body."""
+    if body is block:
+        once = fx.Stage("at once", drive="pull", until=fx.travel(STRETCH - 1))
+        return [once], [once, fx.Stage("hold", duration=20.0)]
+    table = [(0, 0), (4, VOLUME), (24, VOLUME)]
+    return ([fx.Stage("at once", drive="air", until=fx.enclosed_volume(VOLUME))],
+            [fx.Stage("blow", drive="air", follow={fx.enclosed_volume: table[:2]}),
+             fx.Stage("hold", drive="air", follow={fx.enclosed_volume: table[1:]})])
+
+
+def cost(body, material, schedule, elements, accuracy):
+    """{stage: (seconds of the processor, steps, iterations)} from its first state on, failed steps counted, too."""
+    path = fx.Process(body(material, elements)).run(schedule, accuracy=accuracy, max_steps=5000, progress=False,
+                                                    record={"cpu": lambda problem: time.process_time()})
+    found = {}
+    for stage in schedule:
+        states = [s for s in path.states if s.stage == stage.name]
+        first, last = (state.stepping["counts"] for state in (states[0], states[-1]))
+        steps, failures, iterations = (last[k] - first[k] for k in ("steps", "failures", "iterations"))
+        found[stage.name] = (states[-1].measures["cpu"] - states[0].measures["cpu"], steps + failures, iterations)
+    return found
+
+
+def compare(body, elements, accuracy, repeat):
+    """{reading: value} of a body."""
+    once, in_time = stages(body)
+    rows = []
+    for _ in range(repeat):                                  # one after the other: the machine does other things, too
+        elastic = cost(body, ELASTIC, once, elements, accuracy)["at once"]
+        sudden = cost(body, RELAXING, once, elements, accuracy)["at once"]
+        rows.append((elastic, sudden, *cost(body, RELAXING, in_time, elements, accuracy).values()))
+    seconds = np.median([[s for s, *_ in row] for row in rows], axis=0)
+    steps, iterations = np.array([row[1:] for row in rows[0]]).T
+    iteration, step = seconds[0] / iterations[0], seconds[0] / steps[0]
+    name = body.__name__
+    found = {f"{name}/elastic_iteration_ms": 1e3 * iteration, f"{name}/elastic_iterations_per_step":
+             iterations[0] / steps[0], f"{name}/iteration": seconds[1] / iterations[1] / iteration}
+    for k, stage in enumerate(in_time, 2):
+        if stage is not once[0]:
+            key = f"{name}/{stage.name}"
+            found |= {f"{key}/steps": int(steps[k]), f"{key}/iterations_per_step": iterations[k] / steps[k],
+                      f"{key}/step": seconds[k] / steps[k] / iteration,
+                      f"{key}/step_over_step": seconds[k] / steps[k] / step}
+    return found
 
 
 def main():
@@ -36,18 +90,13 @@ def main():
     options.add_argument("--out", type=Path, default=Path("results/time_cost"))
     options.add_argument("--elements", type=int, nargs=2, default=(40, 2))
     options.add_argument("--accuracy", type=float, default=2e-3)
+    options.add_argument("--repeat", type=int, default=5)
     args = options.parse_args()
-    elastic = fx.Stage("blow", drive="air", until=fx.enclosed_volume(VOLUME))
-    relaxing = fx.Stage("blow", drive="air", follow={fx.enclosed_volume: [(0, 0), (4, VOLUME)]})
-    seconds, steps, iterations = cost(ELASTIC, elastic, tuple(args.elements), args.accuracy)
-    iteration = seconds / iterations
-    print(f"elastic: {steps} steps, {iterations} iterations, {1e3 * iteration:.2f} ms an iteration")
-    found = {"elastic_iteration_seconds": iteration, "elastic_iterations_per_step": iterations / steps}
-    seconds, steps, iterations = cost(RELAXING, relaxing, tuple(args.elements), args.accuracy)
-    found |= {"step_seconds": seconds / steps, "iterations_per_step": iterations / steps,
-              "step_over_elastic_iteration": seconds / steps / iteration}
-    print(f"two branches: {steps} steps, {iterations} iterations, {1e3 * seconds / steps:.2f} ms a step:"
-          f" {found['step_over_elastic_iteration']:.2f} elastic iterations")
+    found = {}
+    for body in (sheet, block):
+        found |= compare(body, tuple(args.elements), args.accuracy, args.repeat)
+    for key, value in found.items():
+        print(f"{key:40} {value:8.3g}")
     args.out.mkdir(parents=True, exist_ok=True)
     (args.out / "summary.json").write_text(json.dumps(found, indent=1))
 

@@ -43,12 +43,13 @@ class Formulation(ABC):
         control: the `Constant` of the dimensionless control; time: process time (UFL), which follows it.
         scales: the user's value (pressure, travel, ...) over the amplitude (`Setting`), for every thing of the scene;
             last, 1 for the time. control_scale: that of the only driven thing, or L.
+        terms: of each material of the scene its `MaterialTerms`.
         coefficients: {(layer, name): `Constant` or UFL coefficient} of the materials' constants.
         histories: what the forms depend on besides fields, control and time (`History`).
         potential: of a step, over stress times volume (UFL, rank 0); energy: the energy stored, likewise: the same
             without histories. dissipation: power, over stress times volume (UFL, rank 0), or None.
-        residual: dpotential/dw - external virtual work (UFL, rank 1); control_derivative: its derivative by the
-            control, or None.
+        residual: dpotential/dw - external virtual work (UFL, rank 1); control_derivative, time_derivative: its
+            derivative by the control, in the loads and by way of the time in materials, or None.
         slack_at_rest: True if the body at rest has no stiffness in some direction.
     """
 
@@ -85,7 +86,7 @@ class Formulation(ABC):
         self.scales += [self.length] * (len(scene.things) - len(self.scales)) + [1.0]
         self.control_scale = next((s for s, t in zip(self.scales, scene.things) if t is scene.driven), self.length)
         self._take_materials()
-        self.residual, self.control_derivative = self._residual(body)
+        self.residual, self.control_derivative, self.time_derivative = self._residual(body)
 
     @abstractmethod
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
@@ -137,7 +138,8 @@ class Formulation(ABC):
                        for terms in [MaterialTerms(self, material, names)] for name in names}
         self.coefficients = {(layer, name): c for layer, terms in self._terms.items()
                              for name, c in terms.constants.items()}
-        changing = [terms for terms in dict.fromkeys(self._terms.values()) if terms.internal]
+        self.terms = list(dict.fromkeys(self._terms.values()))
+        changing = [terms for terms in self.terms if terms.internal]
         self.histories: list[History] = [MaterialHistory(self, terms) for terms in changing]
         self.potential = self._energy(MaterialTerms.step_energy)
         self.energy = self._energy(MaterialTerms.stored_energy) if changing else self.potential
@@ -146,7 +148,7 @@ class Formulation(ABC):
     def dissipated(self, factor: Any) -> Any:
         """The integral (UFL) of a factor times the power that is dissipated per reference volume."""
         return sum(self.weighted(factor * terms.dissipation(self.elastic_F), terms.names)
-                   for terms in dict.fromkeys(self._terms.values()) if terms.internal)
+                   for terms in self.terms if terms.internal)
 
     def elastic(self, F: Any) -> Any:
         """What strains the material of a deformation gradient F (UFL, shape (3, 3)): all but thermal expansion."""
@@ -162,7 +164,7 @@ class Formulation(ABC):
         Raises:
             InputError: a constant has no value at a temperature.
         """
-        following: list[Any] = [*dict.fromkeys(self._terms.values()), *([self._free] if self._free else [])]
+        following: list[Any] = [*self.terms, *([self._free] if self._free else [])]
         together(self.comm, [one.take_temperature for one in following])
 
     def cells_of(self, layers: list[str]) -> np.ndarray:
@@ -256,12 +258,13 @@ class Formulation(ABC):
         for constant, value in zip(self._time, (setting.base[-1], setting.rate[-1])):
             constant.value = value
 
-    def _residual(self, body: LoadedBody) -> tuple[Any, Any]:
-        """See `residual` and `control_derivative`; the control stands in driven loads, and in materials by the time."""
+    def _residual(self, body: LoadedBody) -> tuple[Any, Any, Any]:
+        """`residual`, `control_derivative` and `time_derivative`."""
         v, control = self.test_function(), self._control
         residual = ufl.derivative(self.potential, self.w, v)
         timed = ufl.Form([i for i in self.potential.integrals() if self.control in extract_constants(i.integrand())])
-        terms = [ufl.derivative(ufl.diff(timed, control), self.w, v)] if timed.integrals() else []
+        by_time = ufl.derivative(ufl.diff(timed, control), self.w, v) if timed.integrals() else None
+        terms = []
         self._loads = []
         for load, scale in zip(self.scene.loads, self.scales):
             base, rate = self.constant(0.0 if load.driven else load.value), self.constant(0.0)
@@ -271,4 +274,4 @@ class Formulation(ABC):
             residual -= self._scale * work
             if load.driven:
                 terms.append(-self._scale * ufl.diff(work, control))
-        return residual, sum(terms[1:], terms[0]) if terms else None
+        return residual, sum(terms[1:], terms[0]) if terms else None, by_time

@@ -65,23 +65,26 @@ class MaterialHistory:
         self._updated = fem.Expression(ufl.as_vector(flat), terms.places, jit_options=_compat.JIT_OPTIONS)
         weights = terms.material.error_weights
         self.weights = {name: weights.get(name, 1.0) for name in terms.internal}     # of errors in time
+        self._now: Memory | None = None                              # what was put or got last, if it still holds
         self.start()
 
     def start(self) -> None:
         """See `History`."""
+        self._now = None
         for name, rest in self._terms.material.internal.items():
             self._set(name, self._cells, np.asarray(rest, dtype=float).ravel())
         self._terms.start.value = 0.0
 
     def advance(self, x: np.ndarray, control: float) -> None:
         """See `History`."""
+        self._now = None
         for name, values in self._after(self._cells).items():
             self._set(name, self._cells, values)
         self._terms.start.value = self._forms.time_at(control)
 
     def foretell(self, control: float) -> Memory:
         """What `get` would give, were the state that the forms hold now accepted."""
-        return Memory(self._forms.time_at(control), self._after(self._own))
+        return _unchangeable(Memory(self._forms.time_at(control), self._after(self._own)))
 
     def _after(self, cells: np.ndarray) -> dict[str, np.ndarray]:
         """{name: values in some cells, shape (cells, points, components)} at the end of the step."""
@@ -92,17 +95,20 @@ class MaterialHistory:
 
     def get(self) -> Memory:
         """See `History`."""
-        values = {name: self._array(name)[self._points(name, self._own)] for name in self._sizes}
-        for array in values.values():
-            array.setflags(write=False)
-        return Memory(float(self._terms.start.value), values)
+        if self._now is None:
+            values = {name: self._array(name)[self._points(name, self._own)] for name in self._sizes}
+            self._now = _unchangeable(Memory(float(self._terms.start.value), values))
+        return self._now
 
     def put(self, memory: Memory) -> None:
         """See `History`."""
+        if memory is self._now:
+            return
         for name, values in memory.values.items():
             self._set(name, self._own, values)
             self._terms.internal[name].x.scatter_forward()
         self._terms.start.value = memory.time
+        self._now = memory
 
     def save(self, memory: Memory) -> dict[str, Any]:
         """See `History`."""
@@ -133,3 +139,9 @@ class MaterialHistory:
 
     def _set(self, name: str, cells: np.ndarray, values: np.ndarray) -> None:
         self._array(name)[self._points(name, cells)] = values
+
+
+def _unchangeable(memory: Memory) -> Memory:
+    for array in memory.values.values():
+        array.setflags(write=False)
+    return memory

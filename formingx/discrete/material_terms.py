@@ -92,6 +92,14 @@ class MaterialTerms:
             return self.material.strain_energy(F, **self.constants)
         return self.material.stored_energy(F, self.internal, **self.constants)
 
+    def equilibrium_energy(self, F: Any) -> Any:
+        """The energy that is left when all has relaxed, per reference volume (UFL, stress), or None."""
+        return self.material.equilibrium_energy(F, **self.constants)
+
+    def elastic_stretches(self, F: Any) -> list[Any]:
+        """Of each relaxing branch its largest principal elastic stretch (UFL)."""
+        return self.material.elastic_stretches(F, self.internal, **self.constants)
+
     def dissipation(self, F: Any) -> Any:
         """The power that is dissipated, per reference volume (UFL, stress over time)."""
         return self.material.dissipation(F, self.internal, **self.constants)

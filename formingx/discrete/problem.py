@@ -68,7 +68,8 @@ class Problem:
         self._buffer = la.vector(index_map, 1)
         tangent = ufl.derivative(forms.residual, forms.w, ufl.TrialFunction(forms.space))
         self._residual = forms.compile(forms.residual)
-        self._by_control = forms.control_derivative and forms.compile(forms.control_derivative)
+        self._by_control, self._by_time = (form and forms.compile(form)
+                                           for form in (forms.control_derivative, forms.time_derivative))
         self.contacts = [(ContactNodes if contact.points == "nodes" else ContactPoints)(forms, contact, self.assemble)
                          for contact in scene.contacts]
         if scene.heat is not None:                              # after the materials: they relax at the old temperature
@@ -283,6 +284,8 @@ class Problem:
         """out = dF/dcontrol at (x, control); `ahead`: as in `tangent`."""
         self.set_state(x, control)
         values = self.assemble(self._by_control) if self._by_control else np.zeros(self._n)
+        if self._by_time and self.setting.rate[-1]:
+            values += self.assemble(self._by_time)
         if self._by_motion and np.any(self._stage.rate):
             values += self.assemble(self._by_motion)
         for contact in self.touching:

@@ -70,6 +70,17 @@ class Material:
         """The energy per reference volume that is stored at F, with the internal variables as they are then."""
         return self.strain_energy(F, **constants)
 
+    def equilibrium_energy(self, F: Any, **constants: Any) -> Any:
+        """The energy per reference volume that is left at F when all has relaxed; None: none is left, or not known."""
+        return None if self.internal else self.strain_energy(F, **constants)
+
+    def elastic_stretches(self, F: Any, internal: dict[str, Any], **constants: Any) -> list[Any]:
+        """Of each relaxing branch its largest principal elastic stretch, with the internal variables as they are then.
+
+        UFL scalars; 1 when the branch has relaxed, and that of F itself (without change of volume) before it does.
+        """
+        return []
+
     def dissipation(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
         """The power per reference volume that is dissipated there, stress over time; 0 without a history."""
         return ufl.as_ufl(0.0)

@@ -127,6 +127,20 @@ class RelaxingMaterial(HistoryTests, Material):
         total = sum(mu for mu, _ in self.branches) + (0.0 if rest is None else rest.shear_modulus)
         return {"C": 0.0} | {f"{self._tensor}_{k}": mu / total for k, mu, _ in self._branches(self.parameters)}
 
+    def equilibrium_energy(self, F, **constants):
+        return None if self._equilibrium is None else self._relaxed_energy(F, constants)
+
+    def elastic_stretches(self, F, internal, **constants):
+        """See `Material`: the roots of the eigenvalues of F M F^T, M = Cv^-1 or A, J^(-1/3) F for F."""
+        scale = kinematics.volume_ratio(F) ** (-2 / 3)
+        found = []
+        for k, *_ in self._branches(constants):
+            M = self._metric(_entries(internal[f"{self._tensor}_{k}"]))
+            B = scale * F * ufl.as_tensor([[M[0], M[2], 0], [M[2], M[1], 0], [0, 0, M[3]]]) * F.T
+            radius = ufl.sqrt((B[0, 0] - B[1, 1]) ** 2 + 4 * B[0, 1] ** 2)
+            found.append(ufl.sqrt(ufl.max_value((B[0, 0] + B[1, 1] + radius) / 2, B[2, 2])))
+        return found
+
     def strain_energy(self, F, **constants):
         """The energy of F before anything has flowed."""
         mu = sum(mu for _, mu, _ in self._branches(constants))
@@ -253,7 +267,11 @@ class RelaxingMaterial(HistoryTests, Material):
         while f"mu_{(k := k + 1)}" in constants and f"tau_{k}" in constants:
             yield k, constants[f"mu_{k}"], constants[f"tau_{k}"]
 
-    # the law of a branch: energies over mu/2, times over tau, tensors as entries, C with det C = 1
+    # the law of a branch: energies over mu/2, times over tau, tensors as entries, C with det C = 1; `_metric` is M of
+    # the elastic strain F M F^T
+
+    def _metric(self, A: Entries) -> Entries:
+        raise NotImplementedError
 
     def _stored(self, C: Entries, A: Entries) -> Any:
         raise NotImplementedError
@@ -319,11 +337,14 @@ class Viscoelastic(RelaxingMaterial):
             difference = _sum(difference, _sum(second, first, -1), mu)
         return ufl.sqrt(ufl.max_value(_deviator_squared(C, difference), 0))
 
+    def _metric(self, Cv):
+        return _cofactor(Cv)
+
     def _stored(self, C, Cv):
-        return _inner(C, _cofactor(Cv)) - 3
+        return _inner(C, self._metric(Cv)) - 3
 
     def _dissipated(self, C, Cv):
-        return _deviator_squared(C, _cofactor(Cv))
+        return _deviator_squared(C, self._metric(Cv))
 
     def _step(self, C, before, Cv, x):
         G, x = self._start(before, Cv, x)
@@ -360,6 +381,9 @@ class TransientNetwork(RelaxingMaterial):
     """
 
     _tensor = "A"
+
+    def _metric(self, A):
+        return A
 
     def _stored(self, C, A):
         return _inner(C, A) - 3 - ufl.ln(_determinant(A))

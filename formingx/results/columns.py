@@ -9,6 +9,7 @@ from ..discrete.tooling import Tooling
 from ..errors import InputError
 from ..solve.forces import resisting
 from ..solve.targets import Amplitude, Bound, Target, bind_pole_height, bind_pole_stretch, bind_volume
+from .evaluate.relaxed import PoleStressRatio
 
 Measure = Target | Callable[[Any], float]
 """What a user's own column records, see `formingx.trace`."""
@@ -51,6 +52,17 @@ class _Reaction(_Recorded):
 
     def value(self, x, control):
         return self._problem.reaction(self._number, x, control)
+
+
+class _Ratio(_Recorded):
+    """See `PoleStressRatio`."""
+
+    def __init__(self, problem):
+        self._problem, self._ratio = problem, PoleStressRatio(problem)
+
+    def value(self, x, control):
+        self._problem.set_state(x, control)
+        return self._ratio.now()
 
 
 class _Own(_Recorded):
@@ -102,7 +114,8 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     name), and tool_force where there is one tool. With a driven support: support_force (of the body on it, along its
     component). Where several things can be driven each has its column, plug_travel for one named "plug"
     (`Scene.column`), a support plug_force. `timed`: process_time too. With materials that relax: dissipated_power
-    (stress length^3 over time), and from it, in a run, dissipated_energy (stress length^3).
+    (stress length^3 over time), and from it, in a run, dissipated_energy (stress length^3); with an axis and a known
+    equilibrium, pole_stress_ratio: the Mises stress at the pole over the one in equilibrium (`PoleStressRatio`).
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
     found: dict[str, Bound] = {"process_time": Amplitude(problem, -1)} if timed else {}
@@ -123,6 +136,8 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
                                     lambda v: (v / volume) ** 0.5)
     if forms.dissipation is not None:
         found["dissipated_power"] = _Scalar(problem, forms.dissipation, lambda v: v * forms.stress * volume)
+        if PoleStressRatio.known(problem):
+            found["pole_stress_ratio"] = _Ratio(problem)
     if problem.contacts:
         found["contact_length"] = _Nodal(problem, lambda c, *at: c.contact_length(*at), sum)
         found["penetration"] = _Nodal(problem, lambda c, *at: c.largest_penetration(*at), max)

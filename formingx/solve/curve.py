@@ -93,11 +93,12 @@ class Curve:
             raise Failure("the tangent is singular: something in the body is held no more, or has no stiffness", [])
         return self._state(control, [], "start", None)
 
-    def solve(self, x: np.ndarray, control: float, constraint: Callable, kind: str, before: State) -> State:
-        """The solution of F = 0 and of the constraint, from a guess; raises `Failure`."""
+    def solve(self, x: np.ndarray, control: float, constraint: Callable, kind: str, before: State,
+              chords: bool = False) -> State:
+        """The solution of F = 0 and of the constraint, from a guess; raises `Failure`. chords: see `BorderedNewton`."""
         self._x.array_w[:] = x
         try:
-            control, history = self.newton.correct(self._x, control, constraint, before)
+            control, history = self.newton.correct(self._x, control, constraint, before, chords)
         except Failure as failure:
             self._iterations += len(failure.history)
             failure.attempt = self._attempt()
@@ -138,14 +139,33 @@ class Curve:
             low, high = (middle, high) if work(middle) < 0 else (low, middle)
         return sign * high * rest.direction
 
-    def step(self, old: State, length: float) -> State:
-        """One step: predict along the tangent, correct in the plane normal to it at that distance (4.14 to 4.31)."""
-        x, control = old.x + length * old.direction, old.control + length * old.slope
-        return self.solve(x, control, self._plane(old, x, control), "step", old)
+    def step(self, old: State, length: float, foretold: Callable | None = None) -> State:
+        """One step: predict along the tangent, correct in the plane normal to it at that distance (4.14 to 4.31).
 
-    def step_to(self, old: State, length: float, equation: Callable) -> State:
-        """Predict along the tangent, correct to where an equation such as "measure = target" holds."""
-        return self.solve(old.x + length * old.direction, old.control + length * old.slope, equation, "target", old)
+        foretold: of a step in time: x at a control, or None if the tangent is the better guess.
+        """
+        x, control = old.x + length * old.direction, old.control + length * old.slope
+        return self._solve_from(x, control, self._plane(old, x, control), "step", old, foretold)
+
+    def step_to(self, old: State, length: float, equation: Callable, foretold: Callable | None = None) -> State:
+        """Predict along the tangent, correct to where an equation such as "measure = target" holds; see `step`."""
+        x, control = old.x + length * old.direction, old.control + length * old.slope
+        return self._solve_from(x, control, equation, "target", old, foretold)
+
+    def _solve_from(self, x: np.ndarray, control: float, constraint: Callable, kind: str, old: State,
+                    foretold: Callable | None) -> State:
+        """`solve`; in time with a foretold guess and kept tangents, but not near a fold, which tangents locate."""
+        if foretold is None or not self._runs_along_control(old.slope):
+            return self.solve(x, control, constraint, kind, old)
+        guess = foretold(control)
+        new = self.solve(x if guess is None else guess, control, constraint, kind, old, chords=True)
+        if self._runs_along_control((new.control - old.control) / self.distance(old, new)):
+            return new
+        return self.solve(new.x, new.control, constraint, kind, old)
+
+    def _runs_along_control(self, slope: float) -> bool:
+        """True if the control makes the greater part of a path of this slope, whose fold is then not near."""
+        return slope**2 * CONTROL_WEIGHT > 0.5
 
     def unit_slope(self, state: State) -> float:
         """dcontrol by arc length at a state."""

@@ -10,8 +10,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from . import extrapolate
 from .follow import Inaccurate, Run
-from .newton import Failure
+from .newton import Failure, tangents
 from .state import Record, State
 from .stepping import StepControl
 from .targets import Bound, Target, is_met, process_time
@@ -56,7 +57,7 @@ class Flow(Run):
                 new = self._at(old, event if dt == left else old.time + dt)
                 error = self._error_in_time(new)
                 if dt < 1.5 * self.step.length * self._duration:
-                    self.step.accepted(len(new.history) - 1, error)
+                    self.step.accepted(tangents(new.history), error)
                 return [self._met_before(old, new)]
             except Inaccurate as found:
                 self.record.counts.failures += 1
@@ -82,19 +83,18 @@ class Flow(Run):
         if problem.reach(old.x, old.control, by, slope, 1.0) < 0.5:
             raise Failure("too much would come into contact in one step", [])
         problem.prepare(old.x, old.control, by, slope, 1.0)
-        new = self.curve.solve(x, control, self._measure.equation(value), "step", old)
+        new = self.curve.solve(x, control, self._measure.equation(value), "step", old, chords=True)
         if problem.too_far(old.x, old.control, new.x, new.control):
             raise Failure("too much came into contact in one step", [])
         return new
 
     def _foretold(self, old: State, time: float, value: float) -> tuple[np.ndarray, float]:
-        """(x, control) at a time: on the parabola through the last states, or along the tangent of the first."""
-        past = [s for k, s in enumerate(self.states[-3:]) if not k or s.time > self.states[-3:][k - 1].time]
+        """(x, control) at a time: on the polynomial through the last states, or along the tangent of the first."""
+        past = extrapolate.before(self.states, time, extrapolate.CUBIC - self.problem.has_kinks)
         if len(past) == 1:
             return self._along(old, value)
-        t = np.array([s.time for s in past])
-        weights = [np.prod([(time - b) / (a - b) for b in t if b != a]) for a in t]
-        return sum(w * s.x for w, s in zip(weights, past)), sum(w * s.control for w, s in zip(weights, past))
+        w = extrapolate.weights(past, time)
+        return w @ [s.x for s in past], float(w @ [s.control for s in past])
 
     def _along(self, old: State, value: float) -> tuple[np.ndarray, float]:
         """Where the tangent of a state has a value of the measure; the state itself if it has it nowhere near."""

@@ -10,17 +10,18 @@ import contextlib
 import itertools
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..errors import ConvergenceError
+from . import extrapolate
 from .curve import Curve
 from .diagnose import diagnose
 from .jump import AHEAD, jump
-from .newton import Failure
+from .newton import Failure, tangents
 from .state import Record, State
 from .stepping import StepControl
 from .targets import Amplitude, Bound, Target, is_met
@@ -224,9 +225,9 @@ class Run:
         """One step of a length, or to a target that is within reach; raises `Failure`, `Inaccurate` or `_Late`."""
         self.problem.prepare(old.x, old.control, old.direction, old.slope, reach, ends=True)
         if target is None:
-            new = self.curve.step(old, length)
+            new = self.curve.step(old, length, self._foretold)
         else:
-            new = self.curve.step_to(old, reach, bound.equation(target.value))
+            new = self.curve.step_to(old, reach, bound.equation(target.value), self._foretold)
             if not 0 < self.curve.progress(old, new) < 2 * length:
                 raise _Astray("the target was met on a far part of the path", [])
             new.met = target
@@ -240,8 +241,20 @@ class Run:
         error = self._error_in_time(new)
         states, self._ahead = self._sorted_into(old, new), AHEAD
         if target is None and length == self.step.length:   # not one that contact has made shorter
-            self.step.accepted(len(new.history) - 1, error)
+            self.step.accepted(tangents(new.history), error)
         return states
+
+    @property
+    def _foretold(self) -> Callable | None:
+        """Of a step in which a body relaxes: x at a control, or None where the tangent of the last state is better."""
+        if self._time_error is None or not self.problem.setting.rate[-1] or self.problem.has_kinks:
+            return None
+
+        def x(control: float) -> np.ndarray | None:
+            time = self.problem.forms.time_at(control)
+            past = extrapolate.before(self.states, time, extrapolate.CUBIC)
+            return extrapolate.weights(past, time) @ [s.x for s in past] if len(past) > 2 else None
+        return x
 
     def _error_in_time(self, new: State) -> float:
         """Of the step to a state, over what is allowed; raises `Inaccurate` if it is much more."""

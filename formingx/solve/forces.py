@@ -53,7 +53,8 @@ class _SupportForce(Bound):
         along.x.array[problem.driven_unknowns(number)] = 1.0
         total = ufl.action(forms.residual, along)
         self._derivative = forms.compile(ufl.derivative(total, forms.w, forms.test_function()))
-        self._by_control = forms.control_derivative and forms.compile(ufl.action(forms.control_derivative, along))
+        self._by_control = [forms.compile(ufl.action(form, along))
+                            for form in (forms.control_derivative, forms.time_derivative) if form is not None]
         self.size = self._scale
 
     def value(self, x, control):
@@ -65,7 +66,7 @@ class _SupportForce(Bound):
         def c(x, control, gradient):
             force = self.value(x, control)
             problem.fill(gradient, -problem.assemble(self._derivative))
-            slope = -problem.assemble_scalar(self._by_control) if self._by_control else 0.0
+            slope = -sum(problem.assemble_scalar(form) for form in self._by_control)
             return (force - target) / self._scale, slope
         return c
 

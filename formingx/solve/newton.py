@@ -10,6 +10,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..errors import count, positive
+from .chords import Chords
 from .direct import DirectSolver
 from .settle import Settling
 
@@ -36,12 +37,18 @@ class Iteration(NamedTuple):
     """One Newton iteration: what it found and what it did. The last entry of a history is the converged state.
 
     residual: |F| before it, over the norm of the support forces; correction: |dx|/(|x| + AT_REST), criterion (3.5.1);
-    work: |F . dx| over its first value, criterion (3.5.2).
+    work: |F . dx| over its first value, criterion (3.5.2). chord: with the tangent of an iteration before it.
     """
 
     residual: float
     correction: float
     work: float
+    chord: bool = False
+
+
+def tangents(history: list[Iteration]) -> int:
+    """How many iterations had a tangent of their own; the last entry is the converged state."""
+    return sum(not iteration.chord for iteration in history[:-1])
 
 
 class Failure(Exception):
@@ -107,8 +114,11 @@ class Tolerances:
         count("Tolerances: iterations", self.iterations)
         count("Tolerances: settling", self.settling)
 
-    def met(self, corrections: list[float], residuals: list[float]) -> bool:
+    def met(self, corrections: list[float], residuals: list[float], chord: bool = False) -> bool:
         """True if a state with these corrections behind it, and these residuals (its own last), has converged.
+
+        `chord`: the last correction was one of a chord iteration, which converges linearly: the next one is foretold
+        from the fall of residuals and corrections, and doubled.
 
         Corrections that no longer shrink, below 1e-7, or that are below 1e-11, have met round-off (a flat thin sheet:
         near 1e-8): then nothing better is to be had, and the residual may be what round-off leaves. A
@@ -118,6 +128,9 @@ class Tolerances:
         if not corrections:
             return False
         residual, last, before = residuals[-1], corrections[-1], corrections[-2] if len(corrections) > 1 else 1.0
+        if chord:
+            ahead = 2 * last * max(residual / residuals[-2], last / before)
+            return ahead < self.correction and residual < self.residual
         ahead = last * min(1.0, last / before) ** 2
         if ahead < self.correction and residual < self.residual:
             return True
@@ -140,6 +153,7 @@ class BorderedNewton:
         new = problem.x.duplicate
         self.F, self.F_control, self.gradient, self.a, self.b = new(), new(), new(), new(), new()
         self.reached = 0.0, 0.0                             # control and its last correction in `correct`
+        self._chords = Chords()
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> bool:
         """`self.b` = dx/dcontrol along the path at a solution; False if the tangent matrix is singular.
@@ -147,19 +161,24 @@ class BorderedNewton:
         `ahead`: see `Problem.tangent`.
         """
         self.problem.tangent(x, control, ahead)
-        if not self.solver.factorise():
+        good = self.solver.factorise()
+        self._chords.made(self.problem.setting if good else None)
+        if not good:
             return False
         self.problem.control_derivative(x, control, self.F_control, ahead)
         self.solver.solve(self.F_control, self.b)
         self.b.scale(-1)
         return bool(np.isfinite(self.b.norm()))
 
-    def correct(self, x: PETSc.Vec, control: float, constraint: Any, old: Any = None) -> tuple[float, list[Iteration]]:
+    def correct(self, x: PETSc.Vec, control: float, constraint: Any, old: Any = None,
+                chords: bool = False) -> tuple[float, list[Iteration]]:
         """Iterate x (in place) and control to convergence; returns the control and the history.
 
-        `old`: the state that they are a guess ahead of, if there is one.
+        `old`: the state that they are a guess ahead of, if there is one. `chords`: tangents may be kept where
+        that costs less and no contact has kinks (see `Chords`).
 
-        Afterwards `self.b` is dx/dcontrol at the solution (to the accuracy of the last correction).
+        Afterwards `self.b` is dx/dcontrol at the solution (to the accuracy of the last correction, or of the tangent
+        that was kept).
 
         Raises:
             Failure: no convergence; x is then worthless.
@@ -170,6 +189,7 @@ class BorderedNewton:
         problem.residual(x, control, self.F)
         self.a.set(0)
         self.reached = control, 0.0
+        self._chords.begin(problem.setting, chords and not problem.has_kinks)
         work0 = moved = 0.0
         active = _ActiveSet(problem)
         points = Settling(problem) if problem.has_history else None
@@ -177,7 +197,10 @@ class BorderedNewton:
             residual = self.F.norm() / (problem.force_scale + UNLOADED)
             if not np.isfinite(residual):
                 raise Failure(f"the forces are not finite: {problem.why_not_finite}", history)
-            if self.tolerances.met([i.correction for i in history], [*(i.residual for i in history), residual]):
+            if history:
+                self._chords.took(history[-1].chord, residual / (history[-1].residual or 1.0))
+            if self.tolerances.met([i.correction for i in history], [*(i.residual for i in history), residual],
+                                   bool(history) and history[-1].chord):
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
             problem.linearise(x, control, self.F)
@@ -185,6 +208,9 @@ class BorderedNewton:
             if points:
                 points.look()
             self._check(history, active, moved)
+            chord = self._chords.serve(residual, self.tolerances.residual)
+            if not chord and not self.tangent(x, control):
+                raise Failure("the tangent matrix is singular", history)
             step = self._correction(x, control, constraint, history)
             share = active.share
             if points and active.changed == len(history) >= _UNSETTLED:
@@ -199,7 +225,7 @@ class BorderedNewton:
             correction = moved / (self._norm(x, control) + AT_REST)
             if not np.isfinite(correction):
                 raise Failure("the tangent matrix is singular", history)
-            history.append(Iteration(residual, correction, work / work0))
+            history.append(Iteration(residual, correction, work / work0, chord))
             self.reached = control, step
             problem.residual(x, control, self.F)
 
@@ -217,8 +243,6 @@ class BorderedNewton:
 
     def _correction(self, x: PETSc.Vec, control: float, constraint: Any, history: list) -> float:
         """Solve for the correction `self.a` of x and that of the control, which is returned."""
-        if not self.tangent(x, control):
-            raise Failure("the tangent matrix is singular", history)
         c, c_control = constraint(x, control, self.gradient)
         self.solver.solve(self.F, self.a)
         self.a.scale(-1)

@@ -53,7 +53,8 @@ class State:
 
 @dataclass
 class Counts:
-    """What a run cost: accepted states (without the start), failed attempts, all Newton iterations, seconds."""
+    """What a run cost: accepted states (without the start), failed attempts, all Newton iterations (with a tangent that
+    was kept, too), seconds."""
 
     steps: int = 0
     failures: int = 0

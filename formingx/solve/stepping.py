@@ -35,7 +35,8 @@ class StepControl:
             raise InputError(f"StepControl: largest = {self.largest!r}: must be greater than 0")
 
     def accepted(self, iterations: int, error: float = 0.0) -> None:
-        """A full step converged in so many iterations; error: in time, over what is allowed."""
+        """A full step converged in so many iterations with a tangent of their own; error: in time, over what is
+        allowed."""
         factor = min(max(self.target / max(iterations, 1), 0.5), self.growth)
         factor = min(factor, 0.9 * max(error, 1e-9) ** (-1 / 3))
         self.length = min(self.length * factor, self.largest)

@@ -56,21 +56,26 @@ class TimeError:
             points = [*before[first:], after]
             if not points[-2].time < after.time:
                 continue
-            weights = problem.histories[k].weights
-            for name, weight in weights.items():
+            times = np.array([point.time for point in points])
+            divided = _divided(times)
+            for name, weight in problem.histories[k].weights.items():
                 if weight:
-                    worst = max(worst, weight * self._local([p.time for p in points], [p.values[name] for p in points]))
+                    worst = max(worst, weight * self._local(times, divided, [p.values[name] for p in points]))
         return worst / self._allowed
 
-    def _local(self, times: list[float], values: list[np.ndarray]) -> float:
+    def _local(self, times: np.ndarray, weights: np.ndarray, values: list[np.ndarray]) -> float:
         """Root mean square of the relative local error of an internal variable, all ranks."""
-        y, h = values[-1], times[-1] - times[-2]
-        size = np.abs(y) + _FLOOR * np.abs(y).max(axis=-1, keepdims=True, initial=1e-300)
-        n = len(times) - 1                                   # order of the divided difference: 1, 2 or 3
-        table, t = [v / size for v in values], np.array(times)
-        for order in range(1, n + 1):
-            table = [(b - a) / (t[i + order] - t[i]) for i, (a, b) in enumerate(zip(table, table[1:]))]
+        y, n = np.abs(values[-1]), len(times) - 1
+        size = y + _FLOOR * y.max(axis=-1, keepdims=True, initial=1e-300)
+        ratio = sum(w * v for w, v in zip(weights, values)) / size
         comm = self._problem.comm
-        total, number = (comm.allreduce(v, MPI.SUM) for v in (float(np.sum(table[0]**2)), y.size))
-        derivative = [1.0, 2.0, 6.0][n - 1] * np.sqrt(total / max(number, 1)) * h**n
+        total, number = (comm.allreduce(v, MPI.SUM) for v in (float(np.sum(ratio**2)), y.size))
+        derivative = [1.0, 2.0, 6.0][n - 1] * np.sqrt(total / max(number, 1)) * (times[-1] - times[-2]) ** n
         return float(derivative ** (3 / n)) / 12
+
+
+def _divided(times: np.ndarray) -> np.ndarray:
+    """Of values at these times, their weights in the divided difference."""
+    apart = times[:, None] - times
+    np.fill_diagonal(apart, 1.0)
+    return 1 / apart.prod(axis=1)

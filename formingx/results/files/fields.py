@@ -7,6 +7,9 @@ Every triangle gets six nodes of its own, so that nothing is smeared over an int
     principal_stresses      of the Cauchy stress, from the largest to the smallest, stress
     cauchy_rr, _zz, _rz, _hoop  its components; hydrostatic_pressure: minus a third of its trace, stress
     stress_error            its estimated error, one value in each triangle (`StressError.mean`), stress
+    elastic_stretch_1, _2   of each relaxing branch: the larger root of the eigenvalues of F Cv^-1 F^T (F A F^T of a
+                            `TransientNetwork`), without change of volume: 1 when it has relaxed, the largest stretch
+                            when nothing has; linear in each triangle; nan in layers without such a branch
     contact_pressure        normal traction per deformed area at the face, stress, of all tools; where there are any
                             (the first two nodes from the axis share their areas: there it is less accurate)
     thickness, thickness_ratio  of the sheet there, where the mesh has two faces that face each other
@@ -33,6 +36,7 @@ from mpi4py import MPI
 from ...errors import InputError, place
 from .. import files
 from ..evaluate.contact_face import ContactFace
+from ..evaluate.relaxed import ElasticStretches
 
 _NODES = {1: np.array([[0.0], [1.0], [0.5]]), 2: np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])}
 """Places of the nodes in the reference cell, in DOLFINx order, by dimension."""
@@ -53,6 +57,7 @@ class Fields:
         self._where, self._u = (fem.Expression(ufl.as_vector([v[0], v[1]]), _NODES[self.dimension])
                                 for v in (forms.X, forms.u))
         self.points = self._eval(self._where)
+        self._elastic = ElasticStretches(self._problem, _NODES[self.dimension])
         self._between: tuple[np.ndarray, np.ndarray] | None = None
         self._faces: dict[int, tuple[ContactFace, np.ndarray, np.ndarray]] = {}
 
@@ -69,6 +74,9 @@ class Fields:
                       "cauchy_rr": sigma[:, 0, 0], "cauchy_zz": sigma[:, 1, 1], "cauchy_rz": sigma[:, 0, 1],
                       "cauchy_hoop": sigma[:, 2, 2], "hydrostatic_pressure": stress.hydrostatic_pressure,
                       "stress_error": np.repeat(field.error_in_cells(), len(_NODES[2]))}
+            with problem.at(state):
+                elastic = self._elastic.now(len(self._cells))
+            found |= {f"elastic_stretch_{k + 1}": elastic[..., k] for k in range(self._elastic.count)}
             if problem.contacts:
                 found["contact_pressure"] = self._contact_pressure(state)
         try:

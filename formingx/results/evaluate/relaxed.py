@@ -1,0 +1,111 @@
+"""How far a body has relaxed: its stress at the pole over that which is left, elastic strains of branches."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import basix
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from ... import _compat
+
+_STRAIN, _NONE = 1e-6, 1e-10
+"""Equibiaxial strain that is added where no stress is left (over the shear modulus): rest has the ratio of moduli."""
+
+
+class PoleStressRatio:
+    """The Mises stress at the pole over the one that is left at the same F when all has relaxed.
+
+    Both are means over the reference volume of the elements that touch the axis, at their quadrature points, of
+    sqrt(3/2) |dev(P F^T)|, P = dW/dF of the stored energy and of `Material.equilibrium_energy`. In the equibiaxial
+    state of a pole that is the stress along the sheet less the one through its thickness.
+    """
+
+    def __init__(self, problem: Any):
+        forms = problem.forms
+        domain, mesh = forms.domain, forms.mesh
+        dim = domain.topology.dim
+        domain.topology.create_connectivity(dim - 1, dim)
+        facets = np.concatenate([mesh.facets.find(tag) for tag in np.atleast_1d(mesh.boundaries["axis"])])
+        cells = [domain.topology.connectivity(dim - 1, dim).links(f) for f in facets]
+        near = np.unique(np.concatenate([np.zeros(0, np.int32), *cells]))
+        near = near[near < domain.topology.index_map(dim).size_local]
+        self._problem, self._strain = problem, forms.constant(0.0)
+        self._weights: Any = basix.make_quadrature(domain.basix_cell(), problem.scene.quadrature_degree)[1]
+        self._parts = [(self._expression(terms), np.intersect1d(near, terms.cells).astype(np.int32))
+                       for terms in forms.terms]
+
+    @staticmethod
+    def known(problem: Any) -> bool:
+        """True if the scene has a pole, and of all its materials it is known what is left."""
+        forms = problem.forms
+        return "axis" in forms.mesh.boundaries and all(t.equilibrium_energy(forms.elastic_F) is not None
+                                                       for t in forms.terms)
+
+    def now(self) -> float:
+        """At the state that the forms hold; collective."""
+        now, left, modulus = self._integrals()
+        if left < _NONE * modulus:
+            self._strain.value = _STRAIN
+            now, left, _ = self._integrals()
+            self._strain.value = 0.0
+        return float(now / left)
+
+    def _integrals(self) -> np.ndarray:
+        """Over the elements at the pole, all ranks: of both stresses, and of the scale of stresses."""
+        totals = np.zeros(3)
+        for expression, cells in self._parts:
+            if len(cells):
+                values = expression.eval(self._problem.forms.domain, cells).reshape(len(cells), -1, 3)
+                totals += np.einsum("q,cqk->k", self._weights, values)
+        return self._problem.comm.allreduce(totals, MPI.SUM)
+
+    def _expression(self, terms: Any) -> fem.Expression:
+        """What `_integrals` sums up of a material, with the weight of volumes."""
+        forms, e = self._problem.forms, self._strain
+        F = ufl.variable(forms.elastic_F * ufl.diag(ufl.as_vector([1 + e, 1 - 2 * e, 1 + e])))
+        deviators = [ufl.dev(ufl.diff(energy, F) * F.T) for energy in (terms.stored_energy(F),
+                                                                      terms.equilibrium_energy(F))]
+        stresses = [ufl.sqrt(1.5 * ufl.inner(d, d)) for d in deviators] + [forms.constant(forms.stress)]
+        volume = sum(part.integrand() for part in forms.weighted(forms.constant(1.0), terms.names).integrals())
+        volume *= abs(ufl.JacobianDeterminant(forms.domain))
+        return fem.Expression(ufl.as_vector([s * volume for s in stresses]), terms.places,
+                              jit_options=_compat.JIT_OPTIONS)
+
+
+class ElasticStretches:
+    """The largest principal elastic stretch of each branch, linear in each element, at places of the reference cell.
+
+    Args:
+        places: shape (n, dimension).
+    """
+
+    def __init__(self, problem: Any, places: np.ndarray):
+        forms = problem.forms
+        self._problem, self._n = problem, len(places)
+        self._parts = []
+        for terms in forms.terms:
+            if stretches := terms.elastic_stretches(forms.elastic_F):
+                own = terms.cells[terms.cells < forms.domain.topology.index_map(forms.domain.topology.dim).size_local]
+                self._parts.append((fem.Expression(ufl.as_vector(stretches), terms.places,
+                                                   jit_options=_compat.JIT_OPTIONS), own, len(stretches)))
+        self.count = max((count for *_, count in self._parts), default=0)
+        if self._parts:
+            at: Any
+            weights: Any
+            at, weights = basix.make_quadrature(forms.domain.basix_cell(), problem.scene.quadrature_degree)
+            root = np.sqrt(np.abs(weights))[:, None]
+            basis, there = (np.column_stack([np.ones(len(x)), x]) for x in (at, places))
+            self._to_places = there @ np.linalg.pinv(root * basis) * root.T      # least squares: an L2 projection
+
+    def now(self, cells: int) -> np.ndarray:
+        """At the state that the forms hold, in this rank's own cells, shape (cells, n, branches); nan: no branch."""
+        found = np.full((cells, self._n, self.count), np.nan)
+        for expression, own, count in self._parts:
+            if len(own):
+                values = expression.eval(self._problem.forms.domain, own).reshape(len(own), -1, count)
+                found[own, :, :count] = np.einsum("nq,cqk->cnk", self._to_places, values)
+        return found

@@ -1,0 +1,35 @@
+"""States in time foretold from those before: Lagrange's polynomial through the last of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .state import State
+
+CUBIC = 4
+"""States that a cubic goes through."""
+
+_CLOSE = 0.1
+"""States closer than this part of the step ahead are not told apart: what they are not exact in would be magnified."""
+
+
+def before(states: Sequence[State], time: float, most: int) -> list[State]:
+    """The last states, at most so many, on whose polynomial a time lies ahead: in order, from the last jump on."""
+    found: list[State] = []
+    for state in reversed(states):
+        if not found or state.time < found[0].time - _CLOSE * (time - states[-1].time):
+            found.insert(0, state)
+        if len(found) == most or state.kind == "jump":
+            break
+    return found
+
+
+def weights(states: Sequence[State], time: float) -> np.ndarray:
+    """Of each state, with times that grow, in the value at a time; shape (states,)."""
+    t = np.array([state.time for state in states])
+    apart, ahead = t[:, None] - t, np.tile(time - t, (len(t), 1))
+    np.fill_diagonal(apart, 1.0)
+    np.fill_diagonal(ahead, 1.0)
+    return np.prod(ahead / apart, axis=1)

@@ -1,0 +1,133 @@
+"""How far a body has relaxed: stress over that in equilibrium, elastic stretches of branches; what its steps cost."""
+
+import csv
+
+import numpy as np
+import pytest
+from conftest import run as run_python
+
+import formingx as fx
+from formingx import Stage
+from formingx.results.files.fields import Fields
+from formingx.solve import extrapolate
+from formingx.solve.newton import Tolerances
+from formingx.solve.state import State
+
+RUBBER = fx.NeoHookean(c10=0.05)
+BRANCHES = [(0.3, 0.5), (0.4, 5.0)]
+POLYMER = fx.Viscoelastic(RUBBER, BRANCHES)
+AT_ONCE = Stage("at once", drive="pull", until=fx.travel(1.0))
+
+
+def block(material=POLYMER, mesh=None):
+    """A cylinder of radius and height 1, pulled at its top."""
+    return fx.Scene(mesh=mesh or fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)), materials=material,
+                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.Displaced("top", name="pull")])
+
+
+def run(scene, *stages, **options):
+    return fx.Process(scene).run(stages, progress=False, **options)
+
+
+@pytest.mark.parametrize("law", [fx.Viscoelastic, fx.TransientNetwork])
+def test_stress_at_the_pole_relaxes_to_that_in_equilibrium(law, tmp_path):
+    material = law(RUBBER, BRANCHES)
+    path = run(block(material), AT_ONCE, Stage("hold", duration=1.0), Stage("later", duration=1e9), accuracy=1e-4)
+    found = path["pole_stress_ratio"]
+    held = [state for state in path.states if state.stage == "hold"]
+    assert found[0] == pytest.approx(material.shear_modulus / RUBBER.shear_modulus, rel=1e-9)       # of moduli, at rest
+    assert held[0].measures["pole_stress_ratio"] == pytest.approx(8.0, rel=1e-9)
+    expected = material.relaxation("uniaxial", 2.0, [1.0])[0] / RUBBER.stress("uniaxial", 2.0)
+    assert held[-1].measures["pole_stress_ratio"] == pytest.approx(expected, rel=1e-4)
+    assert found[-1] == pytest.approx(1.0, abs=1e-9)
+    path.to_csv(tmp_path / "run.csv")
+    with open(tmp_path / "run.csv") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    assert float(rows[-1]["pole_stress_ratio"]) == pytest.approx(1.0, abs=1e-9)
+    path.report(tmp_path / "run.html")
+    assert "pole stress ratio" in (tmp_path / "run.html").read_text()
+
+
+def test_no_ratio_where_nothing_is_left_in_equilibrium():
+    once = Stage("at once", drive="pull", until=fx.travel(0.1))
+    assert "pole_stress_ratio" not in run(block(RUBBER), once).columns
+    assert "pole_stress_ratio" not in run(block(fx.Viscoelastic(None, BRANCHES)), once).columns
+
+
+def test_ratio_of_a_membrane_with_layers():
+    """Layers count by their thickness: at stretch 2, at once, each has its own moduli."""
+    mesh = fx.mesh.disc(radius=1.0, thickness={"stiff": 0.01, "soft": 0.03}, elements=(4, 1))
+    other = fx.NeoHookean(c10=0.1)
+    scene = fx.Scene(mesh=mesh, materials={"stiff": POLYMER, "soft": other}, model=fx.Membrane(),
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
+                     loads=[fx.Pressure("bottom", name="air")])
+    path = run(scene, Stage("blow", drive="air", until=fx.pole_stretch(1.5)))
+    assert path.last.measures["pole_stress_ratio"] == pytest.approx(
+        (0.01 * 0.4 + 0.03 * 0.1) / (0.01 * 0.05 + 0.03 * 0.1), rel=1e-9)
+
+
+@pytest.mark.parametrize("law", [fx.Viscoelastic, fx.TransientNetwork])
+def test_elastic_stretch_of_branches(law):
+    """That of the body before anything flows, 1 in the end; the branch with the shorter time relaxes first."""
+    path = run(block(law(RUBBER, BRANCHES)), AT_ONCE, Stage("hold", duration=1.0), Stage("later", duration=1e9),
+               accuracy=1e-4)
+    fields, at_once = Fields(path), next(s for s in path.states if s.stage == "hold")
+    first, last = fields.of(at_once), fields.of(path.last)
+    for k in (1, 2):
+        assert first[f"elastic_stretch_{k}"] == pytest.approx(first["stretches"][..., :1], rel=1e-9)
+        assert last[f"elastic_stretch_{k}"] == pytest.approx(1.0, abs=1e-9)
+    held = fields.of([s for s in path.states if s.stage == "hold"][-1])
+    assert 1.001 < held["elastic_stretch_1"].max() < held["elastic_stretch_2"].min() < 1.999
+
+
+def test_a_layer_without_branches_has_no_elastic_stretch():
+    mesh = fx.mesh.disc(radius=1.0, thickness={"relaxing": 0.5, "rubber": 0.5}, elements=(1, 1))
+    path = run(block({"relaxing": POLYMER, "rubber": RUBBER}, mesh), AT_ONCE)
+    fields = Fields(path)
+    found, low = fields.of(path.last)["elastic_stretch_1"][..., 0], fields.points[..., 1].mean(axis=1) < 0.5
+    assert np.isnan(found[~low]).all() and np.all(found[low] > 1)
+
+
+def test_a_cubic_in_time_is_foretold_exactly():
+    """From states far enough apart, and none from before a jump."""
+    def state(time, **kind):
+        return State(np.array([time**3 - time, 2.0]), 0.0, np.zeros(2), 1.0, time=time, **kind)
+    states = [state(t) for t in (0.0, 0.3, 0.7, 1.2, 1.2 + 1e-9)]
+    past = extrapolate.before(states, 1.6, extrapolate.CUBIC)
+    assert [s.time for s in past] == [0.0, 0.3, 0.7, 1.2 + 1e-9]
+    assert extrapolate.weights(past, 1.6) @ [s.x for s in past] == pytest.approx([1.6**3 - 1.6, 2.0], rel=1e-12)
+    states[2] = state(0.7, kind="jump")
+    assert [s.time for s in extrapolate.before(states, 1.6, extrapolate.CUBIC)] == [0.7, 1.2 + 1e-9]
+
+
+def test_tangents_that_are_kept_change_no_result():
+    """A sheet that is blown and held: fewer tangents than states, and what tighter tolerances give."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1)), materials=POLYMER,
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
+                     loads=[fx.Pressure("bottom", name="air")])
+    stage = Stage("flow", drive="air", follow={fx.enclosed_volume: [(0, 0), (1, 1.0), (6, 1.0)]},
+                  step=fx.StepControl(length=0.02, largest=0.02))
+    kept, exact = (run(scene, stage, accuracy=0.5, tolerances=Tolerances(correction=c, residual=r))
+                   for c, r in ((1e-10, 1e-8), (1e-13, 1e-11)))
+    held = [state for state in kept.states if state.time > 2]
+    assert sum(not i.chord for state in held for i in state.history[:-1]) < 0.7 * len(held)
+    assert max(state.history[-1].residual for state in kept.states[1:]) < 1e-8
+    for column in ("pressure", "pole_stretch", "dissipated_energy"):
+        assert kept[column] == pytest.approx(exact[column], rel=1e-7, abs=1e-12)
+
+
+OTHER_CONSTANTS = """
+import sys
+import ffcx.codegeneration.jit as jit
+sys.path.insert(0, "tests")
+from test_relaxed import *
+first = run(block(), AT_ONCE, Stage("hold", duration=1.0))
+jit._compile_objects = lambda *_, **__: sys.exit("a form is compiled")
+other = fx.Viscoelastic(fx.NeoHookean(c10=0.2), [(1.0, 2.0), (3.0, 4.0)])
+print(run(block(other), AT_ONCE, Stage("hold", duration=1.0))["pole_stress_ratio"][0])
+"""
+
+
+def test_nothing_is_compiled_for_other_constants():
+    """In a process of its own: UFL sorts terminals by their numbers as text, so 9 and 10 make another form at times."""
+    assert float(run_python("-c", OTHER_CONSTANTS).split()[-1]) == pytest.approx(11.0, rel=1e-9)
