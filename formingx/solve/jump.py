@@ -27,7 +27,8 @@ _FIRST, _LARGEST, _LEAST, _FALLS, _GROWS = 1.0, (1e7, 1e11), 1e-9, 0.3, (10.0, 3
 at most `_FEW` iterations, and after none was found (before and after).
 
 It begins low and grows to the least that gives a solution: where a state follows after all, only a little viscosity
-finds it; much would hold the body back while contact lets go, and what slips meanwhile changes where it ends."""
+finds it; much would hold the body back while contact lets go, and what slips meanwhile changes where it ends. (At
+the brink of release two states may be near, and which is found still depends on eta: tests/test_jumps.py.)"""
 
 _FEW, _TOLERANCES = 5, Tolerances(1e-8, 1e-6, settling=8)
 """Of a viscous solution. (Where contact does not settle soon more viscosity is cheaper than more iterations.)"""
