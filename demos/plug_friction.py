@@ -46,7 +46,6 @@ def run(case) -> dict:
     """One coefficient of friction: its numbers, and what is drawn of it."""
     mu, fillet, elements, travels, folder = case
     made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), mu, elements, near=NEAR, points=4,
-                       penalty=2e4,
                        ramp=1e-3, comm=MPI.COMM_SELF)
     path, end = plugs.push(made, travels, smallest=1e-4, progress=False)
     path.to_csv(folder / f"mu_{mu:g}.csv")

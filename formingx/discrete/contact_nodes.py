@@ -15,7 +15,7 @@ HOVERING = 1e-3
 """Distances (over thickness) at which a node is as good as in touch."""
 
 _AT_END = 0.95
-"""Part of a step from which on what arrives has no friction until the next."""
+"""Part of a step from which on what arrives, and will stick, has no friction until the next."""
 
 _SLIDES = 1e-2
 """How far (over the length of face that is its own) a node may slide so."""
@@ -276,14 +276,14 @@ class ContactNodes:
                 ends: bool) -> None:
         """A step of this length along a tangent is about to be taken: foretell where nodes arrive.
 
-        ends: it is to end where a node touches (see `touches_by`), which has no friction before.
+        ends: it is to end where a node touches that sticks (see `touches_by`), which has no friction before.
         """
         start = self.positions(fields, control)
         velocity = self._length * self.displacement(direction) - slope * self.rate * self._motion
         times = self._arrivals(start, velocity, length)
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         if self._memory is not None:
-            at_end = ends & (times >= _AT_END * length)
+            at_end = ends & self.contact.sticks & (times >= _AT_END * length)
             arrival = np.where(at_end[:, None], np.nan, start + times[:, None] * velocity)
             self.put(self._memory._replace(touch=self._memory.touch._replace(arrival=arrival)))
 
@@ -312,7 +312,7 @@ class ContactNodes:
 
         Since a node touched, its pressure has grown as it does at the end of the step, along (direction, slope).
         """
-        if self._memory is None:
+        if self._memory is None or not self.contact.sticks:
             return 1.0
         end = self.positions(new, control)
         near = self.law.nearest(end)

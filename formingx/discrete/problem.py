@@ -348,7 +348,7 @@ class Problem:
 
     def touches_by(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float,
                    direction: np.ndarray, slope: float, length: float) -> float:
-        """Part of a step, which ends along (direction, slope), after which it should have ended; 1 if it is short enough.
+        """Part of a step, which ends along (direction, slope), after which it should have ended; 1: short enough.
 
         What comes into contact sticks where it touches: a longer step lets it slide too far before. Arrays: own part.
         """

@@ -3,12 +3,13 @@
 Song (1993), eqs. (5.7) to (5.14), per unit reference area, at a point whose signed distance to the tool is d:
 
     normal traction      N = k F(d),  F the ramp (5.13) of half-width theta: 0 below -theta, d above theta, C1 between;
-    tangential traction  T = k_t F'(d) g, not more than mu N; k_t = k for stick, a part of it for Coulomb's law,
+    tangential traction  T = k_t F'(d) g, not more than mu N; k_t = k for stick, k max(1, mu)/100 but at most k for
+    Coulomb's law,
 
 g being the elastic slip: the tangential motion since the point touched (entered the ramp), less what has slid. Stick
 is mu = inf, frictionless mu = 0. A point that was out of touch at the last accepted state slips from where it arrives
 inside the step, which the tangent of the path foretells: taken from the end of the step, the slip would depend on its
-length. One that the tangent lets arrive at the very end of the step, or later, is free of friction until then.
+length. One that sticks, and that the tangent lets arrive at the very end of the step or later, is free until then.
 
 A tool that the body does not separate from holds what has touched it: F(d) = d + theta for such a point, of either
 sign, and max(d + theta, 0) for the others, which carries on without a jump when one arrives.
@@ -30,17 +31,16 @@ from ..time_temperature import FunctionOfTemperature
 from .part import Part
 from .tools import Nearest, Tool
 
-SOFTER, _LEAST_SLIP = 1e-3, 200.0
-"""Under Coulomb's law k_t is this part of k, but at least so much (in units of shear modulus / thickness), both times mu
-where that is above 1; at most k. A point slides after mu N / k_t of elastic slip.
+SOFTER = 0.01
+"""Stiffness of elastic slip over that of the ramp, under Coulomb's law: a point slides after some mu 100 N/k of slip.
 
-Were it as stiff as the ramp, that range would be narrower than a step of Newton's method can aim at. What never slides
-(mu = 1000 and above) is as stiff as stick.
+Were it as stiff as the ramp, that range would be narrower than a step of Newton's method can aim at. It grows with mu
+above 1, so that the range is no wider than needed, and what never slides (mu = 100 and above) is as stiff as stick.
 """
 
 
-_PENALTY, _SMOOTH, _ROUGH = 2e5, 1e-7, 1e-5
-"""Penalty, and ramp without friction, where a sharp one costs no iterations, and with it."""
+_SMOOTH, _STICK, _ROUGH = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
+"""Penalty and ramp without friction, of what sticks until it is pulled off, and else, where stiffer costs iterations."""
 
 _AT_FOOT = 1e-7
 """Distances from the foot of the ramp, over theta, that are as good as none."""
@@ -55,7 +55,8 @@ class Contact(Part):
         friction: "stick" (a point that touches stays where it touched), "none", or the coefficient mu of Coulomb's
             law (5.9), from 0 (none). One that depends on the temperature of the body where it touches: a `table`
             {T: mu}, or what `of_temperature` returns; it is that of the last accepted state.
-        penalty: k over shear modulus / thickness of the sheet.
+        penalty: k over shear modulus / thickness of the sheet; default 2e4 under Coulomb's law and with separates=False,
+            else 2e5.
         ramp: theta over thickness of the sheet; default 1e-5, without friction 1e-7.
         separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
             start); with "stick" or "none".
@@ -75,7 +76,7 @@ class Contact(Part):
     on: str
     mu: Any
 
-    def __init__(self, on: str, tool: Tool, friction: Any = "stick", *, penalty: float = _PENALTY,
+    def __init__(self, on: str, tool: Tool, friction: Any = "stick", *, penalty: float | None = None,
                  ramp: float | None = None, separates: bool = True, nodes_per_step: int = 1,
                  points: str | int = "nodes",
                  moves: tuple[float, float] | None = None, name: str | None = None):
@@ -85,8 +86,9 @@ class Contact(Part):
         self.on, self.tool, self.friction = on, tool, friction
         self.mu = _coefficient(f"{name}: friction", friction)
         self.separates = instance(f"{name}: separates", separates, bool, "True or False")
-        self.penalty = positive(f"{name}: penalty", penalty)
-        self.ramp = positive(f"{name}: ramp", (_SMOOTH if self.symmetric else _ROUGH) if ramp is None else ramp)
+        usual = _SMOOTH if self.symmetric else _STICK if self.sticks and separates else _ROUGH
+        self.penalty = positive(f"{name}: penalty", usual[0] if penalty is None else penalty)
+        self.ramp = positive(f"{name}: ramp", usual[1] if ramp is None else ramp)
         if not separates and (self.friction_by_temperature or 0 < self.mu < math.inf):
             raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
                              f" Coulomb friction; use 'stick' or 'none'")
@@ -105,6 +107,11 @@ class Contact(Part):
     def friction_by_temperature(self) -> bool:
         """True if friction depends on the temperature."""
         return isinstance(self.mu, FunctionOfTemperature)
+
+    @property
+    def sticks(self) -> bool:
+        """True if a point that touches stays where it touched: under "stick", and where mu is so large as to be no less."""
+        return not self.friction_by_temperature and self.mu * SOFTER >= 1
 
     @property
     def symmetric(self) -> bool:
@@ -137,8 +144,7 @@ class Contact(Part):
         """
         foot = (1 - _AT_FOOT * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)
-        return Law(self.tool, self.friction_at(temperature), k, theta, shift, self.separates,
-                   max(SOFTER, _LEAST_SLIP / self.penalty))
+        return Law(self.tool, self.friction_at(temperature), k, theta, shift, self.separates)
 
     def __repr__(self) -> str:
         return f"Contact({self.on!r}, {self.tool!r}, {self.friction!r})"
@@ -217,28 +223,27 @@ class Motion(NamedTuple):
 class Law:
     """Tractions at points, a function of their positions and of what they remember.
 
-    mu: of friction, a number, or one for each point, shape (n,). softer: k_t/k under Coulomb's law, for mu up to 1.
+    mu: of friction, a number, or one for each point, shape (n,).
 
     Distances are less by `shift`, shape (n,), length: a point that touches from the start begins at the foot of the
     ramp, free of stress.
     """
 
     def __init__(self, tool: Tool, mu: np.ndarray | float, k: float, theta: float, shift: np.ndarray | float = 0.0,
-                 separates: bool = True, softer: float = SOFTER):
+                 separates: bool = True):
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
         self.tool, self.mu, self.k, self.theta, self.shift, self.separates = tool, mu, k, theta, shift, separates
-        self.softer = softer
         self._near: tuple[np.ndarray, Nearest] | None = None        # points last asked for, and what was found
 
     def part(self, points: np.ndarray | slice) -> Law:
         """The law of some of its points."""
         shift = self.shift[points] if isinstance(self.shift, np.ndarray) else self.shift
         mu = self.mu[points] if isinstance(self.mu, np.ndarray) else self.mu
-        return Law(self.tool, mu, self.k, self.theta, shift, self.separates, self.softer)
+        return Law(self.tool, mu, self.k, self.theta, shift, self.separates)
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
         """The same law with other coefficients of friction."""
-        return Law(self.tool, mu, self.k, self.theta, self.shift, self.separates, self.softer)
+        return Law(self.tool, mu, self.k, self.theta, self.shift, self.separates)
 
     @property
     def remembers(self) -> bool:
@@ -315,7 +320,7 @@ class Law:
         assert old is not None
         g, dg = self._slip(x, near, old)
         rising = (np.abs(at) < self.theta) * k / (2 * self.theta) * self.separates
-        kt = k * np.minimum(self.softer * np.maximum(self.mu, 1.0), 1.0)
+        kt = k * np.minimum(SOFTER * np.maximum(self.mu, 1.0), 1.0)
         rising = rising * (kt / k)
         T, dT = (kt * slope + rising * ahead) * g, (kt * slope)[:, None] * dg
         dT += (rising * g)[:, None] * n
