@@ -1,14 +1,23 @@
 """Where there is no state nearby to go on to: jumps to the next one."""
 
+import sys
+
 import numpy as np
 import pytest
+from conftest import ROOT
 from scipy import integrate, optimize
 
 import formingx as fx
 from formingx import tools
+from formingx.discrete.contact_nodes import ContactNodes
 from formingx.physics.contact import SOFTER
 from formingx.results.show import plots
 from formingx.solve import jump
+
+sys.path.insert(0, str(ROOT / "demos"))
+import plugs  # noqa: E402
+from plug_friction import NEAR  # noqa: E402
+from williams_plug import C10, PLUG, RADIUS, THICKNESS  # noqa: E402
 
 
 class Balloon:
@@ -74,68 +83,120 @@ def plug(mu=1.0, thickness=0.5):
     tool = tools.male(radius=2.5, height=60.0, base=-60.0, fillet=0.5).mirrored().moved(z=thickness)
     return fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=0.4, c01=0.04),
                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                    contacts=[fx.Contact("top", tool, mu, moves=(0, -1))])
+                    contacts=[fx.Contact("top", tool, mu, moves=(0, -1), points=4)])
 
 
-def pushed(travel, made=None, **options):
-    return fx.trace(made or plug(), until=fx.travel(travel), step=fx.StepControl(target=6), progress=False, **options)
+def pushed(**step):
+    return fx.trace(plug(), until=fx.travel(6.9), through=[fx.travel(t) for t in range(1, 6)],
+                    step=fx.StepControl(target=6, **step), progress=False)
 
 
-def balance(path):
-    """(work of the tool, energy gained, work of the tractions at the points, lost in jumps), trapezoidal rule."""
-    contact, n = path.problem.contacts[0], path.problem.forms.space.dofmap.index_map.size_local
-    rows = []
-    for state in path.states:
-        with path.problem.at(state):
-            fields = state.x[:n]
-            rows.append((contact.positions(fields, state.control),
-                         contact.area[:, None] * contact.tractions(fields, state.control).force))
-    slips = sum(0.5 * float(np.sum((f + g) * (b - a))) for (a, f), (b, g) in zip(rows, rows[1:]))
-    return (np.trapezoid(path["tool_force"], path["travel"]), path["strain_energy"][-1] - path["strain_energy"][0],
-            slips, sum(state.jump["dissipated"] for state in path.jumps))
+def weighed(run):
+    """(path, work of the tractions at the contact points), with what is solved for on the way of jumps.
+
+    Trapezoidal rule; every jump must find its end at once.
+    """
+    rows, advance = [], ContactNodes.advance
+
+    def recorded(contact, fields, control):
+        rows.append((contact.positions(fields, control),
+                     contact.area[:, None] * contact.tractions(fields, control).force))
+        advance(contact, fields, control)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ContactNodes, "advance", recorded)
+        path = run()
+    return path, sum(0.5 * float(np.sum((f + g) * (b - a))) for (a, f), (b, g) in zip(rows, rows[1:]))
+
+
+def lost_in_jumps(path):
+    return sum(state.jump["dissipated"] for state in path.jumps)
+
+
+def work_and_energy(path):
+    """(work of the tool, energy gained)."""
+    return np.trapezoid(path["tool_force"], path["travel"]), path["strain_energy"][-1] - path["strain_energy"][0]
 
 
 @pytest.fixture(scope="module")
-def rough():
-    """A path with a jump."""
-    path = pushed(7.2)
+def weighed_rough():
+    """`weighed`: a path with a jump."""
+    path, slips = weighed(pushed)
     assert len(path.jumps) >= 1
-    return path
+    return path, slips
+
+
+@pytest.fixture(scope="module")
+def rough(weighed_rough):
+    return weighed_rough[0]
 
 
 def test_a_rough_plug_goes_on_where_points_leave_its_edge(rough):
-    assert rough["travel"][-1] == pytest.approx(7.2, rel=1e-12)
+    assert rough["travel"][-1] == pytest.approx(6.9, rel=1e-12)
     assert np.all(np.diff(rough["travel"]) > 0)
     assert all(state.jump["dissipated"] > 0 and state.jump["moved"] > 0 for state in rough.jumps)
 
 
-def test_friction_keeps_its_law_through_jumps(rough):
-    """The elastic slip that is remembered gives no more than mu N, and mu N where points slide."""
-    contact, n, most = rough.problem.contacts[0], rough.problem.forms.space.dofmap.index_map.size_local, 0.0
+def share_of_friction(path):
+    """Largest traction by the elastic slip that is remembered, over mu N, of all points and states."""
+    contact, n, most = path.problem.contacts[0], path.problem.forms.space.dofmap.index_map.size_local, 0.0
     law = contact.law
-    for state in rough.states:
-        with rough.problem.at(state):
+    for state in path.states:
+        with path.problem.at(state):
             F, slope = law.ramp(law.distance(contact.positions(state.x[:n], state.control)))
             share = SOFTER * slope * np.abs(contact.touch.slip) / np.where(F > 0, law.mu * F, 1.0)
-        assert np.all(share[F > 0] <= 1 + 1e-6)
         most = max(most, share[F > 0].max(initial=0.0))
-    assert most == pytest.approx(1.0, rel=1e-6)
+    return most
 
 
-def test_work_is_energy_and_friction_and_what_jumps_lose(rough):
-    work, energy, slips, lost = balance(rough)
-    assert slips > 0 and lost > 1e-3 * work
+def test_friction_keeps_its_law_through_jumps(rough):
+    """No point has more than mu N, and some slide."""
+    assert share_of_friction(rough) == pytest.approx(1.0, rel=1e-6)
+
+
+def test_work_is_energy_and_friction_and_what_jumps_lose(weighed_rough):
+    path, slips = weighed_rough
+    (work, energy), lost = work_and_energy(path), lost_in_jumps(path)
+    assert slips > 0 and lost > 1e-4 * work
     assert work == pytest.approx(energy + slips + lost, rel=1e-3)
 
 
+@pytest.mark.parametrize("schedule", [
+    {"_FIRST": 3.0, "_FALLS": 0.5}, pytest.param({"_GROWS": (2.0, 2.0)}, marks=pytest.mark.slow)], ids=str)
+def test_where_jumps_end_does_not_depend_on_how_eta_changes(rough, schedule, monkeypatch):
+    for name, value in schedule.items():
+        monkeypatch.setattr(jump, name, value)
+    other = pushed()
+    assert other.jumps and other["tool_force"][-1] == pytest.approx(rough["tool_force"][-1], rel=1e-3)
+
+
 @pytest.mark.slow
-@pytest.mark.xfail(reason="the force after the jump is 8.358, with eta from 1e4, 1e5 on 8.390, 8.382", strict=True)
-def test_where_a_jump_ends_does_not_depend_on_how_eta_falls(rough, monkeypatch):
-    monkeypatch.setattr(jump, "_FIRST", 1e4)
+@pytest.mark.xfail(reason="at the brink of release two states are near, and either is found: 8.053, 8.079", strict=True)
+def test_nor_in_shorter_steps(monkeypatch):
+    before = pushed(largest=0.02)["tool_force"][-1]
+    monkeypatch.setattr(jump, "_FIRST", 3.0)
     monkeypatch.setattr(jump, "_FALLS", 0.5)
-    other = pushed(7.2)
-    assert len(other.jumps) == len(rough.jumps)
-    assert other["tool_force"][-1] == pytest.approx(rough["tool_force"][-1], rel=1e-4)
+    assert pushed(largest=0.02)["tool_force"][-1] == pytest.approx(before, rel=1e-3)
+
+
+def williams(**step):
+    """Williams' plug with mu = 0.3, as in `plug_friction`, past its first snaps."""
+    made = plugs.scene(RADIUS, THICKNESS, PLUG, 0.35, fx.NeoHookean(c10=C10), 0.3, (54, 2), near=NEAR, points=4,
+                       ramp=1e-3)
+    return fx.trace(made, until=fx.travel(9.0), through=[fx.travel(t) for t in range(1, 9)],
+                    step=fx.StepControl(target=6, **step), progress=False)
+
+
+@pytest.mark.slow
+def test_forces_on_a_plug_do_not_depend_on_the_steps_and_its_work_is_accounted_for():
+    found = weighed(williams), weighed(lambda: williams(length=0.01, largest=0.01))
+    forces = [[path.met(fx.travel(t)).measures["tool_force"] for t in range(1, 10)] for path, _ in found]
+    assert forces[0] == pytest.approx(forces[1], rel=3e-3)
+    for path, slips in found:
+        work, energy = work_and_energy(path)
+        assert len(path.jumps) > 3 and min(state.jump["dissipated"] for state in path.jumps) >= 0
+        assert work == pytest.approx(energy + slips + lost_in_jumps(path), rel=1e-3)
+        assert share_of_friction(path) < 1 + 1e-6
 
 
 def test_what_comes_to_rest_nowhere_is_said_in_bounded_time():
@@ -156,9 +217,10 @@ def test_at_fold_is_one_of_three():
         fx.Stage("push", drive="plug", until=fx.travel(1.0), at_fold="leap")
 
 
-def test_pictures_and_reports_mark_jumps(rough, tmp_path):
-    axes = plots.curve(rough, "tool_force", "travel")
+def test_pictures_and_reports_mark_jumps(balloon, tmp_path):
+    path = balloon[-1]
+    axes = plots.curve(path, "enclosed_volume", "pressure")
     marks = [line for line in axes.lines if line.get_marker() == "D"]
-    assert [list(line.get_xdata()) for line in marks] == [[s.measures["travel"] for s in rough.jumps]]
-    fx.report([rough], tmp_path / "report.html")
-    assert f"{len(rough.jumps)} jump" in (tmp_path / "report.html").read_text()
+    assert [list(line.get_xdata()) for line in marks] == [[s.measures["pressure"] for s in path.jumps]]
+    fx.report([path], tmp_path / "report.html")
+    assert f"{len(path.jumps)} jump" in (tmp_path / "report.html").read_text()

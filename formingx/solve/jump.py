@@ -22,9 +22,13 @@ from .state import State
 AHEAD = 1e-6
 """By how much the (dimensionless) control goes on in a jump from a limit point."""
 
-_FIRST, _LARGEST, _LEAST, _FALLS, _GROWS = 1e3, (1e7, 1e11), 1e-9, 0.3, 3.0
+_FIRST, _LARGEST, _LEAST, _FALLS, _GROWS = 1.0, (1e7, 1e11), 1e-9, 0.3, (10.0, 3.0)
 """Of eta: at first, at most (before and after the body has begun to move), at least; factors after a solution that took
-at most `_FEW` iterations, and after none was found."""
+at most `_FEW` iterations, and after none was found (before and after).
+
+It begins low and grows to the least that gives a solution: where a state follows after all, only a little viscosity
+finds it; much would hold the body back while contact lets go, and what slips meanwhile changes where it ends. (At
+the brink of release two states may be near, and which is found still depends on eta: tests/test_jumps.py.)"""
 
 _FEW, _TOLERANCES = 5, Tolerances(1e-8, 1e-6, settling=8)
 """Of a viscous solution. (Where contact does not settle soon more viscosity is cheaper than more iterations.)"""
@@ -118,7 +122,7 @@ class _Way:
     def _hold_back(self) -> float:
         """No solution was found: the factor by which eta grows; it does not fall right after the next one."""
         self._falls = 1.0
-        return _GROWS
+        return _GROWS[self.solved > 0]
 
     def end(self, old: State) -> State | None:
         """The state at rest, if there is one near."""
@@ -134,8 +138,12 @@ class _Way:
         return state
 
     def _lose(self, a: np.ndarray, x: np.ndarray, drag: np.ndarray) -> None:
-        """Work of what is out of balance from a to x (trapezoidal rule: half way there the chord cuts into tools)."""
-        self.lost += 0.5 * self._sum((self._drag + drag) * (x - a))
+        """Work of what is out of balance from a to x (trapezoidal rule: half way there the chord cuts into tools).
+
+        A force at a that has turned before x is none that the body moved by: viscous forces do no negative work.
+        """
+        by = x - a
+        self.lost += 0.5 * (max(self._sum(self._drag * by), 0.0) + self._sum(drag * by))
 
     def _sum(self, values: np.ndarray) -> float:
         return float(self.problem.comm.allreduce(values.sum()))
