@@ -80,5 +80,6 @@ def test_a_flat_rough_plug_comes_back():
     made = plugs.scene(R, H, 5.0, 1.5, MATERIAL, "stick", (40, 1), name="plug")
     path = fx.Process(made).run([fx.Stage("push", drive="plug", until=fx.travel(3.5)),
                                  fx.Stage("back", drive="plug", until=fx.travel(0.0))])
-    assert path["pole_height"][-1] == pytest.approx(0.0, abs=1e-8)
-    assert path["tool_force"][-1] == pytest.approx(0.0, abs=1e-8)
+    # within the ramp, where points that stick hold the sheet
+    assert path["pole_height"][-1] == pytest.approx(0.0, abs=path.problem.contacts[0].law.theta)
+    assert path["tool_force"][-1] == pytest.approx(0.0, abs=1e-8 * path["tool_force"].max())
