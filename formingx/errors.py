@@ -124,7 +124,7 @@ def pair(name: str, values: Any) -> tuple[float, float]:
 
 def place(name: str, value: Any) -> Path:
     """`value` as a path, or an InputError unless it is the name of a file or a folder."""
-    if not isinstance(value, str | os.PathLike) or not os.fspath(value):
+    if not isinstance(value, str | os.PathLike) or not os.fspath(value) or "\0" in os.fsdecode(value):
         raise InputError(f"{name} = {value!r}: must be the name of a file or a folder")
     return Path(value)
 

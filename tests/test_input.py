@@ -35,6 +35,7 @@ def test_mesh(change, words):
     (lambda: fx.NeoHookean(c10=0.0), "no stiffness"),
     (lambda: fx.NeoHookean(c10=-1.0), "no stiffness"),
     (lambda: fx.NeoHookean(c10=math.inf), "finite"),
+    (lambda: fx.mesh.read("a\0b.msh"), "must be the name of a file"),
     (lambda: fx.MooneyRivlin(c10=1.0, c01=-0.1), "not stable.*c01"),
     (lambda: fx.MooneyRivlin(c10=0.0, c01=0.0), "no stiffness"),
     (lambda: fx.Yeoh(c10=1.0, c20=-1e300, c30=0.1), "c20 greater than .* = -0.547"),

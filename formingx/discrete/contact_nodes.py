@@ -306,11 +306,10 @@ class ContactNodes:
         found = int(np.sum((a <= -self.law.theta - HOVERING * self.thickness) & (b > -self.law.theta)))
         return self._comm.allreduce(found, MPI.SUM) > 2 * max(self._allowed, self._foreseen) + 2
 
-    def touches_by(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float,
-                   direction: np.ndarray, slope: float, length: float) -> float:
+    def touches_by(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """Part of a step by which the first of the nodes touched that slid too far without friction; 1 if none did.
 
-        Since a node touched, its pressure has grown as it does at the end of the step, along (direction, slope).
+        Since it touched its pressure has grown, and it has slid, as it does at the end, along (direction, slope).
         """
         if self._memory is None or not self.contact.sticks:
             return 1.0
@@ -319,11 +318,11 @@ class ContactNodes:
         F, grows = self.law.ramp(near.distance)
         velocity = self._length * self.displacement(direction) - slope * self.rate * self._motion
         rate = np.maximum(grows * np.einsum("ni,ni->n", near.normal, velocity), 0.0)
-        since = np.minimum(np.divide(F, rate, out=np.full(len(F), np.inf), where=rate > 0) / length, 1.0)
-        along = np.einsum("ni,ni->n", end - self.positions(old, old_control), near.tangent)
+        since = np.minimum(np.divide(F, rate, out=np.full(len(F), length), where=rate > 0), length)
+        slid = since * np.abs(np.einsum("ni,ni->n", near.tangent, velocity))
         came = np.isnan(self._memory.touch.arrival[:, 0]) & (self._memory.touch.distance <= -self.law.theta) & (F > 0)
-        late = came & (since * np.abs(along) > _SLIDES * self.lengths)
-        return self._comm.allreduce(1 - float(since[late].max(initial=0.0)), MPI.MIN)
+        late = came & (slid > _SLIDES * self.lengths)
+        return self._comm.allreduce(1 - float(since[late].max(initial=0.0)) / length, MPI.MIN)
 
     def touching(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Which nodes touch, or are held, shape (n,)."""

@@ -346,15 +346,13 @@ class Problem:
         n = self._n
         return any([c.grew_too_much(old[:n], old_control, new[:n], control) for c in self.touching])
 
-    def touches_by(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float,
-                   direction: np.ndarray, slope: float, length: float) -> float:
-        """Part of a step, which ends along (direction, slope), after which it should have ended; 1: short enough.
+    def touches_by(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
+        """Part of a step, which came to `new` along (direction, slope), that will do; 1: it was short enough.
 
         What comes into contact sticks where it touches: a longer step lets it slide too far before. Arrays: own part.
         """
         n = self._n
-        return min([c.touches_by(old[:n], old_control, new[:n], control, direction[:n], slope, length)
-                    for c in self.touching], default=1.0)
+        return min([c.touches_by(new[:n], control, direction[:n], slope, length) for c in self.touching], default=1.0)
 
     def motion(self, control: float) -> np.ndarray:
         """The held unknowns at their values for a control, all else 0, shape (owned part of x,)."""

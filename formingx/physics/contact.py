@@ -40,7 +40,7 @@ above 1, so that the range is no wider than needed, and what never slides (mu = 
 
 
 _SMOOTH, _STICK, _ROUGH = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
-"""Penalty and ramp without friction, of what sticks until it is pulled off, and else, where stiffer costs iterations."""
+"""Penalty and ramp without friction, of what sticks until pulled off, and else, where stiffer costs iterations."""
 
 _AT_FOOT = 1e-7
 """Distances from the foot of the ramp, over theta, that are as good as none."""
@@ -55,8 +55,8 @@ class Contact(Part):
         friction: "stick" (a point that touches stays where it touched), "none", or the coefficient mu of Coulomb's
             law (5.9), from 0 (none). One that depends on the temperature of the body where it touches: a `table`
             {T: mu}, or what `of_temperature` returns; it is that of the last accepted state.
-        penalty: k over shear modulus / thickness of the sheet; default 2e4 under Coulomb's law and with separates=False,
-            else 2e5.
+        penalty: k over shear modulus / thickness of the sheet; default 2e5; 2e4 under Coulomb's law and with
+            separates=False.
         ramp: theta over thickness of the sheet; default 1e-5, without friction 1e-7.
         separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
             start); with "stick" or "none".
@@ -110,7 +110,7 @@ class Contact(Part):
 
     @property
     def sticks(self) -> bool:
-        """True if a point that touches stays where it touched: under "stick", and where mu is so large as to be no less."""
+        """True if a point that touches stays where it touched: under "stick", and where mu is as good as that."""
         return not self.friction_by_temperature and self.mu * SOFTER >= 1
 
     @property

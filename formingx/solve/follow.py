@@ -233,8 +233,8 @@ class Run:
             new.met = target
         if self.problem.too_far(old.x, old.control, new.x, new.control):
             raise _Astray("too much came into contact in one step", [])
-        part = self.problem.touches_by(old.x, old.control, new.x, new.control, new.direction, new.slope, reach)
-        if part < 0.999 and reach > _SHORT:
+        part = self.problem.touches_by(new.x, new.control, new.direction, new.slope, reach)
+        if part < 1 and reach > _SHORT:
             raise _Late(part)
         if was_passed(self.curve, self.states[:-1], old, new):
             raise _Astray("the iteration fell back to a part of the path that was passed", [])
@@ -416,7 +416,7 @@ class _Late(Exception):
 
     def __init__(self, part: float):
         super().__init__(part)
-        self.part = max(1.001 * part, 0.1)
+        self.part = max(part, 0.1)
 
 
 class _Astray(Failure):
