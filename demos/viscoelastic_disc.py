@@ -68,7 +68,7 @@ def main():
     options.add_argument("--elements", type=int, default=40, help="elements along the radius")
     options.add_argument("--accuracy", type=float, default=1e-4, help="relative error in time")
     args = options.parse_args()
-    n, accuracy = (24, 1e-3) if args.quick else (args.elements, args.accuracy)
+    n, accuracy = (24, 3e-4) if args.quick else (args.elements, args.accuracy)
     summary: dict = {}
     paths = {}
     for model in MODELS:

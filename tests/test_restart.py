@@ -246,7 +246,7 @@ def test_of_another_scene(message, whole):
 
 def test_contacts_are_compared_to_the_last_number(whole):
     folder, *_ = whole["stick"]
-    with pytest.raises(fx.InputError, match=r"contacts\[0\].penalty: 20000.0 there, 10000.0 here"):
+    with pytest.raises(fx.InputError, match=r"contacts\[0\].penalty: 200000.0 there, 10000.0 here"):
         fx.load(folder, cup("stick", penalty=1e4))
     with pytest.raises(fx.InputError, match=r"contacts\[0\].tool.pieces"):
         fx.load(folder, cup("stick", fillet=1.1))

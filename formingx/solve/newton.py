@@ -129,6 +129,8 @@ class Tolerances:
             return False
         residual, last, before = residuals[-1], corrections[-1], corrections[-2] if len(corrections) > 1 else 1.0
         if chord:
+            if residual == 0:                                # at rest, where nothing acts
+                return True
             ahead = 2 * last * max(residual / residuals[-2], last / before)
             return ahead < self.correction and residual < self.residual
         ahead = last * min(1.0, last / before) ** 2
