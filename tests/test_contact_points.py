@@ -65,9 +65,9 @@ def test_no_points_at_all_are_refused():
 
 
 def plugged():
-    """A flat plug with a fillet and friction, pushed into a clamped sheet."""
-    plug = fx.tools.cylinder(radius=3.0, z=0.3, fillet=0.5)
-    return fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(8, 1)),
+    """A ball with friction, pushed into a clamped sheet."""
+    plug = fx.tools.sphere(radius=5.0, z=0.3)
+    return fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(12, 1)),
                     materials=fx.MooneyRivlin(c10=50, c01=15), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                     contacts=[fx.Contact("top", plug, 0.3, moves=(0, -1), points=3)])
 
@@ -80,8 +80,8 @@ def numbers(path):
 def push(folder, start=None):
     """Make, or go on with, a run that leaves its states in a folder."""
     scene = plugged()
-    path = fx.trace(scene, until=fx.travel(2.0), progress=False, tolerances=fx.Tolerances(residual=1e-10),
-                    start=start and fx.load(start, scene, state=2))
+    path = fx.trace(scene, until=fx.travel(3.0), progress=False, tolerances=fx.Tolerances(residual=1e-10),
+                    start=start and fx.load(start, scene, state=4))
     path.save(folder)
     return path
 

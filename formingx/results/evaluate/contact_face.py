@@ -45,8 +45,8 @@ class ContactFace:
 
     Attributes:
         rest: the points at rest, shape (n, 2), length, by R, then Z.
-        nodes, nearest: nodes of the face at rest, shape (m, 2), length, and the numbers of the points that stand for
-            them: they themselves, or the nearest Gauss points, shape (m,).
+        nodes, nearest: nodes of the face at rest, edge by edge, shape (m, 2), length, and the numbers of the points
+            that stand for them: they themselves, or the nearest Gauss points, shape (m,).
     """
 
     def __init__(self, path: Any, contact: Any):
@@ -54,10 +54,8 @@ class ContactFace:
         self._path, self._contact = path, contact
         self._at_nodes = contact.contact.points == "nodes"
         self.rest, _ = self._gathered(contact.points)
-        edges = self._edge_points()
-        tree = cKDTree(self.rest)
-        self.nodes = edges.reshape(-1, 2)
-        self.nearest = tree.query(self.nodes)[1]
+        self.nodes = self._edge_points().reshape(-1, 2)
+        self.nearest = cKDTree(self.rest).query(self.nodes)[1]
         if self._at_nodes:
             self._edges = np.unique(self.nearest.reshape(-1, 3), axis=0)             # a ghost is there twice
             self._rest_tangents = _tangents(self.rest[self._edges])
