@@ -102,11 +102,41 @@ def test_filling_of_a_cup(formed):
 
 
 def test_contact_presses_as_the_air_does(formed):
-    """On the flat floor the sheet passes on the pressure; there is none where there is a gap, and no friction."""
+    """On the flat floor the sheet passes on the pressure, at the axis too; none where there is a gap, no friction."""
     table = formed.contact()
-    flat = (table.rest[:, 0] > 0.9) & (table.rest[:, 0] < 2.8)
+    flat = table.rest[:, 0] < 2.8
     assert flat.sum() > 5 and table.pressure[flat] == pytest.approx(np.full(flat.sum(), 8.0), rel=5e-4)
     assert np.all(table.pressure[table.gap > 1e-3] == 0) and not table.friction.any()
+
+
+def compressed(friction, points="nodes"):
+    """The upper half of a block between plates, pressed to 0.8 of its height."""
+    plate = fx.Contact("top", fx.tools.plane(1.0), friction, moves=(0, -1), points=points)
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(6, 4)), materials=fx.NeoHookean(c10=1.0),
+                     contacts=[plate], supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z")])
+    return fx.trace(scene, until=fx.travel(0.2), progress=False)
+
+
+@pytest.mark.parametrize("points", ["nodes", 3])
+def test_a_smooth_plate_presses_alike_everywhere(points):
+    """sigma = 2 c10 (1/l - l^2), from the axis on."""
+    path, l = compressed("none", points), 0.8
+    table, exact = path.contact(), 2 * (1 / l - l**2)
+    assert table.pressure == pytest.approx(np.full(len(table.rest), exact), rel=2e-4)
+    assert table.points[:, 0] == pytest.approx(table.rest[:, 0] / np.sqrt(l), rel=1e-4, abs=1e-12)
+    assert path["tool_force"][-1] == pytest.approx(exact * np.pi / l, rel=1e-4)
+
+
+@pytest.mark.parametrize("points", ["nodes", 3])
+def test_uneven_tractions_add_up_to_the_force(points):
+    """On a plate that the block sticks to: over the areas at rest that belong to the points."""
+    path = compressed("stick", points)
+    with path.problem.at(path.last) as problem:
+        contact, = problem.contacts
+        _, traction = contact.traction(problem.x.array_r, problem.control)
+    assert np.ptp(traction[:, 0]) > 0.2 * traction[:, 0].mean()
+    order = np.lexsort((contact.points[:, 1], contact.points[:, 0]))
+    assert contact.lumped[order] @ traction[:, 0] == pytest.approx(path["tool_force"][-1], rel=1e-9)
 
 
 def test_tool_force_resists(formed):

@@ -1,12 +1,14 @@
-"""Contact at Gauss points of the facets: areas, derivatives, and the forces that contact at the nodes gives."""
+"""Contact at Gauss points of the facets: areas, derivatives, ranks, and what contact at the nodes gives."""
 
 import numpy as np
 import pytest
+from conftest import run
 from test_contact import cup
 from test_derivatives import difference, random_state, residual
 
 import formingx as fx
 from formingx.discrete.problem import Problem
+from formingx.results.files.fields import Fields
 
 
 @pytest.mark.quick
@@ -42,9 +44,63 @@ def test_forces_are_those_of_contact_at_nodes():
     assert found[1] == pytest.approx(found[0], rel=1e-2)
 
 
-def test_what_needs_nodes_says_so():
-    path = fx.trace(cup("none", elements=(5, 1), points=2), until=fx.pressure(0.1), progress=False)
-    with pytest.raises(fx.InputError, match="acts at Gauss points"):
-        path.contact()
+def test_table_is_that_of_contact_at_nodes():
+    """A cup's floor takes the pressure of the air; both tables are of one face, and so are the fields for ParaView."""
+    tables = []
+    for points in ("nodes", 3):
+        path = fx.trace(cup("none", depth=1.5, points=points), until=fx.pressure(8.0), progress=False)
+        tables.append(path.contact())
+        shown = Fields(path).of(path.last)["contact_pressure"]
+        assert shown.max() == pytest.approx(tables[-1].pressure.max(), rel=1e-12) and np.mean(shown == 0) > 0.4
+    nodes, gauss = tables
+    flat = gauss.rest[:, 0] < 5
+    assert flat.sum() > 25 and gauss.pressure[flat] == pytest.approx(np.full(flat.sum(), 8.0), rel=2e-3)
+    height = np.interp(gauss.rest[:, 0], nodes.rest[:, 0], nodes.points[:, 1])
+    assert height == pytest.approx(gauss.points[:, 1], abs=1e-2)
+
+
+def test_no_points_at_all_are_refused():
     with pytest.raises(fx.InputError, match="points"):
         cup("none", points=0)
+
+
+def plugged():
+    """A ball with friction, pushed into a clamped sheet."""
+    plug = fx.tools.sphere(radius=5.0, z=0.3)
+    return fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(12, 1)),
+                    materials=fx.MooneyRivlin(c10=50, c01=15), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                    contacts=[fx.Contact("top", plug, 0.3, moves=(0, -1), points=3)])
+
+
+def numbers(path):
+    table, columns = path.contact(), ("tool_force", "pole_height", "contact_length")
+    return np.concatenate([*(path[c] for c in columns), table.pressure, table.friction, table.points.ravel()])
+
+
+def push(folder, start=None):
+    """Make, or go on with, a run that leaves its states in a folder."""
+    scene = plugged()
+    path = fx.trace(scene, until=fx.travel(3.0), progress=False, tolerances=fx.Tolerances(residual=1e-10),
+                    start=start and fx.load(start, scene, state=4))
+    path.save(folder)
+    return path
+
+
+ON_RANKS = """
+import sys
+sys.path.insert(0, "tests")
+from test_contact_points import push
+push(*sys.argv[1:])
+"""
+
+
+def test_ranks_agree_and_go_on_where_others_stopped(tmp_path):
+    """A facet's points are on one rank, its nodes may be on another."""
+    one, two, three, end = (tmp_path / name for name in ("one", "two", "three", "end"))
+    path = push(one)
+    expected = numbers(path)
+    assert np.sum(path.contact().friction != 0) > 5
+    run("-c", ON_RANKS, two, ranks=2)
+    run("-c", ON_RANKS, three, two, ranks=3)
+    for path in (fx.load(two, plugged()), fx.load(three, plugged()), push(end, three)):
+        np.testing.assert_allclose(numbers(path), expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())

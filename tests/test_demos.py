@@ -38,6 +38,21 @@ def test_help_names_every_option():
         assert option in text
 
 
+def test_clamp_ring_quick(tmp_path):
+    """Between rings stress and limit pressure have a limit; at a clamped corner stress has none."""
+    found = summary("clamp_ring", tmp_path, "--quick")
+    rings, clamped, simple = ([found[held][n] for n in "12"] for held in ("rings", "clamped", "simply_supported"))
+    stress, pressure = "peak_stress_kg_per_cm2_at_stretch_1.5", "limit_pressure_kg_per_cm2"
+    for coarse, fine in (rings, simple):
+        assert fine["peak_converged"] and fine[stress] == pytest.approx(coarse[stress], rel=0.06)
+        assert fine[pressure] == pytest.approx(coarse[pressure], rel=3e-4)
+    assert rings[1][stress] == pytest.approx(9.53, rel=5e-3)          # 9.538 on 90 x 6 elements
+    assert rings[1][pressure] == pytest.approx(0.50367, abs=1e-4)     # its limit is between those of the two
+    assert simple[1][pressure] < rings[1][pressure] < clamped[1][pressure]
+    assert clamped[1][stress] > 1.5 * clamped[0][stress] and not clamped[1]["peak_converged"]
+    assert drawn(tmp_path / "clamp_ring.png")
+
+
 def test_cup_quick(tmp_path):
     found = summary("cup", tmp_path, "--quick")
     for name in ("stick", "frictionless", "coulomb_0.3"):

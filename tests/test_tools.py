@@ -19,6 +19,8 @@ SHAPES = {
     "cone": tools.cone(half_angle=30, z=-0.5, tip=0.4),
     "sharp cone": tools.cone(half_angle=50, z=0.1),
     "sphere": tools.sphere(radius=1.3, z=0.2),
+    "clamp ring": tools.clamp_ring(radius=1.5, width=2.0, fillet=0.3, z=0.1),
+    "thick clamp ring, below": tools.clamp_ring(radius=1.5, width=2.0, fillet=0.3, height=1.0).mirrored(),
     "mirrored": tools.male(radius=2, height=3, fillet=0.5).mirrored().moved(z=5),
     "turned": tools.Tool([(1, 0), (3, 0.5), (2.5, 2), (1.2, 1.5)], fillets=[0.1, 0.2, 0.0, 0.3],
                          closed=True).turned(20),
@@ -232,6 +234,7 @@ def test_gmsh_models(tmp_path, kind):
     (lambda: tools.cup(radius=1, depth=5, draft=20), "leaves no floor"),
     (lambda: tools.cone(half_angle=90), "below 90"),
     (lambda: tools.cone(half_angle=5e-324), "at least 0.01"),
+    (lambda: tools.clamp_ring(radius=1, width=1, fillet=0.2, height=0.3), "fillet"),
     (lambda: tools.bottle(radius=1, height=1, neck=2, shoulder=1, neck_height=1), "below radius"),
 ])
 def test_bad_profiles(build, message):

@@ -39,7 +39,8 @@ class ContactNodes:
 
     Attributes:
         dofs: local numbers of (u_r, u_z), shape (n, 2); points: reference positions, shape (n, 2), length.
-        lengths, area: reference length and area that belong to each node, shape (n,) (area: 0 on the axis).
+        lengths, lumped: reference length and area that belong to each node, shape (n,) (lumped: 0 on the axis).
+        area: that forces act on: `lumped`, but for a facet that ends on the axis, see `_spread_to_axis`, shape (n,).
     """
 
     def __init__(self, solid: Any, contact: Contact, assemble: Any):
@@ -76,7 +77,8 @@ class ContactNodes:
         own = dofs[:, 0] < solid.space.dofmap.index_map.size_local
         self.dofs, self.points = dofs[own], vectors.tabulate_dof_coordinates()[nodes[own], :2].copy()
         self.lengths = assemble(solid.compile(solid.length_row(on)))[self.dofs[:, 0]]
-        self.area = self.lengths * solid.scene.kinematics.weight(self.points.T)
+        self.lumped = self.lengths * solid.scene.kinematics.weight(self.points.T)
+        self.area = self.lumped.copy()
         self._spread_to_axis(solid.scene.kinematics)
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
@@ -183,8 +185,8 @@ class ContactNodes:
 
         (1/24, -2/24, 1/24) of L times the weight at L: integrals of what is linear along the facet stay exact.
         """
-        nodes = np.concatenate(self._comm.allgather(np.column_stack([self.points, self.lengths, self.area])))
-        for axis in nodes[(nodes[:, 3] < 1e-9 * nodes[:, 3].max()) & (nodes[:, 2] > 0)]:
+        nodes = np.concatenate(self._comm.allgather(np.column_stack([self.points, self.lengths, self.lumped])))
+        for axis in nodes[_no_area(nodes[:, 3], nodes[:, 2])]:
             length = 6 * axis[2]                                        # of its facet, on which Gauss-Lobatto gives 1/6
             away = np.hypot(*(self.points - axis[:2]).T) / length
             at = kinematics.weight(np.array([axis[0] + length, axis[1]])) * length / 24
@@ -338,12 +340,23 @@ class ContactNodes:
         return self._comm.allreduce(float(self.lengths[self.touching(fields, control)].sum()), MPI.SUM)
 
     def traction(self, fields: np.ndarray, control: float) -> tuple[np.ndarray, np.ndarray]:
-        """(reference points (m, 2), normal and tangential traction per reference area (m, 2)) of all ranks, by R."""
+        """(reference points (m, 2), normal and tangential traction per reference area (m, 2)) of all ranks, by R.
+
+        That is force over `lumped` area: their sum is the force. The node on the axis has none: its force counts to the
+        middle of its facet, whose pressure it shows (pressure is even in R, tangential traction odd).
+        """
         found = self.tractions(fields, control)
-        rows = np.column_stack([self.points, found.normal, found.tangential])
+        rows = np.column_stack([self.points, self.area, self.lumped, self.lengths, found.normal, found.tangential])
         rows = np.concatenate(self._comm.allgather(rows))
         rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
-        return rows[:, :2], rows[:, 2:]
+        points, (area, lumped, lengths), values = rows[:, :2], rows[:, 2:5].T, rows[:, 5:]
+        axis = _no_area(lumped, lengths)
+        values = values * np.divide(area, lumped, out=area.copy(), where=~axis)[:, None]
+        for i in np.flatnonzero(axis):
+            middle = np.argsort(np.hypot(*(points - points[i]).T))[1]
+            values[middle] += values[i] / lumped[middle]
+            values[i] = values[middle, 0], 0.0
+        return points, values
 
     def force(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Total force of the body on the tool (r, z), shape (2,), stress length^2 (per depth: length), all ranks.
@@ -352,3 +365,8 @@ class ContactNodes:
         """
         total = (self.area[:, None] * self.tractions(fields, control).force).sum(0)
         return self._comm.allreduce(total, MPI.SUM)
+
+
+def _no_area(lumped: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Which nodes of a face are on the axis, of all ranks, shape (n,)."""
+    return (lumped < 1e-9 * lumped.max()) & (lengths > 0)

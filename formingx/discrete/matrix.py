@@ -61,7 +61,7 @@ class ExtendedMatrix:
     def fill(self, blocks: Sequence[tuple[np.ndarray, np.ndarray]] = ()) -> PETSc.Mat:
         """The matrix at the state that the form's functions hold now.
 
-        blocks: (local owned dofs (n, m), values (n, m, m)) to be added to K; the dofs of a block must share a cell.
+        blocks: (local dofs (n, m), ghosts too, values (n, m, m)) to be added to K; dofs of a block must share a cell.
         """
         A, add = self.mat, PETSc.InsertMode.ADD_VALUES
         A.zeroEntries()

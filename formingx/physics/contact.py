@@ -64,7 +64,7 @@ class Contact(Part):
             What sticks depends on when it touched: with 4, a run takes half the iterations, and thickness changes by
             some 0.1 % of itself.
         points: where it acts: at the "nodes" of the face, or at so many Gauss points of each facet, which let go one by
-            one: smoother where a sheet slides over an edge (in one process, not under mpirun).
+            one: smoother where a sheet slides over an edge.
         moves: (r, z) of the tool's motion per unit of travel: the tool is what the run controls; None: it stays.
         name: what it is called in a process and in its columns.
 

@@ -11,8 +11,8 @@ from ..errors import InputError, finite, non_negative, positive
 from .profile import TURN, Arc, Line, Nearest, Tool
 from .tool_files import read
 
-__all__ = ["Arc", "Line", "Nearest", "Pot", "Tool", "bottle", "cone", "cup", "cylinder", "male", "plane", "pot",
-           "read", "sphere"]
+__all__ = ["Arc", "Line", "Nearest", "Pot", "Tool", "bottle", "clamp_ring", "cone", "cup", "cylinder", "male", "plane",
+           "pot", "read", "sphere"]
 
 
 def plane(z: float = 0.0) -> Tool:
@@ -117,6 +117,25 @@ class Pot(NamedTuple):
 
     mould: Tool
     plug: Tool
+
+
+def clamp_ring(*, radius: float, width: float, fillet: float, z: float = 0.0, height: float | None = None) -> Tool:
+    """A ring that a sheet lies under, its flat face at Z = z and its inner edges rounded: half a grip.
+
+    The other half is `clamp_ring(...).mirrored()`. Between the two a sheet may grow thin, and it leaves them over their
+    edges: a clamp without a singular corner. Hold the sheet's rim, between the rings, by `SimplySupported`.
+
+    Args:
+        radius: of the opening.
+        width: from there outwards, more than the fillet.
+        fillet: radius of the edges.
+        height: of the ring, at least two fillets, as by default.
+    """
+    radius, z = positive("clamp_ring: radius", radius), finite("clamp_ring: z", z)
+    fillet, width = positive("clamp_ring: fillet", fillet), positive("clamp_ring: width", width)
+    height = 2 * fillet if height is None else positive("clamp_ring: height", height)
+    outer, top = radius + width, z + height
+    return Tool([(outer, top), (radius, top), (radius, z), (outer, z)], [0.0, fillet, fillet, 0.0])
 
 
 def pot(*, mouth: float, base: float, depth: float, sheet: float, fillet: float, lip: float = 0.0,

@@ -93,12 +93,13 @@ class _Points:
         for rank, count in enumerate(counts):
             for k in range(count):
                 unit[:] = 0
-                if rank == self._comm.rank:
-                    contact, point, way = own[k]
+                mine, point, way = own[k] if rank == self._comm.rank else (None, 0, 0)
+                for contact in contacts:                        # on all ranks: the force may act on nodes of another
                     forces = np.zeros((len(contact.points), 2))
-                    forces[point, way] = 1.0
+                    if contact is mine:
+                        forces[point, way] = 1.0
                     contact.add(unit, forces)
-                    unit[held] = 0
+                unit[held] = 0
                 e.array_w[:] = unit
                 solver.solve(e, v)
                 steps.append(border(v))

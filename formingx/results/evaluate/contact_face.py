@@ -1,4 +1,4 @@
-"""What a tool and a face of the body do to each other, node by node: pressure, friction, gap; and the tool's force."""
+"""What a tool and a face of the body do to each other, point by point: pressure, friction, gap; the tool's force."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..files.sheet import Sheet
 
 @dataclass(frozen=True, repr=False)
 class ContactTable(Sheet):
-    """A face that meets a tool, at its n nodes, by R at rest.
+    """A face that meets a tool, at the n points where contact acts (nodes or Gauss points), by R at rest.
 
     Attributes:
         rest: (R, Z), shape (n, 2), length.
@@ -41,37 +41,43 @@ class ContactTable(Sheet):
 
 
 class ContactFace:
-    """The face of one contact of a problem (`NodalContact`), its nodes from all ranks in one order; collective.
+    """The face of one contact of a problem (`ContactNodes`), its points from all ranks in one order; collective.
 
     Attributes:
-        rest: the nodes at rest, shape (n, 2), length, by R, then Z.
+        rest: the points at rest, shape (n, 2), length, by R, then Z.
+        nodes, nearest: nodes of the face at rest, edge by edge, shape (m, 2), length, and the numbers of the points
+            that stand for them: they themselves, or the nearest Gauss points, shape (m,).
     """
 
     def __init__(self, path: Any, contact: Any):
-        if contact.contact.points != "nodes":
-            raise InputError(f"contact table: {contact.contact!r} acts at Gauss points: tables are made at nodes, of a"
-                             " scene with points='nodes'")
+        from scipy.spatial import cKDTree
         self._path, self._contact = path, contact
+        self._at_nodes = contact.contact.points == "nodes"
         self.rest, _ = self._gathered(contact.points)
-        self._edges = self._find_edges()
-        self._rest_tangents = _tangents(self.rest[self._edges])
+        self.nodes = self._edge_points().reshape(-1, 2)
+        self.nearest = cKDTree(self.rest).query(self.nodes)[1]
+        if self._at_nodes:
+            self._edges = np.unique(self.nearest.reshape(-1, 3), axis=0)             # a ghost is there twice
+            self._rest_tangents = _tangents(self.rest[self._edges])
 
     def of(self, state: Any) -> ContactTable:
         """The face in a state; of a tool that takes no part, without pressure."""
         path, contact = self._path, self._contact
         with path.problem.at(state) as problem:
-            fields = problem.x.array_r
-            moved = contact.points + path.problem.forms.length * fields[contact.dofs]
-            seen = contact.positions(fields, state.control)
-            gap = -contact.contact.tool.signed_distance(seen)
-            traction = np.zeros((len(seen), 2))
+            fields = problem.x.array_r.copy()
+            moved = contact.points + path.problem.forms.length * contact.displacement(fields)
+            gap = -contact.contact.tool.signed_distance(contact.positions(fields, state.control))
+            traction = np.zeros((len(self.rest), 2))
             if contact in path.problem.touching:
-                found = contact.tractions(fields, state.control)
-                traction = np.column_stack([found.normal, found.tangential])
-        _, values = self._gathered(moved, gap[:, None], traction)
+                _, traction = contact.traction(fields, state.control)
+        _, values = self._gathered(moved, gap)
         points = values[:, :2]
-        per_area = values[:, 3:] / self.area_ratio(points)[:, None]
-        return ContactTable(self.rest, points, values[:, 2], per_area[:, 0], per_area[:, 1], path.problem.comm)
+        if self._at_nodes:
+            ratio = self.area_ratio(points)[:, None]
+        else:
+            _, ratio = self._gathered(contact.area_ratio(fields))
+        pressure, friction = (traction / ratio).T
+        return ContactTable(self.rest, points, values[:, 2], pressure, friction, path.problem.comm)
 
     def area_ratio(self, points: np.ndarray) -> np.ndarray:
         """Deformed over reference area at the nodes, the mean of what the edges on both sides say, shape (n,)."""
@@ -90,10 +96,9 @@ class ContactFace:
         rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
         return rows[:, :2], rows[:, 2:]
 
-    def _find_edges(self) -> np.ndarray:
-        """Numbers of the two ends and the middle of every edge of the face, shape (m, 3); same on all ranks."""
+    def _edge_points(self) -> np.ndarray:
+        """The two ends and the middle of every edge of the face, shape (m, 3, 2); same on all ranks, ghosts twice."""
         from dolfinx.mesh import entities_to_geometry
-        from scipy.spatial import cKDTree
         mesh = self._path.problem.scene.mesh
         mesh.domain.topology.create_connectivity(1, 2)
         facets = mesh.facets_of(self._contact.contact.on)
@@ -101,13 +106,11 @@ class ContactFace:
         X = mesh.domain.geometry.x[nodes][..., :2]
         if len(X) and X.shape[1] == 2:                           # straight edges
             X = np.concatenate([X, X.mean(1, keepdims=True)], axis=1)
-        points = np.concatenate([part.reshape(-1, 3, 2) for part in mesh.comm.allgather(X)])
-        numbers = cKDTree(self.rest).query(points)[1]
-        return np.unique(numbers, axis=0)                        # a ghost is there twice
+        return np.concatenate([part.reshape(-1, 3, 2) for part in mesh.comm.allgather(X)])
 
 
 def contact_of(path: Any, tool: Any, who: str) -> list[Any]:
-    """The contacts (`NodalContact`) of a tool: by its name, as the `Tool` or a `Contact`; None: the only one."""
+    """The contacts (`ContactNodes`) of a tool: by its name, as the `Tool` or a `Contact`; None: the only one."""
     contacts = path.problem.contacts
     found = [c for c in contacts if tool is None or tool in (c.contact.name, c.contact.on)
              or tool is c.contact.tool or tool is c.contact]

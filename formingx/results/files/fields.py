@@ -103,8 +103,8 @@ class Fields:
         for k, contact in enumerate(self._problem.contacts):
             if k not in self._faces:
                 face = ContactFace(self._path, contact)
-                away, at = cKDTree(face.rest).query(self.points.reshape(-1, 2))
-                self._faces[k] = face, at, away < 1e-9 * self._problem.forms.length
+                away, at = cKDTree(face.nodes).query(self.points.reshape(-1, 2))
+                self._faces[k] = face, face.nearest[at], away < 1e-9 * self._problem.forms.length
             face, at, there = self._faces[k]
             pressure += np.where(there, face.of(state).pressure[at], 0.0).reshape(pressure.shape)
         return pressure
