@@ -9,6 +9,7 @@ import pytest
 from conftest import ROOT, run
 
 from formingx.discrete.history import MaterialHistory
+from formingx.solve.newton import BorderedNewton
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import limit  # noqa: E402
@@ -37,6 +38,31 @@ def test_a_tool_is_looked_at_once_for_the_same_points(monkeypatch):
     scene, _ = limit.cup((20, 1))
     path = limit.fx.trace(scene, until=limit.fx.pressure(8.0), step=limit.fx.StepControl(target=8), progress=False)
     assert calls[0] < 2 * path.counts.iterations + 12 * len(path)
+
+
+@pytest.mark.parametrize("friction", ["stick", "none"])
+def test_the_tangent_ahead_comes_from_the_factors_at_hand(monkeypatch, friction):
+    calls, factorise = [0], limit.DirectSolver.factorise
+
+    def counted(self):
+        calls[0] += 1
+        return factorise(self)
+
+    def form():
+        scene, _ = limit.cup((20, 1))
+        scene = limit.fx.Scene(mesh=scene.mesh, materials=scene.materials, supports=scene.supports, loads=scene.loads,
+                               contacts=[limit.fx.Contact("top", scene.contacts[0].tool, friction)])
+        calls[0] = 0
+        path = limit.fx.trace(scene, until=limit.fx.pressure(8.0), progress=False)
+        return path, calls[0] - path.counts.iterations      # factorisations that are no iteration's
+    monkeypatch.setattr(limit.DirectSolver, "factorise", counted)
+    path, more = form()
+    monkeypatch.setattr(BorderedNewton, "turn_ahead", lambda self, x, control: False)
+    other, one_each = form()
+    assert len(path) == len(other) == one_each - 1 > 3 * more       # the first state has one more
+    for a, b in zip(path.states, other.states, strict=True):
+        assert a.slope == pytest.approx(b.slope, rel=1e-5)
+        np.testing.assert_allclose(a.direction, b.direction, atol=1e-5 * np.abs(b.direction).max())
 
 
 def test_what_materials_remember_is_computed_once_a_step(monkeypatch):
