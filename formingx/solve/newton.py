@@ -171,7 +171,7 @@ class BorderedNewton:
         return bool(np.isfinite(self.b.norm()))
 
     def turn_ahead(self, x: PETSc.Vec, control: float) -> bool:
-        """Make `self.b`, at a solution just found, that of the tangent ahead, by the factors at hand; False: it cannot."""
+        """Make `self.b`, at a solution just found, that of the tangent ahead, by the factors at hand; False: not so."""
         return restiffen(self.problem, self.problem.changes_ahead(x, control), self.solver, self.b)
 
     def correct(self, x: PETSc.Vec, control: float, constraint: Any, old: Any = None,
