@@ -114,7 +114,7 @@ class Curve:
     def look_ahead(self, state: State) -> None:
         """The tangent of an accepted state once more: the problem remembers the state now.
 
-        The factors of its last iteration do, but where many contact points differ or a material, which has advanced.
+        The factors of its last iteration serve, unless many contact points differ or materials have advanced.
         """
         self._x.array_w[:] = state.x
         at_hand, self._found = state is self._found and not self.problem.relaxes, None

@@ -7,7 +7,7 @@ compliance C (the inverse tangent, condensed to them): their motions y, to first
     y - y0 + C (f(y) - f0 - S0 y) = 0,
 
 f the law of contact, f0 + S0 y its linearisation in the iteration, which led to y0. This small problem is solved for
-by itself.
+by itself. With f linear it is Woodbury's formula, by which a tangent follows a few points whose stiffness changes.
 """
 
 from __future__ import annotations
