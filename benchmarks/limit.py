@@ -21,6 +21,7 @@ from common import COMM, say  # noqa: E402
 import formingx as fx  # noqa: E402
 from formingx.discrete.problem import Problem  # noqa: E402
 from formingx.results import files  # noqa: E402
+from formingx.solve.curve import Curve  # noqa: E402
 from formingx.solve.direct import DirectSolver  # noqa: E402
 
 SIZES = {"inflation": [(20, 1), (40, 2), (80, 4)], "cup": [(30, 1), (60, 2)]}
@@ -66,7 +67,8 @@ def measure(case, elements, profile=None):
     """What a run costs: set-up and path (CPU seconds), its iterations, one iteration's linear algebra, and the ratio.
 
     Set-up: all that a run to the state at rest takes (forms, columns, the first factorisation with its analysis). What
-    linear algebra costs is measured in the run itself, where what comes between empties the caches.
+    linear algebra costs is measured in the run itself, where what comes between empties the caches. Look ahead: of a
+    state, `Curve.look_ahead`.
 
     profile: a `cProfile.Profile` that looks on, or None.
     """
@@ -74,16 +76,17 @@ def measure(case, elements, profile=None):
     began = time.process_time()
     fx.trace(scene, until=fx.pressure(0.0), progress=False)
     setup = time.process_time() - began
-    with clocked((Problem, "tangent"), (DirectSolver, "factorise"), (DirectSolver, "solve")) as spent, \
-            profile or contextlib.nullcontext():
+    with clocked((Problem, "tangent"), (DirectSolver, "factorise"), (DirectSolver, "solve"),
+                 (Curve, "look_ahead")) as spent, profile or contextlib.nullcontext():
         began = time.process_time()
         path = fx.trace(scene, until=target, step=fx.StepControl(target=8) if scene.contacts else None, progress=False)
         spent_on_path = time.process_time() - began - setup
-    tangent, factors, solve = (np.mean(calls[1:]) for calls in spent.values())      # the first one is set-up
+    *linear, ahead = spent.values()
+    tangent, factors, solve = (np.mean(calls[1:]) for calls in linear)              # the first one is set-up
     n = path.counts.iterations
     return {"unknowns": path.problem.n_unknowns, "states": len(path), "iterations": n, "set-up": setup,
             "path": spent_on_path, "tangent": tangent, "factors": factors, "two solves": 2 * solve,
-            "ratio": spent_on_path / (n * (tangent + factors + 2 * solve))}
+            "look ahead": sum(ahead) / len(path), "ratio": spent_on_path / (n * (tangent + factors + 2 * solve))}
 
 
 def main():

@@ -9,6 +9,7 @@ import pytest
 from conftest import ROOT, run
 
 from formingx.discrete.history import MaterialHistory
+from formingx.solve.newton import BorderedNewton
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import limit  # noqa: E402
@@ -37,6 +38,29 @@ def test_a_tool_is_looked_at_once_for_the_same_points(monkeypatch):
     scene, _ = limit.cup((20, 1))
     path = limit.fx.trace(scene, until=limit.fx.pressure(8.0), step=limit.fx.StepControl(target=8), progress=False)
     assert calls[0] < 2 * path.counts.iterations + 12 * len(path)
+
+
+@pytest.mark.parametrize("friction", ["stick", "none"])
+def test_the_tangent_ahead_comes_from_the_factors_at_hand(monkeypatch, friction):
+    turn_ahead, found, changed = BorderedNewton.turn_ahead, [], [0.0]
+
+    def beside_other_factors(self, x, control):
+        before = self.b.array_r.copy()
+        found.append(turn_ahead(self, x, control))
+        now = self.b.array_r.copy()
+        assert self.tangent(x, control, ahead=True)
+        size = np.abs(self.b.array_r).max()
+        changed.append(np.abs(now - before).max() / size)
+        np.testing.assert_allclose(now, self.b.array_r, atol=1e-6 * size)
+        return True
+    monkeypatch.setattr(BorderedNewton, "turn_ahead", beside_other_factors)
+    fx, (scene, _) = limit.fx, limit.cup((20, 1))
+    scene = fx.Scene(mesh=scene.mesh, materials=scene.materials, supports=scene.supports, loads=scene.loads,
+                     contacts=[fx.Contact("top", scene.contacts[0].tool, friction)])
+    path = fx.trace(scene, until=fx.pressure(8.0), progress=False,
+                    tolerances=fx.Tolerances(correction=1e-14))     # the last factors are those of the state
+    assert all(found) and len(path) - 2 <= len(found) < len(path)
+    assert (max(changed) > 1e-3) == (friction == "stick")           # nodes that have just arrived
 
 
 def test_what_materials_remember_is_computed_once_a_step(monkeypatch):

@@ -20,6 +20,9 @@ _AT_END = 0.95
 _SLIDES = 1e-2
 """How far (over the length of face that is its own) a node may slide so."""
 
+SAME = 1e-3
+"""Of the stiffness of a node: what it may differ by to count as the same in the tangent ahead."""
+
 
 class Memory(NamedTuple):
     """What the nodes of a face remember of the last accepted state.
@@ -58,6 +61,7 @@ class ContactNodes:
         self.base, self.rate = 0.0, float(contact.driven)   # of the travel by the control (`Setting`)
         self.present = True                                 # it takes part in the stage
         self._last: Any = None                              # positions and tractions last computed
+        self._in_tangent = np.zeros((len(self.points), 2, 2))   # stiffness per area in the tangent last made
         # of Newton's method: `Motion` and sense of sliding at the iteration before
         self._iterate: Any = None
         self._sense: Any = None
@@ -242,22 +246,32 @@ class ContactNodes:
         self.add(values, self._scale[:, None] * self.tractions(fields, control).force)
 
     def stiffness(self, fields: np.ndarray, control: float, ahead: bool = False) -> np.ndarray:
-        """Derivative of the forces by the unknowns of each point, shape (n, m, m); `ahead`: see the law."""
-        return self._between_unknowns(self._stiffness(fields, control, ahead))
+        """For a tangent: derivative of forces by the unknowns of each point, shape (n, m, m); `ahead`: see the law."""
+        self._in_tangent = self._stiffness(fields, control, ahead)
+        return self._between_unknowns((self._scale * self._length)[:, None, None] * self._in_tangent)
+
+    def change_ahead(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Stiffness ahead of an accepted state, less that in the tangent last made, shape (n, 2, 2), stress/length.
+
+        0 where they differ by less than `SAME` of it.
+        """
+        change = self._stiffness(fields, control, True) - self._in_tangent
+        least = SAME * np.abs(self._in_tangent).max((1, 2), keepdims=True)
+        return np.where(np.abs(change).max((1, 2), keepdims=True) > least, change, 0.0)
 
     def _stiffness(self, fields: np.ndarray, control: float, ahead: bool) -> np.ndarray:
-        """Derivative of the forces by the displacements of their points, shape (n, 2, 2)."""
-        values = self.tractions(fields, control).stiffness
+        """Derivative of the tractions by the positions, shape (n, 2, 2), stress/length."""
         if ahead:
             arrived = self._memory.arrived if self._memory else np.zeros(len(self.points), dtype=bool)
-            values = self.law.stiffness_ahead(self.positions(fields, control), self.touch, arrived)
-        return (self._scale * self._length)[:, None, None] * values
+            return self.law.stiffness_ahead(self.positions(fields, control), self.touch, arrived)
+        return self.tractions(fields, control).stiffness
 
     def add_control_derivative(self, values: np.ndarray, fields: np.ndarray, control: float,
                                ahead: bool = False) -> None:
         """Add the derivative of the nodal forces by the control: the tool moves; `ahead`: as in `stiffness`."""
         if self.rate:
-            self.add(values, -self._stiffness(fields, control, ahead) @ (self.rate * self._motion / self._length))
+            stiffness = self._stiffness(fields, control, ahead)
+            self.add(values, -self._scale[:, None] * (stiffness @ (self.rate * self._motion)))
 
     def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step along a tangent may be: to the first touch, or until enough new nodes touch.

@@ -280,6 +280,10 @@ class Problem:
         fields = x.array_r[: self._n]
         return self._matrix.fill([(c.dofs, c.stiffness(fields, control, ahead)) for c in self.touching])
 
+    def changes_ahead(self, x: PETSc.Vec, control: float) -> list[np.ndarray]:
+        """Of each contact that takes part: by how much the tangent `ahead` differs from the one last made."""
+        return [contact.change_ahead(x.array_r[: self._n], control) for contact in self.touching]
+
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, ahead: bool = False) -> None:
         """out = dF/dcontrol at (x, control); `ahead`: as in `tangent`."""
         self.set_state(x, control)

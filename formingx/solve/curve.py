@@ -30,6 +30,7 @@ class Curve:
         self.problem = problem
         self.newton = BorderedNewton(problem, tolerances, self.norm)
         self._iterations = 0
+        self._found: State | None = None                    # whose factors are at hand
         self._x, self._a, self._b = (problem.x.duplicate() for _ in range(3))
 
     def norm(self, x: Any, control: float) -> float:
@@ -97,6 +98,7 @@ class Curve:
               chords: bool = False) -> State:
         """The solution of F = 0 and of the constraint, from a guess; raises `Failure`. chords: see `BorderedNewton`."""
         self._x.array_w[:] = x
+        self._found = None
         try:
             control, history = self.newton.correct(self._x, control, constraint, before, chords)
         except Failure as failure:
@@ -106,12 +108,18 @@ class Curve:
         self._iterations += len(history) - 1
         if self.problem.folded(self._x, control):               # forces of 1/J know no sign
             raise Failure("an element turned inside out", history)
-        return self._state(control, history, kind, before)
+        self._found = self._state(control, history, kind, before)
+        return self._found
 
     def look_ahead(self, state: State) -> None:
-        """The tangent of an accepted state once more: the problem remembers the state now."""
+        """The tangent of an accepted state once more: the problem remembers the state now.
+
+        The factors of its last iteration serve, unless many contact points differ or materials have advanced.
+        """
         self._x.array_w[:] = state.x
-        if self.newton.tangent(self._x, state.control, ahead=True):
+        at_hand, self._found = state is self._found and not self.problem.relaxes, None
+        if at_hand and self.newton.turn_ahead(self._x, state.control) or self.newton.tangent(
+                self._x, state.control, ahead=True):
             size = self._length_of(self.newton.b)
             direction, slope = self.newton.b.array_r / size, 1 / size
             sense = np.sign(self._inner(direction, slope, state.direction, state.slope)) or 1.0

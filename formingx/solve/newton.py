@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from ..errors import count, positive
 from .chords import Chords
 from .direct import DirectSolver
-from .settle import Settling
+from .settle import Settling, restiffen
 
 UNLOADED = 1e-5
 """Floor of the support forces (over stress times volume over length) in the relative residual."""
@@ -171,6 +171,10 @@ class BorderedNewton:
         self.solver.solve(self.F_control, self.b)
         self.b.scale(-1)
         return bool(np.isfinite(self.b.norm()))
+
+    def turn_ahead(self, x: PETSc.Vec, control: float) -> bool:
+        """Make `self.b`, at a solution just found, that of the tangent ahead, by the factors at hand; False: not so."""
+        return restiffen(self.problem, self.problem.changes_ahead(x, control), self.solver, self.b)
 
     def correct(self, x: PETSc.Vec, control: float, constraint: Any, old: Any = None,
                 chords: bool = False) -> tuple[float, list[Iteration]]:

@@ -7,7 +7,7 @@ compliance C (the inverse tangent, condensed to them): their motions y, to first
     y - y0 + C (f(y) - f0 - S0 y) = 0,
 
 f the law of contact, f0 + S0 y its linearisation in the iteration, which led to y0. This small problem is solved for
-by itself.
+by itself. With f linear it is Woodbury's formula, by which a tangent follows a few points whose stiffness changes.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ from .direct import DirectSolver
 
 MOST = 40
 """Points that are settled together; with more, the iteration is left to itself."""
+
+FEW = 3
+"""Points that change for which solutions with the factors at hand cost less than other factors."""
 
 _ITERATIONS = 15
 
@@ -78,6 +81,26 @@ class Settling:
         return self._problem.comm.allreduce(found, MPI.LOR)
 
 
+def restiffen(problem: Any, changes: list[np.ndarray], solver: DirectSolver, b: Any) -> bool:
+    """Make b = dx/dcontrol by a factorised tangent that of one which differs at a few points (Woodbury's formula).
+
+    changes: of the stiffness per area of each contact's points, shape (n, 2, 2). False, and b as it was, where so many
+    points change that factors of the other tangent cost less, or where that is singular.
+    """
+    chosen = [np.flatnonzero(change.any((1, 2))) for change in changes]
+    points = problem.comm.allreduce(sum(map(len, chosen)), MPI.SUM)
+    if not points:
+        return True
+    if points > FEW:
+        return False
+    small = _Points(problem, problem.touching, chosen, solver, lambda v: 0.0)
+    by = small.restiffened(b, [change[i] for change, i in zip(changes, chosen)])
+    if by is None:
+        return False
+    b.array_w += by
+    return True
+
+
 class _Points:
     """A few points and the body as they see it. Arrays: all of all ranks, but for what is said to be own."""
 
@@ -116,7 +139,7 @@ class _Points:
         """How a correction and its step change, own part; None if no consistent state was found."""
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._taken()
-        y, n = y0.copy(), len(y0)
+        y = y0.copy()
         accuracy = 1e-4 * min(c.law.theta for c in self._contacts)
         for _ in range(_ITERATIONS):
             f, S = self._law(y)
@@ -125,14 +148,29 @@ class _Points:
             if np.abs(R).max() < accuracy:
                 forces = -self._scale * more
                 return self._columns @ forces, float(self._steps @ forces)
-            J = np.eye(n) + np.einsum("mni,nij->mnj", self._C.reshape(n, -1, 2), S - S0).reshape(n, n)
-            try:
-                y = y - np.linalg.solve(J, R)
-            except np.linalg.LinAlgError:
+            by = self._within(S - S0, R)
+            if by is None:
                 return None
-            if not np.isfinite(y).all():
-                return None
+            y = y - by
         return None
+
+    def restiffened(self, b: Any, changes: list[np.ndarray]) -> np.ndarray | None:
+        """How dx/dcontrol changes, own part, with stiffnesses per area of own points; None: the tangent is singular."""
+        more = self._gather(np.concatenate(changes))
+        y = self._within(more, self._gather(self._moved(b.array_r, 1.0)))
+        if y is None:
+            return None
+        return -self._columns @ (self._scale * np.einsum("nij,nj->ni", more, y.reshape(-1, 2)).ravel())
+
+    def _within(self, more: np.ndarray, y: np.ndarray) -> np.ndarray | None:
+        """What motions y become if the points are stiffer by `more`, (1 + C more)^-1 y; None if there is no answer."""
+        n = len(y)
+        J = np.eye(n) + np.einsum("mni,nij->mnj", self._C.reshape(n, -1, 2), more).reshape(n, n)
+        try:
+            found = np.linalg.solve(J, y)
+        except np.linalg.LinAlgError:
+            return None
+        return found if np.isfinite(found).all() else None
 
     def _moved(self, dx: np.ndarray, step: float) -> np.ndarray:
         """Own points' part of a correction, seen from their tools, flat."""
