@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -69,9 +70,11 @@ class Sheet:
 
 
 def _words(column: Any) -> list[str]:
-    """Numbers with five digits, and what is round-off beside the others as 0; words as they are."""
+    """Numbers to the fifth digit of the largest in the column; words as they are."""
     values = np.asarray(column)
     if values.dtype.kind != "f":
         return [str(v) for v in values]
-    least = 1e-12 * np.abs(values).max(initial=0.0)
-    return [f"{v:.5g}" for v in np.where(np.abs(values) <= least, 0.0, values)]
+    largest = np.nanmax(np.abs(values), initial=0.0)
+    places = 4 - math.floor(math.log10(largest)) if 0 < largest < math.inf else 0
+    rounded = np.round(values, places) + 0.0                # no -0
+    return [f"{v:.5g}" if abs(places) > 8 else f"{v:.{max(places, 0)}f}" for v in rounded]
