@@ -42,18 +42,18 @@ def test_a_tool_is_looked_at_once_for_the_same_points(monkeypatch):
 
 @pytest.mark.parametrize("friction", ["stick", "none"])
 def test_the_tangent_ahead_comes_from_the_factors_at_hand(monkeypatch, friction):
-    turn_ahead, found, changed = BorderedNewton.turn_ahead, [], [0.0]
+    update_ahead, found, changed = BorderedNewton.update_ahead, [], [0.0]
 
     def beside_other_factors(self, x, control):
         before = self.b.array_r.copy()
-        found.append(turn_ahead(self, x, control))
+        found.append(update_ahead(self, x, control))
         now = self.b.array_r.copy()
         assert self.tangent(x, control, ahead=True)
         size = np.abs(self.b.array_r).max()
         changed.append(np.abs(now - before).max() / size)
         np.testing.assert_allclose(now, self.b.array_r, atol=1e-6 * size)
         return True
-    monkeypatch.setattr(BorderedNewton, "turn_ahead", beside_other_factors)
+    monkeypatch.setattr(BorderedNewton, "update_ahead", beside_other_factors)
     fx, (scene, _) = limit.fx, limit.cup((20, 1))
     scene = fx.Scene(mesh=scene.mesh, materials=scene.materials, supports=scene.supports, loads=scene.loads,
                      contacts=[fx.Contact("top", scene.contacts[0].tool, friction)])

@@ -20,7 +20,7 @@ _AT_END = 0.95
 _SLIDES = 1e-2
 """How far (over the length of face that is its own) a node may slide so."""
 
-SAME = 1e-3
+_SAME_STIFFNESS = 1e-3
 """Of the stiffness of a node: what it may differ by to count as the same in the tangent ahead."""
 
 
@@ -224,7 +224,7 @@ class ContactNodes:
         self._iterate = self.law.motion(x, self.touch)
 
     def moved(self, dx: np.ndarray, step: float) -> np.ndarray:
-        """Change of `positions` by a correction of the unknowns (own part) and of the control, shape (n, 2), length."""
+        """Change of `positions` by one of the unknowns (own part) and of the control, shape (n, 2), length."""
         return self._length * self.displacement(dx) - self.rate * step * self._motion
 
     def taken(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -253,10 +253,10 @@ class ContactNodes:
     def change_ahead(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Stiffness ahead of an accepted state, less that in the tangent last made, shape (n, 2, 2), stress/length.
 
-        0 where they differ by less than `SAME` of it.
+        0 where they differ by less than `_SAME_STIFFNESS` of it.
         """
         change = self._stiffness(fields, control, True) - self._in_tangent
-        least = SAME * np.abs(self._in_tangent).max((1, 2), keepdims=True)
+        least = _SAME_STIFFNESS * np.abs(self._in_tangent).max((1, 2), keepdims=True)
         return np.where(np.abs(change).max((1, 2), keepdims=True) > least, change, 0.0)
 
     def _stiffness(self, fields: np.ndarray, control: float, ahead: bool) -> np.ndarray:
@@ -279,7 +279,7 @@ class ContactNodes:
         A step that would bring a whole region into contact at once would decide by its own length where it sticks.
         """
         start = self.positions(fields, control)
-        velocity = self._length * self.displacement(direction) - slope * self.rate * self._motion
+        velocity = self.moved(direction, slope)
         free = ~self.law.touching(start, self.touch)
         times = self._arrivals(start, velocity, length)
         ahead = (times > 0.02 * length) & (times < length)         # nearer ones are as good as in touch
@@ -295,7 +295,7 @@ class ContactNodes:
         ends: it is to end where a node touches that sticks (see `touches_by`), which has no friction before.
         """
         start = self.positions(fields, control)
-        velocity = self._length * self.displacement(direction) - slope * self.rate * self._motion
+        velocity = self.moved(direction, slope)
         times = self._arrivals(start, velocity, length)
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         if self._memory is not None:
@@ -332,7 +332,7 @@ class ContactNodes:
         end = self.positions(new, control)
         near = self.law.nearest(end)
         F, grows = self.law.ramp(near.distance)
-        velocity = self._length * self.displacement(direction) - slope * self.rate * self._motion
+        velocity = self.moved(direction, slope)
         rate = np.maximum(grows * np.einsum("ni,ni->n", near.normal, velocity), 0.0)
         since = np.minimum(np.divide(F, rate, out=np.full(len(F), length), where=rate > 0), length)
         slid = since * np.abs(np.einsum("ni,ni->n", near.tangent, velocity))

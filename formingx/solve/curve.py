@@ -118,7 +118,7 @@ class Curve:
         """
         self._x.array_w[:] = state.x
         at_hand, self._found = state is self._found and not self.problem.relaxes, None
-        if at_hand and self.newton.turn_ahead(self._x, state.control) or self.newton.tangent(
+        if at_hand and self.newton.update_ahead(self._x, state.control) or self.newton.tangent(
                 self._x, state.control, ahead=True):
             size = self._length_of(self.newton.b)
             direction, slope = self.newton.b.array_r / size, 1 / size

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from ..errors import count, positive
 from .chords import Chords
 from .direct import DirectSolver
-from .settle import Settling, restiffen
+from .settle import Settling, woodbury
 
 UNLOADED = 1e-5
 """Floor of the support forces (over stress times volume over length) in the relative residual."""
@@ -172,9 +172,9 @@ class BorderedNewton:
         self.b.scale(-1)
         return bool(np.isfinite(self.b.norm()))
 
-    def turn_ahead(self, x: PETSc.Vec, control: float) -> bool:
-        """Make `self.b`, at a solution just found, that of the tangent ahead, by the factors at hand; False: not so."""
-        return restiffen(self.problem, self.problem.changes_ahead(x, control), self.solver, self.b)
+    def update_ahead(self, x: PETSc.Vec, control: float) -> bool:
+        """Make `self.b`, at a solution just found, that of the tangent ahead, by the factors at hand; False: failed."""
+        return woodbury(self.problem, self.problem.changes_ahead(x, control), self.solver, self.b)
 
     def correct(self, x: PETSc.Vec, control: float, constraint: Any, old: Any = None,
                 chords: bool = False) -> tuple[float, list[Iteration]]:

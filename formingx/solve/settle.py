@@ -81,7 +81,7 @@ class Settling:
         return self._problem.comm.allreduce(found, MPI.LOR)
 
 
-def restiffen(problem: Any, changes: list[np.ndarray], solver: DirectSolver, b: Any) -> bool:
+def woodbury(problem: Any, changes: list[np.ndarray], solver: DirectSolver, b: Any) -> bool:
     """Make b = dx/dcontrol by a factorised tangent that of one which differs at a few points (Woodbury's formula).
 
     changes: of the stiffness per area of each contact's points, shape (n, 2, 2). False, and b as it was, where so many
@@ -94,7 +94,7 @@ def restiffen(problem: Any, changes: list[np.ndarray], solver: DirectSolver, b: 
     if points > FEW:
         return False
     small = _Points(problem, problem.touching, chosen, solver, lambda v: 0.0)
-    by = small.restiffened(b, [change[i] for change, i in zip(changes, chosen)])
+    by = small.updated(b, [change[i] for change, i in zip(changes, chosen)])
     if by is None:
         return False
     b.array_w += by
@@ -154,7 +154,7 @@ class _Points:
             y = y - by
         return None
 
-    def restiffened(self, b: Any, changes: list[np.ndarray]) -> np.ndarray | None:
+    def updated(self, b: Any, changes: list[np.ndarray]) -> np.ndarray | None:
         """How dx/dcontrol changes, own part, with stiffnesses per area of own points; None: the tangent is singular."""
         more = self._gather(np.concatenate(changes))
         y = self._within(more, self._gather(self._moved(b.array_r, 1.0)))
