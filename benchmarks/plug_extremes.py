@@ -27,7 +27,8 @@ LAWS = ("frictionless", 0.1, 0.3, 1.0, 3.0, 10.0, "stick", "held")
 class Plug:
     """A plug and its sheet: radius over r0, fillet over h0 ("round": the plug's radius), r0/h0.
 
-    law: of `plugs.LAWS`, or a coefficient of friction; back: held at its travel and withdrawn.
+    law: of `plugs.LAWS`, or a coefficient of friction; back: held at its travel and withdrawn; cone: its end is
+    one of 45 degrees, not flat, nose and edge rounded by the fillet; refine: all elements are divided by this.
     """
 
     radius: float = 0.25
@@ -35,12 +36,23 @@ class Plug:
     slenderness: float = 20.0
     law: float | str = "held"
     back: bool = False
+    cone: bool = False
+    refine: int = 1
 
     @property
     def lengths(self) -> tuple[float, float, float]:
         """Plug radius, fillet, thickness, cm."""
         radius, thickness = self.radius * RADIUS, RADIUS / self.slenderness
         return radius, radius if self.fillet == "round" else self.fillet * thickness, thickness
+
+    @property
+    def tool(self) -> fx.Tool:
+        """The plug, on the sheet."""
+        radius, fillet, thickness = self.lengths
+        if not self.cone:
+            return plugs.plug(radius, thickness, fillet)
+        apex = thickness - (np.sqrt(2) - 1) * fillet
+        return fx.Tool([(0, apex), (radius, apex + radius), (radius, apex + 6 * radius)], [fillet, fillet, 0])
 
 
 CASES = {
@@ -62,28 +74,30 @@ def mesh_for(plug):
     radius, fillet, thickness = plug.lengths
     slides = plug.law not in ("held", "stick")
     places, parts, least = ((0.6 * radius, radius), 8, 0.05) if slides else ((radius,), 3, 0.1)
+    places = (0.0, radius) if plug.cone else places
     smallest, largest = np.clip((fillet or thickness) / parts, least * thickness, thickness / 2), RADIUS / 20
     small = min(smallest / largest, 1.0)
     R = np.linspace(0, RADIUS, 4001)
     away = np.abs(np.subtract.outer(places, R))
     sizes = (small + (1 - small) * away / away.max(1, keepdims=True)).min(0)
     along = int(np.ceil(np.trapezoid(1 / sizes, R) / largest))
-    return fx.mesh.disc(radius=RADIUS, thickness=thickness, elements=(along, 2),
+    return fx.mesh.disc(radius=RADIUS, thickness=thickness, elements=(plug.refine * along, plug.refine * 2),
                         concentrate=dict.fromkeys(places, small))
 
 
-def run(plug, max_steps=400, **options):
-    """(path or None, how it ended, elements): "arrived", or why not."""
-    radius, fillet, thickness = plug.lengths
+def run(plug, max_steps=400, through=(), **options):
+    """(path or None, how it ended, elements): "arrived", or why not. through: travels on the way, over its radius."""
+    radius = plug.lengths[0]
     friction, separates = plugs.LAWS.get(plug.law, (plug.law, True))
     mesh = mesh_for(plug)
     elements = mesh.domain.topology.index_map(2).size_global
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=0.4, c01=0.04),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                     contacts=[fx.Contact("top", plugs.plug(radius, thickness, fillet), friction, separates=separates,
-                                          moves=(0, -1), name="plug", **options)])
+                     contacts=[fx.Contact("top", plug.tool, friction, separates=separates, moves=(0, -1),
+                                          name="plug", **options)])
     travel = TRAVEL * radius
-    stages = [fx.Stage("push", drive="plug", until=fx.travel(travel))]
+    stages = [fx.Stage("push", drive="plug", until=fx.travel(travel),
+                       through=[fx.travel(t * radius) for t in through])]
     if plug.back:
         stages += [fx.Stage("hold", follow={"plug": [(0, travel), (1, travel)]}),
                    fx.Stage("withdraw", drive="plug", until=fx.travel(0.0))]

@@ -3,10 +3,13 @@
 The sheet of `williams_plug` (neo-Hookean, c10 = 0.448 MPa; r0 = 8.89 cm, h0 = 0.6985 cm; plug radius 1.905 cm, its
 edge rounded) pushed 20 cm under five coefficients of friction, beside a membrane that slides over the same edge. Where
 points of the sheet leave the edge of the plug there may be no state nearby to go on to: the sheet snaps to the next
-one (`Path.jumps`), marked in the curves. Contact acts at four Gauss points of each facet, which slide over the edge
-more smoothly than nodes. The less friction, the thinner the sheet under the plug (a membrane under mu = 0.1 is
-stretched 150 times both ways at 20 cm), so elements shrink towards the axis. Lengths in cm, forces in N.
+one (`Path.jumps`), marked in the curves. The less friction, the more of the face slides over the edge, and the thinner
+it is drawn (a membrane under mu = 0.1 is stretched 150 times both ways at 20 cm): elements are as large as their distance
+from the axis times a constant, so that whatever comes to the edge has as many of them around it. Lengths in cm, forces
+in N.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 import plugs
@@ -21,7 +24,7 @@ from formingx.results import files
 from formingx.results.show import plots
 
 FRICTIONS = (0.1, 0.2, 0.5, 0.3, 1.0)      # begun in this order, two processes are busy to the end
-NEAR = {0.0: 0.012, 1.5: 0.15, RADIUS: 0.3}
+GROWTH = 0.0625                             # of elements from one to the next away from the axis
 FACE_STRETCHES = (1.01, 1.05, 1.1, 1.2, 1.35, 1.5, 1.75, 2, 2.5, 3.2, 5, 10, 25, 80, 200)
 
 
@@ -30,45 +33,62 @@ def main():
     options.add_argument("--fillet", type=float, default=0.35, help="radius of the plug's edge, cm")
     options.add_argument("--refine", type=int, default=1, help="all elements divided by this")
     args = options.parse_args()
-    elements = tuple(n * args.refine for n in ((40, 2) if args.quick else (54, 2)))
     frictions, travels = ((0.3,), (2, 4, 6, 8)) if args.quick else (FRICTIONS, TRAVELS)
     args.out.mkdir(parents=True, exist_ok=True)
-    cases = [(mu, args.fillet, elements, travels, args.out) for mu in frictions]
+    cases = [(mu, args.fillet, args.refine, travels, args.out) for mu in frictions]
     runs = dict(sorted(zip(frictions, map(run, cases) if args.quick else sweep(run, cases))))
     for mu, found in runs.items():
         tell(mu, found["numbers"])
     save(draw(runs), args.out / "plug_friction.png")
     summarise(args.out, {**{f"mu_{mu:g}": found["numbers"] for mu, found in runs.items()},
-                         "elements": list(elements), "fillet_cm": args.fillet, "versions": files.versions()})
+                         "fillet_cm": args.fillet, "versions": files.versions()})
 
 
 def run(case) -> dict:
     """One coefficient of friction: its numbers, and what is drawn of it."""
-    mu, fillet, elements, travels, folder = case
-    made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), mu, elements, near=NEAR, points=4,
-                       ramp=1e-3, comm=MPI.COMM_SELF)
-    path, end = plugs.push(made, travels, smallest=1e-4, progress=False)
+    mu, fillet, refine, travels, folder = case
+    membrane = membrane_curve(mu, fillet, travels[-1])
+    elements, near = graded(membrane.face_stretch[-1], refine)
+    made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), mu, elements, near=near, points=4,
+                       ramp=5e-3, nodes_per_step=4, comm=MPI.COMM_SELF)
+    path, end = plugs.push(made, travels, smallest=1e-3, progress=False)
     path.to_csv(folder / f"mu_{mu:g}.csv")
-    profile, membrane = path.profile(), membrane_curve(mu, fillet, travels[-1])
-    numbers = key_numbers(path, end, travels)
-    numbers["membrane_force_N_at_travel_cm"] = {f"{t:g}": float(np.interp(t, *membrane)) for t in travels}
+    profile = path.profile()
+    numbers = {"elements": list(elements), **key_numbers(path, end, travels)}
+    numbers["membrane_force_N_at_travel_cm"] = {
+        f"{t:g}": float(np.interp(t, membrane.travel, membrane.force)) for t in travels}
     return {"numbers": numbers, "travel": path["travel"], "force": plugs.NEWTON * path["tool_force"],
-            "jumps": [(state.measures["travel"], plugs.force(state)) for state in path.jumps], "membrane": membrane,
-            "radius": profile.reference_radius, "wall": profile.wall_ratio}
+            "jumps": [(state.measures["travel"], plugs.force(state)) for state in path.jumps],
+            "membrane": (membrane.travel, membrane.force), "radius": profile.reference_radius,
+            "wall": profile.wall_ratio}
 
 
-def membrane_curve(mu, fillet, last) -> tuple:
-    """(travels, forces) of the membrane, up to a travel."""
-    found = [(0.0, 0.0)]
+class Membrane(NamedTuple):
+    """A membrane that slides over the plug: travel, cm, force, N, stretch of its face, shapes (n,)."""
+
+    travel: np.ndarray
+    force: np.ndarray
+    face_stretch: np.ndarray
+
+
+def membrane_curve(mu, fillet, last) -> Membrane:
+    """The membrane, up to a travel."""
+    found = [(0.0, 0.0, 1.0)]
     for stretch in FACE_STRETCHES:
         state = membrane_sliding_over_plug(stretch, radius=RADIUS, plug_radius=PLUG, fillet=fillet,
                                            thickness=THICKNESS, c10=C10, mu=mu)
-        found.append((state.travel, plugs.NEWTON * state.force))
+        found.append((state.travel, plugs.NEWTON * state.force, stretch))
         if state.travel > last:
             break
-    travels, forces = np.transpose(found)
-    fine = np.linspace(0, travels[-1], 400)
-    return fine, PchipInterpolator(travels, forces)(fine)
+    travels, forces, stretches = np.transpose(found)
+    fine = np.linspace(0, last, 400)
+    return Membrane(fine, *(PchipInterpolator(travels, values)(fine) for values in (forces, stretches)))
+
+
+def graded(face_stretch, refine) -> tuple:
+    """(elements, sizes to concentrate): in proportion to the radius, down to what the edge is to hold at the end."""
+    smallest = PLUG / RADIUS / face_stretch / 3
+    return (int(np.ceil(refine * np.log(1 / smallest) / GROWTH)), 2 * refine), {0.0: smallest}
 
 
 def key_numbers(path, end, travels) -> dict:

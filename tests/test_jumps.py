@@ -16,7 +16,7 @@ from formingx.solve import jump
 
 sys.path.insert(0, str(ROOT / "demos"))
 import plugs  # noqa: E402
-from plug_friction import NEAR  # noqa: E402
+from plug_friction import graded  # noqa: E402
 from williams_plug import C10, PLUG, RADIUS, THICKNESS  # noqa: E402
 
 
@@ -181,7 +181,8 @@ def test_nor_in_shorter_steps(monkeypatch):
 
 def williams(**step):
     """Williams' plug with mu = 0.3, as in `plug_friction`, past its first snaps."""
-    made = plugs.scene(RADIUS, THICKNESS, PLUG, 0.35, fx.NeoHookean(c10=C10), 0.3, (54, 2), near=NEAR, points=4,
+    elements, near = graded(face_stretch=2.0, refine=1)
+    made = plugs.scene(RADIUS, THICKNESS, PLUG, 0.35, fx.NeoHookean(c10=C10), 0.3, elements, near=near, points=4,
                        ramp=1e-3)
     return fx.trace(made, until=fx.travel(9.0), through=[fx.travel(t) for t in range(1, 9)],
                     step=fx.StepControl(target=6, **step), progress=False)

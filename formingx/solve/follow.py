@@ -214,9 +214,10 @@ class Run:
                 failed += not isinstance(failure, _Astray)
                 if self._may_jump and (not good or self._at_fold == "jump" and failed > 1 and length < jumps[0]):
                     jumps.pop(0)
-                    for ahead in (reach,) if good else (_JUMPS[-1], 0.0):
+                    for ahead in (reach,) if good else (_JUMPS[-1], 0.0, 0.0):
                         with contextlib.suppress(Failure):
                             return [self._jump(old, ahead, first)]
+                        self._ahead = AHEAD if ahead == 0 else self._ahead     # which jumps before have made longer
                 if not good:
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
                                   failure.attempt)
