@@ -48,8 +48,8 @@ THICK = {
 @pytest.mark.parametrize("accuracy", [pytest.param("draft"), pytest.param("standard", marks=pytest.mark.slow),
                                       pytest.param("fine", marks=pytest.mark.slow)])
 def test_promised_error_is_kept_in_thick_discs(ratio, accuracy):
-    found, _ = thickness.inflate(ratio, heights=THICK[ratio]["heights"], accuracy=accuracy)
-    for quantity, error in thickness.errors(found, THICK[ratio]).items():
+    path, _ = thickness.inflate(ratio, heights=THICK[ratio]["heights"], accuracy=accuracy)
+    for quantity, error in thickness.errors(thickness.measures(path, ratio), THICK[ratio]).items():
         assert len(error) == 4
         assert error.max() < (NEAR_RIM if quantity == "rim_stress" else PROMISED)[accuracy], quantity
 

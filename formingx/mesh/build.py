@@ -17,6 +17,9 @@ ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
 _TALLEST = 1.5
 """Height over width of such elements at most: the inf-sup constant of P2 + bubble / P1dg falls as triangles get slim,
 and across a thick sheet, which bends, they lock (benchmarks/thickness.py)."""
+_BENDS, _MORE, _RIM = 1 / 25, 1.5, 0.5
+"""A sheet bends within a few thicknesses of its rim: elements there are this much of those at the axis, and one at
+least this thick over its length has so many times the least number through it."""
 _MOST = 250_000            # rectangles of a mesh
 
 Thickness = float | Callable[[float], float] | Mapping[float, float]
@@ -25,8 +28,9 @@ length}, linear between its points."""
 
 
 def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accuracy: str = "standard",
-         elements: tuple | None = None, grading: float = 1.0, concentrate: Mapping[float, float] | None = None,
-         inner_radius: float = 0.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
+         elements: tuple | None = None, grading: float | None = None,
+         concentrate: Mapping[float, float] | None = None, inner_radius: float = 0.0,
+         comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     """A disc (or ring) in the (R, Z) plane, bottom face on Z = 0.
 
     Boundaries: `axis` (R = inner_radius; called `inner` if that is above 0), `rim`, `bottom`, `top`.
@@ -40,7 +44,8 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
             be more than 1.5 times taller than wide (as for `thickness` = `radius` in thicker ones).
         elements: (along the radius, through each layer), in place of `accuracy`; the latter may be a tuple, one count
             per layer. Each rectangle is two triangles.
-        grading: size of the last element at the rim over that of the first at the axis, 1e-6 to 1e6.
+        grading: size of the last element at the rim over that of the first at the axis, 1e-6 to 1e6; default 1, with
+            `accuracy` 0.5 (of a ring 1).
         concentrate: in place of `grading`, {reference radius: size of the elements there over that of the largest}, for
             example around a plug's edge. Sizes grow linearly with the distance from these radii; nodes lie on them.
 
@@ -50,15 +55,15 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
             thickness that is not given all over the disc.
     """
     radius = positive("disc: radius", radius)
-    grading = _grading("disc", grading)
     inner_radius = non_negative("disc: inner_radius", inner_radius)
     if inner_radius >= radius:
         raise InputError(f"disc: inner_radius = {inner_radius!r}: must be at least 0 and below radius = {radius!r}")
     sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
     known("disc: accuracy", accuracy, ACCURACY)
     layers = _layers("disc", thickness, "sheet", "R")
-    if elements is None:
-        elements = _preset(accuracy, inner_radius, radius, layers)
+    usual = _RIM if elements is None and concentrate is None and inner_radius == 0 else 1.0
+    grading = _grading("disc", usual if grading is None else grading)
+    elements = _preset(accuracy, inner_radius, radius, layers) if elements is None else elements
     along, through = _counts("disc", "radius", elements, len(layers))
     sizes = None if concentrate is None else _sizes(concentrate, inner_radius, radius)
     if sizes and grading != 1:
@@ -71,12 +76,12 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
 
 
 def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[int, list[int]]:
-    """(elements along, through each layer) of a disc: near squares in thick layers."""
+    """(elements along, through each layer) of a disc: more through sheets that bend, near squares in thick layers."""
     along, least = ACCURACY[accuracy]
-    length, R = high - low, np.linspace(low, high, along + 1)
-    tallest = _TALLEST * length / along
-    return along, [max(least, int(np.ceil(min(float(thickness_at(R).max()), length) / tallest - 1e-9)))
-                   for thickness_at in layers.values()]
+    R = np.linspace(low, high, along + 1)
+    thick = np.array([min(float(thickness_at(R).max()) / (high - low), 1.0) for thickness_at in layers.values()])
+    bending = _MORE * least * thick / thick.sum() if thick.sum() >= _BENDS else 0.0
+    return along, np.maximum(least, np.ceil(np.maximum(bending, thick * along / _TALLEST) - 1e-9)).astype(int).tolist()
 
 
 def _sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
