@@ -13,13 +13,16 @@ from .grid import Grid, to_mesh
 from .mesh import Mesh
 
 ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
-"""Elements of a disc (along the radius, least number through each layer): docs/choosing.md says what each promises."""
+"""Elements of a disc (along the radius, usual number through each layer): docs/choosing.md says what each promises."""
 _TALLEST = 1.5
 """Height over width of such elements at most: the inf-sup constant of P2 + bubble / P1dg falls as triangles get slim,
 and across a thick sheet, which bends, they lock (benchmarks/thickness.py)."""
 _BENDS, _MORE, _RIM = 1 / 25, 1.5, 0.5
 """A sheet bends within a few thicknesses of its rim: elements there are this much of those at the axis, and one at
-least this thick over its length has so many times the least number through it."""
+least this thick over its length has so many times the usual number through it."""
+_FILM = 1 / 400
+"""Thickness over length below which none of that is seen: one even element through each layer; more cost accuracy, by
+round-off, and from 1/1e5 on the start."""
 _MOST = 250_000            # rectangles of a mesh
 
 Thickness = float | Callable[[float], float] | Mapping[float, float]
@@ -40,12 +43,13 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
         thickness: a length (one layer, called `sheet`), or {layer name: its thickness} from bottom to top. Each may
             vary with the radius: a function of R, or a table {R: thickness}, linear between its radii (all nodes lie
             on it, those on edges too).
-        accuracy: "draft", "standard" or "fine": how many elements; more of them through layers so thick that they would
-            be more than 1.5 times taller than wide (as for `thickness` = `radius` in thicker ones).
+        accuracy: "draft", "standard" or "fine": how many elements; more of them through sheets that bend near the rim,
+            and through layers so thick that they would be more than 1.5 times taller than wide (as for `thickness` =
+            `radius` in thicker ones); one through each layer of films, thinner than 1/400 of the radius.
         elements: (along the radius, through each layer), in place of `accuracy`; the latter may be a tuple, one count
             per layer. Each rectangle is two triangles.
         grading: size of the last element at the rim over that of the first at the axis, 1e-6 to 1e6; default 1, with
-            `accuracy` 0.5 (of a ring 1).
+            `accuracy` 0.5 (of a ring or a film 1).
         concentrate: in place of `grading`, {reference radius: size of the elements there over that of the largest}, for
             example around a plug's edge. Sizes grow linearly with the distance from these radii; nodes lie on them.
 
@@ -61,27 +65,30 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
     sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
     known("disc: accuracy", accuracy, ACCURACY)
     layers = _layers("disc", thickness, "sheet", "R")
-    usual = _RIM if elements is None and concentrate is None and inner_radius == 0 else 1.0
-    grading = _grading("disc", usual if grading is None else grading)
-    elements = _preset(accuracy, inner_radius, radius, layers) if elements is None else elements
+    elements, usual = _preset(accuracy, inner_radius, radius, layers) if elements is None else (elements, 1.0)
     along, through = _counts("disc", "radius", elements, len(layers))
     sizes = None if concentrate is None else _sizes(concentrate, inner_radius, radius)
-    if sizes and grading != 1:
+    grading = grading if grading is None else _grading("disc", grading)
+    if sizes and grading not in (None, 1):
         raise InputError(f"disc: grading = {grading!r} and concentrate = {concentrate!r}: give one of them")
     joints = (_concentrated(inner_radius, radius, along, sizes) if sizes
-              else inner_radius + (radius - inner_radius) * _graded(along, grading))
+              else inner_radius + (radius - inner_radius) * _graded(along, grading or usual))
     R = _with_middles(joints)
     Z = _levels(layers, through, R)
     return _mesh("disc", np.stack([np.broadcast_to(R, Z.shape), Z], axis=-1), list(layers), through, sides, comm)
 
 
-def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[int, list[int]]:
-    """(elements along, through each layer) of a disc: more through sheets that bend, near squares in thick layers."""
-    along, least = ACCURACY[accuracy]
+def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[tuple[int, list[int]], float]:
+    """((elements along, through each layer), grading) of a disc: near squares in thick layers."""
+    along, usual = ACCURACY[accuracy]
     R = np.linspace(low, high, along + 1)
     thick = np.array([min(float(thickness_at(R).max()) / (high - low), 1.0) for thickness_at in layers.values()])
-    bending = _MORE * least * thick / thick.sum() if thick.sum() >= _BENDS else 0.0
-    return along, np.maximum(least, np.ceil(np.maximum(bending, thick * along / _TALLEST) - 1e-9)).astype(int).tolist()
+    whole = thick.sum()
+    if whole < _FILM:
+        return (along, [1] * len(layers)), 1.0
+    bending = _MORE * usual * thick / whole if whole >= _BENDS else 0.0
+    through = np.maximum(usual, np.ceil(np.maximum(bending, thick * along / _TALLEST) - 1e-9))
+    return (along, through.astype(int).tolist()), 1.0 if low > 0 else _RIM
 
 
 def _sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
