@@ -126,9 +126,10 @@ def slim_triangles():
 
 
 def rim_faces():
-    """Creases: the least stretch along the rim's face over the pole stretch, on three meshes that agree up to one."""
+    """Creases: the least stretch along the rim's face, on three meshes, which agree up to there."""
     stretches, results = (1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.7, 2.0), {}
-    say("", "least stretch along the rim's face, at pole stretches of", " " * 32 + "".join(f"{s:8g}" for s in stretches))
+    say("", "least stretch along the rim's face, at pole stretches of",
+        " " * 32 + "".join(f"{s:8g}" for s in stretches))
     for ratio, material in ((1, "neo-Hookean"), (1.25, "Mooney"), (1.25, "neo-Hookean")):
         for name, mesh in (("standard", {"accuracy": "standard"}), ("60x33", {"elements": (60, 33)}),
                            ("reference", {"elements": RATIOS[ratio][0], "space": "P1"})):

@@ -25,8 +25,7 @@ REFERENCE = {
 @pytest.mark.parametrize("accuracy", [pytest.param("draft"), pytest.param("standard"),
                                       pytest.param("fine", marks=pytest.mark.slow)])
 def test_promised_error_is_kept(scene, accuracy):
-    along, through = fx.mesh.ACCURACY[accuracy]
-    found = trade.one(scene, {"model": "P2+/P1dg", "along": along, "through": through})
+    found = trade.one(scene, {"model": "P2+/P1dg", "accuracy": accuracy})
     for quantity in trade.QUANTITIES:
         assert found[quantity] == pytest.approx(REFERENCE[scene][quantity], rel=PROMISED[accuracy]), quantity
 
@@ -68,9 +67,10 @@ def test_presets_have_more_elements_across_where_sheets_bend_and_near_squares_in
     for accuracy, (along, through) in fx.mesh.ACCURACY.items():
         for ratio, n in ((15.24, np.ceil(1.5 * through)), (24, np.ceil(1.5 * through)), (30, through), (2000, 1)):
             assert counts(accuracy, radius=1.0, thickness=1 / ratio) == [2 * along * n]
-        assert counts(accuracy, radius=1.0, thickness={"a": 1 / 30, "b": 1 / 30}) == [2 * along * through] * 2
-    for disc, last in (({"thickness": 0.05}, 0.5), ({"thickness": 0.001}, 1), ({"thickness": 0.05, "grading": 0.7}, 0.7),
-                       ({"thickness": 0.1, "inner_radius": 0.5}, 1), ({"thickness": 0.05, "elements": (40, 2)}, 1)):
+        assert counts(accuracy, radius=1.0, thickness={"a": 1 / 30, "b": 1 / 30}) == 2 * [2 * along * through]
+    for disc, last in (({"thickness": 0.05}, 0.5), ({"thickness": 0.001}, 1),
+                       ({"thickness": 0.05, "grading": 0.7}, 0.7), ({"thickness": 0.1, "inner_radius": 0.5}, 1),
+                       ({"thickness": 0.05, "elements": (40, 2)}, 1)):
         R = np.diff(np.unique(fx.mesh.disc(radius=1.0, **disc).nodes_of("bottom")[:, 0])[::2])
         assert len(R) == 40 and R[-1] / R[0] == pytest.approx(last)
     assert counts("standard", radius=2.0, thickness=1.0) == [2 * 40 * 14]
