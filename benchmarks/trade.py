@@ -66,7 +66,7 @@ def one(scene, way):
     began = time.perf_counter()
     mesh = fx.mesh.disc(radius=size["radius"], thickness=size["thickness"], **(
         {"accuracy": way["accuracy"]} if "accuracy" in way else
-        {"elements": (way["along"], way["through"]), "grading": way.get("grading")}))
+        {"elements": (way["along"], way["through"]), "grading": way.get("grading", 1.0)}))
     given = fx.Scene(
         mesh=mesh, materials={n: fx.MooneyRivlin(c10=a, c01=b) for n, (a, b) in size["materials"].items()},
         supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")],

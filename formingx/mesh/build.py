@@ -17,11 +17,11 @@ ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
 _TALLEST = 1.5
 """Height over width of such elements at most: the inf-sup constant of P2 + bubble / P1dg falls as triangles get slim,
 and across a thick sheet, which bends, they lock (benchmarks/thickness.py)."""
-_BENDS, _MORE, _RIM = 1 / 25, 1.5, 0.5
-"""A sheet bends within a few thicknesses of its rim: elements there are this much of those at the axis, and one at
-least this thick over its length has so many times the usual number through it."""
+_BENDS, _BENDING = 1 / 40, {"draft": 1, "standard": 4, "fine": 6}
+"""A hinged sheet bends within a few thicknesses of its rim: thickness over length from which on that is seen, and least
+number of elements through it then. (Narrower ones at the rim would do with fewer, but there a clamped one creases.)"""
 _FILM = 1 / 400
-"""Thickness over length below which none of that is seen: one even element through each layer; more cost accuracy, by
+"""Thickness over length below which none of that is seen: one element through each layer; more cost accuracy, by
 round-off, and from 1/1e5 on the start."""
 _MOST = 250_000            # rectangles of a mesh
 
@@ -31,9 +31,8 @@ length}, linear between its points."""
 
 
 def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accuracy: str = "standard",
-         elements: tuple | None = None, grading: float | None = None,
-         concentrate: Mapping[float, float] | None = None, inner_radius: float = 0.0,
-         comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
+         elements: tuple | None = None, grading: float = 1.0, concentrate: Mapping[float, float] | None = None,
+         inner_radius: float = 0.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     """A disc (or ring) in the (R, Z) plane, bottom face on Z = 0.
 
     Boundaries: `axis` (R = inner_radius; called `inner` if that is above 0), `rim`, `bottom`, `top`.
@@ -48,8 +47,7 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
             `radius` in thicker ones); one through each layer of films, thinner than 1/400 of the radius.
         elements: (along the radius, through each layer), in place of `accuracy`; the latter may be a tuple, one count
             per layer. Each rectangle is two triangles.
-        grading: size of the last element at the rim over that of the first at the axis, 1e-6 to 1e6; default 1, with
-            `accuracy` 0.5 (of a ring or a film 1).
+        grading: size of the last element at the rim over that of the first at the axis, 1e-6 to 1e6.
         concentrate: in place of `grading`, {reference radius: size of the elements there over that of the largest}, for
             example around a plug's edge. Sizes grow linearly with the distance from these radii; nodes lie on them.
 
@@ -59,36 +57,36 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
             thickness that is not given all over the disc.
     """
     radius = positive("disc: radius", radius)
+    grading = _grading("disc", grading)
     inner_radius = non_negative("disc: inner_radius", inner_radius)
     if inner_radius >= radius:
         raise InputError(f"disc: inner_radius = {inner_radius!r}: must be at least 0 and below radius = {radius!r}")
     sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
     known("disc: accuracy", accuracy, ACCURACY)
     layers = _layers("disc", thickness, "sheet", "R")
-    elements, usual = _preset(accuracy, inner_radius, radius, layers) if elements is None else (elements, 1.0)
+    if elements is None:
+        elements = _preset(accuracy, inner_radius, radius, layers)
     along, through = _counts("disc", "radius", elements, len(layers))
     sizes = None if concentrate is None else _sizes(concentrate, inner_radius, radius)
-    grading = grading if grading is None else _grading("disc", grading)
-    if sizes and grading not in (None, 1):
+    if sizes and grading != 1:
         raise InputError(f"disc: grading = {grading!r} and concentrate = {concentrate!r}: give one of them")
     joints = (_concentrated(inner_radius, radius, along, sizes) if sizes
-              else inner_radius + (radius - inner_radius) * _graded(along, grading or usual))
+              else inner_radius + (radius - inner_radius) * _graded(along, grading))
     R = _with_middles(joints)
     Z = _levels(layers, through, R)
     return _mesh("disc", np.stack([np.broadcast_to(R, Z.shape), Z], axis=-1), list(layers), through, sides, comm)
 
 
-def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[tuple[int, list[int]], float]:
-    """((elements along, through each layer), grading) of a disc: near squares in thick layers."""
+def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[int, list[int]]:
+    """(elements along, through each layer) of a disc: near squares in thick layers."""
     along, usual = ACCURACY[accuracy]
     R = np.linspace(low, high, along + 1)
     thick = np.array([min(float(thickness_at(R).max()) / (high - low), 1.0) for thickness_at in layers.values()])
     whole = thick.sum()
     if whole < _FILM:
-        return (along, [1] * len(layers)), 1.0
-    bending = _MORE * usual * thick / whole if whole >= _BENDS else 0.0
-    through = np.maximum(usual, np.ceil(np.maximum(bending, thick * along / _TALLEST) - 1e-9))
-    return (along, through.astype(int).tolist()), 1.0 if low > 0 else _RIM
+        return along, [1] * len(layers)
+    bending = _BENDING[accuracy] * thick / whole if whole >= _BENDS else 0.0
+    return along, np.maximum(usual, np.ceil(np.maximum(bending, thick * along / _TALLEST) - 1e-9)).astype(int).tolist()
 
 
 def _sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:

@@ -1,4 +1,4 @@
-"""Whether elements cover the body once: none flat or turned inside out, none over another, no gap where they touch, in one piece."""
+"""Whether elements cover the body once: none flat or turned inside out, none over another, no gap, all in one piece."""
 
 from __future__ import annotations
 
