@@ -30,8 +30,8 @@ from formingx.results import files  # noqa: E402
 STRETCHES = (1.02, 1.2, 2.0, 3.0)
 # r0/h0: elements of the reference, and the size of its last element at the rim over that of the first
 RATIOS = {1: ((60, 60), 1.0), 1.25: ((60, 48), 1.0), 2: ((80, 40), 1.0), 3: ((90, 30), 1.0), 5: ((120, 24), 1.0),
-          10: ((140, 14), 1.0), 15.24: ((160, 10), 1.0), 20: ((160, 8), 1.0), 30: ((180, 6), 1.0), 50: ((200, 4), 0.3),
-          200: ((400, 2), 0.2), 2000: ((800, 2), 0.1)}
+          10: ((140, 14), 1.0), 13: ((156, 12), 1.0), 15.24: ((160, 10), 1.0), 20: ((160, 8), 1.0),
+          30: ((180, 6), 1.0), 50: ((200, 4), 0.3), 200: ((400, 2), 0.2), 2000: ((800, 2), 0.1)}
 # where a hinge's rim face creases before 3 (`rim_faces` shows it): to these only, as no two meshes agree beyond
 CREASED = {(1, "neo-Hookean"): (1.02, 1.1), (1, "Mooney"): (1.02, 1.1), (1.25, "Mooney"): (1.02, 1.2, 1.5)}
 MATERIALS = {"neo-Hookean": 0.0, "Mooney": 0.2}        # c01 of c10 + c01 = 1
