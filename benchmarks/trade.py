@@ -61,11 +61,12 @@ def ways(quick):
 
 
 def one(scene, way):
-    """Trace one scene in one way; its key numbers and cost."""
+    """Trace one scene in one way (its elements, or an accuracy that picks them); its key numbers and cost."""
     size = SCENES[scene]
     began = time.perf_counter()
-    mesh = fx.mesh.disc(radius=size["radius"], thickness=size["thickness"], elements=(way["along"], way["through"]),
-                        grading=way.get("grading", 1.0))
+    mesh = fx.mesh.disc(radius=size["radius"], thickness=size["thickness"], **(
+        {"accuracy": way["accuracy"]} if "accuracy" in way else
+        {"elements": (way["along"], way["through"]), "grading": way.get("grading", 1.0)}))
     given = fx.Scene(
         mesh=mesh, materials={n: fx.MooneyRivlin(c10=a, c01=b) for n, (a, b) in size["materials"].items()},
         supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")],

@@ -11,6 +11,7 @@ from conftest import treloar
 import formingx as fx
 
 MESH = {"radius": 1.0, "thickness": 0.1, "elements": (4, 1)}
+NONE = np.array([])
 
 
 @pytest.mark.parametrize("change, words", [
@@ -58,6 +59,13 @@ def test_mesh(change, words):
     (lambda: fx.Symmetry("axis", normal="x"), "normal = 'x'.*'r' or 'z'"),
     (lambda: fx.pole_stretch(-1), "pole_stretch = -1.*greater than 0"),
     (lambda: fx.mesh.read("no such file.msh"), "not there"),
+    (lambda: fx.DisplacementPenalty(stress_free=NONE), "stress_free = .*True or False"),
+    (lambda: fx.Tool([(0, 0), (1, 0)], closed=NONE), "closed = .*True or False"),
+    (lambda: fx.StepControl(largest=NONE), "largest = .*must be a number"),
+    (lambda: fx.Contact("top", fx.tools.plane(z=1.0), points=NONE), "points = .*must be a number"),
+    (lambda: fx.Clamped(None), "Clamped: on = None: must be the name of a boundary"),
+    (lambda: fx.Pressure(None), "Pressure: on = None: must be the name of a boundary"),
+    (lambda: fx.Contact(None, fx.tools.plane(z=1.0)), "Contact: on = None: must be the name of a boundary"),
 ])
 def test_objects(make, words):
     with pytest.raises(fx.InputError, match=words):
@@ -87,7 +95,7 @@ def scene(**change):
     ({"supports": [fx.Clamped("rim")]}, "touches the axis"),
     ({"loads": [fx.Pressure("bottom"), fx.Pressure("top")]}, "one control drives a run"),
     ({"mesh": "disc"}, "mesh = 'disc'"),
-    ({"quadrature_degree": 0}, "quadrature_degree = 0"),
+    ({"quadrature_degree": 0}, "quadrature_degree = 0"), ({"quadrature_degree": 1e300}, "must be at most 30"),
 ])
 def test_scene(change, words):
     with pytest.raises(fx.InputError, match=words):

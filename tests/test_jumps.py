@@ -211,6 +211,19 @@ def test_what_comes_to_rest_nowhere_is_said_in_bounded_time():
     assert "the pressure has a limit point" in stopped.ended and stopped.last.kind == "limit point"
 
 
+@pytest.mark.slow
+def test_a_body_at_rest_where_no_state_is_found_is_not_moved_on():
+    """A plug and a pressure in step, where another branch starts: each jump ends once the body rests."""
+    plug = fx.Contact("top", tools.sphere(radius=0.5, z=0.1), "none", moves=(0, -1), name="plug")
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1)), materials=fx.NeoHookean(c10=1.0),
+                     loads=[fx.Pressure("bottom", name="air")], contacts=[plug],
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
+    rows = [(0.0, 0.0), (0.1, 0.02), (0.93557094, 0.95713907)]
+    with pytest.raises(fx.ConvergenceError, match="another branch starts there") as error:
+        fx.Process(scene).run([fx.Stage("on", follow={"air": rows, "plug": rows})], progress=False)
+    assert error.value.path.counts.iterations < 9000        # 11600 with 400 solutions of a body that stands still
+
+
 def test_at_fold_is_one_of_three():
     with pytest.raises(fx.InputError, match="at_fold = 'leap' is not known"):
         fx.trace(plug(), until=fx.travel(1.0), at_fold="leap")

@@ -144,6 +144,8 @@ BAD = {
     "an edge inside": (changed(("2 1 2 3 2 3 4", "2 1 2 2 2 2 4")), "is not an edge of an element"),
     "not joined": (changed(("$Nodes\n4", "$Nodes\n6"), ("4 0 1 0\n", "4 0 1 0\n5 0 0 0\n6 1 1 0\n"),
                            ("1 1 3 4\n$End", "1 5 6 4\n$End")), "touches or crosses itself"),
+    "in pieces": (changed(("$Nodes\n4", "$Nodes\n7"), ("4 0 1 0\n", "4 0 1 0\n5 3 0 0\n6 4 0 0\n7 4 1 0\n"),
+                          ("1 1 3 4\n$End", "1 5 6 7\n$End")), "the body is in pieces: no elements lead from"),
     "binary without its mark": (changed(("2.2 0 8", "2.2 1 8")), "must hold the number one"),
     "bytes": (b"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n\xff\xfe\x00\n$EndNodes\n$Elements\n$EndElements",
               "must be numbers"),

@@ -130,6 +130,16 @@ def test_tables():
     assert half.last.measures["process_time"] == pytest.approx(4.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("end", [1e-20, 1e-12, 1e12])
+def test_time_has_no_smallest_length(end):
+    """Without materials that know time a table is the same in any unit of time."""
+    scene = fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom", name="air")],
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
+    path = run(scene, Stage("up", follow={"air": [(0.0, 0.0), (end, 0.05)]}))
+    assert path.last.measures["process_time"] == pytest.approx(end)
+    assert path.last.measures["pressure"] == pytest.approx(0.05)
+
+
 def test_a_table_beyond_a_limit_point_is_refused():
     p = fx.Pressure("bottom")
     mesh = fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1))

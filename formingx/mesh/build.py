@@ -13,10 +13,16 @@ from .grid import Grid, to_mesh
 from .mesh import Mesh
 
 ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
-"""Elements of a disc (along the radius, least number through each layer): docs/choosing.md says what each promises."""
+"""Elements of a disc (along the radius, usual number through each layer): docs/choosing.md says what each promises."""
 _TALLEST = 1.5
 """Height over width of such elements at most: the inf-sup constant of P2 + bubble / P1dg falls as triangles get slim,
 and across a thick sheet, which bends, they lock (benchmarks/thickness.py)."""
+_BENDS, _BENDING = 1 / 40, {"draft": 1, "standard": 4, "fine": 6}
+"""A hinged sheet bends within a few thicknesses of its rim: thickness over length from which on that is seen, and least
+number of elements through it then. (Narrower ones at the rim would do with fewer, but there a clamped one creases.)"""
+_FILM = 1 / 400
+"""Thickness over length below which none of that is seen: one element through each layer; more cost accuracy, by
+round-off, and from 1/1e5 on the start."""
 _MOST = 250_000            # rectangles of a mesh
 
 Thickness = float | Callable[[float], float] | Mapping[float, float]
@@ -36,8 +42,9 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
         thickness: a length (one layer, called `sheet`), or {layer name: its thickness} from bottom to top. Each may
             vary with the radius: a function of R, or a table {R: thickness}, linear between its radii (all nodes lie
             on it, those on edges too).
-        accuracy: "draft", "standard" or "fine": how many elements; more of them through layers so thick that they would
-            be more than 1.5 times taller than wide (as for `thickness` = `radius` in thicker ones).
+        accuracy: "draft", "standard" or "fine": how many elements; more of them through sheets that bend near the rim,
+            and through layers so thick that they would be more than 1.5 times taller than wide (as for `thickness` =
+            `radius` in thicker ones); one through each layer of films, thinner than 1/400 of the radius.
         elements: (along the radius, through each layer), in place of `accuracy`; the latter may be a tuple, one count
             per layer. Each rectangle is two triangles.
         grading: size of the last element at the rim over that of the first at the axis, 1e-6 to 1e6.
@@ -72,11 +79,14 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
 
 def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[int, list[int]]:
     """(elements along, through each layer) of a disc: near squares in thick layers."""
-    along, least = ACCURACY[accuracy]
-    length, R = high - low, np.linspace(low, high, along + 1)
-    tallest = _TALLEST * length / along
-    return along, [max(least, int(np.ceil(min(float(thickness_at(R).max()), length) / tallest - 1e-9)))
-                   for thickness_at in layers.values()]
+    along, usual = ACCURACY[accuracy]
+    R = np.linspace(low, high, along + 1)
+    thick = np.array([min(float(thickness_at(R).max()) / (high - low), 1.0) for thickness_at in layers.values()])
+    whole = thick.sum()
+    if whole < _FILM:
+        return along, [1] * len(layers)
+    bending = _BENDING[accuracy] * thick / whole if whole >= _BENDS else 0.0
+    return along, np.maximum(usual, np.ceil(np.maximum(bending, thick * along / _TALLEST) - 1e-9)).astype(int).tolist()
 
 
 def _sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:

@@ -1,4 +1,4 @@
-"""Whether elements cover the body once: none flat or turned inside out, none over another, no gap where they touch."""
+"""Whether elements cover the body once: none flat or turned inside out, none over another, no gap, all in one piece."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
 
     Raises:
         InputError: a coordinate that is not finite, an element that is flat or inside out, two that lie over each other
-            or meet without sharing their nodes; the message says where.
+            or meet without sharing their nodes, a body in pieces; the message says where.
     """
     bad = np.flatnonzero(~np.isfinite(points).all(1))
     if len(bad):
@@ -44,6 +44,23 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
     if place is not None:
         raise InputError(f"{what}: the body touches or crosses itself near {_show(place)}: elements that meet share"
                          f" their nodes, and none may lie over another")
+    piece = _pieces(triangles[:, :3])
+    if piece.max() > 0:
+        one, other = (_show(corners[np.argmax(piece == k)].mean(0)) for k in (0, piece.max()))
+        raise InputError(f"{what}: the body is in pieces: no elements lead from {one} to {other}; bodies apart need a"
+                         f" scene each")
+
+
+def _pieces(triangles: np.ndarray) -> np.ndarray:
+    """A number of the piece that each element is of, 0 for that of the first node, shape (m,)."""
+    nodes, corners = np.unique(triangles, return_inverse=True)
+    corners, piece = corners.reshape(-1, 3), np.arange(len(nodes))
+    while True:
+        found = piece[corners]
+        if np.array_equal(found.min(1), found.max(1)):
+            return found[:, 0]
+        np.minimum.at(piece, found.ravel(), np.repeat(found.min(1), 3))
+        piece = piece[piece]
 
 
 def turned_inside_out(nodes: np.ndarray) -> np.ndarray:

@@ -64,7 +64,7 @@ def read(file: str | os.PathLike) -> Grid:
         InputError: the file is not there or not in this format; the message names the line.
     """
     lines = _Lines(os.fspath(file))
-    if " ".join(next(lines)) != _FORMAT:
+    if " ".join(next(lines, [])) != _FORMAT:
         raise lines.error(f"the first line must be {_FORMAT!r}")
     order, points, numbers = None, np.zeros((0, 2)), np.zeros(0, dtype=np.int64)
     layers: dict[str, np.ndarray] = {}
@@ -149,7 +149,7 @@ class _Lines(Iterator):
 
     def block(self, count: str, kinds: tuple, what: str, nodes: dict | None = None, all_nodes: bool = False) -> list:
         """`count` lines of numbers; node numbers (all columns, or all but the first) become indices."""
-        if not count.isdigit() or int(count) < 1:
+        if not (count.isascii() and count.isdigit() and len(count) <= 15) or int(count) < 1:
             raise self.error(f"the count {count!r} must be a whole number of at least 1")
         rows = []
         for k in range(int(count)):

@@ -83,7 +83,7 @@ class Contact(Part):
         self.name, name = name, f"Contact({on!r})"
         if not isinstance(tool, Tool):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
-        self.on, self.tool, self.friction = on, tool, friction
+        self.on, self.tool, self.friction = instance("Contact: on", on, str, "the name of a boundary"), tool, friction
         self.mu = _coefficient(f"{name}: friction", friction)
         self.separates = instance(f"{name}: separates", separates, bool, "True or False")
         usual = _SMOOTH if self.symmetric else _STICK if self.sticks and separates else _ROUGH
@@ -93,7 +93,7 @@ class Contact(Part):
             raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
                              f" Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = count(f"{name}: nodes_per_step", nodes_per_step)
-        self.points = points if points == "nodes" else count(f"{name}: points", points)
+        self.points = points if isinstance(points, str) and points == "nodes" else count(f"{name}: points", points)
         self.moves = None if moves is None else pair(f"{name}: moves", moves)
         if self.moves == (0.0, 0.0):
             raise InputError(f"{name}: moves = (0, 0): must name a direction, or be None")

@@ -6,7 +6,7 @@ from typing import Any
 
 import ufl
 
-from ..errors import finite
+from ..errors import finite, instance
 from .part import Part
 
 
@@ -67,7 +67,7 @@ class Pressure(Load):
     quantity = "pressure"
 
     def __init__(self, on: str, value: float | None = None, name: str | None = None):
-        super().__init__(on, value, name)
+        super().__init__(instance("Pressure: on", on, str, "the name of a boundary"), value, name)
 
     def virtual_work(self, body, value):
         face = body.face(self.on, self.quadrature_degree)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, finite, known, non_negative, positive
+from ..errors import InputError, finite, instance, known, non_negative, positive
 from ..mesh.triangles import Place, Triangles
 
 _SLIM = 3.0                                # slenderness of triangles that can do harm
@@ -154,7 +154,7 @@ class DisplacementPenalty(Model):
     pressure = None
 
     def __init__(self, *, eps: float = 1e-3, points: int = 3, stress_free: bool = True):
-        self.stress_free = bool(stress_free)
+        self.stress_free = instance("DisplacementPenalty: stress_free", stress_free, bool, "True or False")
         self.eps = positive("DisplacementPenalty: eps", eps)
         finite("DisplacementPenalty: points", points)
         if points not in _RULES:

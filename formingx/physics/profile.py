@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, finite, non_negative, pair, positive, several
+from ..errors import InputError, finite, instance, non_negative, pair, positive, several
 
 _FLAT = 1e-9          # radians: a joint that turns less is smooth
 TURN = 2 * math.pi
@@ -103,6 +103,7 @@ class Tool:
     """
 
     def __init__(self, points: Sequence[Sequence[float]], fillets: float | Sequence[float] = 0.0, closed: bool = False):
+        instance("Tool: closed", closed, bool, "True or False")
         corners = np.array([pair("Tool: points", p) for p in several("Tool: points", points, "points (R, Z)")])
         if len(corners) < (3 if closed else 2):
             raise InputError(f"Tool: {len(corners)} points: a{' closed' if closed else 'n open'} profile needs at least"
@@ -129,6 +130,7 @@ class Tool:
                 a profile that doubles back or crosses itself.
         """
         tool = cls.__new__(cls)
+        instance("Tool.of_pieces: closed", closed, bool, "True or False")
         tool._set(several("Tool.of_pieces: pieces", pieces, "Line(...) and Arc(...)"), closed)
         return tool
 
@@ -136,7 +138,7 @@ class Tool:
         pieces = [_checked(piece, i) for i, piece in enumerate(pieces)]
         if not pieces:
             raise InputError("Tool: a profile needs at least one piece, a Line or an Arc")
-        self.pieces, self.closed = tuple(pieces), bool(closed)
+        self.pieces, self.closed = tuple(pieces), closed
         ends = np.array([e for p in pieces for e in p.ends])
         self.size = float(max(np.ptp(ends, axis=0).max(), max((p.radius for p in pieces if isinstance(p, Arc)),
                                                               default=0.0)))

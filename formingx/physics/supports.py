@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..errors import InputError, finite
+from ..errors import InputError, finite, instance
 from .part import Part
 
 R, Z = 0, 1
@@ -42,8 +42,8 @@ class Support(Part):
         on: name of the boundary that it holds.
     """
 
-    def __init__(self, on: str | None = None):
-        self.on = on
+    def __init__(self, on: str):
+        self.on = instance(f"{type(self).__name__}: on", on, str, "the name of a boundary")
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.on!r})"
@@ -105,7 +105,6 @@ class PinnedNode(Support):
     """
 
     def __init__(self, r: float, z: float):
-        super().__init__()
         self.point = (finite("PinnedNode: r", r), finite("PinnedNode: z", z))
 
     def constraints(self):

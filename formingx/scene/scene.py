@@ -23,6 +23,9 @@ from ..physics.supports import Held, Support
 from .sampling import sample
 from .temperature import BodyTemperature
 
+_HIGHEST = 30
+"""Degree of a quadrature: more are asked for by mistake, and their points fill the memory."""
+
 
 class Scene:
     """A body, what it is made of, how it is held and what loads it.
@@ -37,7 +40,7 @@ class Scene:
         contacts: faces of the body that rigid tools stop, see `formingx.Contact`.
         model: how the scene is modelled: `MixedPressure()` (default) or `DisplacementPenalty()`, a solid; `Membrane()`.
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
-        quadrature_degree: of the energy; 5 (seven points) is the thesis' rule.
+        quadrature_degree: of the energy, at most 30; 5 (seven points) is the thesis' rule.
         temperature: of the body, which constants of materials may depend on: a number, a `table` over R, a function of
             arrays (R, Z), a CSV file with columns R, Z, T, what `formingx.heat` returned, or a DOLFINx Function.
         heat: `Cooling(...)`: the temperature changes as time goes by.
@@ -70,6 +73,8 @@ class Scene:
         if not isinstance(self.kinematics, Kinematics):
             raise InputError(f"Scene: kinematics = {kinematics!r}: must be Axisymmetric() or PlaneStrain()")
         self.quadrature_degree = count("Scene: quadrature_degree", quadrature_degree)
+        if self.quadrature_degree > _HIGHEST:
+            raise InputError(f"Scene: quadrature_degree = {quadrature_degree!r}: must be at most {_HIGHEST}")
         if temperature is not None:
             self.temperature = BodyTemperature(temperature, mesh)
         if expansion is not None:

@@ -42,6 +42,9 @@ _MOST = 400
 _NEAR_REST = 1e-3
 """Viscous forces (over the support forces) below which the state at rest is looked for."""
 
+_AT_REST = 1e-12
+"""Viscous forces (over the support forces) below which they are round-off."""
+
 
 class _Viscous:
     """A problem in a viscous medium: F + eta M (x - origin), but for unknowns that are held."""
@@ -125,10 +128,12 @@ class _Way:
         return _GROWS[self.solved > 0]
 
     def end(self, old: State) -> State | None:
-        """The state at rest, if there is one near."""
+        """The state at rest, if there is one near; raises `Failure` if the body rests here and that is no state."""
         try:
             state = self.curve.solve(self.at.x, self.control, fixed(self.control), "jump", self.at)
         except Failure:
+            if self.rest < _AT_REST:
+                raise
             self.settles, self.near = False, 0.3 * self.rest
             return None
         self._lose(self.at.x, state.x, np.zeros(len(state.x)))

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from ..errors import InputError, count, finite, positive
+from ..errors import count, positive
 
 
 @dataclass
@@ -25,14 +26,14 @@ class StepControl:
     target: int = 4
     growth: float = 2.0
     smallest: float = 1e-6
-    largest: float = float("inf")
+    largest: float = math.inf
 
     def __post_init__(self) -> None:
         for name in ("length", "growth", "smallest"):
             positive(f"StepControl: {name}", getattr(self, name))
         count("StepControl: target", self.target)
-        if self.largest != float("inf") and finite("StepControl: largest", self.largest) <= 0:
-            raise InputError(f"StepControl: largest = {self.largest!r}: must be greater than 0")
+        if not (isinstance(self.largest, float) and self.largest == math.inf):
+            positive("StepControl: largest", self.largest)
 
     def accepted(self, iterations: int, error: float = 0.0) -> None:
         """A full step converged in so many iterations with a tangent of their own; error: in time, over what is

@@ -40,7 +40,8 @@ class Amplitude(Bound):
     def __init__(self, problem: Any, number: int | None):
         self._problem, self._number = problem, number
         self._acts = number is not None and 0 <= number < len(problem.scene.loads)
-        self._scale = self.size = 1.0 if number is None else problem.forms.scales[number]
+        self._scale = 1.0 if number is None else problem.forms.scales[number]
+        self.size = 0.0 if number == -1 else self._scale    # a process may be short in any unit of time
 
     @property
     def moves(self) -> bool:
