@@ -41,6 +41,19 @@ class DirectSolver:
         """out = matrix^-1 rhs."""
         self._ksp.solve(rhs, out)
 
+    def solve_all(self, rhs: np.ndarray) -> np.ndarray:
+        """matrix^-1 of columns, all at once, which takes a fraction of the time; own rows, shape (n, m)."""
+        sizes = (len(rhs), None), (None, rhs.shape[1])
+        given, found = (PETSc.Mat().createDense(sizes, comm=self._matrix.comm) for _ in range(2))
+        given.getDenseArray()[:] = rhs
+        given.assemble()
+        found.assemble()
+        self._ksp.getPC().getFactorMatrix().matSolve(given, found)
+        columns = found.getDenseArray().copy()
+        given.destroy()
+        found.destroy()
+        return columns
+
     def solve_transposed(self, rhs: PETSc.Vec, out: PETSc.Vec) -> None:
         """out = matrix^-T rhs."""
         self._ksp.solveTranspose(rhs, out)

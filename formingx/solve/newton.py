@@ -259,11 +259,11 @@ class BorderedNewton:
         self.a.axpy(step, self.b)
         return step
 
-    def _border(self, v: PETSc.Vec) -> float:
-        """Make v = K^-1 e, in place, the solution of the bordered system; returns its part of the control."""
-        step = -self.gradient.dot(v) / self._slope
-        v.axpy(step, self.b)
-        return step
+    def _border(self, V: np.ndarray) -> np.ndarray:
+        """Make V = K^-1 E, own rows, shape (n, m), in place, those of the bordered system; the control's part, (m,)."""
+        steps = -self.problem.comm.allreduce(self.gradient.array_r @ V) / self._slope
+        V += np.outer(self.b.array_r, steps)
+        return steps
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
