@@ -14,10 +14,7 @@ def configure(ksp: PETSc.KSP, matrix: PETSc.Mat, symmetric: bool) -> None:
     pc.setType("cholesky" if symmetric else "lu")
     pc.setFactorSolverType("mumps")
     pc.setFactorSetUpSolverType()
-    factors = pc.getFactorMatrix()
-    factors.setMumpsIcntl(14, 100)                   # workspace over MUMPS' own estimate, percent
-    if not symmetric:
-        factors.setMumpsIcntl(8, 3)                  # scale columns: MUMPS' own iterative scaling takes longer
+    pc.getFactorMatrix().setMumpsIcntl(14, 100)      # workspace over MUMPS' own estimate, percent
 
 
 class DirectSolver:
