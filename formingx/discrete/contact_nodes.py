@@ -306,12 +306,15 @@ class ContactNodes:
     def _arrivals(self, start: np.ndarray, velocity: np.ndarray, length: float) -> np.ndarray:
         """Arc length at which free nodes meet the ramp, `length` if they do not before, shape (n,)."""
         at, times = length * np.linspace(0, 1, 17), np.full(len(start), length)
-        gap = -self.law.theta - self.law.distance(start + at[:, None, None] * velocity)         # shape (17, n)
+        ways = 1.01 * length * np.hypot(*velocity.T)                    # none comes nearer by more
         free = ~self.law.touching(start, self.touch) & (self.area > 0)
-        hit = np.flatnonzero(free & (gap[1:] <= 0).any(0))
+        near = np.flatnonzero(free & (self.law.distance(start) + ways > -self.law.theta))
+        law = self.law.part(near)
+        gap = -law.theta - law.distance(start[near] + at[:, None, None] * velocity[near])       # shape (17, m)
+        hit = np.flatnonzero((gap[1:] <= 0).any(0))
         k = np.argmax(gap[1:, hit] <= 0, axis=0)
         before, now = gap[k, hit], gap[k + 1, hit]
-        times[hit] = at[k] + (at[k + 1] - at[k]) * before / (before - now)
+        times[near[hit]] = at[k] + (at[k + 1] - at[k]) * before / (before - now)
         return times
 
     def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:

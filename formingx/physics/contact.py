@@ -21,6 +21,8 @@ for the lumped area), or at Gauss points of the facets: history is read where it
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -180,20 +182,28 @@ class Touch(NamedTuple):
     arrival: np.ndarray
 
 
-class Tractions(NamedTuple):
+class Tractions:
     """Tractions at n points per unit reference area, as the residual wants them (what the body does to the tool).
 
-    force: shape (n, 2), stress; stiffness: its derivative, shape (n, 2, 2), stress/length; touch: what to remember;
-    normal, tangential: N and T, shape (n,), stress; sense: of sliding, 1 or -1 along the tangent, 0 if stuck, shape
-    (n,).
+    force: shape (n, 2), stress; normal, tangential: N and T, shape (n,), stress; sense: of sliding, 1 or -1 along the
+    tangent, 0 if stuck, shape (n,). stiffness, touch: what gives those properties when they are first asked for, which
+    most tractions never are.
     """
 
-    force: np.ndarray
-    stiffness: np.ndarray
-    touch: Touch
-    normal: np.ndarray
-    tangential: np.ndarray
-    sense: np.ndarray
+    def __init__(self, force: np.ndarray, normal: np.ndarray, tangential: np.ndarray, sense: np.ndarray,
+                 stiffness: Callable[[], np.ndarray], touch: Callable[[], Touch]):
+        self.force, self.normal, self.tangential, self.sense = force, normal, tangential, sense
+        self._stiffness, self._touch = stiffness, touch
+
+    @cached_property
+    def stiffness(self) -> np.ndarray:
+        """Derivative of the force, shape (n, 2, 2), stress/length."""
+        return self._stiffness()
+
+    @cached_property
+    def touch(self) -> Touch:
+        """What to remember."""
+        return self._touch()
 
     @property
     def active(self) -> np.ndarray:
@@ -234,6 +244,7 @@ class Law:
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
         self.tool, self.mu, self.k, self.theta, self.shift, self.separates = tool, mu, k, theta, shift, separates
         self._near: tuple[np.ndarray, Nearest] | None = None        # points last asked for, and what was found
+        self._slid: tuple[Nearest, Touch, tuple] | None = None      # of what is near, and remembered: the slip
 
     def part(self, points: np.ndarray | slice) -> Law:
         """The law of some of its points."""
@@ -276,7 +287,7 @@ class Law:
         if not self.separates:
             slope = np.where(held | (d > -self.theta), 1.0, 0.0)
             return slope * (d + self.theta), slope
-        slope = np.clip((d + self.theta) / (2 * self.theta), 0.0, 1.0)
+        slope = np.minimum(np.maximum((d + self.theta) / (2 * self.theta), 0.0), 1.0)      # np.clip is slow
         return np.where(d < self.theta, self.theta * slope**2, d), slope
 
     def energy(self, x: np.ndarray) -> np.ndarray:
@@ -312,11 +323,11 @@ class Law:
         pressed, ahead = k * F, d - at
         N = pressed + k * slope * ahead
         force = N[:, None] * n
-        stiffness = _outer(k * slope, n, n) + _outer(pressed * bend, t, t)
         zero: np.ndarray = np.zeros(len(x))
-        kept_at = np.where(held, np.maximum(d, 0.0), d)         # held for ever
+        kept_at = np.where(held, np.maximum(d, 0.0), d) if self.remembers else d            # held for ever
         if not self.has_friction:
-            return Tractions(force, stiffness, _touch(x, kept_at, zero), N, zero, zero)
+            return Tractions(force, N, zero, zero, lambda: _outer(n, (k * slope)[:, None] * n)
+                             + _outer(t, (pressed * bend)[:, None] * t), lambda: _touch(x, kept_at, zero))
         assert old is not None
         g, dg = self._slip(x, near, old)
         rising = (np.abs(at) < self.theta) * k / (2 * self.theta) * self.separates
@@ -333,10 +344,16 @@ class Law:
             T, bent = np.where(sliding, limit * N, T), np.clip(T, -self.mu * pressed, self.mu * pressed)
             dT = np.where(sliding[:, None], (limit * k * slope)[:, None] * n, dT)
         force = force + T[:, None] * t
-        stiffness = stiffness + np.einsum("ni,nj->nij", t, dT) - _outer(bent * bend, n, t)
-        kept = np.divide(T, kt * slope, out=zero.copy(), where=slope > 0)
-        kept *= 1 + 1e-9 * np.abs(sense_now)                 # what slides goes on sliding, whatever round-off says
-        return Tractions(force, stiffness, _touch(x, kept_at, kept), N, T, sense_now)
+
+        def stiffness() -> np.ndarray:
+            return (_outer(n, (k * slope)[:, None] * n - (bent * bend)[:, None] * t)
+                    + _outer(t, (pressed * bend)[:, None] * t + dT))
+
+        def touch() -> Touch:
+            kept = np.divide(T, kt * slope, out=zero.copy(), where=slope > 0)
+            kept *= 1 + 1e-9 * np.abs(sense_now)             # what slides goes on sliding, whatever round-off says
+            return _touch(x, kept_at, kept)
+        return Tractions(force, N, T, sense_now, stiffness, touch)
 
     def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
         """Distance and slip of points x, shape (n, 2), and their gradients."""
@@ -359,19 +376,23 @@ class Law:
         return np.where((press > 0)[:, None, None], pressed.stiffness, now.stiffness)
 
     def _slip(self, x: np.ndarray, near: Nearest, old: Touch) -> tuple[np.ndarray, np.ndarray]:
-        """Elastic slip g of points, shape (n,), if none slides, and its gradient, shape (n, 2)."""
+        """Elastic slip g of points, shape (n,), if none slides, and its gradient, shape (n, 2); found once."""
+        if self._slid is not None and self._slid[0] is near and self._slid[1] is old:
+            return self._slid[2]
         touched = old.distance > -self.theta
         motion = x - np.where(touched[:, None], old.position, old.arrival)
         slips = ~np.isnan(motion[:, 0])
         motion = np.where(slips[:, None], motion, 0.0)
         along = np.einsum("ni,ni->n", near.tangent, motion)
         across = np.einsum("ni,ni->n", near.normal, motion)
-        return old.slip + along, near.tangent * (slips * (1 - near.curvature * across))[:, None]
+        found = old.slip + along, near.tangent * (slips * (1 - near.curvature * across))[:, None]
+        self._slid = near, old, found
+        return found
 
 
 def _touch(x: np.ndarray, d: np.ndarray, slip: np.ndarray) -> Touch:
     return Touch(x, d, slip, x)
 
 
-def _outer(c: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.einsum("n,ni,nj->nij", c, a, b)
+def _outer(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[:, :, None] * b[:, None, :]

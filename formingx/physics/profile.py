@@ -83,7 +83,7 @@ class Nearest(NamedTuple):
     @property
     def tangent(self) -> np.ndarray:
         """The normal turned left by a right angle, shape (n, 2)."""
-        return np.column_stack([-self.normal[:, 1], self.normal[:, 0]])
+        return self.normal[:, ::-1] * (-1.0, 1.0)
 
 
 class Tool:

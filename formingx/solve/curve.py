@@ -147,18 +147,29 @@ class Curve:
             low, high = (middle, high) if work(middle) < 0 else (low, middle)
         return sign * high * rest.direction
 
-    def step(self, old: State, length: float, foretold: Callable | None = None) -> State:
+    def step(self, old: State, length: float, foretold: Callable | None = None, behind: State | None = None) -> State:
         """One step: predict along the tangent, correct in the plane normal to it at that distance (4.14 to 4.31).
 
-        foretold: of a step in time: x at a control, or None if the tangent is the better guess.
+        foretold: of a step in time: x at a control, or None if the tangent is the better guess. behind: an earlier
+        state, the path smooth from there on: the guess is on the parabola through it, the old one and its tangent.
         """
-        x, control = old.x + length * old.direction, old.control + length * old.slope
-        return self._solve_from(x, control, self._plane(old, x, control), "step", old, foretold)
+        plane = self._plane(old, *self._ahead(old, length))
+        return self._solve_from(*self._ahead(old, length, behind), plane, "step", old, foretold)
 
-    def step_to(self, old: State, length: float, equation: Callable, foretold: Callable | None = None) -> State:
-        """Predict along the tangent, correct to where an equation such as "measure = target" holds; see `step`."""
+    def step_to(self, old: State, length: float, equation: Callable, foretold: Callable | None = None,
+                behind: State | None = None) -> State:
+        """Predict as `step` does, correct to where an equation such as "measure = target" holds."""
+        return self._solve_from(*self._ahead(old, length, behind), equation, "target", old, foretold)
+
+    def _ahead(self, old: State, length: float, behind: State | None = None) -> tuple[np.ndarray, float]:
+        """(x, control) so far along the tangent, or along the parabola that a state behind gives."""
         x, control = old.x + length * old.direction, old.control + length * old.slope
-        return self._solve_from(x, control, equation, "target", old, foretold)
+        if behind is not None:
+            h = self.distance(behind, old)
+            share = (length / h) ** 2
+            x += share * (behind.x - old.x + h * old.direction)
+            control += share * (behind.control - old.control + h * old.slope)
+        return x, control
 
     def _solve_from(self, x: np.ndarray, control: float, constraint: Callable, kind: str, old: State,
                     foretold: Callable | None) -> State:

@@ -22,6 +22,7 @@ class DirectSolver:
 
     def __init__(self, matrix: PETSc.Mat, symmetric: bool, determinant: bool = False):
         self._matrix, self._symmetric, self._determinant = matrix, symmetric, determinant
+        self._columns: list[PETSc.Mat] = []                 # dense, for `solve_all`
         self._create()
 
     def factorise(self) -> bool:
@@ -41,6 +42,13 @@ class DirectSolver:
         """out = matrix^-1 rhs."""
         self._ksp.solve(rhs, out)
 
+    def solve_all(self, rhs: np.ndarray) -> np.ndarray:
+        """matrix^-1 of columns, all at once, which takes a fraction of the time; own rows, shape (n, m)."""
+        given, found = self._dense(*rhs.shape)
+        given.getDenseArray()[:] = rhs
+        self._ksp.getPC().getFactorMatrix().matSolve(given, found)
+        return found.getDenseArray().copy()
+
     def solve_transposed(self, rhs: PETSc.Vec, out: PETSc.Vec) -> None:
         """out = matrix^-T rhs."""
         self._ksp.solveTranspose(rhs, out)
@@ -55,8 +63,23 @@ class DirectSolver:
         if self._determinant:
             self._ksp.getPC().getFactorMatrix().setMumpsIcntl(33, 1)
 
+    def _dense(self, n: int, m: int) -> list[PETSc.Mat]:
+        """Two matrices of n own rows and m columns, the same as before if that had as many."""
+        if not self._columns or self._columns[0].getSize()[1] != m:
+            self._forget()
+            for _ in range(2):
+                matrix = PETSc.Mat().createDense(((n, None), (None, m)), comm=self._matrix.comm)
+                matrix.assemble()
+                self._columns.append(matrix)
+        return self._columns
+
+    def _forget(self) -> None:
+        while self._columns:
+            self._columns.pop().destroy()
+
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
+        self._forget()
         self._ksp.destroy()
 
 

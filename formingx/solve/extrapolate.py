@@ -1,8 +1,8 @@
-"""States in time foretold from those before: Lagrange's polynomial through the last of them."""
+"""States foretold from those before: in time by Lagrange's polynomial, along a smooth path by a parabola."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -24,6 +24,19 @@ def before(states: Sequence[State], time: float, most: int) -> list[State]:
         if len(found) == most or state.kind == "jump":
             break
     return found
+
+
+def behind(states: Sequence[State], length: float, distance: Callable[[State, State], float]) -> State | None:
+    """An earlier state that gives, with the last one and its tangent, a parabola for a step of a length; None: none.
+
+    It is one of the last few, at least half the step away, with no jump since.
+    """
+    for before, after in zip(states[-2:-6:-1], states[:-6:-1]):
+        if after.kind == "jump":
+            return None
+        if length <= 2 * distance(before, states[-1]):
+            return before
+    return None
 
 
 def weights(states: Sequence[State], time: float) -> np.ndarray:

@@ -87,11 +87,12 @@ class FixedControlCurve(Curve):
         super().__init__(problem, tolerances)
         self._fixed = FixedControl(problem, tolerances)
 
-    def step(self, old: State, length: float, foretold: Callable | None = None) -> State:
+    def step(self, old: State, length: float, foretold: Callable | None = None, behind: State | None = None) -> State:
         """One step to the control that the tangent foretells."""
         return self._correct(old, length, "step")
 
-    def step_to(self, old: State, length: float, equation: Callable, foretold: Callable | None = None) -> State:
+    def step_to(self, old: State, length: float, equation: Callable, foretold: Callable | None = None,
+                behind: State | None = None) -> State:
         """The same, to where an equation for the control holds."""
         return self._correct(old, length, "target")
 

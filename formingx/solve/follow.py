@@ -225,10 +225,11 @@ class Run:
     def _take(self, old: State, length: float, target: Target | None, bound: Any, reach: float) -> list[State]:
         """One step of a length, or to a target that is within reach; raises `Failure`, `Inaccurate` or `_Late`."""
         self.problem.prepare(old.x, old.control, old.direction, old.slope, reach, ends=True)
+        behind = None if self.problem.has_kinks else extrapolate.behind(self.states, reach, self.curve.distance)
         if target is None:
-            new = self.curve.step(old, length, self._foretold)
+            new = self.curve.step(old, length, self._foretold, behind)
         else:
-            new = self.curve.step_to(old, reach, bound.equation(target.value), self._foretold)
+            new = self.curve.step_to(old, reach, bound.equation(target.value), self._foretold, behind)
             if not 0 < self.curve.progress(old, new) < 2 * length:
                 raise _Astray("the target was met on a far part of the path", [])
             new.met = target

@@ -162,15 +162,20 @@ class BorderedNewton:
 
         `ahead`: see `Problem.tangent`.
         """
-        self.problem.tangent(x, control, ahead)
-        good = self.solver.factorise()
-        self._chords.made(self.problem.setting if good else None)
-        if not good:
+        if not self._factorise(x, control, ahead):
             return False
-        self.problem.control_derivative(x, control, self.F_control, ahead)
         self.solver.solve(self.F_control, self.b)
         self.b.scale(-1)
         return bool(np.isfinite(self.b.norm()))
+
+    def _factorise(self, x: PETSc.Vec, control: float, ahead: bool = False) -> bool:
+        """Make factors of the tangent, and `F_control`; False if it is singular."""
+        self.problem.tangent(x, control, ahead)
+        good = self.solver.factorise()
+        self._chords.made(self.problem.setting if good else None)
+        if good:
+            self.problem.control_derivative(x, control, self.F_control, ahead)
+        return good
 
     def update_ahead(self, x: PETSc.Vec, control: float) -> bool:
         """Make `self.b`, at a solution just found, that of the tangent ahead, by the factors at hand; False: failed."""
@@ -215,7 +220,7 @@ class BorderedNewton:
                 points.look()
             self._check(history, active, moved)
             chord = self._chords.serve(residual, self.tolerances.residual)
-            if not chord and not self.tangent(x, control):
+            if not self._solve(x, control, chord):
                 raise Failure("the tangent matrix is singular", history)
             step = self._correction(x, control, constraint, history)
             share = active.share
@@ -247,11 +252,21 @@ class BorderedNewton:
             raise Failure("contact does not settle: " * unsettled + f"no convergence in {len(history)} iterations",
                           history)
 
+    def _solve(self, x: PETSc.Vec, control: float, chord: bool) -> bool:
+        """`self.a` = -K^-1 F and, but in a chord iteration, a new K and `self.b` as in `tangent`; False if singular."""
+        if chord:
+            self.solver.solve(self.F, self.a)
+            self.a.scale(-1)
+            return True
+        if not self._factorise(x, control):
+            return False
+        both = self.solver.solve_all(np.column_stack([self.F.array_r, self.F_control.array_r]))
+        self.a.array_w[:], self.b.array_w[:] = -both[:, 0], -both[:, 1]
+        return bool(np.isfinite(self.b.norm()))
+
     def _correction(self, x: PETSc.Vec, control: float, constraint: Any, history: list) -> float:
-        """Solve for the correction `self.a` of x and that of the control, which is returned."""
+        """Make `self.a` the correction of x; returns that of the control."""
         c, c_control = constraint(x, control, self.gradient)
-        self.solver.solve(self.F, self.a)
-        self.a.scale(-1)
         self._slope = self.gradient.dot(self.b) + c_control
         if self._slope == 0 or not np.isfinite(self._slope):
             raise Failure("the quantity that is aimed at does not change along the path here", history)
@@ -259,11 +274,11 @@ class BorderedNewton:
         self.a.axpy(step, self.b)
         return step
 
-    def _border(self, v: PETSc.Vec) -> float:
-        """Make v = K^-1 e, in place, the solution of the bordered system; returns its part of the control."""
-        step = -self.gradient.dot(v) / self._slope
-        v.axpy(step, self.b)
-        return step
+    def _border(self, V: np.ndarray) -> np.ndarray:
+        """Make V = K^-1 E, own rows, shape (n, m), in place, those of the bordered system; the control's part, (m,)."""
+        steps = -self.problem.comm.allreduce(self.gradient.array_r @ V) / self._slope
+        V += np.outer(self.b.array_r, steps)
+        return steps
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""

@@ -51,7 +51,8 @@ class Settling:
     def correct(self, solver: DirectSolver, dx: Any, step: float, border: Any) -> float:
         """Make a correction (dx, in place, and step, of the control) consistent with the law; returns the step.
 
-        border(v, w): what a solution v = K^-1 e becomes in the bordered system, in place; returns that of the control.
+        border(V): what solutions V = K^-1 E, shape (n, m), become in the bordered system, in place; returns those of
+        the control, shape (m,).
         """
         for _ in range(4):
             chosen = [np.flatnonzero(mark) for mark in self._marked]
@@ -93,7 +94,7 @@ def woodbury(problem: Any, changes: list[np.ndarray], solver: DirectSolver, b: A
         return True
     if points > FEW:
         return False
-    small = _Points(problem, problem.touching, chosen, solver, lambda v: 0.0)
+    small = _Points(problem, problem.touching, chosen, solver, lambda V: np.zeros(V.shape[1]))
     by = small.updated(b, [change[i] for change, i in zip(changes, chosen)])
     if by is None:
         return False
@@ -111,28 +112,24 @@ class _Points:
         first = sum(counts[: self._comm.rank])
         self._own = slice(first, first + counts[self._comm.rank])
         own = [(c, point, way) for c, points in zip(contacts, chosen) for point in points for way in (0, 1)]
-        e, v = problem.x.duplicate(), problem.x.duplicate()
-        columns, steps = [], []
+        units = []
         for rank, count in enumerate(counts):
             for k in range(count):
-                unit[:] = 0
                 mine, point, way = own[k] if rank == self._comm.rank else (None, 0, 0)
                 for contact in contacts:                        # on all ranks: the force may act on nodes of another
                     forces = np.zeros((len(contact.points), 2))
                     if contact is mine:
                         forces[point, way] = 1.0
                     contact.add(unit, forces)
-                unit[held] = 0
-                e.array_w[:] = unit
-                solver.solve(e, v)
-                steps.append(border(v))
-                columns.append(v.array_r.copy())
-        e.destroy()
-        v.destroy()
-        self._columns, self._steps = np.array(columns).T, np.array(steps)      # own rows
+                units.append(unit.copy())
+                unit[:] = 0
+        E = np.array(units).T
+        E[held] = 0
+        self._columns = solver.solve_all(E)                                     # own rows
+        self._steps = border(self._columns)
         scale = np.concatenate([np.repeat(c.scale[i], 2) for c, i in zip(contacts, chosen)])
         self._scale = self._gather(scale)
-        moved = [self._moved(column, step) for column, step in zip(self._columns.T, steps)]
+        moved = [self._moved(column, step) for column, step in zip(self._columns.T, self._steps)]
         self._C = self._gather(np.array(moved).T.reshape(len(own), len(moved))) * self._scale
 
     def solve(self, dx: Any, step: float) -> tuple[np.ndarray, float] | None:
