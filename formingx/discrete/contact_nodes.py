@@ -54,8 +54,8 @@ class ContactNodes:
         if contact.friction_by_temperature:
             self._temperature_nodes = solid.scene.temperature.nodes(self._nodes())
         self.thickness = solid.thickness(contact.on)
-        self.law = contact.law(contact.penalty * solid.stress / self.thickness, contact.ramp * self.thickness,
-                               self.points, self._temperatures())
+        self.law = contact.law(contact.penalty * solid.stress / self.thickness, self.thickness, self.points,
+                               self._temperatures())
         self._scale = solid.length / (solid.stress * solid.volume) * self.area
         self._motion = solid.length * np.array(contact.moves or (0.0, 0.0))
         self.base, self.rate = 0.0, float(contact.driven)   # of the travel by the control (`Setting`)
