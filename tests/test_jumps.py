@@ -10,7 +10,6 @@ from scipy import integrate, optimize
 import formingx as fx
 from formingx import tools
 from formingx.discrete.contact_nodes import ContactNodes
-from formingx.physics.contact import SOFTER
 from formingx.results.show import plots
 from formingx.solve import jump
 
@@ -138,14 +137,12 @@ def test_a_rough_plug_goes_on_where_points_leave_its_edge(rough):
 
 
 def share_of_friction(path):
-    """Largest traction by the elastic slip that is remembered, over mu N, of all points and states."""
+    """Largest traction by the elastic slip that is remembered, over mu N, of all points that touch and states."""
     contact, n, most = path.problem.contacts[0], path.problem.forms.space.dofmap.index_map.size_local, 0.0
-    law = contact.law
     for state in path.states:
         with path.problem.at(state):
-            F, slope = law.ramp(law.distance(contact.positions(state.x[:n], state.control)))
-            share = SOFTER * slope * np.abs(contact.touch.slip) / np.where(F > 0, law.mu * F, 1.0)
-        most = max(most, share[F > 0].max(initial=0.0))
+            touches = contact.touching(state.x[:n], state.control)
+            most = max(most, np.abs(contact.touch.slip[touches]).max(initial=0.0) / contact.law.elastic_slip)
     return most
 
 

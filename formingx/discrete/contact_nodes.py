@@ -299,7 +299,7 @@ class ContactNodes:
         times = self._arrivals(start, velocity, length)
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         if self._memory is not None:
-            at_end = ends & self.contact.sticks & (times >= _AT_END * length)
+            at_end = ends & self.law.has_friction & (times >= _AT_END * length)
             arrival = np.where(at_end[:, None], np.nan, start + times[:, None] * velocity)
             self.put(self._memory._replace(touch=self._memory.touch._replace(arrival=arrival)))
 
@@ -327,7 +327,7 @@ class ContactNodes:
 
         Since it touched its pressure has grown, and it has slid, as it does at the end, along (direction, slope).
         """
-        if self._memory is None or not self.contact.sticks:
+        if self._memory is None or not self.law.has_friction:
             return 1.0
         end = self.positions(new, control)
         near = self.law.nearest(end)
