@@ -6,12 +6,14 @@ Song (1993), eqs. (5.7) to (5.14), per unit reference area, at a point whose sig
     tangential traction  T = k F'(d) g for stick, T = mu N g/g_s but not more than mu N for Coulomb's law,
 
 g being the elastic slip: the tangential motion since the point touched (entered the ramp), less what has slid. Stick
-is mu = inf, frictionless mu = 0. Coulomb's law is regularised so that every point slides after the same small elastic
-slip g_s: its stiffness grows with the pressure (Wriggers, Computational Contact Mechanics, 2006, section 5.2; the
-elastic stick of the Abaqus Theory Manual, 5.2.3). While N changes T is not the derivative of an energy: a cycle of N at
-different slips gains or loses up to mu N g_s/2 per area, which vanishes with g_s. What slides always dissipates. A point that was out of touch at the last accepted state slips from where it arrives
+is mu = inf, frictionless mu = 0. A point that was out of touch at the last accepted state slips from where it arrives
 inside the step, which the tangent of the path foretells: taken from the end of the step, the slip would depend on its
 length. One that sticks, and that the tangent lets arrive at the very end of the step or later, is free until then.
+
+Coulomb's law is regularised so that points slide after the same small elastic slip g_s at every pressure: what holds
+them grows with the pressure (Wriggers, Computational Contact Mechanics, 2006; the elastic stick of the Abaqus Theory
+Manual, section 5.2.3). What slides dissipates. Elastic slip has no energy while N changes: slip under N1, and back
+under N2, gains at most mu (N2 - N1) g_s/2 per area, which vanishes with g_s.
 
 A tool that the body does not separate from holds what has touched it: F(d) = d + theta for such a point, of either
 sign, and max(d + theta, 0) for the others, which carries on without a jump when one arrives.
@@ -37,8 +39,7 @@ _STICKS = 100.0
 """Coefficients of friction from which on a point counts as one that sticks: nothing slides there."""
 
 _ELASTIC_SLIP = 1e-3
-"""g_s over thickness: forces on a block between rough plates, to a third of its height, are within 0.1 % of those with
-a tenth of it (tests/test_compression.py); half of it costs a cup a quarter more iterations."""
+"""g_s over thickness: forces hardly feel it (tests/test_compression.py), and Newton's method can still aim at it."""
 
 _SLIDES, _STICK, _HELD = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
 """Penalty and ramp of what slides, of what sticks until pulled off, and of what never lets go, where stiffer costs
