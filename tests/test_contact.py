@@ -323,7 +323,7 @@ def scene_with(contact, pressed="bottom"):
 
 def test_what_never_slides_is_stick():
     """Coulomb's law with a coefficient that is never reached gives the numbers of stick."""
-    paths = [form(cup(friction, (20, 2), penalty=2e5), 8.0, largest=0.02, length=0.02)
+    paths = [form(cup(friction, (20, 2), penalty=2e5, ramp=1e-5), 8.0, largest=0.02, length=0.02)
              for friction in ("stick", 1000.0, 10.0)]
     stick, same, rough = paths
     assert np.abs(same.last.x - stick.last.x).max() < 1e-12 * np.abs(stick.last.x).max()
