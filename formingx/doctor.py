@@ -175,7 +175,7 @@ def _contact_penalties(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Fi
                           f" {traction / (0.001 * stress):.1g} or more")
         if contact.penalty > 1e9:
             yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g}: few of 16 digits are left"
-                          f" for the body; 2e4 is the default with friction, 2e5 without")
+                          f" for the body; 2e5 is the default")
         if contact.ramp > 0.05:
             yield Finding("warning", repr(contact), f"ramp = {contact.ramp:g}: the face feels the tool already"
                           f" {100 * contact.ramp:.3g} % of the thickness before it; 1e-5 is the default")

@@ -8,7 +8,7 @@ from formingx.discrete.problem import Problem
 from formingx.physics.contact import Law, Touch
 
 tools = fx.tools
-THETA, K = 0.02, 300.0
+THETA, K, SLIP = 0.02, 300.0, 3e-3
 TOOL = tools.cup(radius=2.0, depth=1.0, fillet=0.4, lip=0.3)
 
 
@@ -30,7 +30,7 @@ def derivative(f, x, h):
 
 
 def test_force_is_derivative_of_energy():
-    law = Law(TOOL, 0.0, K, THETA)
+    law = Law(TOOL, 0.0, K, THETA, SLIP)
     x, _ = points_near(TOOL, SIDES)
     force = law.tractions(x, None).force
     np.testing.assert_allclose(derivative(law.energy, x, 1e-6), force, atol=1e-7 * K)
@@ -41,7 +41,7 @@ def test_force_is_derivative_of_energy():
 @pytest.mark.parametrize("slip", [0.0, 1e-4, -0.01, 0.2])
 @pytest.mark.parametrize("touched", [True, False])
 def test_stiffness_is_derivative_of_force(mu, slip, touched):
-    law = Law(TOOL, mu, K, THETA)
+    law = Law(TOOL, mu, K, THETA, SLIP)
     x, tangent = points_near(TOOL, SIDES)
     before = x - slip * tangent
     old = Touch(before, np.full(len(x), -0.5 * THETA if touched else -2 * THETA), np.full(len(x), 1e-4), before)
@@ -55,7 +55,7 @@ def test_stiffness_is_derivative_of_force(mu, slip, touched):
 @pytest.mark.parametrize("touched", [True, False])
 def test_a_tool_that_holds(mu, touched):
     """Stiffness is the derivative of the force; what has touched is pulled back, what has not is free."""
-    law = Law(TOOL, mu, K, THETA, separates=False)
+    law = Law(TOOL, mu, K, THETA, SLIP, separates=False)
     x, tangent = points_near(TOOL, [-5 * THETA, -(1 + 1e-3) * THETA, -0.5 * THETA, 2 * THETA])
     before = x - 0.01 * tangent
     old = Touch(before, np.full(len(x), -0.5 * THETA if touched else -2 * THETA), np.full(len(x), 1e-4), before)
@@ -69,7 +69,7 @@ def test_a_tool_that_holds(mu, touched):
 
 @pytest.mark.parametrize("mu", [0.0, 0.3, np.inf])
 def test_force_is_continuous(mu):
-    law, step = Law(TOOL, mu, K, THETA), 1e-9
+    law, step = Law(TOOL, mu, K, THETA, SLIP), 1e-9
     x, tangent = points_near(TOOL, (-THETA, THETA))
     normal = TOOL.nearest(x).normal
     old = Touch(x, np.full(len(x), -2 * THETA), np.zeros(len(x)), x + 0.05 * tangent)
@@ -79,11 +79,44 @@ def test_force_is_continuous(mu):
 
 @pytest.mark.parametrize("mu", [0.3, np.inf])
 def test_an_accepted_state_keeps_its_forces(mu):
-    law = Law(TOOL, mu, K, THETA)
+    law = Law(TOOL, mu, K, THETA, SLIP)
     x, tangent = points_near(TOOL, SIDES)
     first = law.tractions(x, Touch(x, np.full(len(x), -2 * THETA), np.zeros(len(x)), x + 0.03 * tangent))
     again = law.tractions(x, first.touch)
     np.testing.assert_allclose(again.force, first.force, atol=1e-12 * K)
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("depth", [-0.5 * THETA, 3 * THETA, 300 * THETA])
+def test_a_point_slides_after_the_same_slip_at_every_pressure(depth):
+    """T = mu N g/g_s up to mu N; what slid is forgotten: back by g_s, it is free of traction."""
+    law, mu, away = Law(tools.plane(0.0), 0.4, K, THETA, SLIP), 0.4, np.array([0.3, 0.9, 1.1, 50.0]) * SLIP
+    start = np.column_stack([np.zeros(4), np.full(4, depth)])
+    touch = Touch(start, np.full(4, depth), np.zeros(4), start)
+    x = start + np.outer(away, law.nearest(start).tangent[0])
+    found = law.tractions(x, touch)
+    assert found.normal == pytest.approx(found.normal[0]) and found.normal[0] > 0
+    assert found.tangential == pytest.approx(mu * found.normal * np.minimum(away / SLIP, 1))
+    back = law.tractions(x - np.outer(np.minimum(away, SLIP), law.nearest(start).tangent[0]), found.touch)
+    assert back.tangential == pytest.approx(np.zeros(4), abs=1e-6 * mu * found.normal[0])
+
+
+def test_what_friction_gains_in_a_cycle_of_pressure_vanishes_with_the_elastic_slip():
+    """Slip under little pressure and back under more: the traction returns mu (N2 - N1) g^2 / (2 g_s), no more."""
+    mu, low, high = 0.4, 2 * THETA, 10 * THETA
+    law = Law(tools.plane(0.0), mu, K, THETA, SLIP)
+    way = np.linspace(0, SLIP, 101)
+    cycle = [(g, low) for g in way] + [(SLIP, high)] + [(g, high) for g in way[::-1]]
+    x = np.array([(0.0, low)])
+    touch, work, last = Touch(x, np.array([low]), np.zeros(1), x), 0.0, None
+    for g, d in cycle:
+        x = np.array([(g, d)])
+        found = law.tractions(x, touch)
+        along = float(found.tangential[0] * law.nearest(x).tangent[0, 0])
+        if last is not None:
+            work += 0.5 * (along + last[1]) * (g - last[0])
+        touch, last = found.touch, (g, along)
+    assert work == pytest.approx(-mu * K * (high - low) * SLIP / 2, rel=1e-6)
 
 
 def cup(friction, elements=(20, 2), depth=5.0, thickness=0.3, fillet=1.0, **options):
@@ -290,7 +323,7 @@ def scene_with(contact, pressed="bottom"):
 
 def test_what_never_slides_is_stick():
     """Coulomb's law with a coefficient that is never reached gives the numbers of stick."""
-    paths = [form(cup(friction, (20, 2), penalty=2e5), 8.0, largest=0.02, length=0.02)
+    paths = [form(cup(friction, (20, 2), penalty=2e5, ramp=1e-5), 8.0, largest=0.02, length=0.02)
              for friction in ("stick", 1000.0, 10.0)]
     stick, same, rough = paths
     assert np.abs(same.last.x - stick.last.x).max() < 1e-12 * np.abs(stick.last.x).max()

@@ -10,7 +10,6 @@ from scipy import integrate, optimize
 import formingx as fx
 from formingx import tools
 from formingx.discrete.contact_nodes import ContactNodes
-from formingx.physics.contact import SOFTER
 from formingx.results.show import plots
 from formingx.solve import jump
 
@@ -86,8 +85,9 @@ def plug(mu=1.0, thickness=0.5):
                     contacts=[fx.Contact("top", tool, mu, moves=(0, -1), points=4)])
 
 
-def pushed(**step):
-    return fx.trace(plug(), until=fx.travel(6.9), through=[fx.travel(t) for t in range(1, 6)],
+def pushed(to=6.5, **step):
+    """Past three jumps; at 6.9 another point is at the brink of leaving the edge."""
+    return fx.trace(plug(), until=fx.travel(to), through=[fx.travel(t) for t in range(1, 6)],
                     step=fx.StepControl(target=6, **step), progress=False)
 
 
@@ -132,20 +132,18 @@ def rough(weighed_rough):
 
 
 def test_a_rough_plug_goes_on_where_points_leave_its_edge(rough):
-    assert rough["travel"][-1] == pytest.approx(6.9, rel=1e-12)
+    assert rough["travel"][-1] == pytest.approx(6.5, rel=1e-12)
     assert np.all(np.diff(rough["travel"]) > 0)
     assert all(state.jump["dissipated"] > 0 and state.jump["moved"] > 0 for state in rough.jumps)
 
 
 def share_of_friction(path):
-    """Largest traction by the elastic slip that is remembered, over mu N, of all points and states."""
+    """Largest traction by the elastic slip that is remembered, over mu N, of all points that touch and states."""
     contact, n, most = path.problem.contacts[0], path.problem.forms.space.dofmap.index_map.size_local, 0.0
-    law = contact.law
     for state in path.states:
         with path.problem.at(state):
-            F, slope = law.ramp(law.distance(contact.positions(state.x[:n], state.control)))
-            share = SOFTER * slope * np.abs(contact.touch.slip) / np.where(F > 0, law.mu * F, 1.0)
-        most = max(most, share[F > 0].max(initial=0.0))
+            touches = contact.touching(state.x[:n], state.control)
+            most = max(most, np.abs(contact.touch.slip[touches]).max(initial=0.0) / contact.law.elastic_slip)
     return most
 
 
@@ -173,10 +171,10 @@ def test_where_jumps_end_does_not_depend_on_how_eta_changes(rough, schedule, mon
 @pytest.mark.slow
 @pytest.mark.xfail(reason="at the brink of release two states are near, and either is found: 8.053, 8.079", strict=True)
 def test_nor_in_shorter_steps(monkeypatch):
-    before = pushed(largest=0.02)["tool_force"][-1]
+    before = pushed(6.9, largest=0.02)["tool_force"][-1]
     monkeypatch.setattr(jump, "_FIRST", 3.0)
     monkeypatch.setattr(jump, "_FALLS", 0.5)
-    assert pushed(largest=0.02)["tool_force"][-1] == pytest.approx(before, rel=1e-3)
+    assert pushed(6.9, largest=0.02)["tool_force"][-1] == pytest.approx(before, rel=1e-3)
 
 
 def williams(**step):

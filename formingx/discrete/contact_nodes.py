@@ -54,8 +54,8 @@ class ContactNodes:
         if contact.friction_by_temperature:
             self._temperature_nodes = solid.scene.temperature.nodes(self._nodes())
         self.thickness = solid.thickness(contact.on)
-        self.law = contact.law(contact.penalty * solid.stress / self.thickness, contact.ramp * self.thickness,
-                               self.points, self._temperatures())
+        self.law = contact.law(contact.penalty * solid.stress / self.thickness, self.thickness, self.points,
+                               self._temperatures())
         self._scale = solid.length / (solid.stress * solid.volume) * self.area
         self._motion = solid.length * np.array(contact.moves or (0.0, 0.0))
         self.base, self.rate = 0.0, float(contact.driven)   # of the travel by the control (`Setting`)
@@ -326,21 +326,26 @@ class ContactNodes:
         return self._comm.allreduce(found, MPI.SUM) > 2 * max(self._allowed, self._foreseen) + 2
 
     def touches_by(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
-        """Part of a step by which the first of the nodes touched that slid too far without friction; 1 if none did.
+        """Part of a step by which the first of the nodes touched whose slip the step got wrong; 1 if there is none.
 
-        Since it touched its pressure has grown, and it has slid, as it does at the end, along (direction, slope).
+        Since it touched its pressure has grown, and it has slid, as it does at the end, along (direction, slope). One
+        that sticks slid too far without friction; under Coulomb's law it slides the other way than it came.
         """
-        if self._memory is None or not self.contact.sticks:
+        if self._memory is None or not self.law.has_friction:
             return 1.0
-        end = self.positions(new, control)
+        end, touch = self.positions(new, control), self._memory.touch
         near = self.law.nearest(end)
         F, grows = self.law.ramp(near.distance)
         velocity = self.moved(direction, slope)
         rate = np.maximum(grows * np.einsum("ni,ni->n", near.normal, velocity), 0.0)
         since = np.minimum(np.divide(F, rate, out=np.full(len(F), length), where=rate > 0), length)
-        slid = since * np.abs(np.einsum("ni,ni->n", near.tangent, velocity))
-        came = np.isnan(self._memory.touch.arrival[:, 0]) & (self._memory.touch.distance <= -self.law.theta) & (F > 0)
-        late = came & (slid > _SLIDES * self.lengths)
+        slid = since * np.einsum("ni,ni->n", near.tangent, velocity)
+        if self.contact.sticks:
+            wrong = np.isnan(touch.arrival[:, 0]) & (np.abs(slid) > _SLIDES * self.lengths)
+        else:
+            counted = np.einsum("ni,ni->n", near.tangent, end - touch.arrival)
+            wrong = (slid * counted < 0) & (np.minimum(np.abs(slid), np.abs(counted)) > self.law.elastic_slip)
+        late = (touch.distance <= -self.law.theta) & (F > 0) & wrong
         return self._comm.allreduce(1 - float(since[late].max(initial=0.0)) / length, MPI.MIN)
 
     def touching(self, fields: np.ndarray, control: float) -> np.ndarray:

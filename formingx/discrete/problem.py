@@ -353,7 +353,7 @@ class Problem:
     def touches_by(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """Part of a step, which came to `new` along (direction, slope), that will do; 1: it was short enough.
 
-        What comes into contact sticks where it touches: a longer step lets it slide too far before. Arrays: own part.
+        What comes into contact sticks or slides from where it touches: longer steps get that wrong. Arrays: own part.
         """
         n = self._n
         return min([c.touches_by(new[:n], control, direction[:n], slope, length) for c in self.touching], default=1.0)

@@ -3,13 +3,17 @@
 Song (1993), eqs. (5.7) to (5.14), per unit reference area, at a point whose signed distance to the tool is d:
 
     normal traction      N = k F(d),  F the ramp (5.13) of half-width theta: 0 below -theta, d above theta, C1 between;
-    tangential traction  T = k_t F'(d) g, not more than mu N; k_t = k for stick, k max(1, mu)/100 but at most k for
-    Coulomb's law,
+    tangential traction  T = k F'(d) g for stick, T = mu N g/g_s but not more than mu N for Coulomb's law,
 
 g being the elastic slip: the tangential motion since the point touched (entered the ramp), less what has slid. Stick
 is mu = inf, frictionless mu = 0. A point that was out of touch at the last accepted state slips from where it arrives
 inside the step, which the tangent of the path foretells: taken from the end of the step, the slip would depend on its
 length. One that sticks, and that the tangent lets arrive at the very end of the step or later, is free until then.
+
+Coulomb's law is regularised so that points slide after the same small elastic slip g_s at every pressure: what holds
+them grows with the pressure (Wriggers, Computational Contact Mechanics, 2006; the elastic stick of the Abaqus Theory
+Manual, section 5.2.3). What slides dissipates. Elastic slip has no energy while N changes: slip under N1, and back
+under N2, gains at most mu (N2 - N1) g_s/2 per area, which vanishes with g_s.
 
 A tool that the body does not separate from holds what has touched it: F(d) = d + theta for such a point, of either
 sign, and max(d + theta, 0) for the others, which carries on without a jump when one arrives.
@@ -33,16 +37,15 @@ from ..time_temperature import FunctionOfTemperature
 from .part import Part
 from .tools import Nearest, Tool
 
-SOFTER = 0.01
-"""Stiffness of elastic slip over that of the ramp, under Coulomb's law: a point slides after some mu 100 N/k of slip.
+_STICKS = 100.0
+"""Coefficients of friction from which on a point counts as one that sticks: nothing slides there."""
 
-Were it as stiff as the ramp, that range would be narrower than a step of Newton's method can aim at. It grows with mu
-above 1, so that the range is no wider than needed, and what never slides (mu = 100 and above) is as stiff as stick.
-"""
+_ELASTIC_SLIP = 1e-3
+"""g_s over thickness: forces hardly feel it (tests/test_compression.py), and Newton's method can still aim at it."""
 
-
-_SMOOTH, _STICK, _ROUGH = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
-"""Penalty and ramp without friction, of what sticks until pulled off, and else, where stiffer costs iterations."""
+_SLIDES, _STICK, _HELD = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
+"""Penalty and ramp of what slides, of what sticks until pulled off, and of what never lets go, where stiffer costs
+iterations."""
 
 _AT_FOOT = 1e-7
 """Distances from the foot of the ramp, over theta, that are as good as none."""
@@ -57,9 +60,9 @@ class Contact(Part):
         friction: "stick" (a point that touches stays where it touched), "none", or the coefficient mu of Coulomb's
             law (5.9), from 0 (none). One that depends on the temperature of the body where it touches: a `table`
             {T: mu}, or what `of_temperature` returns; it is that of the last accepted state.
-        penalty: k over shear modulus / thickness of the sheet; default 2e5; 2e4 under Coulomb's law and with
-            separates=False.
-        ramp: theta over thickness of the sheet; default 1e-5, without friction 1e-7.
+        penalty: k over shear modulus / thickness of the sheet; default 2e5, with separates=False 2e4.
+        ramp: theta over thickness of the sheet; default 1e-7 where points slide, 1e-5 where they stick or are held.
+        elastic_slip: g_s over thickness of the sheet: how far a point goes under Coulomb's law before it slides.
         separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
             start); with "stick" or "none".
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge).
@@ -79,8 +82,8 @@ class Contact(Part):
     mu: Any
 
     def __init__(self, on: str, tool: Tool, friction: Any = "stick", *, penalty: float | None = None,
-                 ramp: float | None = None, separates: bool = True, nodes_per_step: int = 1,
-                 points: str | int = "nodes",
+                 ramp: float | None = None, elastic_slip: float = _ELASTIC_SLIP, separates: bool = True,
+                 nodes_per_step: int = 1, points: str | int = "nodes",
                  moves: tuple[float, float] | None = None, name: str | None = None):
         self.name, name = name, f"Contact({on!r})"
         if not isinstance(tool, Tool):
@@ -88,9 +91,10 @@ class Contact(Part):
         self.on, self.tool, self.friction = instance("Contact: on", on, str, "the name of a boundary"), tool, friction
         self.mu = _coefficient(f"{name}: friction", friction)
         self.separates = instance(f"{name}: separates", separates, bool, "True or False")
-        usual = _SMOOTH if self.symmetric else _STICK if self.sticks and separates else _ROUGH
+        usual = _HELD if not separates else _STICK if self.sticks else _SLIDES
         self.penalty = positive(f"{name}: penalty", usual[0] if penalty is None else penalty)
         self.ramp = positive(f"{name}: ramp", usual[1] if ramp is None else ramp)
+        self.elastic_slip = positive(f"{name}: elastic_slip", elastic_slip)
         if not separates and (self.friction_by_temperature or 0 < self.mu < math.inf):
             raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
                              f" Coulomb friction; use 'stick' or 'none'")
@@ -113,7 +117,7 @@ class Contact(Part):
     @property
     def sticks(self) -> bool:
         """True if a point that touches stays where it touched: under "stick", and where mu is as good as that."""
-        return not self.friction_by_temperature and self.mu * SOFTER >= 1
+        return not self.friction_by_temperature and self.mu >= _STICKS
 
     @property
     def symmetric(self) -> bool:
@@ -139,14 +143,15 @@ class Contact(Part):
                              f" least 0")
         return mu
 
-    def law(self, k: float, theta: float, points: np.ndarray, temperature: np.ndarray | None = None) -> Law:
-        """Tractions for a penalty k (stress/length) and a ramp theta (length), at points, shape (n, 2).
+    def law(self, k: float, thickness: float, points: np.ndarray, temperature: np.ndarray | None = None) -> Law:
+        """Tractions for a penalty k (stress/length) on a sheet of this thickness, at points, shape (n, 2).
 
         temperature: of the body there, shape (n,), if friction depends on it.
         """
+        theta, elastic_slip = self.ramp * thickness, self.elastic_slip * thickness
         foot = (1 - _AT_FOOT * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)
-        return Law(self.tool, self.friction_at(temperature), k, theta, shift, self.separates)
+        return Law(self.tool, self.friction_at(temperature), k, theta, elastic_slip, shift, self.separates)
 
     def __repr__(self) -> str:
         return f"Contact({self.on!r}, {self.tool!r}, {self.friction!r})"
@@ -233,16 +238,17 @@ class Motion(NamedTuple):
 class Law:
     """Tractions at points, a function of their positions and of what they remember.
 
-    mu: of friction, a number, or one for each point, shape (n,).
+    mu: of friction, a number, or one for each point, shape (n,). elastic_slip: g_s, length, not used by stick.
 
     Distances are less by `shift`, shape (n,), length: a point that touches from the start begins at the foot of the
     ramp, free of stress.
     """
 
-    def __init__(self, tool: Tool, mu: np.ndarray | float, k: float, theta: float, shift: np.ndarray | float = 0.0,
-                 separates: bool = True):
+    def __init__(self, tool: Tool, mu: np.ndarray | float, k: float, theta: float, elastic_slip: float,
+                 shift: np.ndarray | float = 0.0, separates: bool = True):
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
-        self.tool, self.mu, self.k, self.theta, self.shift, self.separates = tool, mu, k, theta, shift, separates
+        self.tool, self.mu, self.k, self.theta, self.elastic_slip = tool, mu, k, theta, elastic_slip
+        self.shift, self.separates = shift, separates
         self._near: tuple[np.ndarray, Nearest] | None = None        # points last asked for, and what was found
         self._slid: tuple[Nearest, Touch, tuple] | None = None      # of what is near, and remembered: the slip
 
@@ -250,11 +256,11 @@ class Law:
         """The law of some of its points."""
         shift = self.shift[points] if isinstance(self.shift, np.ndarray) else self.shift
         mu = self.mu[points] if isinstance(self.mu, np.ndarray) else self.mu
-        return Law(self.tool, mu, self.k, self.theta, shift, self.separates)
+        return Law(self.tool, mu, self.k, self.theta, self.elastic_slip, shift, self.separates)
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
         """The same law with other coefficients of friction."""
-        return Law(self.tool, mu, self.k, self.theta, self.shift, self.separates)
+        return Law(self.tool, mu, self.k, self.theta, self.elastic_slip, self.shift, self.separates)
 
     @property
     def remembers(self) -> bool:
@@ -330,14 +336,12 @@ class Law:
                              + _outer(t, (pressed * bend)[:, None] * t), lambda: _touch(x, kept_at, zero))
         assert old is not None
         g, dg = self._slip(x, near, old)
-        rising = (np.abs(at) < self.theta) * k / (2 * self.theta) * self.separates
-        kt = k * np.minimum(SOFTER * np.maximum(self.mu, 1.0), 1.0)
-        rising = rising * (kt / k)
-        T, dT = (kt * slope + rising * ahead) * g, (kt * slope)[:, None] * dg
-        dT += (rising * g)[:, None] * n
+        foretold = g if expected is None else expected.slip
+        s, rising = self._resistance(at, pressed, slope)
+        T, dT = s * g + rising * ahead * foretold, s[:, None] * dg + (rising * foretold)[:, None] * n
         sense_now, bent = zero, T
         if np.all(np.isfinite(self.mu)):
-            trial = kt * slope * (g if expected is None else expected.slip)
+            trial = s * foretold
             turned = False if sense is None else np.sign(trial) * sense < 0
             sliding, limit = (np.abs(trial) > self.mu * pressed) & ~np.asarray(turned), np.sign(trial) * self.mu
             sense_now = np.where(sliding, np.sign(trial), 0.0)
@@ -350,10 +354,17 @@ class Law:
                     + _outer(t, (pressed * bend)[:, None] * t + dT))
 
         def touch() -> Touch:
-            kept = np.divide(T, kt * slope, out=zero.copy(), where=slope > 0)
+            kept = np.divide(T, s, out=zero.copy(), where=s > 0)
             kept *= 1 + 1e-9 * np.abs(sense_now)             # what slides goes on sliding, whatever round-off says
             return _touch(x, kept_at, kept)
         return Tractions(force, N, T, sense_now, stiffness, touch)
+
+    def _resistance(self, d: np.ndarray, pressed: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Stiffness T/g of elastic slip at distances d, and its derivative by them, shape (n,) each."""
+        sticks, k = np.asarray(self.mu >= _STICKS), self.k
+        along = np.where(sticks, 0.0, self.mu) / self.elastic_slip
+        rising = (np.abs(d) < self.theta) * k / (2 * self.theta) * self.separates
+        return np.where(sticks, k * slope, along * pressed), np.where(sticks, rising, along * k * slope)
 
     def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
         """Distance and slip of points x, shape (n, 2), and their gradients."""

@@ -25,7 +25,9 @@ MOST = 40
 FEW = 3
 """Points that change for which solutions with the factors at hand cost less than other factors."""
 
-_ITERATIONS = 15
+_ITERATIONS, _FULL, _HALVED = 40, 8, 4
+"""Of the small problem: at most so many, with full corrections at first (which may cycle), then with halved ones where
+a full one would lead further away, but not more often than so in a row (which may stall at a kink)."""
 
 
 class Settling:
@@ -136,19 +138,24 @@ class _Points:
         """How a correction and its step change, own part; None if no consistent state was found."""
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._taken()
-        y = y0.copy()
+        y, by, least, halved = y0, np.zeros_like(y0), np.inf, 0
         accuracy = 1e-4 * min(c.law.theta for c in self._contacts)
-        for _ in range(_ITERATIONS):
-            f, S = self._law(y)
-            more = f - f0 + np.einsum("nij,nj->ni", S - S0, y.reshape(-1, 2)).ravel()
-            R = y - y0 + self._C @ more
-            if np.abs(R).max() < accuracy:
+        for k in range(_ITERATIONS):
+            f, S = self._law(y - by)
+            more = f - f0 + np.einsum("nij,nj->ni", S - S0, (y - by).reshape(-1, 2)).ravel()
+            R = y - by - y0 + self._C @ more
+            miss = np.abs(R).max()
+            if miss < accuracy:
                 forces = -self._scale * more
                 return self._columns @ forces, float(self._steps @ forces)
-            by = self._within(S - S0, R)
-            if by is None:
+            if k > _FULL and miss > least and halved < _HALVED:
+                by, halved = by / 2, halved + 1
+                continue
+            y, least, halved = y - by, miss, 0
+            found = self._within(S - S0, R)
+            if found is None:
                 return None
-            y = y - by
+            by = found
         return None
 
     def updated(self, b: Any, changes: list[np.ndarray]) -> np.ndarray | None:
