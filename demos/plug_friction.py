@@ -4,9 +4,8 @@ The sheet of `williams_plug` (neo-Hookean, c10 = 0.448 MPa; r0 = 8.89 cm, h0 = 0
 edge rounded) pushed 20 cm under five coefficients of friction, beside a membrane that slides over the same edge. Where
 points of the sheet leave the edge of the plug there may be no state nearby to go on to: the sheet snaps to the next
 one (`Path.jumps`), marked in the curves. The less friction, the more of the face slides over the edge, and the thinner
-it is drawn (a membrane under mu = 0.1 is stretched 150 times both ways at 20 cm): elements are as large as their distance
-from the axis times a constant, so that whatever comes to the edge has as many of them around it. Lengths in cm, forces
-in N.
+it is drawn (a membrane under mu = 0.1 is stretched 150 times both ways at 20 cm): elements are in proportion to their
+distance from the axis, so that whatever comes to the edge has as many of them around it. Lengths in cm, forces in N.
 """
 
 from typing import NamedTuple
@@ -24,7 +23,8 @@ from formingx.results import files
 from formingx.results.show import plots
 
 FRICTIONS = (0.1, 0.2, 0.5, 0.3, 1.0)      # begun in this order, two processes are busy to the end
-GROWTH = 0.0625                             # of elements from one to the next away from the axis
+MOST = 40                                   # stretch of the face that elements are made for
+GROWTH = 0.09                               # of elements from one to the next away from the axis
 FACE_STRETCHES = (1.01, 1.05, 1.1, 1.2, 1.35, 1.5, 1.75, 2, 2.5, 3.2, 5, 10, 25, 80, 200)
 
 
@@ -49,9 +49,9 @@ def run(case) -> dict:
     mu, fillet, refine, travels, folder = case
     membrane = membrane_curve(mu, fillet, travels[-1])
     elements, near = graded(membrane.face_stretch[-1], refine)
-    made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), mu, elements, near=near, points=4,
-                       ramp=5e-3, nodes_per_step=4, comm=MPI.COMM_SELF)
-    path, end = plugs.push(made, travels, smallest=1e-3, progress=False)
+    made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), mu, elements,
+                       near=near, points=4, penalty=2e4, ramp=5e-3, nodes_per_step=4, comm=MPI.COMM_SELF)
+    path, end = plugs.push(made, travels, smallest=1e-3, progress=False, tolerances=fx.Tolerances(settling=12))
     path.to_csv(folder / f"mu_{mu:g}.csv")
     profile = path.profile()
     numbers = {"elements": list(elements), **key_numbers(path, end, travels)}
@@ -85,9 +85,9 @@ def membrane_curve(mu, fillet, last) -> Membrane:
     return Membrane(fine, *(PchipInterpolator(travels, values)(fine) for values in (forces, stretches)))
 
 
-def graded(face_stretch, refine) -> tuple:
-    """(elements, sizes to concentrate): in proportion to the radius, down to what the edge is to hold at the end."""
-    smallest = PLUG / RADIUS / face_stretch / 3
+def graded(face_stretch, refine=1) -> tuple:
+    """(elements, sizes to concentrate): in proportion to the radius, down to a third of what the edge is to hold."""
+    smallest = PLUG / RADIUS / min(face_stretch, MOST) / 3
     return (int(np.ceil(refine * np.log(1 / smallest) / GROWTH)), 2 * refine), {0.0: smallest}
 
 

@@ -179,9 +179,9 @@ def test_nor_in_shorter_steps(monkeypatch):
 
 def williams(**step):
     """Williams' plug with mu = 0.3, as in `plug_friction`, past its first snaps."""
-    elements, near = graded(face_stretch=2.0, refine=1)
+    elements, near = graded(face_stretch=2.0)
     made = plugs.scene(RADIUS, THICKNESS, PLUG, 0.35, fx.NeoHookean(c10=C10), 0.3, elements, near=near, points=4,
-                       ramp=1e-3)
+                       penalty=2e4, ramp=1e-3)
     return fx.trace(made, until=fx.travel(9.0), through=[fx.travel(t) for t in range(1, 9)],
                     step=fx.StepControl(target=6, **step), progress=False)
 

@@ -68,7 +68,8 @@ def _contact(data: dict[str, Any]) -> Contact:
         values: list[Any] = [np.array(v) if isinstance(v, list) else v for v in piece]
         pieces.append((Line if len(values) == 2 else Arc)(*values))
     moves = data["moves"] and tuple(data["moves"])
-    more = {name: data[name] for name in ("penalty", "ramp", "separates", "nodes_per_step", "name")}
+    names = ("penalty", "ramp", "elastic_slip", "separates", "nodes_per_step", "points", "name")
+    more = {name: data[name] for name in names if name in data}
     words = isinstance(data["friction"], str) and data["friction"] not in ("stick", "none")
     found = Contact(data["on"], Tool.of_pieces(pieces, shape["closed"]), "stick" if words else data["friction"],
                     moves=moves, **more)

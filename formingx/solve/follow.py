@@ -214,10 +214,9 @@ class Run:
                 failed += not isinstance(failure, _Astray)
                 if self._may_jump and (not good or self._at_fold == "jump" and failed > 1 and length < jumps[0]):
                     jumps.pop(0)
-                    for ahead in (reach,) if good else (_JUMPS[-1], 0.0, 0.0):
+                    for ahead in (reach,) if good else (_JUMPS[-1], 0.0):
                         with contextlib.suppress(Failure):
                             return [self._jump(old, ahead, first)]
-                        self._ahead = AHEAD if ahead == 0 else self._ahead     # which jumps before have made longer
                 if not good:
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
                                   failure.attempt)
@@ -284,7 +283,19 @@ class Run:
         """The state that the body snaps to from a step of this length ahead, or from where it is; raises `Failure`.
 
         step: the length of the last step that went well.
+
+        From where the body is contact may settle at one control and not at another next to it.
         """
+        controls = (self._ahead, AHEAD, _FURTHEST) if length == 0 and self.problem.has_history else (self._ahead,)
+        *others, last = dict.fromkeys(controls)
+        for self._ahead in others:
+            with contextlib.suppress(Failure):
+                return self._jump_by(old, length, step)
+        self._ahead = last
+        return self._jump_by(old, length, step)
+
+    def _jump_by(self, old: State, length: float, step: float) -> State:
+        """One try of `_jump`."""
         by = self._sense * max(self._ahead, length * abs(old.slope))
         for target, bound in self.open:                      # of the control, which a jump must not pass
             if isinstance(bound, Amplitude) and bound.moves:
