@@ -23,8 +23,8 @@ from formingx.results import files
 from formingx.results.show import plots
 
 FRICTIONS = (0.1, 0.2, 0.5, 0.3, 1.0)      # begun in this order, two processes are busy to the end
-MOST = 40                                   # stretch of the face that elements are made for
-GROWTH = 0.09                               # of elements from one to the next away from the axis
+MOST = 25                                   # stretch of the face that elements are made for
+GROWTH = 0.091                              # of elements from one to the next away from the axis
 FACE_STRETCHES = (1.01, 1.05, 1.1, 1.2, 1.35, 1.5, 1.75, 2, 2.5, 3.2, 5, 10, 25, 80, 200)
 
 
@@ -50,7 +50,8 @@ def run(case) -> dict:
     membrane = membrane_curve(mu, fillet, travels[-1])
     elements, near = graded(membrane.face_stretch[-1], refine)
     made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), mu, elements,
-                       near=near, points=4, penalty=2e4, ramp=5e-3, nodes_per_step=4, comm=MPI.COMM_SELF)
+                       near=near, points=4, penalty=2e4, ramp=5e-3, elastic_slip=5e-3, nodes_per_step=4,
+                       comm=MPI.COMM_SELF)
     path, end = plugs.push(made, travels, smallest=1e-3, progress=False, tolerances=fx.Tolerances(settling=12))
     path.to_csv(folder / f"mu_{mu:g}.csv")
     profile = path.profile()

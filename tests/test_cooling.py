@@ -70,7 +70,7 @@ def pressed():
                                     [fx.Convection("bottom", h=1e-3, air=60.0)], unit="C", tolerance=0.5,
                                     tools={"plug": (0.3, wall)}, work_to_heat=1e-3),
                     contacts=[fx.Contact("top", tool, fx.table({20.0: 0.1, 150.0: 0.5, 180.0: 0.5}), moves=(0, -1),
-                                         name="plug")])
+                                         name="plug", penalty=2e4, ramp=1e-5)])       # stiffer: round-off shows
 
 
 def press(scene, **options):
