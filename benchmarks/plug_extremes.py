@@ -73,8 +73,8 @@ def mesh_for(plug):
     """
     radius, fillet, thickness = plug.lengths
     slides = plug.law not in ("held", "stick")
-    places, parts, least = ((0.6 * radius, radius), 8, 0.05) if slides else ((radius,), 3, 0.1)
-    places = (0.0, radius) if plug.cone else places
+    parts, least = (8, 0.05) if slides else (3, 0.1)
+    places = (0.0, radius) if plug.cone else (0.6 * radius, radius) if slides else (radius,)
     smallest, largest = np.clip((fillet or thickness) / parts, least * thickness, thickness / 2), RADIUS / 20
     small = min(smallest / largest, 1.0)
     R = np.linspace(0, RADIUS, 4001)

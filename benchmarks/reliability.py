@@ -11,6 +11,7 @@ the earlier file is still there.
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import json
 import math
@@ -18,7 +19,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
@@ -67,12 +68,20 @@ class Outcome(NamedTuple):
     error: str
 
 
-class _ReachedTheSolve(Exception):
-    pass
+class ReachedTheSolve(Exception):
+    """A run was about to solve: what it was given was taken for good input."""
 
 
-def _stop(*_: Any) -> None:
-    raise _ReachedTheSolve
+@contextlib.contextmanager
+def unsolved() -> Iterator[None]:
+    """Runs end with `ReachedTheSolve` where they would begin to solve."""
+    def stop(*_: Any) -> None:
+        raise ReachedTheSolve
+    start, curve.Curve.start = curve.Curve.start, stop
+    try:
+        yield
+    finally:
+        curve.Curve.start = start
 
 
 def _mesh() -> fx.mesh.Mesh:
@@ -106,6 +115,7 @@ def _staged(**stage: Any) -> None:
 def calls(made: fx.Scene, saved: str) -> list[Call]:
     """Every public callable that takes what a user types; `saved`: a checkpoint of the scene `made`."""
     positive, number, word, name = ("positive", 1.0), ("number", 0.1), ("word", "bottom"), ("name", None)
+    late = ("positive or None", None)
     materials = [Call(m.__name__, m, {k: (kind, v) for k, (kind, v) in args.items()}, lambda m: _scene(materials=m))
                  for m, args in ((fx.NeoHookean, {"c10": positive}), (fx.MooneyRivlin,
                                   {"c10": ("not negative", 1.0), "c01": ("not negative", 0.1)}),
@@ -137,14 +147,17 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
             "concentrate": ("optional thing", None)}
     sphere = {"inner_radius": positive, "thickness": positive, "elements": ("pair", (4, 2)), "grading": positive}
     contact = {"on": ("word", "top"), "tool": ("thing", fx.tools.plane(0.3)), "friction": ("friction", "stick"),
-               "penalty": positive, "ramp": positive, "nodes_per_step": ("count", 1), "separates": ("flag", True),
-               "moves": ("pair or None", None), "name": name}
+               "penalty": late, "ramp": late, "nodes_per_step": ("count", 1), "separates": ("flag", True),
+               "moves": ("pair or None", None), "name": name, "points": ("points", "nodes"), "elastic_slip": positive}
     stage = {"name": ("label", "up"), "drive": ("optional thing", "air"), "until": ("optional thing", fx.pressure(0.1)),
-             "through": ("several", ()), "without": ("several", ()), "step": ("optional thing", None)}
+             "through": ("several", ()), "without": ("several", ()), "step": ("optional thing", None), "speed": late,
+             "duration": late, "hold": ("optional table", None), "at_fold": ("optional word", None)}
     table = {"follow": {"air": [(0.0, 0.0), (1.0, 0.1)]}}
+    kept = {"record": ("optional thing", None), "resume": ("flag", False)}
     process = {"stages": ("several", [fx.Stage("up", drive="air", until=fx.pressure(0.1))]),
-               "step": ("optional thing", None), "tolerances": ("optional thing", None), "max_steps": ("count", 200),
-               "progress": ("flag", False), "start": ("optional thing", None), "checkpoint": ("folder", None)}
+               "step": ("optional thing", None), "tolerances": ("optional thing", None),
+               "max_steps": ("count or None", 200), "progress": ("flag", False), "start": ("optional thing", None),
+               "checkpoint": ("folder", None), **kept, "accuracy": ("accuracy", "standard")}
     part = {"name": ("label", "plug"), "of": ("word", "top"), "within": ("pair", (0.0, 0.5)), "along": ("word", "r")}
     return [
         *materials, *boundary, *targets, *tools,
@@ -182,20 +195,76 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
             "supports": ("several", [fx.Symmetry("axis"), fx.Clamped("rim")]),
             "loads": ("several", [fx.Pressure("bottom")]), "contacts": ("several", []),
             "model": ("optional thing", None), "kinematics": ("optional thing", None),
-            "quadrature_degree": ("count", 5)}, _run),
+            "quadrature_degree": ("count", 5), "temperature": ("optional number", None),
+            "heat": ("optional thing", None), "expansion": ("optional thing", None)}, _run),
         Call("StepControl", fx.StepControl, {
             "length": positive, "target": ("count", 4), "growth": positive, "smallest": positive,
             "largest": ("step", 1.0)}, lambda s: fx.trace(_scene(), until=fx.pole_height(0.1), step=s, progress=False)),
-        Call("Tolerances", fx.Tolerances, {"correction": positive, "residual": positive, "iterations": ("count", 12)},
+        Call("Tolerances", fx.Tolerances, {"correction": positive, "residual": positive, "iterations": ("count", 12),
+                                               "settling": ("count", 40)},
              lambda t: fx.trace(_scene(), until=fx.pole_height(0.1), tolerances=t, progress=False)),
         Call("trace", fx.trace, {
             "scene": ("thing", _scene()), "until": ("thing", fx.pole_height(0.1)), "through": ("several", ()),
-            "step": ("optional thing", None), "tolerances": ("optional thing", None), "max_steps": ("count", 200),
-            "progress": ("flag", False), "start": ("optional thing", None), "checkpoint": ("folder", None)}),
+            "step": ("optional thing", None), "tolerances": ("optional thing", None),
+            "max_steps": ("count or None", 200), "progress": ("flag", False), "start": ("optional thing", None),
+            "checkpoint": ("folder", None), **kept, "at_fold": ("optional word", None)}),
         Call("load", fx.load, {"folder": ("file", saved), "scene": ("thing", made), "state": ("state", None)}),
         Call("solve", fx.solve, {"scene": ("thing", _scene()), "to": number, "increments": ("count", 1),
-                                 "tolerances": ("optional thing", None)}),
+                                 "tolerances": ("optional thing", None), "record": ("optional thing", None),
+                                 "max_steps": ("count", 1000)}),
+        *_heat(),
         Call("doctor", fx.doctor, {"scene": ("thing", _scene()), "targets": ("several", ())}),
+    ]
+
+
+def _heat() -> list[Call]:
+    """What relaxes, and what is warm."""
+    positive, number, where = ("positive", 1.0), ("number", 0.1), ("word", "top")
+    rubber, material = ("optional thing", fx.NeoHookean(c10=1.0)), ("thing", fx.ThermalProperties(
+        conductivity=0.2, density=1e3, heat_capacity=2e3))
+    shift = ("optional thing", fx.WLF(c1=10.0, c2=100.0, reference=120.0))
+    branches = ("several", [(0.5, 1.0)])
+
+    def relax(m: Any) -> None:
+        _scene(materials=m, temperature=120.0)
+
+    def cool(b: Any) -> None:
+        _scene(heat=fx.Cooling(material[1], [b], unit="C"), temperature=120.0)
+
+    return [
+        Call("Viscoelastic", fx.Viscoelastic, {"equilibrium": rubber, "branches": branches, "order": ("count", 2),
+                                               "shift": shift}, relax),
+        Call("TransientNetwork", fx.TransientNetwork, {"equilibrium": rubber, "branches": branches, "shift": shift},
+             relax),
+        Call("WLF", fx.WLF, {"c1": positive, "c2": positive, "reference": number}),
+        Call("Arrhenius", fx.Arrhenius, {"activation_energy": positive, "reference": number, "unit": ("word", "C")}),
+        Call("ThermalProperties", fx.ThermalProperties, {"conductivity": positive, "density": positive,
+                                                         "heat_capacity": positive}),
+        Call("ThermalExpansion", fx.ThermalExpansion, {"linear": ("number", 1e-4), "stress_free": number,
+                                                       "specific_volume": ("optional thing", None)}),
+        Call("Cooling", fx.Cooling, {
+            "materials": material, "boundaries": ("several", [fx.Convection("top", h=10.0, air=20.0)]),
+            "unit": ("word", "C"), "tools": ("optional thing", None), "tolerance": positive,
+            "work_to_heat": ("positive or None", None)}, lambda c: _scene(heat=c, temperature=120.0)),
+        Call("ConductingTool", fx.ConductingTool, {
+            "thickness": positive, "conductivity": positive, "heat_capacity": positive,
+            "back": number, "start": ("optional number", None), "elements": ("count", 40),
+            "finest": ("positive", 1e-4)}),
+        Call("Convection", fx.Convection, {"on": where, "h": ("not negative", 10.0), "air": number}, cool),
+        Call("Absorption", fx.Absorption, {"on": where, "flux": number, "coefficient": positive}, cool),
+        Call("Radiation", fx.Radiation, {"on": where, "emissivity": ("not negative", 0.9), "heater": number,
+                                         "view_factor": ("not negative", 1.0), "stefan_boltzmann": positive}, cool),
+        Call("FixedTemperature", fx.FixedTemperature, {"on": where, "temperature": number}, cool),
+        Call("HeatFlux", fx.HeatFlux, {"on": where, "flux": number}, cool),
+        Call("Units", fx.Units, {"length": ("optional word", "mm"), "stress": ("optional word", "MPa"),
+                                 "time": ("any word", "s")}),
+        Call("tools.clamp_ring", fx.tools.clamp_ring, {
+            "radius": positive, "width": ("positive", 0.5), "fillet": ("not negative", 0.1), "z": number,
+            "height": ("positive or None", None)}),
+        Call("tools.pot", fx.tools.pot, {
+            "mouth": ("positive", 3.0), "base": ("positive", 2.0), "depth": ("positive", 3.0),
+            "sheet": ("positive", 0.1), "fillet": ("not negative", 0.3), "lip": ("not negative", 0.0),
+            "plug": ("positive or None", None), "nose": ("positive or None", None)}),
     ]
 
 
@@ -204,6 +273,13 @@ BAD["label"] = BAD["name"] | _NONE
 BAD["table"] = {"a number": 3, "a word": "x", "a list": [[]], "unknown": {"nobody": [(0.0, 0.0)]}, "empty": {},
                 "back in time": {"air": [(0.0, 0.0), (2.0, 0.1), (1.0, 0.2)]}, "no pair": {"air": [0.0, 1.0]},
                 "nan": {"air": [(0.0, 0.0), (math.nan, 0.1)]}, "leaps": {"air": [(0.0, 0.5)]}}
+BAD["positive or None"] = {k: v for k, v in BAD["positive"].items() if k != "None"}
+BAD["count or None"] = {k: v for k, v in BAD["count"].items() if k != "None"}
+BAD["optional word"] = dict(_WORD)
+BAD["optional table"] = {"a number": 3, "a word": "x", "a list": [[]], "unknown": {"nobody": 1.0}}
+BAD["any word"] = {k: v for k, v in BAD["word"].items() if k not in ("empty", "unknown")}
+BAD["points"] = BAD["word"] | {"a number": -1, "0": 0, "a fraction": 1.5, "huge": 10**400}
+BAD["accuracy"] = BAD["word"] | {"0": 0, "negative": -1.0, "inf": math.inf}
 BAD["pair or None"] = {k: v for k, v in BAD["pair"].items() if k != "None"}
 BAD["friction"] = {"unknown": "slippery", "nan": math.nan, "negative": -0.1, "a bool": True, "a list": [], "None": None}
 BAD["file"] = {"None": None, "a number": 3.5, "not there": "/nowhere/at all.msh", "a folder": "/", "empty": ""}
@@ -216,32 +292,31 @@ _LEFT_OUT = {"comm", "self"}
 
 def bad_input() -> list[Outcome]:
     """Every argument of every call wrong in turn, one left out, one unknown."""
-    made, folder = _scene(), tempfile.TemporaryDirectory()
-    saved = os.path.join(folder.name, "run")
-    fx.trace(made, until=fx.pole_height(0.05), progress=False).save(saved)
-    start = curve.Curve.start
-    curve.Curve.start = _stop                              # whatever gets that far was taken for good input
-    found = []
-    try:
-        for call in calls(made, saved):
-            parameters = inspect.signature(fx.Process.run if call.name == "Process.run" else call.make).parameters
-            left = set(parameters) - set(call.arguments) - _LEFT_OUT
-            assert not left, f"{call.name}: no bad values are known for {left}"
-            good = {k: v for k, (_, v) in call.arguments.items()}
-            if call.name != "mesh.read" and _try(call, good)[0] != "accepted":
-                raise AssertionError(f"{call.name}: the good values are refused: {_try(call, good)}")
-            for name, (kind, _) in call.arguments.items():
-                for what, value in BAD[kind].items():
-                    found.append(Outcome(call.name, name, what, *_try(call, good | {name: value})))
-                if parameters[name].default is inspect.Parameter.empty:
-                    rest = {k: v for k, v in good.items() if k != name}
-                    found.append(Outcome(call.name, name, "missing", *_try(call, rest, TypeError)))
-            found.append(Outcome(call.name, "no_such_argument", "unknown", *_try(call, good | {"no_such_argument": 1},
-                                                                                 TypeError)))
-    finally:
-        curve.Curve.start = start
-        folder.cleanup()
+    made, found = _scene(), []
+    with tempfile.TemporaryDirectory() as folder:
+        saved = os.path.join(folder, "run")
+        fx.trace(made, until=fx.pole_height(0.05), progress=False).save(saved)
+        with unsolved():
+            for call in calls(made, saved):
+                found += _bad_calls(call)
     return found
+
+
+def _bad_calls(call: Call) -> Iterator[Outcome]:
+    """One call with every argument wrong in turn, one left out, one unknown."""
+    parameters = inspect.signature(fx.Process.run if call.name == "Process.run" else call.make).parameters
+    left = set(parameters) - set(call.arguments) - _LEFT_OUT
+    assert not left, f"{call.name}: no bad values are known for {left}"
+    good = {k: v for k, (_, v) in call.arguments.items()}
+    if call.name != "mesh.read" and _try(call, good)[0] != "accepted":
+        raise AssertionError(f"{call.name}: the good values are refused: {_try(call, good)}")
+    for name, (kind, _) in call.arguments.items():
+        for what, value in BAD[kind].items():
+            yield Outcome(call.name, name, what, *_try(call, good | {name: value}))
+        if parameters[name].default is inspect.Parameter.empty:
+            rest = {k: v for k, v in good.items() if k != name}
+            yield Outcome(call.name, name, "missing", *_try(call, rest, TypeError))
+    yield Outcome(call.name, "no_such_argument", "unknown", *_try(call, good | {"no_such_argument": 1}, TypeError))
 
 
 def _try(call: Call, arguments: dict, also: type = fx.InputError) -> tuple[str, str]:
@@ -251,7 +326,7 @@ def _try(call: Call, arguments: dict, also: type = fx.InputError) -> tuple[str, 
             call.use(made)
     except (fx.InputError, also) as error:
         return "right", str(error)
-    except _ReachedTheSolve:
+    except ReachedTheSolve:
         return "accepted", ""
     except Exception as error:  # noqa: BLE001  whatever else comes is what is counted
         return "wrong error", f"{type(error).__name__}: {error}"

@@ -178,7 +178,7 @@ def _contact_penalties(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Fi
                           f" for the body; 2e5 is the default")
         if contact.ramp > 0.05:
             yield Finding("warning", repr(contact), f"ramp = {contact.ramp:g}: the face feels the tool already"
-                          f" {100 * contact.ramp:.3g} % of the thickness before it; 1e-5 is the default")
+                          f" {100 * contact.ramp:.3g} % of the thickness before it; the default is 1e-5 or less")
 
 
 def _volume_penalty(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:

@@ -131,7 +131,7 @@ def place(name: str, value: Any) -> Path:
 
 def known(kind: str, name: Any, names: Any) -> None:
     """An InputError that lists the known names unless `name` is one of them."""
-    if not isinstance(name, Hashable) or name not in names:
+    if not isinstance(name, Hashable) or isinstance(name, bool) or name not in names:
         raise InputError(f"{kind} {name!r} is not known; known: {', '.join(map(repr, names)) or 'none'}")
 
 

@@ -1,4 +1,4 @@
-"""A hundred of the random calls of benchmarks/fuzz.py: each ends in a result or an error in words, in time."""
+"""A hundred of the random calls of benchmarks/fuzz.py, and every argument wrong in turn: results, or errors in words."""
 
 import sys
 
@@ -6,6 +6,7 @@ from conftest import ROOT
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import fuzz  # noqa: E402
+import reliability  # noqa: E402
 
 
 def test_random_calls_end_well():
@@ -19,3 +20,9 @@ def test_a_call_that_dies_is_found():
     endings = fuzz.run(4, 0, ("itself",))
     assert [e.number for e in endings] == [0, 1, 2, 3] and all(e.bad for e in endings)
     assert {e.how.split(" (")[0] for e in endings} == {"the process died", "ZeroDivisionError"}
+
+
+def test_every_wrong_argument_is_refused():
+    """Of all public callables in the list of `reliability.calls`, with no argument of theirs left out."""
+    found = reliability.bad_input()
+    assert len(found) > 2000 and not [o for o in found if o.outcome != "right"]

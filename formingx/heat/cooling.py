@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import ConvergenceError, InputError, known, positive, several
+from ..errors import ConvergenceError, InputError, instance, known, positive, several
 from ..tables import Table
 from ..time_temperature import ABSOLUTE_ZERO
 from . import stepping
@@ -21,6 +21,8 @@ _NEAR = 1e-2
 """Distance to a tool over the thickness of the body within which a node touches it, for heat: so thin a layer of air
 conducts as well as a contact does. (A sheet that is drawn over a flat face lifts off its middle by less.)"""
 
+_TOOLS = "a dict of (conductance, tool) by the names of contacts"
+
 
 class ToolHeat(NamedTuple):
     """How a tool of the scene takes heat from the body where, and while, it touches it.
@@ -30,6 +32,14 @@ class ToolHeat(NamedTuple):
 
     conductance: float
     tool: float | ConductingTool
+
+    @classmethod
+    def of(cls, name: str, given: Any) -> ToolHeat:
+        """A pair that a user gave for a contact; raises `InputError` if it is none."""
+        try:
+            return cls(*given)
+        except TypeError:
+            raise InputError(f"Cooling: tools: {name} = {given!r}: must be (conductance, tool)") from None
 
 
 class Cooling:
@@ -57,7 +67,8 @@ class Cooling:
         self.materials, self.unit, self.tolerance = materials, unit, positive("Cooling: tolerance", tolerance)
         self.work_to_heat = None if work_to_heat is None else positive("Cooling: work_to_heat", work_to_heat)
         self.boundaries = several("Cooling: boundaries", boundaries, "boundaries, such as Convection(...)")
-        self.tools = {name: ToolHeat(*given) for name, given in (tools or {}).items()}
+        self.tools = {name: ToolHeat.of(name, given)
+                      for name, given in instance("Cooling: tools", tools or {}, Mapping, _TOOLS).items()}
 
     def check(self, scene: Any) -> None:
         """An InputError unless it fits a scene."""

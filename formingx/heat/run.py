@@ -118,7 +118,7 @@ def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties
 def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> list[Any]:
     """The laws of the faces that a user gave, or an InputError."""
     found = several("heat: boundaries", boundaries, "boundaries, such as Convection('top', h=40, air=20)")
-    held = {b.on for b in found if isinstance(b, FixedTemperature)}
+    held = [b.on for b in found if isinstance(b, FixedTemperature)]
     for boundary in found:
         if not hasattr(boundary, "on") or not (hasattr(boundary, "flux") or hasattr(boundary, "check")) \
                 or isinstance(boundary, type):

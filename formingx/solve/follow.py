@@ -284,30 +284,34 @@ class Run:
 
         step: the length of the last step that went well.
 
-        From where the body is contact may settle at one control and not at another next to it.
+        From where the body is, contact that remembers may settle at one control and not at another next to it: others
+        are tried, too.
         """
-        controls = (self._ahead, AHEAD, _FURTHEST) if length == 0 and self.problem.has_history else (self._ahead,)
-        *others, last = dict.fromkeys(controls)
-        for self._ahead in others:
-            with contextlib.suppress(Failure):
-                return self._jump_by(old, length, step)
-        self._ahead = last
-        return self._jump_by(old, length, step)
-
-    def _jump_by(self, old: State, length: float, step: float) -> State:
-        """One try of `_jump`."""
-        by = self._sense * max(self._ahead, length * abs(old.slope))
-        for target, bound in self.open:                      # of the control, which a jump must not pass
-            if isinstance(bound, Amplitude) and bound.moves:
-                then, now = (self.curve.value(bound, old.x, c) - target.value for c in (old.control + by, old.control))
-                by *= now / (now - then) if now * then < 0 else 1.0
-        new = jump(self.curve, old, by, length > 0)
+        others = (AHEAD, _FURTHEST) if length == 0 and self.problem.has_history else ()
+        for ahead in dict.fromkeys((self._ahead, *others)):
+            self._ahead = ahead
+            try:
+                new = jump(self.curve, old, self._change(old, max(ahead, length * abs(old.slope))), length > 0)
+                break
+            except Failure as last:
+                failure = last
+        else:
+            raise failure
         self._ahead = min(10 * self._ahead, _FURTHEST)
         new.met = next((target for target, bound in self.open
                         if is_met(target, bound, self.curve.value(bound, new.x, new.control))), None)
         self.step.length = max(self.step.length, step / 2)
         log.info("a jump: %s", new.jump)
         return new
+
+    def _change(self, old: State, size: float) -> float:
+        """Of the control in a jump, of at most a size: it does not pass a target."""
+        by = self._sense * size
+        for target, bound in self.open:
+            if isinstance(bound, Amplitude) and bound.moves:
+                then, now = (self.curve.value(bound, old.x, c) - target.value for c in (old.control + by, old.control))
+                by *= now / (now - then) if now * then < 0 else 1.0
+        return by
 
     def _check_direction(self) -> None:
         """Stop if the path has turned back: its target further away than half of what had been gained.
