@@ -1,4 +1,4 @@
-"""A hundred of the random calls of benchmarks/fuzz.py, and every argument wrong in turn: results, or errors in words."""
+"""A hundred random calls of benchmarks/fuzz.py, and every argument wrong in turn: results, or errors in words."""
 
 import sys
 

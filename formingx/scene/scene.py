@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ..errors import InputError, count, instance, known, several, together
-from ..heat.cooling import Cooling
+from ..errors import InputError, count, known, several, together
 from ..materials.expansion import ThermalExpansion
 from ..materials.hyperelastic import Material
 from ..mesh.mesh import Mesh
@@ -90,8 +89,10 @@ class Scene:
         for contact in self.contacts:
             self._check_contact(contact)
         if heat is not None:
-            self.heat = instance("Scene: heat", heat, Cooling, "a Cooling")
+            if not hasattr(heat, "check") or isinstance(heat, type):
+                raise InputError(f"Scene: heat = {heat!r}: must be a Cooling(...)")
             heat.check(self)
+            self.heat = heat
 
     temperature: BodyTemperature | None = None
     heat: Any = None
