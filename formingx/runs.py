@@ -6,6 +6,7 @@ The solvers emit states; a `Path` and, if asked for, a `Checkpoint` are told of 
 from __future__ import annotations
 
 import contextlib
+import logging
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -13,6 +14,7 @@ from .discrete.problem import Problem
 from .errors import ConvergenceError, InputError, Interrupted, count, finite, instance, known, several
 from .physics.contact import Contact
 from .results.columns import Measure
+from .results.evaluate.volume import doubts
 from .results.files.checkpoint import Checkpoint, holds_states, read
 from .results.path import Path
 from .scene import aims, clearance
@@ -27,6 +29,8 @@ from .solve.state import Record, State
 from .solve.stepping import StepControl
 from .solve.targets import Amplitude, Target
 from .solve.time_error import allowed as allowed_error
+
+log = logging.getLogger("formingx")
 
 
 def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: StepControl | None = None,
@@ -268,3 +272,7 @@ def _carried(path: Path, checkpoint: Any = None) -> Iterator[None]:
         how = (f"checkpoint={str(checkpoint)!r} holds it: the same script goes on with resume=True" if checkpoint else
                "it is lost; with checkpoint='folder', resume=True the same script would go on from there")
         raise Interrupted(f"interrupted {stands}; {how}", path if path.states else None) from None
+    for bad, text in doubts(path.last.measures["volume_error"], "the last state",
+                            path.problem.furthest_volume_ratio(path.last)):
+        if bad == "serious" and path.problem.comm.rank == 0:
+            log.warning("%s", text)

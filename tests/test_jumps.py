@@ -119,16 +119,11 @@ def work_and_energy(path):
 
 
 @pytest.fixture(scope="module")
-def weighed_rough():
-    """`weighed`: a path with a jump."""
-    path, slips = weighed(pushed)
+def rough():
+    """A path with a jump."""
+    path = pushed()
     assert len(path.jumps) >= 1
-    return path, slips
-
-
-@pytest.fixture(scope="module")
-def rough(weighed_rough):
-    return weighed_rough[0]
+    return path
 
 
 def test_a_rough_plug_goes_on_where_points_leave_its_edge(rough):
@@ -152,10 +147,10 @@ def test_friction_keeps_its_law_through_jumps(rough):
     assert share_of_friction(rough) == pytest.approx(1.0, rel=1e-6)
 
 
-def test_work_is_energy_and_friction_and_what_jumps_lose(weighed_rough):
-    path, slips = weighed_rough
+def test_work_is_energy_and_friction_and_what_jumps_lose():
+    path, slips = weighed(lambda: pushed(7.0))
     (work, energy), lost = work_and_energy(path), lost_in_jumps(path)
-    assert slips > 0 and lost > 1e-4 * work
+    assert slips > 0 and lost > 4e-3 * work
     assert work == pytest.approx(energy + slips + lost, rel=1e-3)
 
 

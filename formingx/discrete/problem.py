@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -100,6 +101,13 @@ class Problem:
     def n_owned(self) -> int:
         """Number of fields' unknowns that this rank owns."""
         return int(self._n)
+
+    @cached_property
+    def displacements(self) -> np.ndarray:
+        """Numbers of the unknowns that are displacements, own part."""
+        space = self.forms.space.sub(0)
+        dofs = np.concatenate([space.sub(i).dofmap.list.ravel() for i in range(space.num_sub_spaces)])
+        return np.unique(dofs[dofs < self._n])
 
     @property
     def symmetric(self) -> bool:

@@ -22,6 +22,7 @@ from .curve import Curve
 from .diagnose import diagnose
 from .jump import AHEAD, jump
 from .newton import Failure, tangents
+from .progress import progress_bar, show
 from .state import Record, State
 from .stepping import StepControl
 from .targets import Amplitude, Bound, Target, is_met
@@ -85,7 +86,7 @@ class Run:
         record, before = self.record, self.record.counts.steps
         kept: dict[str, Any] = {}
         self._first = len(record.states)
-        bar = _progress_bar(self.problem.comm, f"{self._label}to {self.until}", progress)
+        bar = progress_bar(self.problem.comm, f"{self._label}to {self.until}", progress)
         try:
             if start is None:
                 kept = self._go_on()
@@ -111,7 +112,7 @@ class Run:
                 if record.ended:
                     break
                 self._check_direction()
-                _show(bar, self._gained(self._values[-1]), len(self.states))
+                show(bar, self._gained(self._values[-1]), len(self.states))
         except BaseException:
             record.counts.seconds += self._elapsed()
             raise
@@ -225,10 +226,12 @@ class Run:
         """One step of a length, or to a target that is within reach; raises `Failure`, `Inaccurate` or `_Late`."""
         self.problem.prepare(old.x, old.control, old.direction, old.slope, reach, ends=True)
         behind = None if self.problem.has_kinks else extrapolate.behind(self.states, reach, self.curve.distance)
-        if target is None:
-            new = self.curve.step(old, length, self._foretold, behind)
-        else:
-            new = self.curve.step_to(old, reach, bound.equation(target.value), self._foretold, behind)
+        with self.curve.newton.in_a_hurry(length > _JUMPS[0]):
+            if target is None:
+                new = self.curve.step(old, length, self._foretold, behind)
+            else:
+                new = self.curve.step_to(old, reach, bound.equation(target.value), self._foretold, behind)
+        if target is not None:
             if not 0 < self.curve.progress(old, new) < 2 * length:
                 raise _Astray("the target was met on a far part of the path", [])
             new.met = target
@@ -489,16 +492,3 @@ def begin(curve: Curve) -> State:
             raise curve.no_start(failure) from None
         problem.enter(first, record.last.x, 0.0)
         return curve.resume(record.last.x, 0.0)
-
-
-def _progress_bar(comm: Any, words: str, progress: bool) -> Any:
-    from tqdm import tqdm
-    return tqdm(total=1.0, desc=words, delay=2, disable=not progress or comm.rank != 0, leave=False,
-                bar_format="{desc}: {percentage:3.0f}% |{bar}| {elapsed}{postfix}")
-
-
-def _show(bar: Any, gained: float, states: int) -> None:
-    if not bar.disable:
-        bar.n = min(max(gained, 0.0), 1.0)
-        bar.set_postfix_str(f"state {states}", refresh=False)
-        bar.update(0)

@@ -3,10 +3,11 @@
 Where a process drives one way, a body snaps at a fold of its path, and at a kink beyond which there is no state nearby.
 It comes to rest in the next equilibrium. The way there is followed with vanishing viscosity,
 
-    F(x) + eta M (x - x_k) = 0,   M the lumped metric of the displacements (mean over the reference volume),
+    F(x) + eta M (x - x_k) = 0,   M the same for every component of the displacement, 2 in all,
 
-from one x_k to the next, the histories taken up at each. eta falls where the body moves smoothly and grows where it
-does not; where it is 0 the body is at rest. What is out of balance on the way does work that is lost.
+from one x_k to the next, the histories taken up at each. (Lumped by volume, M would leave small elements, near the axis
+or an edge, without resistance where the large ones are held.) eta falls where the body moves smoothly and grows where
+it does not; where it is 0 the body is at rest. What is out of balance on the way does work that is lost.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from .newton import UNLOADED, BorderedNewton, Failure, Tolerances
+from .newton import UNLOADED, BorderedNewton, Failure, Iteration, Tolerances
 from .state import State
 
 AHEAD = 1e-6
@@ -43,7 +44,8 @@ _NEAR_REST = 1e-3
 """Viscous forces (over the support forces) below which the state at rest is looked for."""
 
 _AT_REST = 1e-12
-"""Viscous forces (over the support forces) below which they are round-off."""
+"""Viscous forces (over the support forces) below which they are round-off: the body rests, though where a point is at a
+kink of its law the iteration without them may go to and fro."""
 
 
 class _Viscous:
@@ -51,12 +53,10 @@ class _Viscous:
 
     def __init__(self, problem: Any):
         self._problem, self._diagonal = problem, problem.x.duplicate()
-        ones = problem.x.duplicate()
-        ones.set(1.0)
-        problem.metric_times(ones, self._diagonal)
-        ones.destroy()
-        self._diagonal.array_w[problem.held] = 0
-        self.mass = self._diagonal.array_r.copy()
+        self.mass = np.zeros(problem.x.getLocalSize())
+        self.mass[problem.displacements] = 1.0
+        self.mass[problem.held] = 0.0
+        self.mass *= 2 / problem.comm.allreduce(self.mass.sum())
         self.eta, self.origin = 0.0, np.zeros(0)
 
     def __getattr__(self, name: str) -> Any:
@@ -128,14 +128,15 @@ class _Way:
         return _GROWS[self.solved > 0]
 
     def end(self, old: State) -> State | None:
-        """The state at rest, if there is one near; raises `Failure` if the body rests here and that is no state."""
+        """The state at rest, if there is one near."""
         try:
             state = self.curve.solve(self.at.x, self.control, fixed(self.control), "jump", self.at)
         except Failure:
-            if self.rest < _AT_REST:
-                raise
-            self.settles, self.near = False, 0.3 * self.rest
-            return None
+            if self.rest > _AT_REST:
+                self.settles, self.near = False, 0.3 * self.rest
+                return None
+            state = self.curve.resume(self.at.x, self.control)
+            state.kind, state.history = "jump", [Iteration(self.rest, 0.0, 0.0)]
         self._lose(self.at.x, state.x, np.zeros(len(state.x)))
         forms = self.problem.forms
         state.jump = {"dissipated": self.lost * forms.stress * forms.volume,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -25,6 +26,9 @@ SETTLING = 40
 """Iterations allowed while the active set of contact still changes. Those with a `SMALL` correction that find an active
 set for the first time do not count: of a slack sheet on a flat plug a hundred points let go one or two at a time.
 (With a history, which depends on the step, a shorter step is better.)"""
+
+HURRIED = 12
+"""The same, of a contact with a history in a step that may be halved many times yet: that is cheaper."""
 
 _UNSETTLED = 2
 """Iterations after which contact points with a history whose status still changes are solved for by themselves."""
@@ -155,7 +159,17 @@ class BorderedNewton:
         new = problem.x.duplicate
         self.F, self.F_control, self.gradient, self.a, self.b = new(), new(), new(), new(), new()
         self.reached = 0.0, 0.0                             # control and its last correction in `correct`
+        self._hurried = False
         self._chords = Chords()
+
+    @contextlib.contextmanager
+    def in_a_hurry(self, hurried: bool) -> Iterator[None]:
+        """While a shorter step is to be had, contact with a history has to settle within `HURRIED` iterations."""
+        self._hurried = hurried and self.problem.has_history
+        try:
+            yield
+        finally:
+            self._hurried = False
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> bool:
         """`self.b` = dx/dcontrol along the path at a solution; False if the tangent matrix is singular.
@@ -246,7 +260,8 @@ class BorderedNewton:
         grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
         if grown and not (self.problem.has_kinks and moved < SMALL):
             raise Failure("the iteration diverges", history)
-        settling = len(history) - min(active.found, 4 * SETTLING) >= self.tolerances.settling
+        most = min(self.tolerances.settling, HURRIED) if self._hurried else self.tolerances.settling
+        settling = len(history) - min(active.found, 4 * SETTLING) >= most
         if len(quiet) >= self.tolerances.iterations or settling:
             unsettled = settling and len(history) - active.changed < 3
             raise Failure("contact does not settle: " * unsettled + f"no convergence in {len(history)} iterations",

@@ -15,18 +15,13 @@ from .. import files
 from ..evaluate.contact_face import ContactFace, ContactTable, tool_forces
 from ..evaluate.folding import first_fold
 from ..evaluate.profile import Profile
+from ..evaluate.volume import doubts
 
 PENETRATION = 0.05
 """Penetration over the smallest thickness above which a report warns."""
 
 MASS = 1e-3
 """Relative error of the mass above which a report warns."""
-
-VOLUME = 5e-3
-"""Root mean square of J - 1 above which a report warns: elements have other volumes, though the mass is kept."""
-
-FURTHEST = 2.0
-"""J, or 1/J, at a point beside the quadrature points above which a report warns."""
 
 
 @dataclass
@@ -101,20 +96,10 @@ class Record:
         return found
 
     def _of_volume(self) -> list[tuple[str, str]]:
-        errors, found = self.measures["volume_error"], []
+        errors = self.measures["volume_error"]
         k = int(np.argmax(errors))
-        if errors[k] > VOLUME:
-            found.append(("serious" if errors[k] > 4 * VOLUME else "minor",
-                          f"The elements do not keep their volumes: the root mean square of J - 1 is up to"
-                          f" {100 * errors[k]:.2g} % (state {k}, {words(self.control)} ="
-                          f" {self.measures[self.control][k]:.5g}): use a finer mesh; the corner of a clamped rim is"
-                          f" singular."))
-        J = 1.0 if self.furthest is None else self.furthest.value
-        if self.furthest is not None and not 1 / FURTHEST < J < FURTHEST:
-            found.append(("minor", f"J is {J:.3g} in the last state at (R, Z) = ({self.furthest.point[0]:.5g},"
-                                   f" {self.furthest.point[1]:.5g}): the stress of the element there means"
-                                   f" nothing."))
-        return found
+        return doubts(errors[k], f"state {k}, {words(self.control)} = {self.measures[self.control][k]:.5g}",
+                      self.furthest)
 
     def _of_folding(self) -> list[tuple[str, str]]:
         first = first_fold(self.profiles, self.axisymmetric)
