@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from .discrete.problem import Problem
@@ -83,11 +83,11 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
         raise InputError("trace: start: must be a path of this very scene: fx.load(folder, scene), or what trace gave"
                          " back")
     start = _from_checkpoint("trace", resume, checkpoint, scene, start)
-    problem = Problem(scene) if start is None else start.problem
-    path = _path(Curve(problem, tolerances or Tolerances()), start, record)
-    targets = [(target, target.bind(problem)) for target in (*through, until)]
-    _keep(path, checkpoint)
-    with _carried(path, checkpoint):
+    with _carried(checkpoint) as carried:
+        problem = Problem(scene) if start is None else start.problem
+        path = carried(_path(Curve(problem, tolerances or Tolerances()), start, record))
+        targets = [(target, target.bind(problem)) for target in (*through, until)]
+        _keep(path, checkpoint)
         run = Run(path.record, targets, step, at_fold)
         run.follow(max_steps, progress, None if path.states else begin(path.record.curve))
     return path
@@ -120,13 +120,14 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
         raise InputError(f"solve: increments = {increments}: must be at most max_steps = {max_steps}")
     if to == 0:
         raise InputError("solve: to = 0: the body is at rest there")
-    problem = Problem(scene)
-    curve = FixedControlCurve(problem, tolerances or Tolerances())
-    path = _path(curve, None, record)
     driven = scene.things.index(scene.driven)
     name = scene.driven.quantity
-    targets = [(Target(name, to * k / increments, None), Amplitude(problem, driven)) for k in range(1, increments + 1)]
-    with _carried(path):
+    with _carried() as carried:
+        problem = Problem(scene)
+        curve = FixedControlCurve(problem, tolerances or Tolerances())
+        path = carried(_path(curve, None, record))
+        targets = [(Target(name, to * k / increments, None), Amplitude(problem, driven))
+                   for k in range(1, increments + 1)]
         increment = abs(to / problem.forms.control_scale) / increments
         step = StepControl(length=1.01 * increment, largest=1.01 * increment, smallest=1e-5 * increment)
         Run(path.record, targets, step).follow(max_steps, False, begin(curve))
@@ -185,13 +186,13 @@ class Process:
             raise InputError("Process: start: must be a path of this very scene: fx.load(folder, scene), or what run"
                              " gave back")
         start = _from_checkpoint("Process", resume, checkpoint, self.scene, start)
-        problem = start.problem if isinstance(start, Path) else Problem(self.scene)
-        for state in [start] if isinstance(start, State) else start.states[-1:] if start else []:
-            _check_start(state, stages, problem)
         tolerances = tolerances or Tolerances()
-        path = _path(Curve(problem, tolerances), start, record, any(stage.timed for stage in stages))
-        _keep(path, checkpoint)
-        with _carried(path, checkpoint):
+        with _carried(checkpoint) as carried:
+            problem = start.problem if isinstance(start, Path) else Problem(self.scene)
+            for state in [start] if isinstance(start, State) else start.states[-1:] if start else []:
+                _check_start(state, stages, problem)
+            path = carried(_path(Curve(problem, tolerances), start, record, any(stage.timed for stage in stages)))
+            _keep(path, checkpoint)
             execution = Execution(path.record, plans, unsure, step, tolerances.residual, allowed)
             execution.run(None if max_steps is None else count("Process: max_steps", max_steps), progress)
         return path
@@ -260,18 +261,31 @@ def _from_checkpoint(who: str, resume: bool, checkpoint: Any, scene: Scene, star
 
 
 @contextlib.contextmanager
-def _carried(path: Path, checkpoint: Any = None) -> Iterator[None]:
-    """Errors carry the path as far as it has come."""
+def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
+    """Errors carry the path that is handed in, as far as it has come; so does the word where a run was interrupted."""
+    paths: list[Path] = []
+
+    def carried(path: Path) -> Path:
+        paths.append(path)
+        return path
+
+    def so_far() -> Path | None:
+        return next((path for path in paths if path.states), None)
+
     try:
-        yield
+        yield carried
     except (ConvergenceError, InputError) as error:
-        error.path = path if path.states else None
+        error.path = so_far()
         raise
     except KeyboardInterrupt:
-        stands = f"at {path.describe(path.last)}, after {len(path)} states" if path.states else "before its first state"
+        path = so_far()
+        if path is None:
+            raise Interrupted("interrupted before its first state") from None
+        stands = f"at {path.describe(path.last)}, after {len(path)} states"
         how = (f"checkpoint={str(checkpoint)!r} holds it: the same script goes on with resume=True" if checkpoint else
                "it is lost; with checkpoint='folder', resume=True the same script would go on from there")
-        raise Interrupted(f"interrupted {stands}; {how}", path if path.states else None) from None
+        raise Interrupted(f"interrupted {stands}; {how}", path) from None
+    path = paths[0]
     for bad, text in doubts(path.last.measures["volume_error"], "the last state",
                             path.problem.furthest_volume_ratio(path.last)):
         if bad == "serious" and path.problem.comm.rank == 0:

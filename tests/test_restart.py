@@ -400,3 +400,16 @@ def test_a_damaged_checkpoint_is_refused(tmp_path, damage):
     for look in (lambda: fx.load(folder, scene), lambda: contents(folder)):
         with pytest.raises(fx.InputError, match="damaged|missing"):
             look()
+
+
+@pytest.mark.parametrize("run", ["trace", "solve", "process"])
+def test_interrupted_before_its_first_state(monkeypatch, run):
+    """While forms are compiled, too, one line says so."""
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("formingx.runs.Problem", interrupt)
+    scene = treloar()
+    with pytest.raises(fx.Interrupted, match="before its first state"):
+        {"trace": lambda: fx.trace(scene, until=fx.pole_height(0.1)), "solve": lambda: fx.solve(scene, to=0.1),
+         "process": lambda: fx.Process(scene).run([fx.Stage("up", drive=scene.driven, until=fx.pressure(0.1))])}[run]()
