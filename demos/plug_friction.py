@@ -52,7 +52,7 @@ def run(case) -> dict:
     made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), mu, elements,
                        near=near, points=4, penalty=2e4, ramp=5e-3, elastic_slip=5e-3, nodes_per_step=4,
                        comm=MPI.COMM_SELF)
-    path, end = plugs.push(made, travels, smallest=1e-3, progress=False, tolerances=fx.Tolerances(settling=12))
+    path, end = plugs.push(made, travels, smallest=1e-3, progress=False)
     path.to_csv(folder / f"mu_{mu:g}.csv")
     profile = path.profile()
     numbers = {"elements": list(elements), **key_numbers(path, end, travels)}

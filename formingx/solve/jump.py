@@ -31,14 +31,15 @@ It begins low and grows to the least that gives a solution: where a state follow
 finds it; much would hold the body back while contact lets go, and what slips meanwhile changes where it ends. (At
 the brink of release two states may be near, and which is found still depends on eta: tests/test_jumps.py.)"""
 
-_FEW, _TOLERANCES = 5, Tolerances(1e-8, 1e-6, settling=8)
+_FEW, _TOLERANCES = 4, Tolerances(1e-8, 1e-6, settling=8)
 """Of a viscous solution. (Where contact does not settle soon more viscosity is cheaper than more iterations.)"""
 
 _FAR = 0.1
 """How far (dimensionless, in the mean) the body is to move in a viscous solution: what is lost depends on it."""
 
-_MOST = 400
-"""Viscous solutions before the body counts as never coming to rest."""
+_MOST, _FURTHEST = 2000, 40.0
+"""Viscous solutions, and a distance (dimensionless, in the mean), after which the body counts as never coming to rest.
+(Where a sheet is drawn over an edge point by point a jump takes hundreds of short ones.)"""
 
 _NEAR_REST = 1e-3
 """Viscous forces (over the support forces) below which the state at rest is looked for."""
@@ -176,7 +177,8 @@ def jump(curve: Any, old: State, by: float, ahead: bool) -> State:
     origin = old.x + by / old.slope * old.direction if ahead else old.x
     eta = _FIRST
     try:
-        while way.solved < _MOST and _LEAST < eta < _LARGEST[way.solved > 0]:
+        while (way.solved < _MOST and _LEAST < eta < _LARGEST[way.solved > 0]
+               and curve.moved(old, way.at) < _FURTHEST):
             state = way.end(old) if way.settles else None
             if state is not None:
                 if state.slope * by < 0:
