@@ -67,6 +67,14 @@ def test_a_balloon_snaps_to_the_state_of_the_same_pressure(balloon):
     assert path["pressure"][-1] > 1.09 * ball.pressure(limit)
 
 
+def test_a_target_that_a_balloon_snaps_past_is_named(balloon):
+    """No state of the path has it, and the run does not go on without end."""
+    scene = balloon[0].scene()
+    with pytest.raises(fx.ConvergenceError, match=r"the body snaps past it, from 1\.\d+ to \d+\.") as caught:
+        fx.trace(scene, until=fx.pole_stretch(2.5), at_fold="jump")
+    assert caught.value.path.last.kind == "jump"
+
+
 def test_what_a_balloon_loses_is_the_work_of_the_pressure_less_the_energy_gained(balloon):
     ball, limit, path = balloon
     (before,), (after,) = path.limit_points, path.jumps

@@ -102,6 +102,7 @@ class Run:
                 self._check_progress()
                 for state in self._next(record.last):
                     self._accept(state)
+                    self._check_jump(state)
                     if state.kind == "limit point" and self._at_fold == "stop":
                         record.ended = f"the {self._driven} has a limit point at {record.describe(state)}"
                     if record.ended or self.problem.has_history or self._at_fold == "jump":
@@ -329,6 +330,14 @@ class Run:
         if self._best > 0.05 and gained < kept * self._best or gained < -0.05:
             self._give_up("the path turned back, which a crease at a singular corner (a clamped rim on a fine mesh) can"
                           " cause")
+
+    def _check_jump(self, state: State) -> None:
+        """Stop if the body has jumped past its target."""
+        if state.kind == "jump" and self._is_open(self.until):
+            before, now = self._values[-2:]
+            if (before - self.until.value) * (now - self.until.value) < 0:
+                self._give_up(f"the body snaps past it, from {before:.6g} to {now:.6g}",
+                              pace="no state of the path lies between: aim at one before or after the jump")
 
     def _check_progress(self) -> None:
         """Stop if many states have come no nearer to the target."""
