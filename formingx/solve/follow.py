@@ -336,8 +336,7 @@ class Run:
         if state.kind == "jump" and self._is_open(self.until):
             before, now = self._values[-2:]
             if (before - self.until.value) * (now - self.until.value) < 0:
-                self._give_up(f"the body snaps past it, from {before:.6g} to {now:.6g}",
-                              pace="no state of the path lies between: aim at one before or after the jump")
+                self._give_up(f"the body snaps past it, from {before:.6g} to {now:.6g}: no state lies between")
 
     def _check_progress(self) -> None:
         """Stop if many states have come no nearer to the target."""
