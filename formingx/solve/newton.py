@@ -27,7 +27,7 @@ SETTLING = 40
 set for the first time do not count: of a slack sheet on a flat plug a hundred points let go one or two at a time.
 (With a history, which depends on the step, a shorter step is better.)"""
 
-HURRIED = 12
+HURRIED = 16
 """The same, of a contact with a history in a step that may be halved many times yet: that is cheaper."""
 
 _UNSETTLED = 2
