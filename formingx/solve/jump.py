@@ -46,7 +46,7 @@ _NEAR_REST = 1e-3
 
 _AT_REST = 1e-12
 """Viscous forces (over the support forces) below which they are round-off: the body rests, though where a point is at a
-kink of its law the iteration without them may go to and fro."""
+kink of its law of friction the iteration without them may go to and fro."""
 
 
 class _Viscous:
@@ -129,13 +129,15 @@ class _Way:
         return _GROWS[self.solved > 0]
 
     def end(self, old: State) -> State | None:
-        """The state at rest, if there is one near."""
+        """The state at rest, if there is one near; raises `Failure` if the body, without a history, rests at none."""
         try:
             state = self.curve.solve(self.at.x, self.control, fixed(self.control), "jump", self.at)
         except Failure:
             if self.rest > _AT_REST:
                 self.settles, self.near = False, 0.3 * self.rest
                 return None
+            if not self.problem.has_history:                # another branch starts here
+                raise
             state = self.curve.resume(self.at.x, self.control)
             state.kind, state.history = "jump", [Iteration(self.rest, 0.0, 0.0)]
         self._lose(self.at.x, state.x, np.zeros(len(state.x)))
