@@ -115,7 +115,7 @@ def _staged(**stage: Any) -> None:
 def calls(made: fx.Scene, saved: str) -> list[Call]:
     """Every public callable that takes what a user types; `saved`: a checkpoint of the scene `made`."""
     positive, number, word, name = ("positive", 1.0), ("number", 0.1), ("word", "bottom"), ("name", None)
-    late = ("positive or None", None)
+    optional = ("positive or None", None)
     materials = [Call(m.__name__, m, {k: (kind, v) for k, (kind, v) in args.items()}, lambda m: _scene(materials=m))
                  for m, args in ((fx.NeoHookean, {"c10": positive}), (fx.MooneyRivlin,
                                   {"c10": ("not negative", 1.0), "c01": ("not negative", 0.1)}),
@@ -147,11 +147,12 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
             "concentrate": ("optional thing", None)}
     sphere = {"inner_radius": positive, "thickness": positive, "elements": ("pair", (4, 2)), "grading": positive}
     contact = {"on": ("word", "top"), "tool": ("thing", fx.tools.plane(0.3)), "friction": ("friction", "stick"),
-               "penalty": late, "ramp": late, "nodes_per_step": ("count", 1), "separates": ("flag", True),
+               "penalty": optional, "ramp": optional, "nodes_per_step": ("count", 1), "separates": ("flag", True),
                "moves": ("pair or None", None), "name": name, "points": ("points", "nodes"), "elastic_slip": positive}
     stage = {"name": ("label", "up"), "drive": ("optional thing", "air"), "until": ("optional thing", fx.pressure(0.1)),
-             "through": ("several", ()), "without": ("several", ()), "step": ("optional thing", None), "speed": late,
-             "duration": late, "hold": ("optional table", None), "at_fold": ("optional word", None)}
+             "through": ("several", ()), "without": ("several", ()), "step": ("optional thing", None),
+             "speed": optional, "duration": optional, "hold": ("optional table", None),
+             "at_fold": ("optional word", None)}
     table = {"follow": {"air": [(0.0, 0.0), (1.0, 0.1)]}}
     kept = {"record": ("optional thing", None), "resume": ("flag", False)}
     process = {"stages": ("several", [fx.Stage("up", drive="air", until=fx.pressure(0.1))]),
@@ -212,13 +213,13 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
         Call("solve", fx.solve, {"scene": ("thing", _scene()), "to": number, "increments": ("count", 1),
                                  "tolerances": ("optional thing", None), "record": ("optional thing", None),
                                  "max_steps": ("count", 1000)}),
-        *_heat(),
+        *_time_and_heat(),
         Call("doctor", fx.doctor, {"scene": ("thing", _scene()), "targets": ("several", ())}),
     ]
 
 
-def _heat() -> list[Call]:
-    """What relaxes, and what is warm."""
+def _time_and_heat() -> list[Call]:
+    """Calls of materials that relax, and of heat."""
     positive, number, where = ("positive", 1.0), ("number", 0.1), ("word", "top")
     rubber, material = ("optional thing", fx.NeoHookean(c10=1.0)), ("thing", fx.ThermalProperties(
         conductivity=0.2, density=1e3, heat_capacity=2e3))

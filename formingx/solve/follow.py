@@ -228,10 +228,8 @@ class Run:
         self.problem.prepare(old.x, old.control, old.direction, old.slope, reach, ends=True)
         behind = None if self.problem.has_kinks else extrapolate.behind(self.states, reach, self.curve.distance)
         with self.curve.newton.in_a_hurry(length > _JUMPS[0]):
-            if target is None:
-                new = self.curve.step(old, length, self._foretold, behind)
-            else:
-                new = self.curve.step_to(old, reach, bound.equation(target.value), self._foretold, behind)
+            new = self.curve.step(old, length, self._foretold, behind) if target is None else self.curve.step_to(
+                old, reach, bound.equation(target.value), self._foretold, behind)
         if target is not None:
             if not 0 < self.curve.progress(old, new) < 2 * length:
                 raise _Astray("the target was met on a far part of the path", [])

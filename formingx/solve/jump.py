@@ -37,7 +37,7 @@ _FEW, _TOLERANCES = 4, Tolerances(1e-8, 1e-6, settling=8)
 _FAR = 0.1
 """How far (dimensionless, in the mean) the body is to move in a viscous solution: what is lost depends on it."""
 
-_MOST, _FURTHEST = 1000, 10.0
+_MOST, _TOO_FAR = 1000, 10.0
 """Viscous solutions, and a distance (dimensionless, in the mean), after which the body counts as never coming to rest.
 (Where a sheet is drawn over an edge point by point a jump takes hundreds of short ones.)"""
 
@@ -180,7 +180,7 @@ def jump(curve: Any, old: State, by: float, ahead: bool) -> State:
     eta = _FIRST
     try:
         while (way.solved < _MOST and _LEAST < eta < _LARGEST[way.solved > 0]
-               and curve.moved(old, way.at) < _FURTHEST):
+               and curve.moved(old, way.at) < _TOO_FAR):
             state = way.end(old) if way.settles else None
             if state is not None:
                 if state.slope * by < 0:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-VOLUME = 5e-3
-"""Root mean square of J - 1 above which a report warns: elements have other volumes, though the mass is kept."""
+_VOLUME = 5e-3
+"""Root mean square of J - 1 above which a report warns, and above four times which a run does: elements have
+other volumes, though the mass is kept."""
 
-FURTHEST = 2.0
+_FURTHEST = 2.0
 """J, or 1/J, at a point beside the quadrature points above which a report warns."""
 
 
@@ -18,12 +19,12 @@ def doubts(error: float, where: str, furthest: Any) -> list[tuple[str, str]]:
     from 1 in the last state, or None.
     """
     found = []
-    if error > VOLUME:
-        found.append(("serious" if error > 4 * VOLUME else "minor",
+    if error > _VOLUME:
+        found.append(("serious" if error > 4 * _VOLUME else "minor",
                       f"The elements do not keep their volumes: the root mean square of J - 1 is up to"
                       f" {100 * error:.2g} % ({where}): use a finer mesh; the corner of a clamped rim is singular."))
     J = 1.0 if furthest is None else furthest.value
-    if not 1 / FURTHEST < J < FURTHEST:
+    if not 1 / _FURTHEST < J < _FURTHEST:
         found.append(("minor" if J > 0 else "serious",
                       f"J is {J:.3g} in the last state at (R, Z) = ({furthest.point[0]:.5g}, {furthest.point[1]:.5g}):"
                       f" the stress of the element there means nothing."))
