@@ -85,6 +85,7 @@ def test_findings(make, targets, severity, words):
 
 @pytest.mark.parametrize("make, target, words", [
     (lambda: formed(), fx.pole_height(0.6), "inside the tool"),
+    (lambda: formed(), fx.enclosed_volume(4.0), "has room for 2"),
     (lambda: treloar(), fx.travel(1.0), "has no travel"),
     (lambda: treloar(support=fx.Clamped("rim")), fx.displacement(0.1, at=(1.25, 0.041)), "Clamped.* holds"),
     (lambda: pushed(), fx.travel(-0.1), "behind the start"),

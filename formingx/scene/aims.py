@@ -14,6 +14,7 @@ from .scene import Scene
 
 _NEAR = 1e-5           # of the body's length: a point is on a boundary
 _MOST = 1e9            # of the largest shear modulus, or of the body's length
+_SQUARES, _ROOMY = 200, 1.05   # along a mould's larger side, and by how much its volume by them may be wrong
 
 
 def check(scene: Scene, targets: Iterable[Any], off: Collection[int] | None = None) -> None:
@@ -51,6 +52,11 @@ def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -
         for contact in (t for t in there if t in scene.contacts and not t.driven):
             if _beyond(scene, contact, value):
                 return f"it lies inside the tool of {contact!r}"
+    if name == "enclosed_volume" and driven is not None and driven.quantity == "pressure":
+        for contact in (t for t in there if t in scene.contacts and not t.driven):
+            room = _room(scene, contact)
+            if value > _ROOMY * room:
+                return f"the tool of {contact!r} has room for {room:.4g}"
     return None
 
 
@@ -85,3 +91,28 @@ def _beyond(scene: Scene, contact: Any, height: float) -> bool:
         return False
     depth = contact.tool.signed_distance((pole + [0.0, height])[None])[0]
     return float(depth) > Triangles(scene.mesh).thickness
+
+
+def _room(scene: Scene, contact: Any) -> float:
+    """Volume between the lower face of a flat body at rest and the mould over it; infinite if the mould is not closed.
+
+    Measured on squares: those that hang together with the body's, outside the tool.
+    """
+    from scipy.ndimage import label
+    face, low = scene.mesh.nodes_of(contact.on), scene.mesh.nodes_of(scene.driven.on)[:, 1].min()
+    edge, top = face.max(0)
+    outline = contact.tool.outline().max(0)
+    if np.ptp(face[:, 1]) > _NEAR * edge or face[:, 0].min() > 0 or outline[1] <= top:
+        return np.inf
+    corner = np.maximum(outline, face.max(0))
+    size = max(corner[0], corner[1] - low) / _SQUARES
+    r, z = (start + (np.arange(np.ceil((end - start) / size) + 1) + 0.5) * size
+            for start, end in ((0.0, corner[0]), (low, corner[1])))
+    points = np.stack(np.meshgrid(r, z, indexing="ij"), -1)
+    free = contact.tool.signed_distance(points.reshape(-1, 2)).reshape(points.shape[:2]) < 0
+    free &= (points[..., 1] > top) | (points[..., 0] < edge)
+    regions, _ = label(free)
+    inside = (regions == regions[0, 0]) & free
+    if inside[-1].any() or inside[:, -1].any():
+        return np.inf
+    return float(size**2 * sum(n * scene.kinematics.weight((R, 0.0)) for R, n in zip(r, inside.sum(1))))
