@@ -83,3 +83,18 @@ def test_a_flat_rough_plug_comes_back():
     # within the ramp, where points that stick hold the sheet
     assert path["pole_height"][-1] == pytest.approx(0.0, abs=path.problem.contacts[0].law.theta)
     assert path["tool_force"][-1] == pytest.approx(0.0, abs=1e-8 * path["tool_force"].max())
+
+
+@pytest.mark.slow
+def test_an_undercut_cup_without_friction():
+    """Elements as long as the fillets: with contact at the nodes another branch starts there, at Gauss points none."""
+    mould = tools.Tool([(0, 5.3), (8.5, 5.3), (8.5, 2.3), (7, 1.3), (7, H), (20, H)], [0, 0.8, 0.5, 0.5, 0.5, 0])
+
+    def made(points):
+        return scene([fx.Contact("top", mould, "none", points=points)], [fx.Pressure("bottom")])
+    with pytest.raises(fx.ConvergenceError, match="becomes singular, and there is no limit point") as error:
+        fx.trace(made("nodes"), until=fx.pressure(8.0))
+    found = error.value.diagnosis
+    assert found.condition > 100 * found.condition_before and "points=4" in found.advice[0]
+    path = fx.trace(made(4), until=fx.pressure(8.0))
+    assert path["pressure"][-1] == pytest.approx(8.0, rel=1e-12) and path.profile().top[:, 1].max() > 5.29

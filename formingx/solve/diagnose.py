@@ -14,6 +14,9 @@ from ..mesh.triangles import Place, place
 from .diagnosis import Diagnosis
 from .direct import DirectSolver, condition
 
+_BEFORE, _SINGULAR = 10, 100.0
+"""So many states before the last one the tangent's condition is looked at, too; a growth by this tells of a branch."""
+
 
 class Attempt(NamedTuple):
     """Where a failed Newton iteration ended: x (own part) and control, and the last correction of both."""
@@ -181,9 +184,9 @@ def _tangents(curve: Any, states: list) -> dict[str, Any]:
     facts: dict[str, Any] = {"limit_points": limits}
     turned = []
     usable = [s for s in states[1 if problem.forms.slack_at_rest else 0:] if s.kind != "limit point"]
-    end = sign(states[-1])
-    if end:
-        facts["condition"] = condition(problem.matrix, solver)
+    for name, state in zip(("condition", "condition_before"), (states[-1], *usable[-1 - _BEFORE:-_BEFORE])):
+        if sign(state):
+            facts[name] = condition(problem.matrix, solver)
     if len(usable) > 1 and not problem.has_history:
         # one sign per stretch between limit points: there it cannot change unless another branch starts
         turned = _changes(states, usable, sign)
@@ -276,14 +279,26 @@ def _of_branches(facts: dict) -> Iterator[tuple[str, str]]:
         yield (f"the tangent lost definiteness between {what} {a:.6g} and {b:.6g} without a limit point: another"
                f" branch starts there, possibly buckling",
                f"a small imperfection in the load or the mesh, or a target before {what} {b:.6g}")
+    if _singular(facts) and not facts.get("turned") and facts.get("limit_ahead") is None:
+        yield (f"the tangent becomes singular, and there is no limit point: its condition number has grown from"
+               f" {facts['condition_before']:.1g} to {facts['condition']:.1g} in {_BEFORE} states; another branch starts"
+               f" here, where the body buckles or a point of contact is about to slip away",
+               "smaller elements; contact at points=4 (Contact), where there is any")
     if facts.get("flipped"):
         yield (f"contact does not settle: {facts['flipped']} nodes changed state in the last iteration",
-               "smaller elements along the face in contact, a wider ramp or a lower penalty (Contact)")
+               "smaller elements along the face in contact, contact at points=4, a wider ramp or a lower penalty"
+               " (Contact)")
+
+
+def _singular(facts: dict) -> bool:
+    """True if the tangent is near a singular one: its condition has grown from state to state."""
+    before = facts.get("condition_before")
+    return bool(before and (facts.get("condition") or 0) > _SINGULAR * before)
 
 
 def _of_numbers(facts: dict) -> Iterator[tuple[str, str]]:
     """(cause, advice) of round-off."""
-    if (facts.get("condition") or 0) > 1e14:
+    if (facts.get("condition") or 0) > 1e14 and not _singular(facts):
         yield (f"round-off: the condition number of the tangent is {facts['condition']:.1g}, next to nothing of"
                f" 16 digits is left",
                "a larger eps, a lower contact penalty, or layers less different in stiffness")

@@ -35,7 +35,8 @@ class Diagnosis:
         limit_ahead: the control at which a limit point lies ahead, as the last slopes tell; or None.
         flipped: nodes that came into contact, left it or changed between stick and slip in the last iteration.
         touching: nodes in contact in the last good state.
-        condition: 1-norm condition number (estimate) of the tangent of the last good state.
+        condition, condition_before: 1-norm condition numbers (estimates) of the tangent of the last good state, and
+            some states before it.
         causes: what the numbers prove or make likely, in plain words, the strongest first.
         advice: what to try.
     """
@@ -59,6 +60,7 @@ class Diagnosis:
     flipped: int | None = None
     touching: int = 0
     condition: float | None = None
+    condition_before: float | None = None
     causes: tuple = ()
     advice: tuple = ()
     what: str = "control"
