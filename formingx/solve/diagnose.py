@@ -281,8 +281,8 @@ def _of_branches(facts: dict) -> Iterator[tuple[str, str]]:
                f"a small imperfection in the load or the mesh, or a target before {what} {b:.6g}")
     if _singular(facts) and not facts.get("turned") and facts.get("limit_ahead") is None:
         yield (f"the tangent becomes singular, and there is no limit point: its condition number has grown from"
-               f" {facts['condition_before']:.1g} to {facts['condition']:.1g} in {_BEFORE} states; another branch starts"
-               f" here, where the body buckles or a point of contact is about to slip away",
+               f" {facts['condition_before']:.1g} to {facts['condition']:.1g} in {_BEFORE} states; another branch"
+               f" starts here, where the body buckles or a point of contact is about to slip away",
                "smaller elements; contact at points=4 (Contact), where there is any")
     if facts.get("flipped"):
         yield (f"contact does not settle: {facts['flipped']} nodes changed state in the last iteration",
