@@ -10,7 +10,9 @@ Rounded edge, Coulomb friction (neo-Hookean): the flat carries no pressure, so i
 everything that touches the edge and the side slides outwards. With tensions per deformed length
 T1 = 2 c10 h0 (l1/l2 - (l1 l2)^-3), T2 likewise, arc length s, slope phi and the meridian's curvature kappa,
 dT1/ds = (T2 - T1) cos(phi)/r + mu N,   N = T1 kappa + T2 sin(phi)/r   (equilibrium: Song 1993, 2.2; friction: 5.9),
-kappa = 1/fillet on the edge, 0 on the side; where the membrane is free N = 0 gives kappa.
+kappa = 0 on the side; where the membrane is free N = 0 gives kappa. On the edge the sheet's thickness counts, which is
+h = h0/(l1 l2): its middle surface bends with kappa = 1/(fillet + h/2), friction acts h/2 below it, which turns mu N into
+mu N fillet/(fillet + h/2) (moments about the centre of the edge), and the travel is that of the plug's face.
 """
 
 from __future__ import annotations
@@ -146,24 +148,31 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
     Raises:
         InputError: a size or constant that is not allowed; a stretch that this plug does not come to.
     """
+    from scipy.integrate import solve_ivp
     from scipy.optimize import brentq
     l0, c10, mu = positive("face_stretch", face_stretch), positive("c10", c10), non_negative("mu", mu)
     radius, thickness = positive("radius", radius), positive("thickness", thickness)
-    rp, f = positive("plug_radius", plug_radius) / radius, positive("fillet", fillet) / radius
+    rp, f, h0 = positive("plug_radius", plug_radius) / radius, positive("fillet", fillet) / radius, thickness / radius
     if not (f <= rp < 1 and l0 > 1):
         raise InputError(f"fillet = {fillet!r}, plug_radius = {plug_radius!r}, radius = {radius!r} must rise in this"
                          f" order, and face_stretch = {face_stretch!r} be above 1")
-    edge = f * np.pi / 2
+    around = _touching(mu, h0, f)
+
+    def upright(_, y):
+        return y[3] - np.pi / 2
+    upright.terminal = True
+    edge = solve_ivp(lambda s, y: around(*y), (0, 2 * (f + h0)), [(rp - f) / l0, rp - f, 0, 0, 1 - l0**-6],
+                     events=upright, dense_output=True, rtol=1e-9, atol=1e-12)
+    whole = edge.t[-1]                        # of the arc length, around the edge
 
     def left(u):                              # where the membrane lets go, u of arc length up the edge and the side
-        y = np.array([(rp - f) / l0, rp - f, 0, 0, 1 - l0**-6])
-        return _along(max(u - edge, 0.0), _along(min(u, edge), y, _touching(1 / f, mu)), _touching(0.0, mu))
+        return _along(max(u - whole, 0.0), edge.sol(min(u, whole)), _touching(mu))
 
     def misses(u):                            # the rim
         y = left(u)
         return _along(1 - y[0], y, _free)[1] - 1 if y[0] < 1 else 1.0
 
-    lengths = np.concatenate([np.linspace(0.01, 1, 30) * edge, edge + np.linspace(0.01, 3, 60)])
+    lengths = np.concatenate([np.linspace(0.01, 1, 30) * whole, whole + np.linspace(0.01, 3, 60)])
     found = [misses(lengths[0])]
     with np.errstate(over="ignore", invalid="ignore"):      # too far
         while not found[-1] <= 0 and len(found) < len(lengths):
@@ -172,9 +181,9 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
         raise InputError(f"face_stretch = {face_stretch!r}: this plug does not draw the membrane so far")
     u = brentq(misses, lengths[len(found) - 2], lengths[len(found) - 1], xtol=1e-13)
     _, r, _, phi, t = y = left(u)
-    travel = _along(1 - y[0], y, _free)[2] * radius
+    travel = _along(1 - y[0], y, _free)[2] * radius + thickness * (1 - l0**-2) / 2
     force = 4 * np.pi * c10 * thickness * radius * r * t * np.sin(phi)
-    return SlidingState(float(travel), float(force), l0, float(phi), float(max(u - edge, 0.0) * radius))
+    return SlidingState(float(travel), float(force), l0, float(phi), float(max(u - whole, 0.0) * radius))
 
 
 def _tensions(t: float, l2: float) -> tuple[float, float]:
@@ -191,12 +200,14 @@ def _along(length: float, y: np.ndarray, slopes: Callable) -> np.ndarray:
     return solve_ivp(lambda s, y: slopes(*y), (0, length), y, rtol=1e-9, atol=1e-12).y[:, -1]
 
 
-def _touching(kappa: float, mu: float) -> Callable:
-    """dy/ds on a tool whose meridian has this curvature."""
+def _touching(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
+    """dy/ds on a rounded edge, or, without one, on the side of the plug."""
     def slopes(R, r, z, phi, t):
         l1, t2 = _tensions(t, r / R)
+        outside = h0 * R / (l1 * r) / 2                     # the middle surface, of the edge
+        kappa, lever = 1 / (fillet + outside), 1 / (1 + outside / fillet)
         N = t * kappa + t2 * np.sin(phi) / r
-        return [1 / l1, np.cos(phi), np.sin(phi), kappa, (t2 - t) * np.cos(phi) / r + mu * N]
+        return [1 / l1, np.cos(phi), np.sin(phi), kappa, (t2 - t) * np.cos(phi) / r + mu * lever * N]
     return slopes
 
 

@@ -87,21 +87,31 @@ WILLIAMS = dict(radius=8.89, plug_radius=1.905, thickness=0.6985, c10=0.448)
 
 
 def test_a_membrane_that_slides_over_a_small_edge_is_that_of_the_sharp_one():
-    """Two integrations of their own; the difference falls with the edge's radius."""
-    away = []
+    """Two integrations of their own, of a thin sheet; the difference falls with the edge's radius."""
+    away, thin = [], {**WILLIAMS, "thickness": 1e-6}
     for fillet in (0.02, 0.005):
-        slides = membrane_sliding_over_plug(1.5, fillet=fillet, mu=0.0, **WILLIAMS)
-        sharp = membrane_under_plug(slides.travel, friction="none", **WILLIAMS)
+        slides = membrane_sliding_over_plug(1.5, fillet=fillet, mu=0.0, **thin)
+        sharp = membrane_under_plug(slides.travel, friction="none", **thin)
         away.append(abs(slides.force / sharp.force - 1))
     assert away[1] < 0.3 * away[0] < 1e-3
 
 
 def test_friction_makes_the_tension_grow_as_on_a_capstan():
     """Far drawn, the force without friction is 4 pi rp c10 h0; with it the edge alone makes it about exp(mu pi/2)."""
-    limit = 4 * np.pi * 1.905 * 0.448 * 0.6985
+    limit = 4 * np.pi * (1.905 + 0.6985 / 20**2 / 2) * 0.448 * 0.6985        # at the middle surface
     smooth, rough = (membrane_sliding_over_plug(20.0, fillet=0.05, mu=mu, **WILLIAMS) for mu in (0.0, 0.1))
     assert smooth.force == pytest.approx(limit, rel=1e-5)
     assert rough.force > np.exp(0.1 * np.pi / 2) * limit
     assert (smooth.wrap, rough.wrap) == pytest.approx((np.pi / 2, np.pi / 2))
     with pytest.raises(fx.InputError, match="does not draw the membrane so far"):
         membrane_sliding_over_plug(1e6, fillet=0.05, mu=0.1, **WILLIAMS)
+
+
+def test_a_thick_sheet_on_a_capstan():
+    """Friction acts below the middle surface: what is left of mu on an edge of radius f is mu f/(f + h/2)."""
+    def tension(thickness, mu):
+        sheet = {**WILLIAMS, "thickness": thickness}
+        return membrane_sliding_over_plug(1.5, fillet=0.35, mu=mu, **sheet).force / thickness
+    h = 0.6985 / 1.5**2
+    thin, thick = (tension(t, 0.5) / tension(t, 0.0) for t in (1e-6, 0.6985))
+    assert np.log(thick) / np.log(thin) == pytest.approx(1 / (1 + h / 2 / 0.35), rel=0.1)
