@@ -131,7 +131,8 @@ class _Way:
     def end(self, old: State) -> State | None:
         """The state at rest, if there is one near; raises `Failure` if the body, without a history, rests at none."""
         try:
-            state = self.curve.solve(self.at.x, self.control, fixed(self.control), "jump", self.at)
+            with self.curve.newton.in_a_hurry(True):        # else there is a little more viscosity to be had
+                state = self.curve.solve(self.at.x, self.control, fixed(self.control), "jump", self.at)
         except Failure:
             if self.rest > _AT_REST:
                 self.settles, self.near = False, 0.3 * self.rest

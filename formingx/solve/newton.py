@@ -28,7 +28,7 @@ set for the first time do not count: of a slack sheet on a flat plug a hundred p
 (With a history, which depends on the step, a shorter step is better.)"""
 
 HURRIED = 16
-"""The same, of a contact with a history in a step that may be halved many times yet: that is cheaper."""
+"""The same, of a contact with a history where there is something cheaper to try, such as half the step."""
 
 _UNSETTLED = 2
 """Iterations after which contact points with a history whose status still changes are solved for by themselves."""
@@ -164,7 +164,7 @@ class BorderedNewton:
 
     @contextlib.contextmanager
     def in_a_hurry(self, hurried: bool) -> Iterator[None]:
-        """While a shorter step is to be had, contact with a history has to settle within `HURRIED` iterations."""
+        """While something cheaper is left to try, contact with a history has to settle within `HURRIED` iterations."""
         self._hurried = hurried and self.problem.has_history
         try:
             yield
