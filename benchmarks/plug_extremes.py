@@ -96,7 +96,7 @@ def run(plug, max_steps=400, through=(), **options):
                      contacts=[fx.Contact("top", plug.tool, friction, separates=separates, moves=(0, -1),
                                           name="plug", **options)])
     travel = TRAVEL * radius
-    stages = [fx.Stage("push", drive="plug", until=fx.travel(travel),
+    stages = [fx.Stage("push", drive="plug", until=fx.travel(travel), at_fold="jump",      # a plug goes one way
                        through=[fx.travel(t * radius) for t in through])]
     if plug.back:
         stages += [fx.Stage("hold", follow={"plug": [(0, travel), (1, travel)]}),

@@ -127,8 +127,9 @@ class Run:
 
     @property
     def _may_jump(self) -> bool:
-        """True if the body may jump: at folds, or, where a fold is followed, where a history leaves no next state."""
-        return self._at_fold == "jump" or self._at_fold == "follow" and self.problem.has_history
+        """True if the body may jump: at folds, or, where a fold is followed, where contact leaves no next state."""
+        pushed = self.problem.has_kinks and not _blown(self.problem)
+        return self._at_fold == "jump" or self._at_fold == "follow" and (self.problem.has_history or pushed)
 
     @property
     def _sense(self) -> float:
@@ -455,11 +456,15 @@ def _usual(problem: Any, falls: bool) -> str:
     Time does. With a history so does whatever is driven, for to follow a fold would be to let it go back; but where a
     pressure that is put on has its maximum it is the volume of the air that goes on growing. `falls`: it is let off.
     """
-    setting, things = problem.setting, problem.scene.things
-    if setting.leading == len(things):
+    if problem.setting.leading == len(problem.scene.things):
         return "jump"
-    blown = setting.leading is not None and things[setting.leading].quantity == "pressure" and not falls
-    return "follow" if not problem.has_history or blown else "jump"
+    return "follow" if not problem.has_history or _blown(problem) and not falls else "jump"
+
+
+def _blown(problem: Any) -> bool:
+    """True if a pressure is what is driven."""
+    leading, things = problem.setting.leading, problem.scene.things
+    return leading is not None and leading < len(things) and things[leading].quantity == "pressure"
 
 
 def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) -> bool:
