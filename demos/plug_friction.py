@@ -4,8 +4,10 @@ The sheet of `williams_plug` (neo-Hookean, c10 = 0.448 MPa; r0 = 8.89 cm, h0 = 0
 edge rounded) pushed 20 cm under five coefficients of friction, beside a membrane that slides over the same edge. Where
 points of the sheet leave the edge of the plug there may be no state nearby to go on to: the sheet snaps to the next
 one (`Path.jumps`), marked in the curves. The less friction, the more of the face slides over the edge, and the thinner
-it is drawn (a membrane under mu = 0.1 is stretched 150 times both ways at 20 cm): elements are in proportion to their
-distance from the axis, so that whatever comes to the edge has as many of them around it. Lengths in cm, forces in N.
+it is drawn (a membrane under mu = 0.1 is stretched 130 times both ways at 20 cm): elements are in proportion to their
+distance from the axis, so that whatever comes to the edge has as many of them around it, and their pressures are
+continuous, for they are slim. Numbers of the first 8 cm are of smaller elements made for them. Lengths in cm, forces in
+N.
 """
 
 from typing import NamedTuple
@@ -24,7 +26,10 @@ from formingx.results.show import plots
 
 FRICTIONS = (0.1, 0.2, 0.5, 0.3, 1.0)      # begun in this order, two processes are busy to the end
 MOST = 25                                   # stretch of the face that elements are made for
-GROWTH = 0.091                              # of elements from one to the next away from the axis
+GROWTH = 0.09                               # of elements from one to the next away from the axis
+AT_RIM = 0.5                                # size of elements at the rim over that of the largest, half way to it
+FIRST = 8                                   # cm: what elements made for this travel give is surer up to there
+ROUGH = 0.5                                 # mu from which on friction shears the sheet: two elements through it
 FACE_STRETCHES = (1.01, 1.05, 1.1, 1.2, 1.35, 1.5, 1.75, 2, 2.5, 3.2, 5, 10, 25, 80, 200)
 
 
@@ -48,20 +53,29 @@ def run(case) -> dict:
     """One coefficient of friction: its numbers, and what is drawn of it."""
     mu, fillet, refine, travels, folder = case
     membrane = membrane_curve(mu, fillet, travels[-1])
-    elements, near = graded(membrane.face_stretch[-1], refine)
-    made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), mu, elements,
-                       near=near, points=4, penalty=2e4, ramp=5e-3, elastic_slip=5e-3, nodes_per_step=4,
-                       comm=MPI.COMM_SELF)
-    path, end = plugs.push(made, travels, smallest=1e-3, progress=False)
-    path.to_csv(folder / f"mu_{mu:g}.csv")
-    profile = path.profile()
+    path, end, elements = pushed(mu, fillet, membrane, travels, refine, ramp=2e-2)
     numbers = {"elements": list(elements), **key_numbers(path, end, travels)}
+    begun, *_ = pushed(mu, fillet, membrane, [t for t in travels if t <= FIRST], 2 * refine, ramp=2e-3)
+    for name in ("force_N_at_travel_cm", "least_wall_ratio_at_travel_cm"):
+        numbers[name] |= key_numbers(begun, "done", travels)[name]
     numbers["membrane_force_N_at_travel_cm"] = {
         f"{t:g}": float(np.interp(t, membrane.travel, membrane.force)) for t in travels}
+    path.to_csv(folder / f"mu_{mu:g}.csv")
+    profile = path.profile()
     return {"numbers": numbers, "travel": path["travel"], "force": plugs.NEWTON * path["tool_force"],
             "jumps": [(state.measures["travel"], plugs.force(state)) for state in path.jumps],
             "membrane": (membrane.travel, membrane.force), "radius": profile.reference_radius,
             "wall": profile.wall_ratio}
+
+
+def pushed(mu, fillet, membrane, travels, refine, ramp) -> tuple:
+    """(path, how it ended, elements) of a sheet whose elements are made for the last of these travels."""
+    stretch = float(np.interp(travels[-1], membrane.travel, membrane.face_stretch))
+    elements, near = graded(mu, stretch, refine)
+    made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), mu, elements, near=near,
+                       model=fx.MixedPressure(space="P1"), points=4, penalty=2e5, ramp=ramp, elastic_slip=5e-3,
+                       nodes_per_step=16, comm=MPI.COMM_SELF)
+    return *plugs.push(made, travels, smallest=1e-3, progress=False), elements
 
 
 class Membrane(NamedTuple):
@@ -86,10 +100,11 @@ def membrane_curve(mu, fillet, last) -> Membrane:
     return Membrane(fine, *(PchipInterpolator(travels, values)(fine) for values in (forces, stretches)))
 
 
-def graded(face_stretch, refine=1) -> tuple:
+def graded(mu, face_stretch, refine=1) -> tuple:
     """(elements, sizes to concentrate): in proportion to the radius, down to a third of what the edge is to hold."""
-    smallest = PLUG / RADIUS / min(face_stretch, MOST) / 3
-    return (int(np.ceil(refine * np.log(1 / smallest) / GROWTH)), 2 * refine), {0.0: smallest}
+    smallest = 2 * PLUG / RADIUS / min(face_stretch, MOST) / 3        # over the largest, which are half way to the rim
+    number = (np.log(1 / smallest) + np.log(1 / AT_RIM) / (1 - AT_RIM)) / GROWTH
+    return (int(np.ceil(refine * number)), refine * (2 if mu >= ROUGH else 1)), {0.0: smallest, RADIUS: AT_RIM}
 
 
 def key_numbers(path, end, travels) -> dict:

@@ -36,12 +36,13 @@ def name_of(law) -> str:
     return law if isinstance(law, str) else f"coulomb_{law:g}"
 
 
-def scene(radius, thickness, plug_radius, fillet, material, law, elements, support=None, near=None, comm=COMM,
-          **options):
+def scene(radius, thickness, plug_radius, fillet, material, law, elements, support=None, near=None, model=None,
+          comm=COMM, **options):
     """A sheet held at its rim under a plug that moves down. law: of LAWS, or a coefficient of friction."""
     friction, separates = LAWS.get(law, (law, True))
     mesh = sheet(radius, thickness, plug_radius, law, elements, near, comm)
     return fx.Scene(mesh=mesh, materials=material, supports=[fx.Symmetry("axis"), support or fx.Clamped("rim")],
+                    model=model or fx.MixedPressure(),
                     contacts=[fx.Contact("top", plug(plug_radius, thickness, fillet), friction, separates=separates,
                                          moves=(0, -1), **options)])
 

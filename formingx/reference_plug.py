@@ -10,8 +10,8 @@ Rounded edge, Coulomb friction (neo-Hookean): the flat carries no pressure, so i
 everything that touches the edge and the side slides outwards. With tensions per deformed length
 T1 = 2 c10 h0 (l1/l2 - (l1 l2)^-3), T2 likewise, arc length s, slope phi and the meridian's curvature kappa,
 dT1/ds = (T2 - T1) cos(phi)/r + mu N,   N = T1 kappa + T2 sin(phi)/r   (equilibrium: Song 1993, 2.2; friction: 5.9),
-kappa = 0 on the side; where the membrane is free N = 0 gives kappa. On the edge the sheet's thickness counts, which is
-h = h0/(l1 l2): its middle surface bends with kappa = 1/(fillet + h/2), friction acts h/2 below it, which turns mu N into
+kappa = 0 on the side; where the membrane is free N = 0 gives kappa. On the edge the sheet's thickness h = h0/(l1 l2)
+counts: its middle surface bends with kappa = 1/(fillet + h/2), friction acts h/2 below it, which turns mu N into
 mu N fillet/(fillet + h/2) (moments about the centre of the edge), and the travel is that of the plug's face.
 """
 

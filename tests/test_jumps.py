@@ -15,7 +15,6 @@ from formingx.solve import jump
 
 sys.path.insert(0, str(ROOT / "demos"))
 import plugs  # noqa: E402
-from plug_friction import graded  # noqa: E402
 from williams_plug import C10, PLUG, RADIUS, THICKNESS  # noqa: E402
 
 
@@ -181,10 +180,9 @@ def test_nor_in_shorter_steps(monkeypatch):
 
 
 def williams(**step):
-    """Williams' plug with mu = 0.3, as in `plug_friction`, past its first snaps."""
-    elements, near = graded(face_stretch=2.0)
-    made = plugs.scene(RADIUS, THICKNESS, PLUG, 0.35, fx.NeoHookean(c10=C10), 0.3, elements, near=near, points=4,
-                       penalty=2e4, ramp=1e-3)
+    """Williams' plug with mu = 0.3 past its first snaps; elements in proportion to the radius."""
+    made = plugs.scene(RADIUS, THICKNESS, PLUG, 0.35, fx.NeoHookean(c10=C10), 0.3, (37, 2), near={0.0: 0.0357},
+                       points=4, penalty=2e4, ramp=1e-3)
     return fx.trace(made, until=fx.travel(9.0), through=[fx.travel(t) for t in range(1, 9)],
                     step=fx.StepControl(target=6, **step), progress=False)
 
