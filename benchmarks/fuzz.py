@@ -384,6 +384,9 @@ def _of_runs(folder: Path, made: Any) -> dict[str, Callable]:
 
 def main(words: list[str]) -> int:
     """Print how the calls ended; 1 if one ended badly."""
+    if {"-h", "--help"} & set(words):
+        print(__doc__)
+        return 0
     if words[:1] == ["--child"]:
         child(int(words[1]), int(words[2]), int(words[3]), tuple(words[4:]))
         return 0
