@@ -26,8 +26,6 @@ from formingx.results.show import plots
 
 FRICTIONS = (0.1, 0.2, 0.5, 0.3, 1.0)      # begun in this order, two processes are busy to the end
 MOST = 25                                   # stretch of the face that elements are made for
-GROWTH = 0.09                               # of elements from one to the next away from the axis
-AT_RIM = 0.5                                # size of elements at the rim over that of the largest, half way to it
 FIRST = 8                                   # cm: what elements made for this travel give is surer up to there
 ROUGH = 0.5                                 # mu from which on friction shears the sheet: two elements through it
 FACE_STRETCHES = (1.01, 1.05, 1.1, 1.2, 1.35, 1.5, 1.75, 2, 2.5, 3.2, 5, 10, 25, 80, 200)
@@ -71,7 +69,8 @@ def run(case) -> dict:
 def pushed(mu, fillet, membrane, travels, refine, ramp) -> tuple:
     """(path, how it ended, elements) of a sheet whose elements are made for the last of these travels."""
     stretch = float(np.interp(travels[-1], membrane.travel, membrane.face_stretch))
-    elements, near = graded(mu, stretch, refine)
+    number, near = plugs.proportionate(RADIUS, PLUG, min(stretch, MOST))
+    elements = int(np.ceil(refine * number)), refine * (2 if mu >= ROUGH else 1)
     made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), mu, elements, near=near,
                        model=fx.MixedPressure(space="P1"), points=4, penalty=2e5, ramp=ramp, elastic_slip=5e-3,
                        nodes_per_step=16, comm=MPI.COMM_SELF)
@@ -98,13 +97,6 @@ def membrane_curve(mu, fillet, last) -> Membrane:
     travels, forces, stretches = np.transpose(found)
     fine = np.linspace(0, last, 400)
     return Membrane(fine, *(PchipInterpolator(travels, values)(fine) for values in (forces, stretches)))
-
-
-def graded(mu, face_stretch, refine=1) -> tuple:
-    """(elements, sizes to concentrate): in proportion to the radius, down to a third of what the edge is to hold."""
-    smallest = 2 * PLUG / RADIUS / min(face_stretch, MOST) / 3        # over the largest, which are half way to the rim
-    number = (np.log(1 / smallest) + np.log(1 / AT_RIM) / (1 - AT_RIM)) / GROWTH
-    return (int(np.ceil(refine * number)), refine * (2 if mu >= ROUGH else 1)), {0.0: smallest, RADIUS: AT_RIM}
 
 
 def key_numbers(path, end, travels) -> dict:

@@ -31,6 +31,17 @@ def sheet(radius, thickness, plug_radius, law, elements, near=None, comm=COMM):
     return fx.mesh.disc(radius=radius, thickness=thickness, elements=elements, concentrate=near, comm=comm)
 
 
+def proportionate(radius, plug_radius, face_stretch, growth=0.09, at_rim=0.5) -> tuple:
+    """(elements, sizes to concentrate) along a sheet that slides over the edge: in proportion to the radius.
+
+    Whatever comes to the edge, stretched so far at last, has as many elements around it; at the axis they are a third
+    of what the edge is to hold then, and fall again to `at_rim` of the largest from half way to the rim.
+    """
+    smallest = 2 * plug_radius / radius / face_stretch / 3
+    number = (np.log(1 / smallest) + np.log(1 / at_rim) / (1 - at_rim)) / growth
+    return number, {0.0: smallest, radius: at_rim}
+
+
 def name_of(law) -> str:
     """A law as a key of the summary."""
     return law if isinstance(law, str) else f"coulomb_{law:g}"

@@ -4,8 +4,8 @@ Mooney rubber, C10 the I1 constant; r0 = 7.62 cm. Thin: h0 = 0.0254 cm (r0/h0 = 
 constants (0.1213, 0.03327 MPa) and with Treloar's (0.143, 0.03327 MPa); thick: h0 = 0.076 cm (100), plug radius 2.30 cm
 (0.1731, 0.004006 MPa). "held": what touches the plug never lets go (no slip), to 10 cm; "frictionless", to a pole
 stretch of 3; each with a clamped and with a hinged rim, beside the membrane under a plug with a sharp edge
-(`formingx.reference`; it ends where it would touch the plug's side). The plug's edge is rounded here (--fillet); with
-smaller fillets the force comes to that of the membrane. Lengths in cm, forces in N.
+(`formingx.reference_plug`; it ends where it would touch the plug's side); and with mu = 0.3, to 10 cm. The plug's edge
+is rounded here (--fillet); with smaller fillets the force comes to that of the membrane. Lengths in cm, forces in N.
 
 The thesis' text has no forces, only this: for the thick sheet its curve seems better than Throne's own; for the thin
 one Throne's constants give much softer curves than measured, Treloar's compare well; outside the plug the strain is
@@ -15,6 +15,7 @@ plane only in part, which is why Throne's plane-strain analysis is worse; the ri
 from functools import cache
 from typing import NamedTuple
 
+import numpy as np
 import plugs
 from common import parser, save, say, summarise
 
@@ -50,6 +51,9 @@ QUICK = {"held": ((60, 1), None, "stick"), "frictionless": ((60, 1), 1.3, "none"
 FILLETS = (0.18, 0.06, 0.02)                                 # over the plug's radius, against the membrane
 
 
+MU, FACE_STRETCH = 0.3, 25.0                                 # elements are made for so far drawn a face
+
+
 def press(sheet, law, elements, travels, stretch=None, fillet=FILLETS[0], rim="clamped"):
     """(path, how it ended), to a pole stretch or to the last travel; fillet over the plug's radius."""
     support = fx.Clamped("rim") if rim == "clamped" else fx.SimplySupported("rim")
@@ -58,9 +62,22 @@ def press(sheet, law, elements, travels, stretch=None, fillet=FILLETS[0], rim="c
     return plugs.push(made, travels, stretch)
 
 
+def slide(sheet, travels, fillet, refine):
+    """(path, how it ended, elements) of a sheet that slides over the edge with Coulomb friction."""
+    number, near = plugs.proportionate(RADIUS, sheet.plug, FACE_STRETCH)
+    elements = int(np.ceil(refine * number)), refine
+    made = plugs.scene(RADIUS, sheet.thickness, sheet.plug, fillet * sheet.plug,
+                       fx.MooneyRivlin(c10=sheet.c10, c01=sheet.c01), MU, elements, near=near,
+                       model=fx.MixedPressure(space="P1"), points=4, penalty=2e4, ramp=0.1, elastic_slip=0.02,
+                       nodes_per_step=16)
+    return *plugs.push(made, travels, smallest=1e-4), elements
+
+
 @cache
 def membrane(sheet, law, travel):
     """The membrane under a sharp plug, or None where there is none."""
+    if law not in RUNS:
+        return None
     try:
         return membrane_under_plug(travel, radius=RADIUS, plug_radius=sheet.plug, thickness=sheet.thickness,
                                    c10=sheet.c10, c01=sheet.c01, friction=RUNS[law][2])
@@ -104,6 +121,13 @@ def main():
                 paths[name, key] = path
                 tell(f"{sheet.label}, {law}, {rim} rim", n)
                 plugs.write(path, args.out, f"{name}_{key}")
+        key = plugs.name_of(MU)
+        path, end, elements = slide(sheet, travels, args.fillet, args.refine)
+        summary[name][key] = n = key_numbers(sheet, key, path, end, travels) | {
+            "elements": list(elements), "jumps": len(path.jumps)}
+        paths[name, key] = path
+        tell(f"{sheet.label}, mu = {MU:g}, clamped rim", n)
+        plugs.write(path, args.out, f"{name}_{key}")
     summary["force_over_membrane_at_fillet_over_rp"] = sharpen(args.refine)
     summary["comparison"] = compare(summary)
     save(draw_forces(paths, summary), args.out / "forces.png")
@@ -158,10 +182,11 @@ def draw_forces(paths, summary):
     """Forces on the thick and on the thin sheet, with the membrane's: figs. 6.8 and 6.9."""
     figure, both = plots.figure(2, width=5.0, height=4.4)
     for axes, title, names in zip(both, ("thick sheet", "thin sheet"), (["thick"], ["thin_treloar", "thin_throne"])):
-        for k, (law, name) in enumerate((law, name) for law in RUNS for name in names if name in summary):
+        laws = (*RUNS, plugs.name_of(MU))
+        for k, (law, name) in enumerate((law, name) for law in laws for name in names if name in summary):
             path, constants = paths[name, law], SHEETS[name].label.partition(", ")[2]
             axes.plot(path["travel"], plugs.NEWTON * path["tool_force"], color=f"C{k}",
-                      label=law + (f", {constants}" if constants else ""))
+                      label=(law if law in RUNS else f"$\\mu$ = {MU:g}") + (f", {constants}" if constants else ""))
             exact = summary[name][law]["membrane_force_N_at_travel_cm"]
             axes.plot([float(t) for t in exact], list(exact.values()), "o", color=f"C{k}", fillstyle="none")
         axes.plot([], [], "o", color="0.3", fillstyle="none", label="membrane, sharp edge")

@@ -59,9 +59,10 @@ def test_table_is_that_of_contact_at_nodes():
     assert height == pytest.approx(gauss.points[:, 1], abs=1e-2)
 
 
-def test_no_points_at_all_are_refused():
+@pytest.mark.parametrize("points", [0, 10**9])
+def test_no_points_and_too_many_are_refused(points):
     with pytest.raises(fx.InputError, match="points"):
-        cup("none", points=0)
+        cup("none", points=points)
 
 
 def plugged():

@@ -55,6 +55,8 @@ def test_what_does_not_dissipate_is_refused():
         pulled(fx.NeoHookean(c10=1.0))
     with pytest.raises(fx.InputError, match="work_to_heat = -1"):
         pulled(work_to_heat=-1.0)
+    with pytest.raises(fx.InputError, match="Cooling: tools"):
+        fx.Cooling(POLYMER, unit="C", tools=np.zeros(3))
 
 
 def pressed():

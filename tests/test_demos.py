@@ -187,6 +187,11 @@ def test_throne_plug_quick(tmp_path):
         for law in (held, slips):                            # a rounded edge takes some of the plug's radius
             for ratio in law["force_over_membrane_at_travel_cm"].values():
                 assert 0.84 < ratio < 1
+        rubs = found[name]["coulomb_0.3"]
+        assert rubs["ended"] == "done"
+        for t, force in rubs["force_N_at_travel_cm"].items():
+            assert force < held["force_N_at_travel_cm"][t]
+            assert force > slips["force_N_at_travel_cm"].get(t, 0)
         stretch = slips["stretches_at_pole"]
         assert stretch["meridional"] == pytest.approx(stretch["hoop"], rel=1e-3) and stretch["hoop"] > 1.29
     sharper = list(found["force_over_membrane_at_fillet_over_rp"].values())

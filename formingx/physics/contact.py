@@ -47,6 +47,8 @@ _SLIDES, _STICK, _HELD = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
 """Penalty and ramp of what slides, of what sticks until pulled off, and of what never lets go, where stiffer costs
 iterations."""
 
+_MOST_POINTS = 100
+
 _AT_FOOT = 1e-7
 """Distances from the foot of the ramp, over theta, that are as good as none."""
 
@@ -100,6 +102,8 @@ class Contact(Part):
                              f" Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = count(f"{name}: nodes_per_step", nodes_per_step)
         self.points = points if isinstance(points, str) and points == "nodes" else count(f"{name}: points", points)
+        if self.points != "nodes" and self.points > _MOST_POINTS:
+            raise InputError(f"{name}: points = {points!r}: must be at most {_MOST_POINTS} on a facet")
         self.moves = None if moves is None else pair(f"{name}: moves", moves)
         if self.moves == (0.0, 0.0):
             raise InputError(f"{name}: moves = (0, 0): must name a direction, or be None")

@@ -20,7 +20,7 @@ from ..errors import ConvergenceError
 from . import extrapolate
 from .curve import Curve
 from .diagnose import diagnose
-from .jump import AHEAD, jump
+from .jump import AHEAD, Restless, jump
 from .newton import Failure, tangents
 from .progress import progress_bar, show
 from .state import Record, State
@@ -37,6 +37,7 @@ The last is also that of the step ahead where a kink turns the path back, or whe
 
 _FURTHEST = 1e-3
 """By how much the (dimensionless) control goes on at most in a jump from where the body is."""
+
 
 _PATIENCE = 500
 """States that gain less than a thousandth of the way to the target, after which a run gives up."""
@@ -73,6 +74,7 @@ class Run:
         self.until, self._aim = self.open[-1]
         self._step, self._best, self._began = step, 0.0, time.perf_counter()
         self._ahead = AHEAD                                 # by how much the control goes on in a jump
+        self._restless = False                              # if the last jump, at some cost, came to rest nowhere
         self._values: list[float] = []                      # what is aimed at, in the states of this run
 
     def follow(self, max_steps: int | None, progress: bool, start: State | None) -> None:
@@ -193,7 +195,8 @@ class Run:
     def _next(self, old: State) -> list[State]:
         """The next states: one at a target within reach, or one step ahead, and what lies on the way to it.
 
-        Failures halve the step. Where short ones fail, or the control has its limit, the body jumps.
+        Failures halve the step. Where short ones fail, or the control has its limit, the body jumps (the shortest ones,
+        if a jump came to rest nowhere).
         """
         first, jumps, failed, most = self.step.length, [*_JUMPS, 0.0], 0, np.inf
         if self._at_fold == "jump" and (old.kind == "limit point" or old.slope * self._sense < 0):
@@ -215,7 +218,8 @@ class Run:
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good = self.step.failed()
                 failed += not isinstance(failure, _Astray)
-                if self._may_jump and (not good or self._at_fold == "jump" and failed > 1 and length < jumps[0]):
+                soon = self._at_fold == "jump" and failed > 1 and length < jumps[0] and not self._restless
+                if self._may_jump and (not good or soon):
                     jumps.pop(0)
                     for ahead in (reach,) if good else (_JUMPS[-1], 0.0):
                         with contextlib.suppress(Failure):
@@ -298,8 +302,10 @@ class Run:
                 break
             except Failure as last:
                 failure = last
+                self._restless |= isinstance(last, Restless)
         else:
             raise failure
+        self._restless = False
         self._ahead = min(10 * self._ahead, _FURTHEST)
         new.met = next((target for target, bound in self.open
                         if is_met(target, bound, self.curve.value(bound, new.x, new.control))), None)

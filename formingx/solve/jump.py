@@ -49,6 +49,10 @@ _AT_REST = 1e-12
 kink of its law of friction the iteration without them may go to and fro."""
 
 
+class Restless(Failure):
+    """The body came to rest nowhere."""
+
+
 class _Viscous:
     """A problem in a viscous medium: F + eta M (x - origin), but for unknowns that are held."""
 
@@ -173,7 +177,8 @@ def jump(curve: Any, old: State, by: float, ahead: bool) -> State:
         ahead: start where the tangent leads to, not where the body is.
 
     Raises:
-        Failure: the body comes to rest nowhere; the problem's histories are those of `old`.
+        Failure: none was found, `Restless` if the body comes to rest nowhere. The problem's histories are then those of
+            `old`.
     """
     problem, kept = curve.problem, curve.problem.memory
     way = _Way(curve, old, old.control + by)
@@ -188,7 +193,7 @@ def jump(curve: Any, old: State, by: float, ahead: bool) -> State:
                     state.direction, state.slope = -state.direction, -state.slope
                 return state
             eta *= way.move(way.at.x if way.solved else origin, eta)
-        raise Failure("no state follows that the body could snap to: it comes to rest nowhere", [])
+        raise Restless("no state follows that the body could snap to: it comes to rest nowhere", [])
     except Failure:
         problem.memory = kept
         raise
