@@ -160,7 +160,7 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
 
     def upright(_, y):
         return y[3] - np.pi / 2
-    upright.terminal = True
+    upright.terminal = True  # type: ignore[attr-defined]
     edge = solve_ivp(lambda s, y: around(*y), (0, 2 * (f + h0)), [(rp - f) / l0, rp - f, 0, 0, 1 - l0**-6],
                      events=upright, dense_output=True, rtol=1e-9, atol=1e-12)
     whole = edge.t[-1]                        # of the arc length, around the edge

@@ -101,9 +101,7 @@ class Contact(Part):
             raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
                              f" Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = count(f"{name}: nodes_per_step", nodes_per_step)
-        self.points = points if isinstance(points, str) and points == "nodes" else count(f"{name}: points", points)
-        if self.points != "nodes" and self.points > _MOST_POINTS:
-            raise InputError(f"{name}: points = {points!r}: must be at most {_MOST_POINTS} on a facet")
+        self.points = points if isinstance(points, str) and points == "nodes" else _points(f"{name}: points", points)
         self.moves = None if moves is None else pair(f"{name}: moves", moves)
         if self.moves == (0.0, 0.0):
             raise InputError(f"{name}: moves = (0, 0): must name a direction, or be None")
@@ -175,6 +173,13 @@ def _coefficient(name: str, friction: Any) -> Any:
         raise InputError(f"{name} = {friction!r}: must be 'stick', 'none' or a coefficient of friction: a number"
                          f" or, by temperature, table({{T: mu, ...}}) or of_temperature(f)")
     return non_negative(name, friction)
+
+
+def _points(name: str, points: Any) -> int:
+    """How many on a facet."""
+    if count(name, points) > _MOST_POINTS:
+        raise InputError(f"{name} = {points!r}: must be at most {_MOST_POINTS} on a facet")
+    return int(points)
 
 
 class Touch(NamedTuple):
