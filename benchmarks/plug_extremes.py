@@ -66,8 +66,9 @@ CASES = {
 
 
 def mesh_for(plug):
-    """The one rule: at the edge three elements to the fillet, or two to h0, and not smaller than h0/10; r0/20 far away.
+    """The one rule: at the edge three elements to the fillet, or two to h0, and not smaller than h0/10; r0/30 far away.
 
+    At the rim, where a clamped sheet is creased, they are a third of that: it alone changes the first forces by 1 %.
     Where the sheet may slide over the edge there are eight to the fillet, not smaller than h0/20, from 0.6 plug radii
     on: they come to the edge stretched, and nodes slide off it one by one.
     """
@@ -75,14 +76,15 @@ def mesh_for(plug):
     slides = plug.law not in ("held", "stick")
     parts, least = (8, 0.05) if slides else (3, 0.1)
     places = (0.0, radius) if plug.cone else (0.6 * radius, radius) if slides else (radius,)
-    smallest, largest = np.clip((fillet or thickness) / parts, least * thickness, thickness / 2), RADIUS / 20
+    smallest, largest = np.clip((fillet or thickness) / parts, least * thickness, thickness / 2), RADIUS / 30
     small = min(smallest / largest, 1.0)
-    R = np.linspace(0, RADIUS, 4001)
-    away = np.abs(np.subtract.outer(places, R))
-    sizes = (small + (1 - small) * away / away.max(1, keepdims=True)).min(0)
-    along = int(np.ceil(np.trapezoid(1 / sizes, R) / largest))
+    at = {RADIUS: max(small, 0.3)} | dict.fromkeys(places, small)
+    R, (places, sizes) = np.linspace(0, RADIUS, 4001), np.transpose(list(at.items()))
+    away = np.abs(np.subtract.outer(R, places))
+    size = (sizes + (1 - sizes) * away / away.min(1).max()).min(1)
+    along = int(np.ceil(np.trapezoid(1 / size, R) / largest))
     return fx.mesh.disc(radius=RADIUS, thickness=thickness, elements=(plug.refine * along, plug.refine * 2),
-                        concentrate=dict.fromkeys(places, small))
+                        concentrate=at)
 
 
 def run(plug, max_steps=400, through=(), **options):
