@@ -79,8 +79,8 @@ def mesh_for(plug):
     smallest, largest = np.clip((fillet or thickness) / parts, least * thickness, thickness / 2), RADIUS / 30
     small = min(smallest / largest, 1.0)
     at = {RADIUS: max(small, 0.3)} | dict.fromkeys(places, small)
-    R, (places, sizes) = np.linspace(0, RADIUS, 4001), np.transpose(list(at.items()))
-    away = np.abs(np.subtract.outer(R, places))
+    R, sizes = np.linspace(0, RADIUS, 4001), np.array(list(at.values()))
+    away = np.abs(np.subtract.outer(R, list(at)))
     size = (sizes + (1 - sizes) * away / away.min(1).max()).min(1)
     along = int(np.ceil(np.trapezoid(1 / size, R) / largest))
     return fx.mesh.disc(radius=RADIUS, thickness=thickness, elements=(plug.refine * along, plug.refine * 2),

@@ -6,8 +6,8 @@ points of the sheet leave the edge of the plug there may be no state nearby to g
 one (`Path.jumps`), marked in the curves. The less friction, the more of the face slides over the edge, and the thinner
 it is drawn (a membrane under mu = 0.1 is stretched 130 times both ways at 20 cm): elements are in proportion to their
 distance from the axis, so that whatever comes to the edge has as many of them around it, and their pressures are
-continuous, for they are slim. Numbers of the first 8 cm are of smaller elements made for them. Lengths in cm, forces in
-N.
+continuous, for they are slim. Forces and walls of the first 8 cm are of smaller elements made for them. Lengths in cm,
+forces in N.
 """
 
 from typing import NamedTuple
@@ -25,9 +25,9 @@ from formingx.results import files
 from formingx.results.show import plots
 
 FRICTIONS = (0.1, 0.2, 0.5, 0.3, 1.0)      # begun in this order, two processes are busy to the end
-MOST = 25                                   # stretch of the face that elements are made for
-FIRST = 8                                   # cm: what elements made for this travel give is surer up to there
-ROUGH = 0.5                                 # mu from which on friction shears the sheet: two elements through it
+MOST = 25                                   # stretch of the face that elements are made for, at most
+FIRST = 8                                   # travel, cm, up to which elements of its own give forces and walls
+ROUGH = 0.5                                 # mu from which friction shears the sheet: two elements through it
 FACE_STRETCHES = (1.01, 1.05, 1.1, 1.2, 1.35, 1.5, 1.75, 2, 2.5, 3.2, 5, 10, 25, 80, 200)
 
 
@@ -53,9 +53,11 @@ def run(case) -> dict:
     membrane = membrane_curve(mu, fillet, travels[-1])
     path, end, elements = pushed(mu, fillet, membrane, travels, refine, ramp=2e-2)
     numbers = {"elements": list(elements), **key_numbers(path, end, travels)}
-    begun, *_ = pushed(mu, fillet, membrane, [t for t in travels if t <= FIRST], 2 * refine, ramp=2e-3)
-    for name in ("force_N_at_travel_cm", "least_wall_ratio_at_travel_cm"):
-        numbers[name] |= key_numbers(begun, "done", travels)[name]
+    first, first_end, first_elements = pushed(mu, fillet, membrane, [t for t in travels if t <= FIRST], 2 * refine,
+                                              ramp=2e-3)
+    for name, values in at_travels(first, travels).items():
+        numbers[name] |= values
+    numbers[f"first_{FIRST}_cm"] = {"elements": list(first_elements), "ended": first_end, **plugs.cost(first)}
     numbers["membrane_force_N_at_travel_cm"] = {
         f"{t:g}": float(np.interp(t, membrane.travel, membrane.force)) for t in travels}
     path.to_csv(folder / f"mu_{mu:g}.csv")
@@ -69,11 +71,9 @@ def run(case) -> dict:
 def pushed(mu, fillet, membrane, travels, refine, ramp) -> tuple:
     """(path, how it ended, elements) of a sheet whose elements are made for the last of these travels."""
     stretch = float(np.interp(travels[-1], membrane.travel, membrane.face_stretch))
-    number, near = plugs.proportionate(RADIUS, PLUG, min(stretch, MOST))
-    elements = int(np.ceil(refine * number)), refine * (2 if mu >= ROUGH else 1)
-    made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), mu, elements, near=near,
-                       model=fx.MixedPressure(space="P1"), points=4, penalty=2e5, ramp=ramp, elastic_slip=5e-3,
-                       nodes_per_step=16, comm=MPI.COMM_SELF)
+    made, elements = plugs.sliding(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), mu, min(stretch, MOST),
+                                   refine, 2 if mu >= ROUGH else 1, penalty=2e5, ramp=ramp, elastic_slip=5e-3,
+                                   comm=MPI.COMM_SELF)
     return *plugs.push(made, travels, smallest=1e-3, progress=False), elements
 
 
@@ -99,13 +99,20 @@ def membrane_curve(mu, fillet, last) -> Membrane:
     return Membrane(fine, *(PchipInterpolator(travels, values)(fine) for values in (forces, stretches)))
 
 
-def key_numbers(path, end, travels) -> dict:
-    """Forces, walls, jumps and cost of one path."""
+def at_travels(path, travels) -> dict:
+    """Forces and least walls at the travels that a path met."""
     met = {f"{t:g}": path.met(fx.travel(t)) for t in travels}
     met = {t: state for t, state in met.items() if state is not None}
     return {
         "force_N_at_travel_cm": {t: plugs.force(state) for t, state in met.items()},
         "least_wall_ratio_at_travel_cm": {t: float(path.profile(s).wall_ratio.min()) for t, s in met.items()},
+    }
+
+
+def key_numbers(path, end, travels) -> dict:
+    """Forces, walls, jumps and cost of one path."""
+    return {
+        **at_travels(path, travels),
         "jumps": len(path.jumps),
         "jumps_at_travel_cm": [state.measures["travel"] for state in path.jumps],
         "dissipated_in_jumps_MPa_cm3": [state.jump["dissipated"] for state in path.jumps],
@@ -123,7 +130,8 @@ def tell(mu, n) -> None:
         f" iterations, {n['cutbacks']} cut back, {n['jumps']} jumps, {n['solve_seconds']:.1f} s; force (membrane), N: "
         + ", ".join(f"{t} cm {f:.1f} ({n['membrane_force_N_at_travel_cm'][t]:.0f})"
                     for t, f in n["force_N_at_travel_cm"].items()),
-        *([] if n["ended"] == "done" else [f"  ended before its target: {n['ended'][:200]} ..."]))
+        *(f"  ended before its target: {end[:200]} ..." for end in (n["ended"], n[f"first_{FIRST}_cm"]["ended"])
+          if end != "done"))
 
 
 def draw(runs):

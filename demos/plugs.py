@@ -15,6 +15,8 @@ LAWS = {
     "frictionless": ("none", True),
 }
 """{name: (friction, separates)}; a number is Coulomb's coefficient."""
+GROWTH, AT_RIM = 0.09, 0.5
+"""Of the elements of `sliding`: size over the radius, and size at the rim over that of the largest."""
 
 
 def plug(radius, thickness, fillet, height=60.0):
@@ -31,17 +33,6 @@ def sheet(radius, thickness, plug_radius, law, elements, near=None, comm=COMM):
     return fx.mesh.disc(radius=radius, thickness=thickness, elements=elements, concentrate=near, comm=comm)
 
 
-def proportionate(radius, plug_radius, face_stretch, growth=0.09, at_rim=0.5) -> tuple:
-    """(elements, sizes to concentrate) along a sheet that slides over the edge: in proportion to the radius.
-
-    Whatever comes to the edge, stretched so far at last, has as many elements around it; at the axis they are a third
-    of what the edge is to hold then, and fall again to `at_rim` of the largest from half way to the rim.
-    """
-    smallest = 2 * plug_radius / radius / face_stretch / 3
-    number = (np.log(1 / smallest) + np.log(1 / at_rim) / (1 - at_rim)) / growth
-    return number, {0.0: smallest, radius: at_rim}
-
-
 def name_of(law) -> str:
     """A law as a key of the summary."""
     return law if isinstance(law, str) else f"coulomb_{law:g}"
@@ -53,9 +44,24 @@ def scene(radius, thickness, plug_radius, fillet, material, law, elements, suppo
     friction, separates = LAWS.get(law, (law, True))
     mesh = sheet(radius, thickness, plug_radius, law, elements, near, comm)
     return fx.Scene(mesh=mesh, materials=material, supports=[fx.Symmetry("axis"), support or fx.Clamped("rim")],
-                    model=model or fx.MixedPressure(),
+                    model=model,
                     contacts=[fx.Contact("top", plug(plug_radius, thickness, fillet), friction, separates=separates,
                                          moves=(0, -1), **options)])
+
+
+def sliding(radius, thickness, plug_radius, fillet, material, mu, face_stretch, refine=1, through=1, **options):
+    """(scene, elements) of a sheet that slides over the edge with Coulomb friction; options: of `scene`.
+
+    Elements in proportion to the radius: whatever comes to the edge has as many around it. At the axis they are a third
+    of what the edge holds when the face is stretched by face_stretch; half way to the rim they begin to fall to AT_RIM
+    of the largest. They are slim, so pressures are continuous.
+    """
+    smallest = 2 * plug_radius / radius / face_stretch / 3
+    along = (np.log(1 / smallest) + np.log(1 / AT_RIM) / (1 - AT_RIM)) / GROWTH
+    elements = int(np.ceil(refine * along)), refine * through
+    made = scene(radius, thickness, plug_radius, fillet, material, mu, elements, near={0.0: smallest, radius: AT_RIM},
+                 model=fx.MixedPressure(space="P1"), points=4, nodes_per_step=16, **options)
+    return made, elements
 
 
 def push(made, travels, pole_stretch=None, smallest=1e-6, **options):

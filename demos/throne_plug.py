@@ -15,7 +15,6 @@ plane only in part, which is why Throne's plane-strain analysis is worse; the ri
 from functools import cache
 from typing import NamedTuple
 
-import numpy as np
 import plugs
 from common import parser, save, say, summarise
 
@@ -49,9 +48,7 @@ THESIS = {"thin_throne": "much softer than measured", "thin_treloar": "compares 
 RUNS = {"held": ((120, 1), None, "stick"), "frictionless": ((100, 1), 3.0, "none")}
 QUICK = {"held": ((60, 1), None, "stick"), "frictionless": ((60, 1), 1.3, "none")}
 FILLETS = (0.18, 0.06, 0.02)                                 # over the plug's radius, against the membrane
-
-
-MU, FACE_STRETCH = 0.3, 25.0                                 # elements are made for so far drawn a face
+MU, FACE_STRETCH = 0.3, 25.0                                 # of friction, and of the face that elements are made for
 
 
 def press(sheet, law, elements, travels, stretch=None, fillet=FILLETS[0], rim="clamped"):
@@ -64,12 +61,9 @@ def press(sheet, law, elements, travels, stretch=None, fillet=FILLETS[0], rim="c
 
 def slide(sheet, travels, fillet, refine):
     """(path, how it ended, elements) of a sheet that slides over the edge with Coulomb friction."""
-    number, near = plugs.proportionate(RADIUS, sheet.plug, FACE_STRETCH)
-    elements = int(np.ceil(refine * number)), refine
-    made = plugs.scene(RADIUS, sheet.thickness, sheet.plug, fillet * sheet.plug,
-                       fx.MooneyRivlin(c10=sheet.c10, c01=sheet.c01), MU, elements, near=near,
-                       model=fx.MixedPressure(space="P1"), points=4, penalty=2e4, ramp=0.1, elastic_slip=0.02,
-                       nodes_per_step=16)
+    made, elements = plugs.sliding(RADIUS, sheet.thickness, sheet.plug, fillet * sheet.plug,
+                                   fx.MooneyRivlin(c10=sheet.c10, c01=sheet.c01), MU, FACE_STRETCH, refine,
+                                   penalty=2e4, ramp=0.1, elastic_slip=0.02)
     return *plugs.push(made, travels, smallest=1e-4), elements
 
 

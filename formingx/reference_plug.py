@@ -148,7 +148,6 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
     Raises:
         InputError: a size or constant that is not allowed; a stretch that this plug does not come to.
     """
-    from scipy.integrate import solve_ivp
     from scipy.optimize import brentq
     l0, c10, mu = positive("face_stretch", face_stretch), positive("c10", c10), non_negative("mu", mu)
     radius, thickness = positive("radius", radius), positive("thickness", thickness)
@@ -156,13 +155,12 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
     if not (f <= rp < 1 and l0 > 1):
         raise InputError(f"fillet = {fillet!r}, plug_radius = {plug_radius!r}, radius = {radius!r} must rise in this"
                          f" order, and face_stretch = {face_stretch!r} be above 1")
-    around = _touching(mu, h0, f)
 
     def upright(_, y):
         return y[3] - np.pi / 2
     upright.terminal = True  # type: ignore[attr-defined]
-    edge = solve_ivp(lambda s, y: around(*y), (0, 2 * (f + h0)), [(rp - f) / l0, rp - f, 0, 0, 1 - l0**-6],
-                     events=upright, dense_output=True, rtol=1e-9, atol=1e-12)
+    flat = np.array([(rp - f) / l0, rp - f, 0, 0, 1 - l0**-6])
+    edge = _integrated(2 * (f + h0), flat, _touching(mu, h0, f), events=upright, dense_output=True)
     whole = edge.t[-1]                        # of the arc length, around the edge
 
     def left(u):                              # where the membrane lets go, u of arc length up the edge and the side
@@ -194,18 +192,21 @@ def _tensions(t: float, l2: float) -> tuple[float, float]:
 
 def _along(length: float, y: np.ndarray, slopes: Callable) -> np.ndarray:
     """y = (R, r, z, phi, T1) at a distance from where it is known; lengths over the radius, tensions over 2 c10 h0."""
+    return y if length == 0 else _integrated(length, y, slopes).y[:, -1]
+
+
+def _integrated(length: float, y: np.ndarray, slopes: Callable, **options: Any) -> Any:
+    """What `solve_ivp` finds from y on; options: of it."""
     from scipy.integrate import solve_ivp
-    if length == 0:
-        return y
-    return solve_ivp(lambda s, y: slopes(*y), (0, length), y, rtol=1e-9, atol=1e-12).y[:, -1]
+    return solve_ivp(lambda s, y: slopes(*y), (0, length), y, rtol=1e-9, atol=1e-12, **options)
 
 
 def _touching(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
     """dy/ds on a rounded edge, or, without one, on the side of the plug."""
     def slopes(R, r, z, phi, t):
         l1, t2 = _tensions(t, r / R)
-        outside = h0 * R / (l1 * r) / 2                     # the middle surface, of the edge
-        kappa, lever = 1 / (fillet + outside), 1 / (1 + outside / fillet)
+        half = h0 * R / (l1 * r) / 2                        # of the thickness
+        kappa, lever = 1 / (fillet + half), 1 / (1 + half / fillet)
         N = t * kappa + t2 * np.sin(phi) / r
         return [1 / l1, np.cos(phi), np.sin(phi), kappa, (t2 - t) * np.cos(phi) / r + mu * lever * N]
     return slopes

@@ -199,6 +199,16 @@ def test_forces_on_a_plug_do_not_depend_on_the_steps_and_its_work_is_accounted_f
         assert share_of_friction(path) < 1 + 1e-6
 
 
+def test_a_sheet_without_friction_snaps_off_an_edge_too():
+    """Elements longer than the edge: no step is short enough where a node leaves it, and the plug moves on."""
+    made = plugs.scene(10.0, 0.1, 2.5, 0.05, fx.MooneyRivlin(c10=0.4, c01=0.04), "frictionless", (40, 1),
+                       near={1.5: 0.1, 2.5: 0.1})
+    path = fx.trace(made, until=fx.travel(5.0), through=[fx.travel(2.5)], step=fx.StepControl(target=6), progress=False)
+    assert path["travel"][-1] == pytest.approx(5.0, rel=1e-12)
+    assert path.jumps and all(state.jump["dissipated"] >= 0 for state in path.jumps)
+    assert path.jumps[0].measures["travel"] == pytest.approx(3.08, abs=0.05)
+
+
 def test_what_comes_to_rest_nowhere_is_said_in_bounded_time():
     mesh = fx.mesh.disc(radius=10.0, thickness=0.3, elements=(12, 1))
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.4), loads=[fx.Pressure("bottom")],

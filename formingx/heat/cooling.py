@@ -67,9 +67,8 @@ class Cooling:
         self.materials, self.unit, self.tolerance = materials, unit, positive("Cooling: tolerance", tolerance)
         self.work_to_heat = None if work_to_heat is None else positive("Cooling: work_to_heat", work_to_heat)
         self.boundaries = several("Cooling: boundaries", boundaries, "boundaries, such as Convection(...)")
-        self.tools = {name: ToolHeat.of(name, given)
-                      for name, given in instance("Cooling: tools", {} if tools is None else tools, Mapping,
-                                                     _TOOLS).items()}
+        tools = {} if tools is None else instance("Cooling: tools", tools, Mapping, _TOOLS)
+        self.tools = {name: ToolHeat.of(name, given) for name, given in tools.items()}
 
     def check(self, scene: Any) -> None:
         """An InputError unless it fits a scene."""

@@ -48,6 +48,7 @@ _SLIDES, _STICK, _HELD = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
 iterations."""
 
 _MOST_POINTS = 100
+"""Gauss points on a facet."""
 
 _AT_FOOT = 1e-7
 """Distances from the foot of the ramp, over theta, that are as good as none."""
@@ -101,7 +102,7 @@ class Contact(Part):
             raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
                              f" Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = count(f"{name}: nodes_per_step", nodes_per_step)
-        self.points = points if isinstance(points, str) and points == "nodes" else _points(f"{name}: points", points)
+        self.points = _points(f"{name}: points", points)
         self.moves = None if moves is None else pair(f"{name}: moves", moves)
         if self.moves == (0.0, 0.0):
             raise InputError(f"{name}: moves = (0, 0): must name a direction, or be None")
@@ -175,11 +176,14 @@ def _coefficient(name: str, friction: Any) -> Any:
     return non_negative(name, friction)
 
 
-def _points(name: str, points: Any) -> int:
-    """How many on a facet."""
-    if count(name, points) > _MOST_POINTS:
+def _points(name: str, points: Any) -> str | int:
+    """"nodes", or a number of Gauss points; an InputError for anything else."""
+    if isinstance(points, str) and points == "nodes":
+        return points
+    number = count(name, points)
+    if number > _MOST_POINTS:
         raise InputError(f"{name} = {points!r}: must be at most {_MOST_POINTS} on a facet")
-    return int(points)
+    return number
 
 
 class Touch(NamedTuple):

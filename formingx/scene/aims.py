@@ -32,6 +32,7 @@ def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -
     """
     name, value, driven = target.name, target.value, scene.driven
     there = [thing for i, thing in enumerate(scene.things) if i not in (off or ())]
+    moulds = [thing for thing in there if thing in scene.contacts and not thing.driven]
     if name == "pole_stretch" and scene.kinematics.axisymmetric:
         largest, material = max(((m.largest_stretch("equibiaxial"), m) for m in scene.materials.values()),
                                 key=lambda found: found[0])
@@ -49,11 +50,11 @@ def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -
     if name.endswith(("pressure", "travel")):
         return beyond_all(scene, name.split("_")[-1], value)
     if name == "pole_height":
-        for contact in (t for t in there if t in scene.contacts and not t.driven):
+        for contact in moulds:
             if _beyond(scene, contact, value):
                 return f"it lies inside the tool of {contact!r}"
     if name == "enclosed_volume" and driven is not None and driven.quantity == "pressure":
-        for contact in (t for t in there if t in scene.contacts and not t.driven):
+        for contact in moulds:
             room = _room(scene, contact)
             if value > _ROOMY * room:
                 return f"the tool of {contact!r} has room for {room:.4g}"
@@ -96,7 +97,7 @@ def _beyond(scene: Scene, contact: Any, height: float) -> bool:
 def _room(scene: Scene, contact: Any) -> float:
     """Volume between the lower face of a flat body at rest and the mould over it; infinite if the mould is not closed.
 
-    Measured on squares: those that hang together with the body's, outside the tool.
+    Counted in squares: the connected ones outside the tool, from where the body is.
     """
     from scipy.ndimage import label
     face, low = scene.mesh.nodes_of(contact.on), scene.mesh.nodes_of(scene.driven.on)[:, 1].min()

@@ -15,7 +15,8 @@ from .diagnosis import Diagnosis
 from .direct import DirectSolver, condition
 
 _BEFORE, _SINGULAR = 10, 100.0
-"""So many states before the last one the tangent's condition is looked at, too; a growth by this tells of a branch."""
+"""States before the last one at which the condition number of the tangent is looked at, too, and the growth from
+there that tells of a singular tangent."""
 
 
 class Attempt(NamedTuple):
@@ -184,9 +185,10 @@ def _tangents(curve: Any, states: list) -> dict[str, Any]:
     facts: dict[str, Any] = {"limit_points": limits}
     turned = []
     usable = [s for s in states[1 if problem.forms.slack_at_rest else 0:] if s.kind != "limit point"]
-    for name, state in zip(("condition", "condition_before"), (states[-1], *usable[-1 - _BEFORE:-_BEFORE])):
-        if sign(state):
-            facts[name] = condition(problem.matrix, solver)
+    if sign(states[-1]):
+        facts["condition"] = condition(problem.matrix, solver)
+    if len(usable) > _BEFORE and sign(usable[-1 - _BEFORE]):
+        facts["condition_before"] = condition(problem.matrix, solver)
     if len(usable) > 1 and not problem.has_history:
         # one sign per stretch between limit points: there it cannot change unless another branch starts
         turned = _changes(states, usable, sign)

@@ -20,7 +20,7 @@ from ..errors import ConvergenceError
 from . import extrapolate
 from .curve import Curve
 from .diagnose import diagnose
-from .jump import AHEAD, Restless, jump
+from .jump import AHEAD, NoEquilibrium, jump
 from .newton import Failure, tangents
 from .progress import progress_bar, show
 from .state import Record, State
@@ -37,7 +37,6 @@ The last is also that of the step ahead where a kink turns the path back, or whe
 
 _FURTHEST = 1e-3
 """By how much the (dimensionless) control goes on at most in a jump from where the body is."""
-
 
 _PATIENCE = 500
 """States that gain less than a thousandth of the way to the target, after which a run gives up."""
@@ -74,7 +73,7 @@ class Run:
         self.until, self._aim = self.open[-1]
         self._step, self._best, self._began = step, 0.0, time.perf_counter()
         self._ahead = AHEAD                                 # by how much the control goes on in a jump
-        self._restless = False                              # if the last jump, at some cost, came to rest nowhere
+        self._no_equilibrium = False                        # if the last jump found none, which costs most
         self._values: list[float] = []                      # what is aimed at, in the states of this run
 
     def follow(self, max_steps: int | None, progress: bool, start: State | None) -> None:
@@ -195,8 +194,8 @@ class Run:
     def _next(self, old: State) -> list[State]:
         """The next states: one at a target within reach, or one step ahead, and what lies on the way to it.
 
-        Failures halve the step. Where short ones fail, or the control has its limit, the body jumps (the shortest ones,
-        if a jump came to rest nowhere).
+        Failures halve the step. Where short ones fail, or the control has its limit, the body jumps (where the
+        shortest fails, if the last jump found no equilibrium).
         """
         first, jumps, failed, most = self.step.length, [*_JUMPS, 0.0], 0, np.inf
         if self._at_fold == "jump" and (old.kind == "limit point" or old.slope * self._sense < 0):
@@ -218,7 +217,7 @@ class Run:
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good = self.step.failed()
                 failed += not isinstance(failure, _Astray)
-                soon = self._at_fold == "jump" and failed > 1 and length < jumps[0] and not self._restless
+                soon = self._at_fold == "jump" and failed > 1 and length < jumps[0] and not self._no_equilibrium
                 if self._may_jump and (not good or soon):
                     jumps.pop(0)
                     for ahead in (reach,) if good else (_JUMPS[-1], 0.0):
@@ -233,8 +232,10 @@ class Run:
         self.problem.prepare(old.x, old.control, old.direction, old.slope, reach, ends=True)
         behind = None if self.problem.has_kinks else extrapolate.behind(self.states, reach, self.curve.distance)
         with self.curve.newton.in_a_hurry(length > _JUMPS[0]):
-            new = self.curve.step(old, length, self._foretold, behind) if target is None else self.curve.step_to(
-                old, reach, bound.equation(target.value), self._foretold, behind)
+            if target is None:
+                new = self.curve.step(old, length, self._foretold, behind)
+            else:
+                new = self.curve.step_to(old, reach, bound.equation(target.value), self._foretold, behind)
         if target is not None:
             if not 0 < self.curve.progress(old, new) < 2 * length:
                 raise _Astray("the target was met on a far part of the path", [])
@@ -302,10 +303,10 @@ class Run:
                 break
             except Failure as last:
                 failure = last
-                self._restless |= isinstance(last, Restless)
+                self._no_equilibrium |= isinstance(last, NoEquilibrium)
         else:
             raise failure
-        self._restless = False
+        self._no_equilibrium = False
         self._ahead = min(10 * self._ahead, _FURTHEST)
         new.met = next((target for target, bound in self.open
                         if is_met(target, bound, self.curve.value(bound, new.x, new.control))), None)
@@ -464,7 +465,8 @@ def _usual(problem: Any, falls: bool) -> str:
     """
     if problem.setting.leading == len(problem.scene.things):
         return "jump"
-    return "follow" if not problem.has_history or _blown(problem) and not falls else "jump"
+    blown = _blown(problem) and not falls
+    return "follow" if not problem.has_history or blown else "jump"
 
 
 def _blown(problem: Any) -> bool:

@@ -49,8 +49,8 @@ _AT_REST = 1e-12
 kink of its law of friction the iteration without them may go to and fro."""
 
 
-class Restless(Failure):
-    """The body came to rest nowhere."""
+class NoEquilibrium(Failure):
+    """A body that moved on came to rest nowhere."""
 
 
 class _Viscous:
@@ -135,7 +135,7 @@ class _Way:
     def end(self, old: State) -> State | None:
         """The state at rest, if there is one near; raises `Failure` if the body, without a history, rests at none."""
         try:
-            with self.curve.newton.in_a_hurry(True):        # else there is a little more viscosity to be had
+            with self.curve.newton.in_a_hurry(True):        # if it fails the body moves on, with viscosity
                 state = self.curve.solve(self.at.x, self.control, fixed(self.control), "jump", self.at)
         except Failure:
             if self.rest > _AT_REST:
@@ -177,8 +177,8 @@ def jump(curve: Any, old: State, by: float, ahead: bool) -> State:
         ahead: start where the tangent leads to, not where the body is.
 
     Raises:
-        Failure: none was found, `Restless` if the body comes to rest nowhere. The problem's histories are then those of
-            `old`.
+        Failure: none was found, `NoEquilibrium` if the body comes to rest nowhere. The problem's histories are then
+            those of `old`.
     """
     problem, kept = curve.problem, curve.problem.memory
     way = _Way(curve, old, old.control + by)
@@ -193,7 +193,7 @@ def jump(curve: Any, old: State, by: float, ahead: bool) -> State:
                     state.direction, state.slope = -state.direction, -state.slope
                 return state
             eta *= way.move(way.at.x if way.solved else origin, eta)
-        raise Restless("no state follows that the body could snap to: it comes to rest nowhere", [])
+        raise NoEquilibrium("no state follows that the body could snap to: it comes to rest nowhere", [])
     except Failure:
         problem.memory = kept
         raise
