@@ -94,7 +94,7 @@ def plug(mu=1.0, thickness=0.5):
 
 def pushed(to=6.5, **step):
     """To 6.5 past two jumps; at 6.9 a point is at the brink of leaving the edge."""
-    return fx.trace(plug(), until=fx.travel(to), through=[fx.travel(t) for t in range(1, 6)],
+    return fx.trace(plug(), until=fx.travel(to), through=[fx.travel(t) for t in range(1, 7)],
                     step=fx.StepControl(target=6, **step), progress=False)
 
 

@@ -62,9 +62,10 @@ class ContactNodes:
         self.present = True                                 # it takes part in the stage
         self._last: Any = None                              # positions and tractions last computed
         self._in_tangent = np.zeros((len(self.points), 2, 2))   # stiffness per area in the tangent last made
-        # of Newton's method: `Motion` and sense of sliding at the iteration before
+        # of Newton's method: `Motion` and sense of sliding at the iteration before; which points touched before it
         self._iterate: Any = None
         self._sense: Any = None
+        self._touched: Any = None
         # of the step ahead: nodes that it may bring into contact (without history its own convergence limits them),
         # and that its tangent brings
         self._allowed = contact.nodes_per_step * (1 if self.law.remembers else 10)
@@ -203,6 +204,13 @@ class ContactNodes:
         return self._last[1].active
 
     @property
+    def arrivals(self) -> np.ndarray:
+        """Which points touch at the state last looked at that did not where Newton's method began, shape (n,)."""
+        if self._touched is None:
+            return np.zeros(len(self.points), dtype=bool)
+        return self.law.touching(self._last[0], self.touch) & ~self._touched
+
+    @property
     def scale(self) -> np.ndarray:
         """Of the forces in F by tractions, shape (n,)."""
         return self._scale
@@ -210,6 +218,7 @@ class ContactNodes:
     def begin(self, x: np.ndarray | None) -> None:
         """Newton's method begins ahead of a state with the nodes at x, shape (n, 2), if there is one."""
         self._sense = None
+        self._touched = None if x is None else self.law.touching(x, self.touch)
         self._iterate = None if x is None else self.law.motion(x, self.touch)
 
     def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:

@@ -1,8 +1,9 @@
-"""The status (free, stick, slide) of the few contact points for which it changes between iterations.
+"""The few contact points that a step brings, or whose status (free, stick, slide) changes between iterations.
 
 An iteration of Newton's method linearises the law of contact of every point at its status of the iteration before.
-Where the statuses of points depend on each other that can cycle. For the few points whose status changes the body is a
-compliance C (the inverse tangent, condensed to them): their motions y, to first order, satisfy
+Where the statuses of points depend on each other that can cycle, and where points arrive, at the foot of their law's
+ramp, it only halves their penetration. For the few points that arrive or change their status the body is a compliance C
+(the inverse tangent, condensed to them): their motions y, to first order, satisfy
 
     y - y0 + C (f(y) - f0 - S0 y) = 0,
 
@@ -31,7 +32,7 @@ a full one would lead further away, but not more often than so in a row (which m
 
 
 class Settling:
-    """The points whose status changed in one run of Newton's method.
+    """The points that arrived, or whose status changed, in one run of Newton's method.
 
     Attributes:
         failed: how often no consistent state of them was found.
@@ -39,13 +40,14 @@ class Settling:
 
     def __init__(self, problem: Any):
         self._problem, self._contacts = problem, problem.touching
-        self._marked = [np.zeros(len(c.points), dtype=bool) for c in self._contacts]
+        self._marked: list[np.ndarray] = []
         self._active: list[np.ndarray] = []
         self.failed = 0
 
     def look(self) -> None:
         """To be called once an iteration, after the problem was linearised."""
         now = [contact.active for contact in self._contacts]
+        self._marked = self._marked or [contact.arrivals for contact in self._contacts]
         for mark, a, b in zip(self._marked, self._active, now):
             mark |= a != b
         self._active = now
