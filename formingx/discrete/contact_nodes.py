@@ -66,9 +66,11 @@ class ContactNodes:
         self._iterate: Any = None
         self._sense: Any = None
         self._touched: Any = None
-        # of the step ahead: nodes that it may bring into contact (without history its own convergence limits them),
-        # and that its tangent brings
-        self._allowed = contact.nodes_per_step * (1 if self.law.remembers else 10)
+        # of the step ahead: nodes that it may bring into contact (where it does not matter when they come, its own
+        # convergence limits them), and that its tangent brings
+        heat = solid.scene.heat
+        timed = self.law.remembers or heat is not None and heat.conducts(contact)
+        self._allowed = contact.nodes_per_step * (1 if timed else 10)
         self._foreseen = 0
         self._memory: Any = None
         self.start()

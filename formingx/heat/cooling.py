@@ -87,12 +87,17 @@ class Cooling:
         """What a problem remembers of the temperature (`formingx.discrete.history.History`)."""
         return CoolingHistory(self, problem)
 
+    def conducts(self, contact: Any) -> bool:
+        """True if heat flows through a contact of the scene."""
+        return contact.name in self.tools
+
     def _touches(self, scene: Any) -> list[ContactWithTool]:
         names = [contact.name for contact in scene.contacts]
         for name in self.tools:
             known("Cooling: tools: contact", name, names)
+        touching = [(contact, self.tools[contact.name]) for contact in scene.contacts if self.conducts(contact)]
         return [ContactWithTool(contact.on, conductance=given.conductance, tool=given.tool)
-                for contact in scene.contacts for given in [self.tools.get(contact.name)] if given is not None]
+                for contact, given in touching]
 
 
 class Memory(NamedTuple):
@@ -122,7 +127,7 @@ class CoolingHistory:
         self._body = Conduction(scene.mesh, checked_materials(scene.mesh, cooling.materials),
                                 checked_boundaries(scene.mesh, [*cooling.boundaries, *touches], self._zero),
                                 scene.kinematics, self._zero, forms.u)
-        touching = [c for c in problem.contacts if c.contact.name in cooling.tools]
+        touching = [c for c in problem.contacts if cooling.conducts(c.contact)]
         self._touches = [(touch, contact, touch.conductance.copy())
                          for touch, contact in zip(self._body.touches, touching, strict=True)]
         self._n = len(self._body.points)

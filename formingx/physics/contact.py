@@ -69,8 +69,8 @@ class Contact(Part):
         separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
             start); with "stick" or "none".
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge).
-            What sticks depends on when it touched: with 4, a run takes half the iterations, and thickness changes by
-            some 0.1 % of itself.
+            What sticks or gives off heat depends on when it touched: with 4, a run takes half the iterations, and
+            thickness changes by some 0.1 % of itself.
         points: where it acts: at the "nodes" of the face, or at so many Gauss points of each facet, which let go one by
             one: smoother where a sheet slides over an edge.
         moves: (r, z) of the tool's motion per unit of travel: the tool is what the run controls; None: it stays.
