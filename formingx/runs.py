@@ -56,7 +56,8 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
             (with friction, or under a tool that moves, the body jumps where no state is left on it).
             "jump": it goes on, and the body snaps to its next equilibrium, see `Path.jumps`; also where no other state
             is near. "stop": end there. None: "jump" where it can go one way only: it is time, or there is a history
-            (friction); but a pressure is followed, for what an air supply makes grow is the volume.
+            (friction); but a pressure is followed, for what an air supply makes grow is the volume (with a history: as
+            long as the volume grows).
         resume: go on from what the checkpoint holds, which must be of this scene; if it holds nothing, begin.
 
     Raises:

@@ -171,7 +171,6 @@ def test_where_jumps_end_does_not_depend_on_how_eta_changes(rough, schedule, mon
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="at the brink of release two states are near, and either is found: 8.053, 8.079", strict=True)
 def test_nor_in_shorter_steps(monkeypatch):
     before = pushed(6.9, largest=0.02)["tool_force"][-1]
     monkeypatch.setattr(jump, "_FIRST", 3.0)

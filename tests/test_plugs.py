@@ -9,7 +9,7 @@ from conftest import ROOT, treloar
 import formingx as fx
 from formingx.errors import InputError
 from formingx.reference_plug import membrane_sliding_over_plug, membrane_under_plug
-from formingx.solve.follow import was_passed
+from formingx.solve.folds import snaps, was_passed
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import plug_extremes  # noqa: E402
@@ -81,6 +81,24 @@ def test_a_path_never_comes_back_to_itself():
     k = next(i for i, s in enumerate(path.states) if s.measures["pole_stretch"] > fallen.measures["pole_stretch"])
     del path.states[k:]
     assert not was_passed(curve, path.states[:-1], path.last, fallen)
+    path.last.kind = "jump"                                  # from here on the body is another
+    assert not was_passed(curve, path.states[:-1], path.last, risen)
+
+
+def test_work_ahead_is_that_of_the_pressure_on_the_volume_that_grows():
+    """Before, at and after the pressure's maximum; where the volume would shrink a sheet with friction snaps."""
+    path = fx.trace(treloar(support=fx.Clamped("rim")), until=fx.pole_stretch(4.0), progress=False)
+    curve, forms, h = path.record.curve, path.problem.forms, 1e-5
+    volume = fx.enclosed_volume(1.0).bind(path.problem)
+    limit = path.limit_points[0]
+    for state in (path.states[3], limit, path.last):
+        ends = [curve.value(volume, state.x + by * state.direction, state.control + by * state.slope) for by in (h, -h)]
+        growth = (ends[0] - ends[1]) / (2 * h)
+        work = curve.work_ahead(state) * forms.stress * forms.volume / forms.control_scale
+        assert work == pytest.approx(growth, rel=1e-6) and growth > 0
+    assert not snaps(curve, limit, "blow", 1.0)
+    limit.direction, limit.slope = -limit.direction, -limit.slope
+    assert snaps(curve, limit, "blow", 1.0) and not snaps(curve, limit, "follow", 1.0)
 
 
 WILLIAMS = dict(radius=8.89, plug_radius=1.905, thickness=0.6985, c10=0.448)

@@ -194,6 +194,13 @@ class Curve:
         """Distance from old to new along the tangent of old."""
         return self._inner(old.direction, old.slope, new.x - old.x, new.control - old.control)
 
+    def work_ahead(self, state: State) -> float:
+        """Work along the tangent of a state of what grows with the control, by its growth and by arc length."""
+        self._x.array_w[:] = state.x
+        self._b.array_w[:] = state.direction
+        self.problem.control_derivative(self._x, state.control, self.newton.F_control)
+        return -float(self.newton.F_control.dot(self._b))
+
     def value(self, bound: Any, x: np.ndarray, control: float) -> float:
         """A bound measure at (x, control)."""
         self._b.array_w[:] = x

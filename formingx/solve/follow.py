@@ -20,6 +20,7 @@ from ..errors import ConvergenceError
 from . import extrapolate
 from .curve import Curve
 from .diagnose import diagnose
+from .folds import blown, snaps, usual, was_passed
 from .jump import AHEAD, NoEquilibrium, jump
 from .newton import Failure, tangents
 from .progress import progress_bar, show
@@ -59,7 +60,7 @@ class Run:
         targets: (target, its measure): the last one ends the run, the others are met on the way.
         step: step control; default that of the record's last states, or `StepControl()`.
         at_fold: what to do where the control has a limit point: "follow" the path back, "jump" to the next state, or
-            "stop"; None: jump where the process drives one way, see `_at_fold`.
+            "stop"; None: as `folds.usual` says.
         accuracy: the error in time that is allowed, relative.
         label: what is said before the target beside a progress bar.
     """
@@ -93,7 +94,7 @@ class Run:
                 kept = self._go_on()
             else:
                 self._accept(self._facing_target(start))
-            self._at_fold = self._at_fold or _usual(self.problem, self._falls)
+            self._at_fold = self._at_fold or usual(self.problem, self._falls)
             self.step = replace(self._step or StepControl(**kept))
             self._close_met(record.last)
             self._settle()
@@ -129,8 +130,8 @@ class Run:
     @property
     def _may_jump(self) -> bool:
         """True if the body may jump: at folds, or, where a fold is followed, where contact leaves no next state."""
-        pushed = self.problem.has_kinks and not _blown(self.problem)
-        return self._at_fold == "jump" or self._at_fold == "follow" and (self.problem.has_history or pushed)
+        pushed = self.problem.has_kinks and not blown(self.problem)
+        return self._at_fold in ("jump", "blow") or self._at_fold == "follow" and (self.problem.has_history or pushed)
 
     @property
     def _sense(self) -> float:
@@ -198,7 +199,7 @@ class Run:
         shortest fails, if the last jump found no equilibrium).
         """
         first, jumps, failed, most = self.step.length, [*_JUMPS, 0.0], 0, np.inf
-        if self._at_fold == "jump" and (old.kind == "limit point" or old.slope * self._sense < 0):
+        if snaps(self.curve, old, self._at_fold, self._sense):
             return self._snap(old)
         while True:
             length = self.problem.reach(old.x, old.control, old.direction, old.slope, min(self.step.length, most))
@@ -455,35 +456,6 @@ class _Late(Exception):
 
 class _Astray(Failure):
     """A state was found, but not one that a step should come to: a shorter one will do better."""
-
-
-def _usual(problem: Any, falls: bool) -> str:
-    """What is done at folds: "jump" if the control goes one way.
-
-    Time does. With a history so does whatever is driven, for to follow a fold would be to let it go back; but where a
-    pressure that is put on has its maximum it is the volume of the air that goes on growing. `falls`: it is let off.
-    """
-    if problem.setting.leading == len(problem.scene.things):
-        return "jump"
-    blown = _blown(problem) and not falls
-    return "follow" if not problem.has_history or blown else "jump"
-
-
-def _blown(problem: Any) -> bool:
-    """True if a pressure is what is driven."""
-    leading, things = problem.setting.leading, problem.scene.things
-    return leading is not None and leading < len(things) and things[leading].quantity == "pressure"
-
-
-def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) -> bool:
-    """True if a state found from `old` lies on a piece of the path passed earlier, to which it never comes back."""
-    near = 0.1 * curve.distance(old, new)
-    for a, b in zip(passed, passed[1:]):
-        if (a.control - new.control) * (b.control - new.control) < 0:
-            x, control = curve.interpolate(a, b, (new.control - a.control) / (b.control - a.control))
-            if curve.distance(new, replace(new, x=x, control=control)) < near:
-                return True
-    return False
 
 
 def begin(curve: Curve) -> State:

@@ -1,0 +1,54 @@
+"""What is done where what is driven has a limit point: follow the path back, or let the body snap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from .curve import Curve
+from .state import State
+
+
+def usual(problem: Any, falls: bool) -> str:
+    """What is done at folds: "follow", "jump", or "blow", which is to follow while the volume of the air grows.
+
+    Time goes one way. With a history so does whatever is driven, for to follow a fold would be to let it go back; but
+    where a pressure that is put on has its maximum it is the volume of the air that goes on growing, unless it has its
+    maximum there, too. `falls`: what is driven is let off.
+    """
+    if problem.setting.leading == len(problem.scene.things):
+        return "jump"
+    if not problem.has_history:
+        return "follow"
+    return "blow" if blown(problem) and not falls else "jump"
+
+
+def blown(problem: Any) -> bool:
+    """True if a pressure is what is driven."""
+    leading, things = problem.setting.leading, problem.scene.things
+    return leading is not None and leading < len(things) and things[leading].quantity == "pressure"
+
+
+def snaps(curve: Curve, old: State, at_fold: str, sense: float) -> bool:
+    """True if the body snaps from a state: its path would lead back. sense: 1 or -1, which way the control goes."""
+    if at_fold == "jump":
+        return old.kind == "limit point" or old.slope * sense < 0
+    return at_fold == "blow" and old.kind == "limit point" and curve.work_ahead(old) * sense < 0
+
+
+def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) -> bool:
+    """True if a state found from `old` lies on a piece of the path passed earlier, to which it never comes back.
+
+    (After a jump it may: then the body is another.)
+    """
+    near = 0.1 * curve.distance(old, new)
+    states = [] if old.kind == "jump" else passed[::-1]
+    for b, a in zip(states, states[1:]):
+        if b.kind == "jump":
+            break
+        if (a.control - new.control) * (b.control - new.control) < 0:
+            x, control = curve.interpolate(a, b, (new.control - a.control) / (b.control - a.control))
+            if curve.distance(new, replace(new, x=x, control=control)) < near:
+                return True
+    return False
