@@ -1,14 +1,15 @@
 """Calls of everything public with random arguments and damaged files: each must end, and end well.
 
-    python3 benchmarks/fuzz.py [CALLS] [SEED] [KIND ...]
+    python3 benchmarks/fuzz.py [--calls 10000] [--seed 0] [--kinds KIND ...]
 
 A call ends well in a result, an InputError, a ConvergenceError or an OSError, within 10 s. Call k of a seed is always
-the same one, so that one that ended badly can be repeated: `python3 benchmarks/fuzz.py --only K SEED`. The calls run in
-a process of their own, which is started again where one ends it.
+the same one, so that one that ended badly can be repeated: `--only K --seed SEED`. The calls run in a process of their
+own, which is started again where one ends it.
 """
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import json
 import math
@@ -55,7 +56,8 @@ def run(calls: int, seed: int = 0, kinds: tuple[str, ...] = ()) -> list[Ending]:
 
 def _watched(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> Iterator[Ending]:
     """The calls of one process, up to the one that ends it or takes too long."""
-    child = subprocess.Popen([sys.executable, __file__, "--child", str(first), str(last), str(seed), *kinds],
+    options = ["--child", first, last, "--seed", seed, *(["--kinds", *kinds] if kinds else [])]
+    child = subprocess.Popen([sys.executable, __file__, *map(str, options)],
                              stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=Path(__file__).parents[1])
     assert child.stdout is not None
     number, began = first, ""
@@ -382,26 +384,27 @@ def _of_runs(folder: Path, made: Any) -> dict[str, Callable]:
     return {"runs damaged checkpoint": load, "runs table": table}
 
 
-def main(words: list[str]) -> int:
+def main() -> int:
     """Print how the calls ended; 1 if one ended badly."""
-    if {"-h", "--help"} & set(words):
-        print(__doc__)
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--calls", type=int, default=10000)
+    options.add_argument("--seed", type=int, default=0)
+    options.add_argument("--kinds", nargs="+", default=[], help="first words of what is called: files, runs, ...")
+    options.add_argument("--only", type=int, metavar="K", help="make call K of the seed, and no other")
+    options.add_argument("--child", type=int, nargs=2, help=argparse.SUPPRESS)     # first and last call
+    args = options.parse_args()
+    calls = args.child if args.only is None else (args.only, args.only + 1)
+    if calls:
+        child(*calls, args.seed, tuple(args.kinds))
         return 0
-    if words[:1] == ["--child"]:
-        child(int(words[1]), int(words[2]), int(words[3]), tuple(words[4:]))
-        return 0
-    if words[:1] == ["--only"]:
-        child(int(words[1]), int(words[1]) + 1, int(words[2]), tuple(words[3:]))
-        return 0
-    calls, seed = (int(w) for w in (*words[:2], *("10000", "0")[len(words[:2]):]))
-    endings = run(calls, seed, tuple(words[2:]))
+    endings = run(args.calls, args.seed, tuple(args.kinds))
     for how, n in Counter(e.how for e in endings).most_common():
         print(f"{n:6} {how}")
     for e in endings:
         if e.bad:
-            print(f"call {e.number} of seed {seed}: {e.call}: {e.how} {e.text}")
+            print(f"call {e.number} of seed {args.seed}: {e.call}: {e.how} {e.text}")
     return int(any(e.bad for e in endings))
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())
