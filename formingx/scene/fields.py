@@ -47,7 +47,10 @@ def _values(field: Any, points: np.ndarray, name: str) -> np.ndarray:
     elif hasattr(field, "temperature"):
         return _values(field.temperature(), points, name)
     elif callable(field):
-        found = np.broadcast_to(np.asarray(field(R, Z), dtype=float), len(points))
+        try:
+            found = np.broadcast_to(np.asarray(field(R, Z), dtype=float), len(points))
+        except Exception as error:
+            raise InputError(f"{name}: the function of (R, Z) fails: {type(error).__name__}: {error}") from error
     else:
         found = np.full(len(points), finite(name, field))
     if not np.all(np.isfinite(found)):
