@@ -77,6 +77,14 @@ def test_distance_against_brute_force(name):
     np.testing.assert_allclose(tool.signed_distance(points), signed, atol=2e-7 * tool.size)
 
 
+def test_behind_an_arc_with_an_open_end_there_is_a_distance_too():
+    """A tool of the other half plane, whose tip is round: what lies beside the tip, and within no piece's reach."""
+    tool = fx.tools.Tool([(0.0, 0.0), (-2.0, -2.0)], [0.1, 0])
+    near = tool.nearest(np.random.default_rng(0).uniform(-2, 2, (200, 2)))
+    assert np.all(np.isfinite(near.distance))
+    np.testing.assert_allclose(np.hypot(*near.normal.T), 1.0, rtol=1e-12)
+
+
 @pytest.mark.parametrize("name", SHAPES)
 def test_normal_and_curvature_are_derivatives_of_distance(name):
     tool, h = SHAPES[name], 1e-5

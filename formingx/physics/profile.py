@@ -164,7 +164,9 @@ class Tool:
         angle = np.mod(self._sign[arcs] * (np.arctan2(up, across) - self._start[arcs]), TURN)
         at[:, arcs] = np.where(angle > TURN - _FLAT, 0.0, angle)
         d[:, arcs] = self._sign[arcs] * (self._radius[arcs] - np.maximum(np.hypot(across, up), 1e-300))
-        d[(at < self._low) | (at > self._high)] = np.inf
+        beyond = (at < self._low) | (at > self._high)
+        beyond[beyond.all(axis=1)] = False                  # behind an arc with an open end: all pieces, as if longer
+        d[beyond] = np.inf
         best, i = np.argmin(np.abs(d), axis=1), np.arange(len(x))
         s, line, rel = self._sign[best], np.isnan(self._radius[best]), rel[i, best]
         rho = np.maximum(np.hypot(rel[:, 0], rel[:, 1]), 1e-300)
