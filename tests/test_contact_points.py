@@ -77,16 +77,17 @@ def plugged():
 
 
 def numbers(path):
-    """Of the last state. (How far the steps before it go is decided by tangents, known less well than states.)"""
+    """At both targets. (How far other steps go is decided by tangents, which are known less well than states.)"""
     table, columns = path.contact(), ("tool_force", "pole_height", "contact_length")
-    return np.concatenate([[path[c][-1] for c in columns], table.pressure, table.friction, table.points.ravel()])
+    met = [path.met(fx.travel(t)).measures[c] for t in (2.5, 3.0) for c in columns]
+    return np.concatenate([met, table.pressure, table.friction, table.points.ravel()])
 
 
 def push(folder, start=None):
     """Make, or go on with, a run that leaves its states in a folder."""
     scene = plugged()
-    path = fx.trace(scene, until=fx.travel(3.0), progress=False, tolerances=fx.Tolerances(residual=1e-9),
-                    start=start and fx.load(start, scene, state=4))
+    path = fx.trace(scene, until=fx.travel(3.0), through=[fx.travel(2.5)], progress=False,
+                    tolerances=fx.Tolerances(residual=1e-9), start=start and fx.load(start, scene, state=4))
     path.save(folder)
     return path
 

@@ -75,13 +75,13 @@ def pressed():
                                          name="plug", penalty=2e4, ramp=1e-5)])       # stiffer: round-off shows
 
 
-def drawn_over(conductance):
+def drawn_over():
     """How far the touch of a ball without friction spreads from state to state, over the length of an element."""
     n, ball = 12, fx.tools.sphere(radius=0.8, z=0.05)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(n, 1)), temperature=150.0,
                      materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      heat=fx.Cooling(fx.ThermalProperties(conductivity=0.01, density=1.0, heat_capacity=1.0),
-                                     unit="C", tools={"ball": (conductance, 30.0)}, tolerance=5.0),
+                                     unit="C", tools={"ball": (0.1, 30.0)}, tolerance=5.0),
                      contacts=[fx.Contact("top", ball, "none", moves=(0, -1), name="ball")])
     path = fx.Process(scene).run([fx.Stage("push", drive="ball", until=fx.travel(0.4), duration=0.5)], progress=False,
                                  accuracy=0.5, step=fx.StepControl(length=0.5))
@@ -90,9 +90,9 @@ def drawn_over(conductance):
 
 def test_what_gives_off_heat_touches_node_by_node(monkeypatch):
     """When a node touches decides how cold it becomes: a step brings one, half an element (where none cools, more)."""
-    assert drawn_over(0.1) < 1.01
+    assert drawn_over() < 1.01
     monkeypatch.setattr(fx.Cooling, "conducts", lambda cooling, contact: False)
-    assert drawn_over(0.1) > 1.01
+    assert drawn_over() > 1.01
 
 
 def press(scene, **options):

@@ -195,7 +195,10 @@ class Curve:
         return self._inner(old.direction, old.slope, new.x - old.x, new.control - old.control)
 
     def work_ahead(self, state: State) -> float:
-        """Work along the tangent of a state of what grows with the control, by its growth and by arc length."""
+        """Work of the driven load along the tangent of a state, per unit of control and of arc length.
+
+        Of a pressure that is the growth of the enclosed volume (dimensionless).
+        """
         self._x.array_w[:] = state.x
         self._b.array_w[:] = state.direction
         self.problem.control_derivative(self._x, state.control, self.newton.F_control)

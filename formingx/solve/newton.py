@@ -27,11 +27,11 @@ SETTLING = 40
 set for the first time do not count: of a slack sheet on a flat plug a hundred points let go one or two at a time.
 (With a history, which depends on the step, a shorter step is better.)"""
 
-_LEFT_ALONE = 1
-"""The iteration (from 0) that settles no contact points: what the first got wrong often comes right in it."""
-
 HURRIED = 16
 """The same, of a contact with a history where there is something cheaper to try, such as half the step."""
+
+_LEFT_ALONE = 1
+"""The iteration (from 0) that settles no contact points: what the first got wrong often comes right in it."""
 
 SMALL = 1e-3
 """Corrections (dimensionless displacement) that may grow without a sign of divergence while the active set changes."""
@@ -217,7 +217,7 @@ class BorderedNewton:
         self._chords.begin(problem.setting, chords and not problem.has_kinks)
         work0 = moved = 0.0
         active = _ActiveSet(problem)
-        points = Settling(problem) if problem.touching else None
+        points = Settling(problem) if problem.has_kinks else None
         while True:
             residual = self.F.norm() / (problem.force_scale + UNLOADED)
             if not np.isfinite(residual):
