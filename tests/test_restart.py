@@ -355,6 +355,7 @@ def stop(problem):
         os.kill(os.getpid(), signal.SIGINT)
     return float(stop.calls)
 stop.calls = 0
+signal.signal(signal.SIGINT, signal.default_int_handler)         # what a shell starts in the background ignores it
 fx.trace(make(), until=until, progress=False, checkpoint=sys.argv[1], record={"calls": stop})
 """
 

@@ -30,6 +30,12 @@ set for the first time do not count: of a slack sheet on a flat plug a hundred p
 HURRIED = 16
 """The same, of a contact with a history where there is something cheaper to try, such as half the step."""
 
+_CAME_BACK = 8
+"""Returns of the active set to one it has had before, after which it cycles (solutions took up to 4)."""
+
+_ASTRAY = 0.3
+"""Three corrections in a row above this lead nowhere, contact or not (those of solutions stayed below 0.1)."""
+
 _LEFT_ALONE = 1
 """The iteration (from 0) that settles no contact points: what the first got wrong often comes right in it."""
 
@@ -70,14 +76,14 @@ class _ActiveSet:
     Attributes:
         changed: the iteration at which it changed last; share: of a correction to take, halved when an active set comes
             back: full corrections would cycle.
-        found: how often a small correction led to an active set for the first time.
+        found: how often a small correction led to an active set for the first time; returns: how often one came back.
     """
 
     def __init__(self, problem: Any):
         self._problem, self._iteration = problem, -1
         self._seen: dict[Any, int] = {}
         self._last: Any = None
-        self.changed, self.share, self.found = 0, 1.0, 0
+        self.changed, self.share, self.found, self.returns = 0, 1.0, 0, 0
 
     def look(self, moved: float) -> None:
         """To be called once an iteration, after the residual was computed; moved: by the correction before."""
@@ -87,6 +93,7 @@ class _ActiveSet:
             self.changed = self._iteration
             if now in self._seen:
                 self.share = max(self.share / 2, 0.25)
+                self.returns += 1
             else:
                 self.found += moved < SMALL and not self._problem.has_history
         elif self._iteration > self.changed + 1:
@@ -182,10 +189,10 @@ class BorderedNewton:
         self.b.scale(-1)
         return bool(np.isfinite(self.b.norm()))
 
-    def _factorise(self, x: PETSc.Vec, control: float, ahead: bool = False) -> bool:
+    def _factorise(self, x: PETSc.Vec, control: float, ahead: bool = False, rescale: bool = True) -> bool:
         """Make factors of the tangent, and `F_control`; False if it is singular."""
         self.problem.tangent(x, control, ahead)
-        good = self.solver.factorise()
+        good = self.solver.factorise(rescale)
         self._chords.made(self.problem.setting if good else None)
         if good:
             self.problem.control_derivative(x, control, self.F_control, ahead)
@@ -234,7 +241,7 @@ class BorderedNewton:
                 points.look()
             self._check(history, active, moved)
             chord = self._chords.serve(residual, self.tolerances.residual)
-            if not self._solve(x, control, chord):
+            if not self._solve(x, control, chord, rescale=not history):
                 raise Failure("the tangent matrix is singular", history)
             step = self._correction(x, control, constraint, history)
             share = active.share
@@ -258,8 +265,11 @@ class BorderedNewton:
         """Raise `Failure` if the iteration diverges, or takes too long."""
         quiet = history[active.changed:]
         grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
-        if grown and not (self.problem.has_kinks and moved < SMALL):
+        astray = len(history) > 2 and min(iteration.correction for iteration in history[-3:]) > _ASTRAY
+        if astray or grown and not (self.problem.has_kinks and moved < SMALL):
             raise Failure("the iteration diverges", history)
+        if active.returns >= _CAME_BACK:
+            raise Failure("contact does not settle: the same points touch, stick and slide in turns", history)
         most = min(self.tolerances.settling, HURRIED) if self._hurried else self.tolerances.settling
         settling = len(history) - min(active.found, 4 * SETTLING) >= most
         if len(quiet) >= self.tolerances.iterations or settling:
@@ -267,13 +277,13 @@ class BorderedNewton:
             raise Failure("contact does not settle: " * unsettled + f"no convergence in {len(history)} iterations",
                           history)
 
-    def _solve(self, x: PETSc.Vec, control: float, chord: bool) -> bool:
+    def _solve(self, x: PETSc.Vec, control: float, chord: bool, rescale: bool) -> bool:
         """`self.a` = -K^-1 F and, but in a chord iteration, a new K and `self.b` as in `tangent`; False if singular."""
         if chord:
             self.solver.solve(self.F, self.a)
             self.a.scale(-1)
             return True
-        if not self._factorise(x, control):
+        if not self._factorise(x, control, rescale=rescale):
             return False
         both = self.solver.solve_all(np.column_stack([self.F.array_r, self.F_control.array_r]))
         self.a.array_w[:], self.b.array_w[:] = -both[:, 0], -both[:, 1]
