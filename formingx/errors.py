@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from numbers import Complex, Real
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 
 class InputError(ValueError):
@@ -120,6 +122,27 @@ def pair(name: str, values: Any) -> tuple[float, float]:
     if len(found) != 2:
         raise InputError(f"{name} = {values!r}: must be two numbers")
     return finite(name, found[0]), finite(name, found[1])
+
+
+def values(name: str, function: Callable, at: Mapping[str, np.ndarray]) -> np.ndarray:
+    """A user's function of arrays of one shape, by name, as floats of that shape; an InputError unless all are finite.
+
+    (One that `function` raises goes through.)
+    """
+    arguments = ", ".join(at) if len(at) == 1 else f"({', '.join(at)})"
+    try:
+        found = np.broadcast_to(np.asarray(function(*at.values()), dtype=float), np.shape(next(iter(at.values()))))
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"{name}: the function of arrays {arguments} fails:"
+                         f" {type(error).__name__}: {error}") from error
+    wrong = ~np.isfinite(found)
+    if np.any(wrong):
+        where = ", ".join(f"{array[wrong].flat[0]:.6g}" for array in at.values())
+        raise InputError(f"{name}: is {found[wrong].flat[0]}, not a finite number, at"
+                         f" {arguments} = {where if len(at) == 1 else f'({where})'}")
+    return found
 
 
 def place(name: str, value: Any) -> Path:

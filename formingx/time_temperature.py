@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import ufl
 
-from .errors import InputError, finite, known, positive
+from .errors import InputError, finite, known, positive, values
 from .tables import Table
 
 ABSOLUTE_ZERO = {"C": -273.15, "K": 0.0}
@@ -34,18 +34,7 @@ class FunctionOfTemperature:
         T = np.asarray(temperature, dtype=float)
         if isinstance(self.function, Table):
             self.function.check(T, "temperature")
-        try:
-            found = np.broadcast_to(np.asarray(self.function(T), dtype=float), T.shape)
-        except (TypeError, ValueError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"the constant {self!r} must be a function of an array of temperatures, shape (n,):"
-                             f" {error}") from None
-        wrong = ~np.isfinite(found)
-        if np.any(wrong):
-            raise InputError(f"the constant {self!r} is {found[wrong].flat[0]} at a temperature of"
-                             f" {T[wrong].flat[0]:.6g}")
-        return found
+        return values(f"the constant {self!r}", self.function, {"temperature": T})
 
     def __repr__(self) -> str:
         return self._words

@@ -15,7 +15,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from ..errors import InputError, finite, known
+from ..errors import InputError, finite, known, values
 from ..tables import Table
 from ..time_temperature import ABSOLUTE_ZERO, FunctionOfTemperature
 
@@ -64,14 +64,7 @@ class OfPosition(Varying):
 
     def __call__(self, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
         """Values, shape (n,), all finite."""
-        try:
-            found = np.broadcast_to(np.asarray(self.function(R, Z), dtype=float), np.shape(R))
-        except (TypeError, ValueError) as error:
-            raise InputError(f"the constant {self!r} must be a function of arrays (R, Z), shape (n,):"
-                             f" {error}") from None
-        for i in np.flatnonzero(~np.isfinite(found))[:1]:
-            raise InputError(f"the constant {self!r} is {found[i]} at (R, Z) = ({R[i]:.6g}, {Z[i]:.6g})")
-        return found
+        return values(f"the constant {self!r}", self.function, {"R": R, "Z": Z})
 
     def values(self, sample):
         return self(*sample.points.T)

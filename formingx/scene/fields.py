@@ -10,7 +10,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from .. import csv_files
-from ..errors import InputError, finite
+from ..errors import InputError, finite, values
 from ..mesh import Mesh
 from ..mesh.locate import locate
 from ..tables import Table
@@ -47,10 +47,7 @@ def _values(field: Any, points: np.ndarray, name: str) -> np.ndarray:
     elif hasattr(field, "temperature"):
         return _values(field.temperature(), points, name)
     elif callable(field):
-        try:
-            found = np.broadcast_to(np.asarray(field(R, Z), dtype=float), len(points))
-        except Exception as error:
-            raise InputError(f"{name}: the function of (R, Z) fails: {type(error).__name__}: {error}") from error
+        return values(name, field, {"R": R, "Z": Z})
     else:
         found = np.full(len(points), finite(name, field))
     if not np.all(np.isfinite(found)):
