@@ -38,9 +38,10 @@ def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges:
     return domain, marks[0], marks[1]
 
 
-def assemble_matrix(matrix: Any, form: Any, bcs: Any) -> None:
-    """Add a compiled form's entries to a PETSc matrix, but none in the rows and columns that `bcs` hold: 1 there."""
-    fem_petsc.assemble_matrix(matrix, form, bcs=bcs)  # type: ignore[misc]  # its types are those of another variant
+def assemble_matrix(matrix: Any, form: Any, bcs: Any, held: float = 1.0) -> None:
+    """Add a compiled form's entries to a PETSc matrix, but for the rows and columns that `bcs` hold: these get `held`
+    on the diagonal, else nothing."""
+    fem_petsc.assemble_matrix(matrix, form, bcs, held)  # type: ignore[misc]  # its types are those of another variant
 
 
 def interpolation_points(space: Any) -> Any:

@@ -218,6 +218,13 @@ class Formulation(ABC):
         dx = ufl.dx(self.domain, metadata={"quadrature_degree": 4})
         return (v[0] + v[1]) * self.weight / self.constant(self.volume) * dx
 
+    def viscosity(self) -> Any:
+        """Bilinear form of a viscous stress, P = dF/dt, as the residual is scaled: dF : dF over the volume."""
+        F = self.scene.kinematics.deformation_gradient(self.u, self.X)
+        potential = ufl.inner(F, F) / 2 * self.weight / self.constant(self.volume)
+        dx = ufl.dx(self.domain, metadata={"quadrature_degree": 4})
+        return ufl.derivative(ufl.derivative(potential * dx, self.w, self.test_function()), self.w)
+
     def thickness(self, boundary: str) -> float:
         """Volume of the body over the area of a boundary, length."""
         return self.volume / self.integral(self.scene.kinematics.weight(self.X) * self.face(boundary, 2)[1])

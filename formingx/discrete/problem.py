@@ -27,6 +27,7 @@ from .formulations import formulate
 from .history import MaterialHistory
 from .matrix import ExtendedMatrix
 from .schedule import Setting
+from .viscosity import Viscosity
 
 
 class _Stage(NamedTuple):
@@ -287,6 +288,14 @@ class Problem:
         self.set_state(x, control)
         fields = x.array_r[: self._n]
         return self._matrix.fill([(c.dofs, c.stiffness(fields, control, ahead)) for c in self.touching])
+
+    def viscosity(self) -> Viscosity:
+        """That of the body as it is held now; to be destroyed."""
+        return Viscosity(self._viscosity, self._stage.active.bcs)
+
+    @cached_property
+    def _viscosity(self) -> Any:
+        return self.forms.compile(self.forms.viscosity())
 
     def changes_ahead(self, x: PETSc.Vec, control: float) -> list[np.ndarray]:
         """Of each contact that takes part: by how much the tangent `ahead` differs from the one last made."""

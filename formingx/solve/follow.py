@@ -218,7 +218,8 @@ class Run:
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good = self.step.failed()
                 failed += not isinstance(failure, _Astray)
-                soon = self._at_fold == "jump" and failed > 1 and length < jumps[0] and not self._no_equilibrium
+                soon = (self._at_fold == "jump" and failed > 1 and length < jumps[0] and not self._no_equilibrium
+                        and old.kind != "start")
                 if self._may_jump and (not good or soon):
                     jumps.pop(0)
                     for ahead in (reach,) if good else (_JUMPS[-1], 0.0):

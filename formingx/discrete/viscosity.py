@@ -1,0 +1,46 @@
+"""A viscous stress in a body that moves from one place to another: P = eta dF, for all of the body alike."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from dolfinx.fem import petsc as fem_petsc
+from petsc4py import PETSc
+
+from .. import _compat
+
+
+class Viscosity:
+    """Nodal forces eta V dx by a change dx of the unknowns; none by unknowns that are held, nor on them.
+
+    Args:
+        form: compiled bilinear form of V; bcs: what is held.
+    """
+
+    def __init__(self, form: Any, bcs: list):
+        self._matrix = fem_petsc.create_matrix(form)
+        _compat.assemble_matrix(self._matrix, form, bcs, held=0.0)
+        self._matrix.assemble()
+        self._change, self._forces = self._matrix.createVecs()
+        self._rows = np.arange(*self._matrix.getOwnershipRange(), dtype=PETSc.IntType)
+        self._entries = self._matrix.getValuesCSR()
+
+    def forces(self, change: np.ndarray, eta: float) -> np.ndarray:
+        """eta V dx; own part of both, shape (n,), that of the fields first."""
+        found, n = np.zeros_like(change), len(self._rows)
+        self._change.array_w[:] = change[:n]
+        self._matrix.mult(self._change, self._forces)
+        found[:n] = eta * self._forces.array_r
+        return found
+
+    def add_to(self, tangent: PETSc.Mat, eta: float) -> None:
+        """Add eta V to a tangent."""
+        pointers, columns, values = self._entries
+        tangent.setValuesIJV(pointers, columns, eta * values, PETSc.InsertMode.ADD_VALUES, self._rows)
+        tangent.assemble()
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        for thing in (self._matrix, self._change, self._forces):
+            thing.destroy()
