@@ -5,6 +5,8 @@ import pytest
 
 import formingx as fx
 from formingx.discrete.problem import Problem
+from formingx.discrete.viscosity import Viscosity
+from formingx.solve.jump import _Viscous
 
 pytestmark = pytest.mark.quick
 
@@ -155,3 +157,30 @@ def test_pressure_does_the_work_p_dV(kinematics):
     problem.control_derivative(x, 0.0, derivative)
     work = -derivative.dot(d) * forms.stress * forms.volume / forms.control_scale
     assert work == pytest.approx(change, rel=1e-8)
+
+
+@pytest.mark.parametrize("support", [fx.Clamped("rim"), fx.SimplySupported("rim")], ids=lambda s: type(s).__name__)
+def test_tangent_with_viscosity(support):
+    """Held unknowns (clamped) and means (hinged) are none that move against it."""
+    problem = Problem(scene(support=support))
+    x, d = random_state(problem)
+    viscous = _Viscous(problem)
+    viscous.eta, viscous.origin = 3.0, 0.5 * x.array_r
+    exact = x.duplicate()
+    viscous.tangent(x, 0.0).mult(d, exact)
+    f = residual(viscous, 0.0)
+    assert_second_order(lambda h: np.abs(difference(f, x, d, h) - exact.array_r).max(), exact.array_r)
+    assert np.abs(viscous.drag(x.array_r)).max() > 1e-3 and not viscous.drag(x.array_r)[problem.held].any()
+    viscous.destroy()
+
+
+@pytest.mark.parametrize("kinematics, dF2", [(fx.Axisymmetric(), 3), (fx.PlaneStrain(), 2)], ids=["ring", "bar"])
+def test_viscous_work_of_a_homogeneous_stretch(kinematics, dF2):
+    """u = s X: dF = s I (s I in the plane, bar), so the work of the viscous stress is s^2 |I|^2 per volume."""
+    problem = Problem(scene(keeping=fx.DisplacementPenalty(), kinematics=kinematics))
+    s, x = 0.3, problem.x.duplicate()
+    problem.forms.w.sub(0).interpolate(lambda X: s / problem.forms.length * X[:2])
+    x.array_w[: problem.n_owned] = problem.forms.w.x.array[: problem.n_owned]
+    viscosity = Viscosity(problem.forms.compile(problem.forms.viscosity()), [])
+    assert x.array_r @ viscosity.forces(x.array_r, 2.0) == pytest.approx(2.0 * dF2 * s**2, rel=1e-12)
+    viscosity.destroy()

@@ -142,7 +142,7 @@ def test_laws_that_are_refused(make, words):
     ({"unit": "F"}, "unit 'F' is not known"),
     ({"start": -274.0}, "absolute zero"),
     ({"start": "missing.csv"}, "cannot be read"),
-    ({"start": lambda R, Z: R / 0 * np.nan}, "not a finite number at"),
+    ({"start": lambda R, Z: R / 0 * np.nan}, "not a finite number, at"),
     ({"times": [2.0, 1.0]}, "times that grow|several that grow"),
     ({"times": []}, "several that grow"),
     ({"times": 0.0}, "times = 0.0"),

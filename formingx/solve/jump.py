@@ -36,8 +36,8 @@ _FEW, _TOLERANCES = 6, Tolerances(1e-8, 1e-6, settling=8)
 """Of a viscous solution. (Where contact does not settle soon more viscosity is cheaper than more iterations.)"""
 
 _FAR, _SHARE = (3e-4, 0.1), 0.1
-"""How far (dimensionless, in the mean) the body is to move in a viscous solution: a share of its way up to there, within
-bounds. What is lost depends on it and, with friction, where it ends (tests/test_jumps.py)."""
+"""How far (dimensionless, in the mean) the body is to move in a viscous solution: within bounds, a share of its way up
+to there. What is lost depends on it and, with friction, where it ends (tests/test_jumps.py)."""
 
 _MOST, _TOO_FAR = 1000, 10.0
 """Viscous solutions, and a distance (dimensionless, in the mean), after which the body counts as never coming to rest.

@@ -1,0 +1,52 @@
+"""What a second rank gains: wall time of an iteration's parts, of a clamped disc with some 3e5 unknowns.
+
+Run it on one rank and on two: `./fx python3 benchmarks/ranks.py`, `./fx mpirun -n 2 python3 benchmarks/ranks.py`.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
+from common import COMM, say  # noqa: E402
+from limit import clocked  # noqa: E402
+
+import formingx as fx  # noqa: E402
+from formingx.discrete.problem import Problem  # noqa: E402
+from formingx.results import files  # noqa: E402
+from formingx.solve.direct import DirectSolver  # noqa: E402
+
+PARTS = {"tangent": (Problem, "tangent"), "residual": (Problem, "residual"), "factors": (DirectSolver, "factorise"),
+         "two solves": (DirectSolver, "solve_all")}
+
+
+def wall() -> float:
+    """Seconds, of the last rank that comes here."""
+    COMM.barrier()
+    return time.perf_counter()
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--elements", type=int, nargs=2, default=(400, 40))
+    options.add_argument("--out", type=Path, default=Path("results/ranks"))
+    args = options.parse_args()
+    disc = fx.mesh.disc(radius=10.0, thickness=1.0, elements=tuple(args.elements))
+    scene = fx.Scene(mesh=disc, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
+    with clocked(*PARTS.values(), clock=wall) as spent:
+        began = wall()
+        path = fx.trace(scene, until=fx.pressure(0.05), progress=False)
+        whole = wall() - began
+    found = {name: float(np.median(calls[1:])) for name, calls in zip(PARTS, spent.values())}
+    say(f"{COMM.size} ranks, {path.problem.n_unknowns} unknowns, {path.counts.iterations} iterations, {whole:.2f} s: "
+        + ", ".join(f"{name} {seconds * 1e3:.1f} ms" for name, seconds in found.items()))
+    files.write_summary(args.out / f"ranks_{COMM.size}" / "summary.json",
+                        {"unknowns": path.problem.n_unknowns, "seconds": whole, **found}, COMM)
+
+
+if __name__ == "__main__":
+    main()
