@@ -9,6 +9,7 @@ import pytest
 from conftest import ROOT, drawn, run_json, treloar
 
 import formingx as fx
+from formingx.solve import diagnose
 
 
 def failure(attempt):
@@ -155,3 +156,11 @@ def test_a_script_that_stops_in_an_error_ends():
     done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=120)
     assert done.returncode == 1 and "ConvergenceError: pressure = 1 was not reached" in done.stderr
     assert "Exception ignored" not in done.stderr
+
+
+@pytest.mark.parametrize("grown, named", [(1000.0, True), (10.0, False)])
+def test_a_tangent_that_becomes_singular_is_named(grown, named):
+    """Its condition number has grown within a few states, and no limit point explains it."""
+    found = [cause for cause, _ in diagnose._of_branches({"what": "pressure", "condition_before": 1e10,
+                                                          "condition": grown * 1e10})]
+    assert any("becomes singular, and there is no limit point" in cause for cause in found) == named
