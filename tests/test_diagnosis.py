@@ -129,6 +129,28 @@ def test_condition_number():
     assert exact / 3 <= condition(problem.matrix, solver) <= exact * (1 + 1e-6)
 
 
+@pytest.mark.parametrize("able", [True, False], ids=["kept", "MUMPS cannot"])
+def test_solutions_with_a_scaling_that_is_kept(able, monkeypatch):
+    """Of another tangent, to round-off; a MUMPS that cannot keep one makes another."""
+    from formingx.discrete.problem import Problem
+    from formingx.solve import direct
+    problem = Problem(treloar(elements=(4, 1)))
+    x, found = problem.x.duplicate(), problem.x.duplicate()
+    x.set(0)
+    problem.tangent(x, 0.0)
+    solver = direct.DirectSolver(problem.matrix, problem.symmetric)
+    assert solver.factorise()
+    if not able:
+        monkeypatch.setattr(direct.DirectSolver, "scaling", 0)
+    x.array_w[:] = 0.01 * np.random.default_rng(1).standard_normal(len(x.array_r))
+    rhs = problem.tangent(x, 0.0) * x
+    assert solver.factorise(rescale=False)
+    monkeypatch.undo()
+    assert solver.scaling == (-1 if able else 7)
+    solver.solve(rhs, found)
+    assert np.abs(found.array_r - x.array_r).max() < 1e-10 * np.abs(x.array_r).max()
+
+
 SCRIPT = """
 import json, sys
 from mpi4py import MPI

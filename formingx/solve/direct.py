@@ -26,6 +26,7 @@ class DirectSolver:
         self._matrix, self._symmetric, self._determinant = matrix, symmetric, determinant
         self._columns: list[PETSc.Mat] = []                 # dense, for `solve_all`
         self._scaled = False                                # there are factors, and a scaling with them
+        self._keeps = matrix.comm.size == 1                 # MUMPS can keep it
         self._create()
 
     def factorise(self, rescale: bool = True) -> bool:
@@ -34,7 +35,7 @@ class DirectSolver:
         rescale: False keeps the scaling of rows and columns of the factorisation before, if there was one: to find
         one takes MUMPS a fifth of the time. (On several ranks it cannot keep one.)
         """
-        keep = self._scaled and not rescale and self._matrix.comm.size == 1
+        keep = self._keeps and self._scaled and not rescale
         self._ksp.getPC().getFactorMatrix().setMumpsIcntl(8, _KEEP_SCALING if keep else _SCALE)
         self._ksp.setOperators(self._matrix)
         try:
@@ -42,11 +43,18 @@ class DirectSolver:
             self._scaled = self._ksp.getPC().getFailedReason() == 0
         except PETSc.Error:
             self._scaled = False
-        if not self._scaled:             # PETSc refuses to factorise again with a MUMPS that has failed once
-            self.destroy()
-            self._create()
-            return keep and self.factorise()
-        return True
+        if self._scaled and (not keep or self.scaling == _KEEP_SCALING):
+            return True
+        self._keeps &= not self._scaled  # a MUMPS that cannot keep a scaling has taken none
+        self.destroy()                   # PETSc refuses to factorise again with a MUMPS that has failed once
+        self._create()
+        self._scaled = False
+        return keep and self.factorise()
+
+    @property
+    def scaling(self) -> int:
+        """How MUMPS scaled the matrix of the last factorisation: ICNTL(8), -1 as the one before."""
+        return int(self._ksp.getPC().getFactorMatrix().getMumpsInfog(33))
 
     def solve(self, rhs: PETSc.Vec, out: PETSc.Vec) -> None:
         """out = matrix^-1 rhs."""
