@@ -295,13 +295,15 @@ class Run:
         step: the length of the last step that went well.
 
         From where the body is, contact that remembers may settle at one control and not at another next to it: others
-        are tried, too.
+        are tried, too. What fades is let go of at once: on the way it is a load of its own, which no process has.
         """
-        others = (AHEAD, _FURTHEST) if length == 0 and self.problem.has_history else ()
+        fading = self.problem.setting.fading
+        others = (AHEAD, _FURTHEST) if length == 0 and self.problem.has_history and not fading else ()
         for ahead in dict.fromkeys((self._ahead, *others)):
             self._ahead = ahead
             try:
-                new = jump(self.curve, old, self._change(old, max(ahead, length * abs(old.slope))), length > 0)
+                by = 1 - old.control if fading else self._change(old, max(ahead, length * abs(old.slope)))
+                new = jump(self.curve, old, by, length > 0 and not fading)
                 break
             except Failure as last:
                 failure = last
