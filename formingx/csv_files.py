@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .errors import InputError, known, positive
+from .errors import InputError, known, place, positive
 from .units import LENGTHS, STRESSES
 
 _VOLUMES = {f"{name}3": size**3 for name, size in LENGTHS.items()} | {"l": 1e-3, "ml": 1e-6}
@@ -80,9 +80,10 @@ def read(file: Any) -> Table:
     Cells are parted by commas, semicolons or tabs; lines that begin with # are left out.
 
     Raises:
-        InputError: the file is not there, has no header, a row of another length, or fewer than two rows.
+        InputError: not the name of a file; the file is not there, has no header, a row of another length, or fewer
+            than two rows.
     """
-    name = os.fspath(file)
+    name = os.fspath(place("table", file))
     try:
         with open(name, newline="", encoding="utf-8-sig") as stream:
             lines = [(n, line) for n, line in enumerate(stream, 1) if line.strip() and not line.startswith("#")]
