@@ -103,13 +103,6 @@ class Problem:
         """Number of fields' unknowns that this rank owns."""
         return int(self._n)
 
-    @cached_property
-    def displacements(self) -> np.ndarray:
-        """Numbers of the unknowns that are displacements, own part."""
-        space = self.forms.space.sub(0)
-        dofs = np.concatenate([space.sub(i).dofmap.list.ravel() for i in range(space.num_sub_spaces)])
-        return np.unique(dofs[dofs < self._n])
-
     @property
     def symmetric(self) -> bool:
         """True if the tangent is symmetric: no follower load in the scene."""

@@ -89,8 +89,7 @@ class _Way:
     """From a state to the next: where the body is on it, and what was lost."""
 
     def __init__(self, curve: Any, old: State, control: float):
-        self.curve, self.problem, self.control = curve, curve.problem, control
-        self._old = old
+        self.curve, self.problem, self._old, self.control = curve, curve.problem, old, control
         self.viscous = _Viscous(curve.problem)
         self._newton = BorderedNewton(self.viscous, _TOLERANCES, curve.norm)
         self._x, self._drag = curve.problem.x.duplicate(), np.zeros(len(old.x))
@@ -131,7 +130,7 @@ class _Way:
         self._falls = 1.0
         return _GROWS[self.solved > 0]
 
-    def end(self, old: State) -> State | None:
+    def end(self) -> State | None:
         """The state at rest, if there is one near; raises `Failure` if the body, without a history, rests at none."""
         try:
             with self.curve.newton.in_a_hurry(True):        # if it fails the body moves on, with viscosity
@@ -147,7 +146,7 @@ class _Way:
         self._lose(self.at.x, state.x, np.zeros(len(state.x)))
         forms = self.problem.forms
         state.jump = {"dissipated": self.lost * forms.stress * forms.volume,
-                      "moved": self.curve.moved(old, state) * forms.length}
+                      "moved": self.curve.moved(self._old, state) * forms.length}
         return state
 
     def _lose(self, a: np.ndarray, x: np.ndarray, drag: np.ndarray) -> None:
@@ -169,7 +168,7 @@ class _Way:
 
 
 def jump(curve: Any, old: State, by: float, ahead: bool) -> State:
-    """The state that the body comes to from `old` when the control goes on by a little; of kind "jump".
+    """The state that the body comes to from `old` when the control goes on; of kind "jump".
 
     Args:
         curve: the `Curve`. by: change of the control, dimensionless; its sign is the way that the process drives.
@@ -186,7 +185,7 @@ def jump(curve: Any, old: State, by: float, ahead: bool) -> State:
     try:
         while (way.solved < _MOST and _LEAST < eta < _LARGEST[way.solved > 0]
                and curve.moved(old, way.at) < _TOO_FAR):
-            state = way.end(old) if way.settles else None
+            state = way.end() if way.settles else None
             if state is not None:
                 if state.slope * by < 0:
                     state.direction, state.slope = -state.direction, -state.slope

@@ -30,11 +30,11 @@ set for the first time do not count: of a slack sheet on a flat plug a hundred p
 HURRIED = 16
 """The same, of a contact with a history where there is something cheaper to try, such as half the step."""
 
-_CAME_BACK = 8
-"""Returns of the active set to one it has had before, after which it cycles (solutions took up to 4)."""
+_CYCLES = 8
+"""Returns of the active set to one it has had before, after which it counts as cycling (solutions took up to 4)."""
 
-_ASTRAY = 0.3
-"""Three corrections in a row above this lead nowhere, contact or not (those of solutions stayed below 0.1)."""
+_DIVERGED = 0.3
+"""The iteration has diverged, contact or not, where three corrections in a row are larger (of solutions: below 0.1)."""
 
 _LEFT_ALONE = 1
 """The iteration (from 0) that settles no contact points: what the first got wrong often comes right in it."""
@@ -265,10 +265,10 @@ class BorderedNewton:
         """Raise `Failure` if the iteration diverges, or takes too long."""
         quiet = history[active.changed:]
         grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
-        astray = len(history) > 2 and min(iteration.correction for iteration in history[-3:]) > _ASTRAY
-        if astray or grown and not (self.problem.has_kinks and moved < SMALL):
+        diverged = len(history) > 2 and min(iteration.correction for iteration in history[-3:]) > _DIVERGED
+        if diverged or grown and not (self.problem.has_kinks and moved < SMALL):
             raise Failure("the iteration diverges", history)
-        if active.returns >= _CAME_BACK:
+        if active.returns >= _CYCLES:
             raise Failure("contact does not settle: the same points touch, stick and slide in turns", history)
         most = min(self.tolerances.settling, HURRIED) if self._hurried else self.tolerances.settling
         settling = len(history) - min(active.found, 4 * SETTLING) >= most
