@@ -21,7 +21,7 @@ from . import extrapolate
 from .curve import Curve
 from .diagnose import diagnose
 from .folds import blown, snaps, usual, was_passed
-from .jump import AHEAD, NoEquilibrium, jump
+from .jump import AHEAD, MOST, NoEquilibrium, jump
 from .newton import Failure, tangents
 from .progress import progress_bar, show
 from .state import Record, State
@@ -74,7 +74,7 @@ class Run:
         self.until, self._aim = self.open[-1]
         self._step, self._best, self._began = step, 0.0, time.perf_counter()
         self._ahead = AHEAD                                 # by how much the control goes on in a jump
-        self._no_equilibrium = False                        # if the last jump found none, which costs most
+        self._lost_at = np.nan                              # control from which a body that jumped came to rest nowhere
         self._values: list[float] = []                      # what is aimed at, in the states of this run
 
     def follow(self, max_steps: int | None, progress: bool, start: State | None) -> None:
@@ -196,7 +196,7 @@ class Run:
         """The next states: one at a target within reach, or one step ahead, and what lies on the way to it.
 
         Failures halve the step. Where short ones fail, or the control has its limit, the body jumps (where the
-        shortest fails, if the last jump found no equilibrium).
+        shortest fails, if a jump from near there came to rest nowhere).
         """
         first, jumps, failed, most = self.step.length, [*_JUMPS, 0.0], 0, np.inf
         if snaps(self.curve, old, self._at_fold, self._sense):
@@ -218,8 +218,8 @@ class Run:
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good = self.step.failed()
                 failed += not isinstance(failure, _Astray)
-                soon = (self._at_fold == "jump" and failed > 1 and length < jumps[0] and not self._no_equilibrium
-                        and old.kind != "start")
+                soon = (self._at_fold == "jump" and failed > 1 and length < jumps[0] and old.kind != "start"
+                        and not self._was_lost_near(old))
                 if self._may_jump and (not good or soon):
                     jumps.pop(0)
                     for ahead in (reach,) if good else (_JUMPS[-1], 0.0):
@@ -299,24 +299,29 @@ class Run:
         """
         fading = self.problem.setting.fading
         others = (AHEAD, _FURTHEST) if length == 0 and self.problem.has_history and not fading else ()
+        most = MOST // (10 if self._was_lost_near(old) else 1)
         for ahead in dict.fromkeys((self._ahead, *others)):
             self._ahead = ahead
             try:
                 by = 1 - old.control if fading else self._change(old, max(ahead, length * abs(old.slope)))
-                new = jump(self.curve, old, by, length > 0 and not fading)
+                new = jump(self.curve, old, by, length > 0 and not fading, most)
                 break
             except Failure as last:
                 failure = last
-                self._no_equilibrium |= isinstance(last, NoEquilibrium)
+                if isinstance(last, NoEquilibrium):
+                    self._lost_at, most = old.control, MOST // 10
         else:
             raise failure
-        self._no_equilibrium = False
         self._ahead = min(10 * self._ahead, _FURTHEST)
         new.met = next((target for target, bound in self.open
                         if is_met(target, bound, self.curve.value(bound, new.x, new.control))), None)
         self.step.length = max(self.step.length, step / 2)
         log.info("a jump: %s", new.jump)
         return new
+
+    def _was_lost_near(self, old: State) -> bool:
+        """True if a jump from about the control of a state, which costs most, came to rest nowhere."""
+        return abs(old.control - self._lost_at) < _FURTHEST
 
     def _change(self, old: State, size: float) -> float:
         """Of the control in a jump, of at most a size: it does not pass a target."""

@@ -35,11 +35,12 @@ the brink of release two states may be near, and which is found still depends on
 _FEW, _TOLERANCES = 6, Tolerances(1e-8, 1e-6, settling=8)
 """Of a viscous solution. (Where contact does not settle soon more viscosity is cheaper than more iterations.)"""
 
-_FAR, _SHARE = (3e-4, 0.1), 0.1
+_FAR, _SHARE, _AGAIN = (3e-4, 0.1), 0.1, 3.0
 """How far (dimensionless, in the mean) the body is to move in a viscous solution: within bounds, a share of its way up
-to there. What is lost depends on it and, with friction, where it ends (tests/test_jumps.py)."""
+to there; how many times as far the first may move it, or it is made again with more viscosity. What is lost depends on
+it and, with friction, where it ends (tests/test_jumps.py)."""
 
-_MOST, _TOO_FAR = 1000, 10.0
+MOST, _TOO_FAR = 1000, 10.0
 """Viscous solutions, and a distance (dimensionless, in the mean), after which the body counts as never coming to rest.
 (Where a sheet is drawn over an edge point by point a jump takes hundreds of short ones.)"""
 
@@ -111,24 +112,25 @@ class _Way:
         if self.problem.folded(self._x, self.control):
             return self._hold_back()
         x, drag = self._x.array_r.copy(), viscous.drag(self._x.array_r)
+        last, new = self.at, replace(self.at, x=x, control=self.control)
+        most = np.clip(_SHARE * self.curve.moved(self._old, last), *_FAR)
+        far = self.curve.moved(replace(last, x=origin), new) / most
+        if not self.solved and far > _AGAIN:
+            return self._hold_back(far)
         before, self.rest = self.rest, np.sqrt(self._sum(drag * drag)) / (self.problem.force_scale + UNLOADED)
         self.settles = self.rest < min(self.near, before)
-        if self.solved or origin is self.at.x:              # what was foretold is no way that the body went
-            self._lose(self.at.x, x, drag)
-        self._drag = drag
-        last, self.at = self.at, replace(self.at, x=x, control=self.control)
-        by, most = x - last.x, np.clip(_SHARE * self.curve.moved(self._old, last), *_FAR)
-        far = self.curve.moved(last, self.at) / most
+        self._lose(origin, x, drag)                         # from where the body was, or was foretold to be
+        self._drag, self.at, by = drag, new, x - last.x
         self.problem.advance(x, self.control)
         self.problem.prepare(x, self.control, by, 0.0, 1.0)
         self.solved += 1
         falls, self._falls = self._falls, _FALLS
         return max(falls if len(history) - 1 <= _FEW else 1.0, far)
 
-    def _hold_back(self) -> float:
-        """No solution was found: the factor by which eta grows; it does not fall right after the next one."""
+    def _hold_back(self, grows: float = 0.0) -> float:
+        """No solution was found, or too far off: the factor by which eta grows; it does not fall right after the next."""
         self._falls = 1.0
-        return _GROWS[self.solved > 0]
+        return grows or _GROWS[self.solved > 0]
 
     def end(self) -> State | None:
         """The state at rest, if there is one near; raises `Failure` if the body, without a history, rests at none."""
@@ -167,12 +169,12 @@ class _Way:
         self._x.destroy()
 
 
-def jump(curve: Any, old: State, by: float, ahead: bool) -> State:
+def jump(curve: Any, old: State, by: float, ahead: bool, most: int = MOST) -> State:
     """The state that the body comes to from `old` when the control goes on; of kind "jump".
 
     Args:
         curve: the `Curve`. by: change of the control, dimensionless; its sign is the way that the process drives.
-        ahead: start where the tangent leads to, not where the body is.
+        ahead: start where the tangent leads to, not where the body is. most: viscous solutions.
 
     Raises:
         Failure: none was found, `NoEquilibrium` if the body comes to rest nowhere. The problem's histories are then
@@ -183,7 +185,7 @@ def jump(curve: Any, old: State, by: float, ahead: bool) -> State:
     origin = old.x + by / old.slope * old.direction if ahead else old.x
     eta = _FIRST
     try:
-        while (way.solved < _MOST and _LEAST < eta < _LARGEST[way.solved > 0]
+        while (way.solved < most and _LEAST < eta < _LARGEST[way.solved > 0]
                and curve.moved(old, way.at) < _TOO_FAR):
             state = way.end() if way.settles else None
             if state is not None:
