@@ -1,20 +1,16 @@
 """A disc under pressure with FElupe: python3 felupe_loading.py ELEMENTS LAYERS
 
-Biquadratic quadrilaterals of nearly incompressible material that keep pressure and volume to themselves, a `Job` as in
-FElupe's tutorials, PyPardiso, which its documentation advises. FElupe's axis is x.
+A `Job` as in FElupe's tutorials, PyPardiso, which its documentation advises.
 """
 
 import felupe as fem
 from clock import Clock, report, sizes
+from felupe_disc import disc
 from loading import C10, PRESSURE, RADIUS, STEPS, THICKNESS
 from pypardiso import spsolve
 
 clock = Clock()
-n, m = sizes()
-mesh = fem.Rectangle(b=(THICKNESS, RADIUS), n=(m + 1, n + 1)).add_midpoints_edges().add_midpoints_faces()
-mesh = fem.Mesh(mesh.points, mesh.cells, "quad9")
-field = fem.FieldContainer([fem.FieldAxisymmetric(fem.RegionBiQuadraticQuad(mesh), dim=2)])
-solid = fem.SolidBodyNearlyIncompressible(fem.NeoHooke(mu=2 * C10), field, bulk=5000 * 2 * C10)
+mesh, field, solid = disc(sizes(), RADIUS, THICKNESS, C10)
 bottom = fem.RegionBiQuadraticQuadBoundary(mesh, only_surface=True, mask=mesh.points[:, 0] == 0, ensure_3d=True)
 load = fem.SolidBodyPressure(fem.FieldContainer([fem.FieldAxisymmetric(bottom, dim=2)]))
 bounds = {"axis": fem.Boundary(field[0], fy=0, skip=(True, False)), "rim": fem.Boundary(field[0], fy=RADIUS)}

@@ -24,3 +24,55 @@ def load(u, v):
     """Work of a unit pressure, which follows the bottom, on v: n da = r (-dz/dR, dr/dR) dR."""
     along = Grad(u).Trace()
     return (x + u[0]) * (-along[1, 0] * v[0] + (1 + along[0, 0]) * v[1])
+
+
+class Steps:
+    """Steps by hand: a guess along the last two states, half the step on failure, longer ones after success.
+
+    Args:
+        form: of the residual. state: `GridFunction` of (displacement, pressure); inverse: pardiso's, of its free dofs.
+    """
+
+    def __init__(self, form, state, inverse):
+        self.form, self.state, self.inverse = form, state, inverse
+        self.iterations = self.failures = 0
+        self.accepted = [(0.0, state.vec.CreateVector(copy=True))]
+
+    def follow(self, target, step, put):
+        """From 0 to a target; put(value, increment) sets what is driven, before the guess along two states."""
+        now = 0.0
+        while now < target:
+            ahead = min(now + step, target)
+            self.state.vec.data = self.accepted[-1][1]
+            put(ahead, ahead - now)
+            if len(self.accepted) > 1:
+                (before, older), (now, newer) = self.accepted[-2:]
+                self.state.vec.data = newer + (ahead - now) / (now - before) * (newer - older)
+            k = self._correct()
+            if k is None:
+                self.failures += 1
+                step /= 2
+                if step < 1e-6:
+                    raise SystemExit(f"no state beyond {now}")
+                continue
+            now = ahead
+            self.accepted.append((now, self.state.vec.CreateVector(copy=True)))
+            step *= min(2.0, 8 / k)
+
+    def _correct(self):
+        """Newton's method; the number of iterations, or None."""
+        last, n = 1.0, self.state.space.components[0].ndof
+        for k in range(1, 21):
+            residual = self.form.Apply(self.state.vec)
+            self.form.AssembleLinearization(self.state.vec)
+            self.inverse.Update()
+            step = (self.inverse * residual).Evaluate()
+            self.state.vec.data -= step
+            self.iterations += 1
+            size = step[:n].Norm() / (self.state.vec[:n].Norm() + 1e-30)
+            if k > 1 and size * min(1, size / last) ** 2 < 1e-10:
+                return k
+            if not size < 10:
+                return None
+            last = size
+        return None

@@ -128,7 +128,7 @@ class _Way:
         return max(falls if len(history) - 1 <= _FEW else 1.0, far)
 
     def _hold_back(self, grows: float = 0.0) -> float:
-        """No solution was found, or too far off: the factor by which eta grows; it does not fall right after the next."""
+        """No solution, or one too far off: the factor by which eta grows; it does not fall right after the next one."""
         self._falls = 1.0
         return grows or _GROWS[self.solved > 0]
 
