@@ -63,7 +63,7 @@ def slide(sheet, travels, fillet, refine):
     """(path, how it ended, elements) of a sheet that slides over the edge with Coulomb friction."""
     made, elements = plugs.sliding(RADIUS, sheet.thickness, sheet.plug, fillet * sheet.plug,
                                    fx.MooneyRivlin(c10=sheet.c10, c01=sheet.c01), MU, FACE_STRETCH, refine,
-                                   penalty=2e4, ramp=0.1, elastic_slip=0.02)
+                                   (1,) * refine, penalty=2e4, ramp=0.1, elastic_slip=0.02)
     return *plugs.push(made, travels, smallest=1e-4), elements
 
 

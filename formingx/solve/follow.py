@@ -299,7 +299,8 @@ class Run:
         """
         fading = self.problem.setting.fading
         others = (AHEAD, _FURTHEST) if length == 0 and self.problem.has_history and not fading else ()
-        most = MOST // (10 if self._was_lost_near(old) else 1)
+        few = MOST // 5
+        most = few if self._was_lost_near(old) else MOST
         for ahead in dict.fromkeys((self._ahead, *others)):
             self._ahead = ahead
             try:
@@ -309,7 +310,7 @@ class Run:
             except Failure as last:
                 failure = last
                 if isinstance(last, NoEquilibrium):
-                    self._lost_at, most = old.control, MOST // 10
+                    self._lost_at, most = old.control, few
         else:
             raise failure
         self._ahead = min(10 * self._ahead, _FURTHEST)

@@ -32,6 +32,9 @@ It begins low and grows to the least that gives a solution: where a state follow
 finds it; much would hold the body back while contact lets go, and what slips meanwhile changes where it ends. (At
 the brink of release two states may be near, and which is found still depends on eta: tests/test_jumps.py.)"""
 
+_PATIENCE = 8
+"""Solutions at most after a failure before eta falls again: as many more as it failed in a row."""
+
 _FEW, _TOLERANCES = 6, Tolerances(1e-8, 1e-6, settling=8)
 """Of a viscous solution. (Where contact does not settle soon more viscosity is cheaper than more iterations.)"""
 
@@ -96,7 +99,8 @@ class _Way:
         self._x, self._drag = curve.problem.x.duplicate(), np.zeros(len(old.x))
         self.at, self.lost, self.solved = old, 0.0, 0
         self.rest, self.near = np.inf, _NEAR_REST           # what is out of balance; little enough to look for rest
-        self.settles, self._falls = False, _FALLS
+        self.settles = False
+        self._wait, self._patience = 0, 1                   # solutions before eta may fall; after the next failure
 
     def move(self, origin: np.ndarray, eta: float) -> float:
         """One viscous solution from `origin`; the factor by which eta may change then."""
@@ -124,12 +128,16 @@ class _Way:
         self.problem.advance(x, self.control)
         self.problem.prepare(x, self.control, by, 0.0, 1.0)
         self.solved += 1
-        falls, self._falls = self._falls, _FALLS
-        return max(falls if len(history) - 1 <= _FEW else 1.0, far)
+        if self._wait or len(history) - 1 > _FEW:
+            self._wait = max(self._wait - 1, 0)
+            return max(1.0, far)
+        self._patience = max(self._patience // 2, 1)
+        return max(_FALLS, far)
 
     def _hold_back(self, grows: float = 0.0) -> float:
         """No solution, or one too far off: the factor by which eta grows; it does not fall right after the next one."""
-        self._falls = 1.0
+        self._wait = self._patience
+        self._patience = min(2 * self._patience, _PATIENCE)
         return grows or _GROWS[self.solved > 0]
 
     def end(self) -> State | None:
@@ -193,7 +201,8 @@ def jump(curve: Any, old: State, by: float, ahead: bool, most: int = MOST) -> St
                     state.direction, state.slope = -state.direction, -state.slope
                 return state
             eta *= way.move(way.at.x if way.solved else origin, eta)
-        raise NoEquilibrium("no state follows that the body could snap to: it comes to rest nowhere", [])
+        where = "it comes to rest nowhere" if way.solved else "none is found from here, however viscous the body is"
+        raise (NoEquilibrium if way.solved else Failure)(f"no state follows that the body could snap to: {where}", [])
     except Failure:
         problem.memory = kept
         raise
