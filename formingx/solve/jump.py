@@ -50,8 +50,8 @@ MOST, _TOO_FAR = 1000, 10.0
 _NEAR_REST = 1e-3
 """Viscous forces (over the support forces) below which the state at rest is looked for."""
 
-_AT_REST = 1e-12
-"""Viscous forces (over the support forces) below which they are round-off: the body rests, though where a point is at a
+_AT_REST = 1e-10
+"""Viscous forces (over the support forces) below which the body rests, though where a point is at a
 kink of its law of friction the iteration without them may go to and fro."""
 
 
