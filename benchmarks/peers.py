@@ -121,7 +121,7 @@ def draw(results, file):
         right.loglog([row["unknowns"] for row in rows], [row["path_cpu"] / row["iterations"] for row in rows], "o-")
     left.set(xlabel="CPU of the path, s", ylabel="error of the last pressure", title="Treloar's sheet")
     right.set(xlabel="unknowns", ylabel="CPU of an iteration, s", title="a disc under pressure")
-    left.legend(frameon=False)
+    left.legend(frameon=False, loc="upper center")
     figure.savefig(file, dpi=150)
 
 

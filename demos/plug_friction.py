@@ -36,8 +36,9 @@ def main():
     options = parser("plug_friction", __doc__.splitlines()[0])
     options.add_argument("--fillet", type=float, default=0.35, help="radius of the plug's edge, cm")
     options.add_argument("--refine", type=int, default=1, help="all elements divided by this")
+    options.add_argument("--mu", type=float, nargs="+", default=FRICTIONS, help="coefficients of friction")
     args = options.parse_args()
-    frictions, travels = ((0.3,), (2, 4, 6, 8)) if args.quick else (FRICTIONS, TRAVELS)
+    frictions, travels = ((0.3,), (2, 4, 6, 8)) if args.quick else (args.mu, TRAVELS)
     args.out.mkdir(parents=True, exist_ok=True)
     cases = [(mu, args.fillet, args.refine, travels, args.out) for mu in frictions]
     runs = dict(sorted(zip(frictions, map(run, cases) if args.quick else sweep(run, cases))))
