@@ -27,8 +27,8 @@ from formingx.results.show import plots
 FRICTIONS = (1.0, 0.1, 0.5, 0.3, 0.2)      # begun in this order, two processes are busy to the end
 MOST = 25                                   # stretch of the face that elements are made for, at most
 FIRST = 8                                   # travel, cm, up to which elements of its own give forces and walls
-ROUGH = 0.5                                 # mu from which friction shears the sheet: finer elements along it
-SHEARED, THROUGH = 1.0, (4, 2, 1)           # mu from which it is sheared so much that those at the plug are flat, too
+ROUGH, THROUGH = 0.5, (4, 2, 1)             # mu from which friction shears the sheet: flat elements at the plug
+HELD = 1.0                                  # mu from which so little slides that elements made for it are halved
 FACE_STRETCHES = (1.01, 1.05, 1.1, 1.2, 1.35, 1.5, 1.75, 2, 2.5, 3.2, 5, 10, 25, 80, 200)
 
 
@@ -52,12 +52,12 @@ def main():
 def run(case) -> dict:
     """One coefficient of friction: its numbers, and what is drawn of it."""
     mu, fillet, refine, travels, folder = case
-    membrane, finer = membrane_curve(mu, fillet, travels[-1]), 2 if mu >= ROUGH else 1
-    through = THROUGH if mu >= SHEARED else (1,) * finer
-    path, end, elements = pushed(mu, fillet, membrane, travels, finer * refine, np.repeat(through, refine), ramp=2e-2)
+    membrane, rough = membrane_curve(mu, fillet, travels[-1]), mu >= ROUGH
+    path, end, elements = pushed(mu, fillet, membrane, travels, refine * (2 if mu >= HELD else 1),
+                                 np.repeat(THROUGH if rough else (1,), refine), ramp=2e-2)
     numbers = {"elements": list(elements), **key_numbers(path, end, travels)}
     first, first_end, first_elements = pushed(mu, fillet, membrane, [t for t in travels if t <= FIRST], 2 * refine,
-                                              (1,) * (2 * refine * finer), ramp=2e-3)
+                                              (1,) * (refine * (4 if rough else 2)), ramp=2e-3)
     for name, values in at_travels(first, travels).items():
         numbers[name] |= values
     numbers[f"first_{FIRST}_cm"] = {"elements": list(first_elements), "ended": first_end, **plugs.cost(first)}
