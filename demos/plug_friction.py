@@ -6,8 +6,8 @@ points of the sheet leave the edge of the plug there may be no state nearby to g
 one (`Path.jumps`), marked in the curves. The less friction, the more of the face slides over the edge, and the thinner
 it is drawn (a membrane under mu = 0.1 is stretched 130 times both ways at 20 cm): elements are in proportion to their
 distance from the axis, so that whatever comes to the edge has as many of them around it, and their pressures are
-continuous, for they are slim. Forces and walls of the first 8 cm are of smaller elements made for them. Lengths in cm,
-forces in N.
+continuous, for they are slim. Much friction shears the sheet: there the elements at the plug are the thinnest. Forces
+and walls of the first 8 cm are of smaller elements made for them. Lengths in cm, forces in N.
 """
 
 from typing import NamedTuple

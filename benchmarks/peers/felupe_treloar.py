@@ -12,14 +12,14 @@ import numpy as np
 from clock import Clock, maximum, report, sizes
 from contique.helpers import argparser2
 from contique.newtonxt import newtonxt
+from felupe_disc import quadrilaterals
 from pypardiso import spsolve
 from scipy.sparse import bmat, csr_matrix, diags
 from treloar import C10, HEIGHT, RADIUS, THICKNESS
 
 clock = Clock()
 n, m = sizes()
-mesh = fem.Rectangle(b=(THICKNESS, RADIUS), n=(m + 1, n + 1)).add_midpoints_edges().add_midpoints_faces()
-mesh = fem.Mesh(mesh.points, mesh.cells, "quad9")
+mesh = quadrilaterals((n, m), RADIUS, THICKNESS)
 region = fem.RegionBiQuadraticQuad(mesh)
 field = fem.FieldsMixed(region, n=3, axisymmetric=True)                 # displacement, pressure, volume ratio
 solid = fem.SolidBody(fem.NearlyIncompressible(fem.NeoHooke(mu=2 * C10), bulk=2e6), field)

@@ -74,7 +74,7 @@ class Run:
         self.until, self._aim = self.open[-1]
         self._step, self._best, self._began = step, 0.0, time.perf_counter()
         self._ahead = AHEAD                                 # by how much the control goes on in a jump
-        self._lost_at = np.nan                              # control from which a body that jumped came to rest nowhere
+        self._no_rest_at = np.nan                           # control from which a body that jumped came to rest nowhere
         self._values: list[float] = []                      # what is aimed at, in the states of this run
 
     def follow(self, max_steps: int | None, progress: bool, start: State | None) -> None:
@@ -219,7 +219,7 @@ class Run:
                 good = self.step.failed()
                 failed += not isinstance(failure, _Astray)
                 soon = (self._at_fold == "jump" and failed > 1 and length < jumps[0] and old.kind != "start"
-                        and not self._was_lost_near(old))
+                        and not self._found_no_rest_near(old))
                 if self._may_jump and (not good or soon):
                     jumps.pop(0)
                     for ahead in (reach,) if good else (_JUMPS[-1], 0.0):
@@ -299,18 +299,16 @@ class Run:
         """
         fading = self.problem.setting.fading
         others = (AHEAD, _FURTHEST) if length == 0 and self.problem.has_history and not fading else ()
-        few = MOST // 5
-        most = few if self._was_lost_near(old) else MOST
         for ahead in dict.fromkeys((self._ahead, *others)):
             self._ahead = ahead
             try:
                 by = 1 - old.control if fading else self._change(old, max(ahead, length * abs(old.slope)))
-                new = jump(self.curve, old, by, length > 0 and not fading, most)
+                new = jump(self.curve, old, by, length > 0 and not fading, self._solutions(old))
                 break
             except Failure as last:
                 failure = last
                 if isinstance(last, NoEquilibrium):
-                    self._lost_at, most = old.control, few
+                    self._no_rest_at = old.control
         else:
             raise failure
         self._ahead = min(10 * self._ahead, _FURTHEST)
@@ -320,9 +318,13 @@ class Run:
         log.info("a jump: %s", new.jump)
         return new
 
-    def _was_lost_near(self, old: State) -> bool:
+    def _found_no_rest_near(self, old: State) -> bool:
         """True if a jump from about the control of a state, which costs most, came to rest nowhere."""
-        return abs(old.control - self._lost_at) < _FURTHEST
+        return abs(old.control - self._no_rest_at) < _FURTHEST
+
+    def _solutions(self, old: State) -> int:
+        """Viscous ones that a jump from a state may take."""
+        return MOST // 5 if self._found_no_rest_near(old) else MOST
 
     def _change(self, old: State, size: float) -> float:
         """Of the control in a jump, of at most a size: it does not pass a target."""

@@ -32,8 +32,9 @@ It begins low and grows to the least that gives a solution: where a state follow
 finds it; much would hold the body back while contact lets go, and what slips meanwhile changes where it ends. (At
 the brink of release two states may be near, and which is found still depends on eta: tests/test_jumps.py.)"""
 
-_PATIENCE = 8
-"""Solutions at most after a failure before eta falls again: as many more as it failed in a row."""
+_LONGEST_WAIT = 8
+"""Solutions at most for which eta stays after a failure: twice as many from one failure to the next, and half as many
+again where eta has fallen and a solution was found."""
 
 _FEW, _TOLERANCES = 6, Tolerances(1e-8, 1e-6, settling=8)
 """Of a viscous solution. (Where contact does not settle soon more viscosity is cheaper than more iterations.)"""
@@ -51,8 +52,8 @@ _NEAR_REST = 1e-3
 """Viscous forces (over the support forces) below which the state at rest is looked for."""
 
 _AT_REST = 1e-10
-"""Viscous forces (over the support forces) below which the body rests, though where a point is at a
-kink of its law of friction the iteration without them may go to and fro."""
+"""Viscous forces (over the support forces) below which the body rests, though where a point is at a kink of its law of
+friction the iteration without them may go to and fro."""
 
 
 class NoEquilibrium(Failure):
@@ -100,7 +101,7 @@ class _Way:
         self.at, self.lost, self.solved = old, 0.0, 0
         self.rest, self.near = np.inf, _NEAR_REST           # what is out of balance; little enough to look for rest
         self.settles = False
-        self._wait, self._patience = 0, 1                   # solutions before eta may fall; after the next failure
+        self._wait, self._next_wait = 0, 1                  # solutions before eta may fall; after the next failure
 
     def move(self, origin: np.ndarray, eta: float) -> float:
         """One viscous solution from `origin`; the factor by which eta may change then."""
@@ -131,13 +132,13 @@ class _Way:
         if self._wait or len(history) - 1 > _FEW:
             self._wait = max(self._wait - 1, 0)
             return max(1.0, far)
-        self._patience = max(self._patience // 2, 1)
+        self._next_wait = max(self._next_wait // 2, 1)
         return max(_FALLS, far)
 
     def _hold_back(self, grows: float = 0.0) -> float:
         """No solution, or one too far off: the factor by which eta grows; it does not fall right after the next one."""
-        self._wait = self._patience
-        self._patience = min(2 * self._patience, _PATIENCE)
+        self._wait = self._next_wait
+        self._next_wait = min(2 * self._next_wait, _LONGEST_WAIT)
         return grows or _GROWS[self.solved > 0]
 
     def end(self) -> State | None:
@@ -177,12 +178,12 @@ class _Way:
         self._x.destroy()
 
 
-def jump(curve: Any, old: State, by: float, ahead: bool, most: int = MOST) -> State:
+def jump(curve: Any, old: State, by: float, ahead: bool, solutions: int = MOST) -> State:
     """The state that the body comes to from `old` when the control goes on; of kind "jump".
 
     Args:
         curve: the `Curve`. by: change of the control, dimensionless; its sign is the way that the process drives.
-        ahead: start where the tangent leads to, not where the body is. most: viscous solutions.
+        ahead: start where the tangent leads to, not where the body is. solutions: viscous ones, at most.
 
     Raises:
         Failure: none was found, `NoEquilibrium` if the body comes to rest nowhere. The problem's histories are then
@@ -193,7 +194,7 @@ def jump(curve: Any, old: State, by: float, ahead: bool, most: int = MOST) -> St
     origin = old.x + by / old.slope * old.direction if ahead else old.x
     eta = _FIRST
     try:
-        while (way.solved < most and _LEAST < eta < _LARGEST[way.solved > 0]
+        while (way.solved < solutions and _LEAST < eta < _LARGEST[way.solved > 0]
                and curve.moved(old, way.at) < _TOO_FAR):
             state = way.end() if way.settles else None
             if state is not None:
