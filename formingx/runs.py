@@ -14,7 +14,7 @@ from .discrete.problem import Problem
 from .errors import ConvergenceError, InputError, Interrupted, count, finite, instance, known, several
 from .physics.contact import Contact
 from .results.columns import Measure
-from .results.evaluate.volume import doubts
+from .results.evaluate import edges, volume
 from .results.files.checkpoint import Checkpoint, holds_states, read
 from .results.path import Path
 from .scene import aims, clearance
@@ -287,7 +287,8 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
                "it is lost; with checkpoint='folder', resume=True the same script would go on from there")
         raise Interrupted(f"interrupted {stands}; {how}", path) from None
     path = paths[0]
-    for bad, text in doubts(path.last.measures["volume_error"], "the last state",
-                            path.problem.furthest_volume_ratio(path.last)):
+    of_volume = volume.doubts(path.last.measures["volume_error"], "the last state",
+                              path.problem.furthest_volume_ratio(path.last))
+    for bad, text in of_volume + edges.doubts(edges.coarsest(path, path.last)):
         if bad == "serious" and path.problem.comm.rank == 0:
             log.warning("%s", text)

@@ -196,7 +196,8 @@ class Run:
         """The next states: one at a target within reach, or one step ahead, and what lies on the way to it.
 
         Failures halve the step. Where short ones fail, or the control has its limit, the body jumps (where the
-        shortest fails, if a jump from near there came to rest nowhere).
+        shortest fails, if a jump from near there came to rest nowhere; or from the first state, with a history: what
+        touches on the way slips by what the tangent foretells, which at rest knows nothing of what is about to touch).
         """
         first, jumps, failed, most = self.step.length, [*_JUMPS, 0.0], 0, np.inf
         if snaps(self.curve, old, self._at_fold, self._sense):
@@ -218,8 +219,8 @@ class Run:
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good = self.step.failed()
                 failed += not isinstance(failure, _Astray)
-                soon = (self._at_fold == "jump" and failed > 1 and length < jumps[0] and old.kind != "start"
-                        and not self._found_no_rest_near(old))
+                soon = (self._at_fold == "jump" and failed > 1 and length < jumps[0]
+                        and (old.kind != "start" or not self.problem.has_history) and not self._found_no_rest_near(old))
                 if self._may_jump and (not good or soon):
                     jumps.pop(0)
                     for ahead in (reach,) if good else (_JUMPS[-1], 0.0):

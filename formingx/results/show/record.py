@@ -12,10 +12,10 @@ from ...discrete.admissible import Least
 from ...discrete.tooling import Tooling
 from ...errors import InputError
 from .. import files
+from ..evaluate import edges, volume
 from ..evaluate.contact_face import ContactFace, ContactTable, tool_forces
 from ..evaluate.folding import first_fold
 from ..evaluate.profile import Profile
-from ..evaluate.volume import doubts
 
 PENETRATION = 0.05
 """Penetration over the smallest thickness above which a report warns."""
@@ -41,6 +41,7 @@ class Record:
             the profiles say; empty of a checkpoint.
         layers: of the last state, as in `Wall`; script: the file that ran; or "".
         furthest: where J is furthest from 1 in the last state, or None: not known of a checkpoint or a membrane.
+        edge: `edges.coarsest` in the last state, or None.
     """
 
     summary: dict[str, str]
@@ -60,6 +61,7 @@ class Record:
     layers: dict[str, np.ndarray]
     script: str = ""
     furthest: Least | None = None
+    edge: edges.Edge | None = None
 
     @property
     def control(self) -> str:
@@ -89,7 +91,7 @@ class Record:
         if worst > MASS:
             found.append(("serious" if worst > 10 * MASS else "minor",
                           f"The mass changes by up to {100 * worst:.2g} %: a smaller eps, or a finer mesh, keeps it."))
-        found += self._of_volume() + self._of_folding()
+        found += self._of_volume() + self._of_folding() + edges.doubts(self.edge)
         if self.counts.get("failures", 0) > len(self.kinds):
             found.append(("note", f"{self.counts['failures']} attempts at a step failed and were repeated with half its"
                                   f" length; the results do not suffer."))
@@ -98,8 +100,8 @@ class Record:
     def _of_volume(self) -> list[tuple[str, str]]:
         errors = self.measures["volume_error"]
         k = int(np.argmax(errors))
-        return doubts(errors[k], f"state {k}, {words(self.control)} = {self.measures[self.control][k]:.5g}",
-                      self.furthest)
+        return volume.doubts(errors[k], f"state {k}, {words(self.control)} = {self.measures[self.control][k]:.5g}",
+                             self.furthest)
 
     def _of_folding(self) -> list[tuple[str, str]]:
         first = first_fold(self.profiles, self.axisymmetric)
@@ -135,7 +137,7 @@ def of_path(path: Any) -> Record:
                   [list(s.history) for s in path.states], profiles, vars(path.counts), stepping.get("until"), tooling,
                   [tooling.travels(s.setting, s.control) for s in path.states], tool_forces(path),
                   _fields(path, profiles), dict(wall.layers) if wall else {}, sys.argv[0],
-                  problem.furthest_volume_ratio(path.last))
+                  problem.furthest_volume_ratio(path.last), edges.coarsest(path, path.last))
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:

@@ -1,0 +1,58 @@
+"""Whether elements are small enough for the edges of tools that a body slides over."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+_TURN = 40.0
+"""Degrees by which a tool may turn from one contact point to the next before a run warns: see tests/test_edges.py."""
+
+
+class Edge(NamedTuple):
+    """Where a convex edge of a tool turns most between two neighbouring contact points, one of which slides over it.
+
+    turn: degrees; tool: its name, or the face that touches it; point: (r, z) now, length.
+    """
+
+    turn: float
+    tool: str
+    point: tuple[float, float]
+
+
+def coarsest(path: Any, state: Any) -> Edge | None:
+    """The edge in a state on which contact points are the furthest apart; None if nothing slides over one; collective.
+
+    Neighbours are next to each other in the order of R, then Z.
+    """
+    found: list[Edge] = []
+    with path.problem.at(state) as problem:
+        fields = problem.x.array_r.copy()
+        for contact in problem.touching:
+            if contact.contact.sticks or not contact.contact.separates:
+                continue
+            x, law = contact.positions(fields, state.control), contact.tractions(fields, state.control)
+            slides = (law.normal != 0) & (np.abs(law.tangential) >= 0.99 * contact.law.mu * np.abs(law.normal))
+            rows = np.column_stack([contact.points, contact.lengths, x, contact.contact.tool.nearest(x).normal, slides])
+            rows = np.concatenate(problem.comm.allgather(rows))
+            X, length, x, normal, slides = np.split(rows[np.lexsort((rows[:, 1], rows[:, 0]))], [2, 3, 5, 7], axis=1)
+            by, turned = np.diff(x, axis=0), np.diff(normal, axis=0)
+            near = np.hypot(*np.diff(X, axis=0).T) < 1.5 * (length[1:] + length[:-1])[:, 0]
+            either = np.maximum(slides[1:], slides[:-1])[:, 0] > 0
+            convex = (turned * by).sum(1) < 0
+            turn = 2 * np.degrees(np.arcsin(np.minimum(np.hypot(*turned.T) / 2, 1.0))) * (near & either & convex)
+            for k in np.argsort(turn)[-1:]:
+                r, z = x[k] + by[k] / 2 + contact.travelled(state.control)
+                found.append(Edge(float(turn[k]), contact.contact.name or contact.contact.on, (float(r), float(z))))
+    return max((edge for edge in found if edge.turn > 0), default=None)
+
+
+def doubts(edge: Edge | None) -> list[tuple[str, str]]:
+    """(how bad, what), as `volume.doubts`."""
+    if edge is None or edge.turn < _TURN:
+        return []
+    return [("serious", f"The body slides over an edge of {edge.tool!r} near (r, z) = ({edge.point[0]:.5g},"
+                        f" {edge.point[1]:.5g}), and from one contact point to the next the tool turns by"
+                        f" {edge.turn:.0f} degrees: forces go up and down as points leave that edge. Use smaller"
+                        f" elements on the face that slides, or a larger fillet.")]

@@ -1,0 +1,58 @@
+"""Elements on the edges of tools that a body slides over: how far they turn, and what that does to forces."""
+
+import numpy as np
+import pytest
+
+import formingx as fx
+from formingx.results.evaluate import edges
+
+RADIUS, FILLET = 2.5, 0.5
+
+
+def pushed(elements, friction=0.2):
+    """A sheet pushed 4 cm by a flat plug with a rounded edge."""
+    plug = fx.tools.male(radius=RADIUS, height=30.0, base=-30.0, fillet=FILLET).mirrored().moved(z=0.5)
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(elements, 1)),
+                     materials=fx.MooneyRivlin(c10=0.4, c01=0.04),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", plug, friction, moves=(0, -1), name="plug")])
+    return fx.trace(scene, until=fx.travel(4.0), progress=False)
+
+
+@pytest.mark.parametrize("friction", [0.2, "none"])
+def test_turn_is_that_of_the_arc_between_two_nodes(friction):
+    path = pushed(16, friction)
+    edge, face = edges.coarsest(path, path.last), path.contact("plug")
+    centre = np.array([RADIUS - FILLET, 0.5 + FILLET - 4.0])
+    r, z = (face.points - centre).T
+    angles = np.degrees(np.clip(np.arctan2(r, -z), 0, np.pi / 2))       # where the nearest point of the plug is
+    on = face.pressure > 0
+    turns = np.diff(angles)[on[1:] | on[:-1]]
+    assert edge.turn == pytest.approx(turns.max(), abs=0.01) and edge.tool == "plug"
+    assert np.hypot(*(edge.point - centre)) == pytest.approx(FILLET, rel=0.1)
+
+
+def test_what_sticks_has_no_edge_to_slide_over():
+    path = pushed(16, "stick")
+    assert edges.coarsest(path, path.last) is None
+
+
+def test_a_run_warns_where_its_force_is_not_resolved(caplog):
+    """Against 120 elements: 8 that turn by more than 40 degrees are more than 1 % off, 16 and 30 less than 0.3 %."""
+    exact = plug_force(pushed(120))
+    for elements, warns in ((8, True), (16, False), (30, False)):
+        caplog.clear()
+        path = pushed(elements)
+        off = abs(plug_force(path) / exact - 1)
+        assert ("the tool turns by" in caplog.text) == warns, elements
+        assert off > 0.01 if warns else off < 3e-3, (elements, off)
+        assert any("the tool turns by" in text for text in path_warnings(path)) == warns
+
+
+def plug_force(path) -> float:
+    return path["plug_force"][-1]
+
+
+def path_warnings(path) -> list:
+    from formingx.results.show import record
+    return record.of_path(path).warnings()
