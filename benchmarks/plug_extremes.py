@@ -90,7 +90,7 @@ def mesh_for(plug):
                         concentrate=at)
 
 
-def run(plug, max_steps=400, through=(), **options):
+def run(plug, max_steps=None, through=(), **options):
     """(path or None, how it ended, elements): "arrived", or why not. through: travels on the way, over its radius."""
     radius = plug.lengths[0]
     friction, separates = plugs.LAWS.get(plug.law, (plug.law, True))
@@ -134,7 +134,7 @@ def main():
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--groups", nargs="+", choices=CASES, default=list(CASES), help="rows to run")
     options.add_argument("--laws", nargs="+", help="only these: held, stick, frictionless or coefficients")
-    options.add_argument("--max-steps", type=int, default=400, help="states of a stage before it gives up")
+    options.add_argument("--max-steps", type=int, help="states of a stage before it gives up")
     args = options.parse_args()
     print(f"{'case':36}{'elements':>9}{'travel/rp':>10}{'pole, cm':>10}{'force, N':>10}{'depth/h0':>10}{'least J':>9}"
           f"{'states':>8}{'Newton':>8}{'cuts':>6}{'s':>7}  end", flush=True)
