@@ -37,6 +37,18 @@ def test_what_sticks_has_no_edge_to_slide_over():
     assert edges.coarsest(path, path.last) is None
 
 
+@pytest.mark.parametrize("points", ["nodes", 3])
+def test_what_is_held_does_not(points):
+    """A rim held where the lip of a cup meets its wall rests on the lip; the next points hang beside the wall."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(20, 1)), loads=[fx.Pressure("bottom")],
+                     materials=fx.MooneyRivlin(c10=50.0, c01=15.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", fx.tools.cup(radius=10.0, depth=5.0, mouth=0.3, fillet=1.0),
+                                          points=points)])
+    path = fx.trace(scene, until=fx.pressure(6.0), progress=False)
+    assert path.last.measures["tool_force"] > 0
+    assert all(edges.coarsest(path, state) is None for state in path.states)
+
+
 def test_a_run_warns_where_its_force_is_not_resolved(caplog):
     """Against 120 elements: 8 that turn by more than 40 degrees are more than 1 % off, 16 and 30 less than 0.3 %."""
     exact = plug_force(pushed(120))

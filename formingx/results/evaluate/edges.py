@@ -24,16 +24,19 @@ class Edge(NamedTuple):
 def coarsest(path: Any, state: Any) -> Edge | None:
     """The edge in a state on which contact points are the furthest apart; None if nothing slides over one; collective.
 
-    Neighbours are next to each other in the order of R, then Z.
+    Neighbours are next to each other in the order of R, then Z. What a support holds does not slide.
     """
     found: list[Edge] = []
     with path.problem.at(state) as problem:
         fields = problem.x.array_r.copy()
+        free = np.ones(len(fields))
+        free[problem.held] = 0
         for contact in problem.touching:
             if contact.contact.sticks or not contact.contact.separates:
                 continue
             x, law = contact.positions(fields, state.control), contact.tractions(fields, state.control)
             slides = (law.normal != 0) & (np.abs(law.tangential) >= 0.99 * contact.law.mu * np.abs(law.normal))
+            slides &= contact.displacement(free).any(axis=1)
             rows = np.column_stack([contact.points, contact.lengths, x, contact.contact.tool.nearest(x).normal, slides])
             rows = np.concatenate(problem.comm.allgather(rows))
             X, length, x, normal, slides = np.split(rows[np.lexsort((rows[:, 1], rows[:, 0]))], [2, 3, 5, 7], axis=1)
