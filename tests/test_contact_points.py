@@ -66,14 +66,16 @@ def test_no_points_and_too_many_are_refused(points):
 
 
 def plugged():
-    """A ball with friction, pushed into a clamped sheet; in a narrower ramp round-off would show in the tractions.
+    """A ball with friction, pushed into a clamped sheet.
 
-    (Solved to less than 1e-9, round-off would decide how often some ranks iterate.)
+    Round-off of a position, 1e-16 of 10, is 1e-11 of the ramp 1e-4 h0 that tractions grow over; in one of 1e-5 h0 the
+    force differed between ranks by 2e-10 to 1e-9. (Solved to less than 1e-9, round-off would decide how often some
+    ranks iterate.)
     """
     plug = fx.tools.sphere(radius=5.0, z=0.3)
     return fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(12, 1)),
                     materials=fx.MooneyRivlin(c10=50, c01=15), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                    contacts=[fx.Contact("top", plug, 0.3, moves=(0, -1), points=3, ramp=1e-5)])
+                    contacts=[fx.Contact("top", plug, 0.3, moves=(0, -1), points=3, ramp=1e-4)])
 
 
 def numbers(path):
