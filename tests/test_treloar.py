@@ -1,5 +1,7 @@
 """The main job: Treloar's sheet through its pressure maximum."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import treloar
@@ -36,6 +38,20 @@ def test_limit_pressure_is_the_largest_on_the_path(path):
     for pressure, after in ((0.49327, None), (0.49327, limit)):
         found = path.at(fx.pressure(pressure), after=after)
         assert (found.measures["pole_stretch"] > limit.measures["pole_stretch"]) == (after is limit)
+
+
+def test_a_limit_point_found_behind_is_none_that_lies_ahead(monkeypatch):
+    """One behind a jump, at a kink of contact, was taken for the next, again and again; the step is made shorter."""
+    locate, found = Curve.limit_point, []
+
+    def behind_at_first(self, a, b):
+        found.append(locate(self, a, b))
+        return replace(found[0], control=a.control - 1e-6 * a.slope) if len(found) == 1 else found[-1]
+    monkeypatch.setattr(Curve, "limit_point", behind_at_first)
+    path = fx.trace(treloar((10, 1)), until=fx.pole_stretch(3.0), progress=False)
+    limit, = path.limit_points
+    assert limit is found[-1] and len(found) == 2 and path.counts.failures == 1
+    assert limit.control == pytest.approx(found[0].control, rel=1e-9)
 
 
 @pytest.mark.quick

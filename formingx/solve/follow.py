@@ -388,9 +388,12 @@ class Run:
         found = []
         if old.slope * new.slope < 0 and old.kind != "limit point":
             try:
-                found.append(self.curve.limit_point(old, new))
+                limit = self.curve.limit_point(old, new)
             except Failure as failure:
                 raise Failure(f"a limit point lies ahead but could not be located: {failure.reason}", []) from None
+            if (limit.control - old.control) * old.slope < 0:   # it belongs to what a jump has passed
+                raise Failure("a limit point lies ahead, but it was located behind", [])
+            found.append(limit)
         for target, bound in self.open:
             if target is new.met:
                 continue
