@@ -31,10 +31,13 @@ def blown(problem: Any) -> bool:
 
 
 def snaps(curve: Curve, old: State, at_fold: str, sense: float) -> bool:
-    """True if the body snaps from a state: its path would lead back. sense: 1 or -1, which way the control goes."""
-    if at_fold == "jump":
-        return old.kind == "limit point" or old.slope * sense < 0
-    return at_fold == "blow" and old.kind == "limit point" and curve.work_ahead(old) * sense < 0
+    """True if the body snaps from a state: its path leads back. sense: 1 or -1, which way the control goes at first.
+
+    (Right behind the maximum of a pressure that of the volume may follow.)
+    """
+    if at_fold not in ("jump", "blow") or old.kind != "limit point" and old.slope * sense >= 0:
+        return False
+    return at_fold == "jump" or curve.work_ahead(old) * sense < 0
 
 
 def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) -> bool:
