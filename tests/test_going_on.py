@@ -75,6 +75,19 @@ def test_a_block_pressed_to_a_fifth_of_its_height():
     assert law_is_kept(path) < 1 + 1e-6
 
 
+def test_a_parison_is_blown_into_a_bottle_without_friction():
+    """Past the edge under its neck, where contact leaves no next state; the volume has to grow with the pressure."""
+    bottle = tools.bottle(radius=5.75, height=14.0, neck=2.2, shoulder=2.5, neck_height=1.5, base=-2.95, fillet=0.78,
+                          shoulder_fillet=0.5)
+    made = scene([fx.Contact("outer", bottle, "none")], [fx.Pressure("inner")],
+                 fx.mesh.parison(inner_radius=2.0, thickness=0.184, length=18.0, elements=(40, 1)),
+                 supports=[fx.Clamped("neck")])
+    path = fx.trace(made, until=fx.pressure(1.28), step=fx.StepControl(target=8), progress=False)
+    assert path.jumps and all(state.jump["dissipated"] >= 0 for state in path.jumps)
+    body = path.profile().top
+    assert body[:, 0].max() == pytest.approx(5.75, rel=1e-3) and body[:, 1].min() == pytest.approx(-2.95, rel=1e-3)
+
+
 @pytest.mark.slow
 def test_a_flat_rough_plug_comes_back():
     made = plugs.scene(R, H, 5.0, 1.5, MATERIAL, "stick", (40, 1), name="plug")

@@ -15,11 +15,11 @@ def usual(problem: Any, falls: bool) -> str:
 
     Time goes one way. With a history so does whatever is driven, for to follow a fold would be to let it go back; but
     where a pressure that is put on has its maximum it is the volume of the air that goes on growing, unless it has its
-    maximum there, too. `falls`: what is driven is let off.
+    maximum there, too. So it is in contact, with friction or without. `falls`: what is driven is let off.
     """
     if problem.setting.leading == len(problem.scene.things):
         return "jump"
-    if not problem.has_history:
+    if not problem.has_history and not (problem.has_kinks and blown(problem)):
         return "follow"
     return "blow" if blown(problem) and not falls else "jump"
 

@@ -20,7 +20,7 @@ from ..errors import ConvergenceError
 from . import extrapolate
 from .curve import Curve
 from .diagnose import diagnose
-from .folds import blown, snaps, usual, was_passed
+from .folds import snaps, usual, was_passed
 from .jump import AHEAD, MOST, NoEquilibrium, jump
 from .newton import Failure, tangents
 from .progress import progress_bar, show
@@ -130,8 +130,16 @@ class Run:
     @property
     def _may_jump(self) -> bool:
         """True if the body may jump: at folds, or, where a fold is followed, where contact leaves no next state."""
-        pushed = self.problem.has_kinks and not blown(self.problem)
-        return self._at_fold in ("jump", "blow") or self._at_fold == "follow" and (self.problem.has_history or pushed)
+        on_the_way = self.problem.has_history or self.problem.has_kinks
+        return self._at_fold in ("jump", "blow") or self._at_fold == "follow" and on_the_way
+
+    @property
+    def _jumps_soon(self) -> bool:
+        """True if the body jumps where short steps fail, not only the shortest.
+
+        Not where a pressure is followed with a history: what slips on the way counts.
+        """
+        return self._at_fold == "jump" or self._at_fold == "blow" and not self.problem.has_history
 
     @property
     def _sense(self) -> float:
@@ -219,7 +227,7 @@ class Run:
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good = self.step.failed()
                 failed += not isinstance(failure, _Astray)
-                soon = (self._at_fold == "jump" and failed > 1 and length < jumps[0]
+                soon = (self._jumps_soon and failed > 1 and length < jumps[0]
                         and (old.kind != "start" or not self.problem.has_history) and not self._found_no_rest_near(old))
                 if self._may_jump and (not good or soon):
                     jumps.pop(0)
