@@ -53,7 +53,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
         record: {name: measure} of columns of your own: a function of the `Problem`, called while it stands at the
             state, that returns a number; or a target such as `displacement(0, at=(1, 0))`, whose measure is recorded.
         at_fold: what to do at a limit point of what is driven. "follow": go on along the path, on which it turns back
-            (in contact, or with friction, the body jumps where no state is left on it).
+            (in contact, or with a history, the body jumps where no state is left on it).
             "jump": it goes on, and the body snaps to its next equilibrium, see `Path.jumps`; also where no other state
             is near. "stop": end there. None: "jump" where it can go one way only: it is time, or there is a history
             (friction); but a pressure is followed, for what an air supply makes grow is the volume (in contact, or

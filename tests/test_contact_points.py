@@ -68,7 +68,7 @@ def test_no_points_and_too_many_are_refused(points):
 def plugged():
     """A ball with friction, pushed into a clamped sheet.
 
-    Round-off of a position, 1e-16 of 10, is 1e-11 of the ramp 1e-4 h0 that tractions grow over; in one of 1e-5 h0 the
+    Round-off of a position, 1e-16 of 10, is 3e-11 of the ramp 1e-4 h0 that tractions grow over; in one of 1e-5 h0 the
     force differed between ranks by 2e-10 to 1e-9. (Solved to less than 1e-9, round-off would decide how often some
     ranks iterate.)
     """

@@ -15,16 +15,18 @@ def usual(problem: Any, falls: bool) -> str:
 
     Time goes one way. With a history so does whatever is driven, for to follow a fold would be to let it go back; but
     where a pressure that is put on has its maximum it is the volume of the air that goes on growing, unless it has its
-    maximum there, too. So it is in contact, with friction or without. `falls`: what is driven is let off.
+    maximum there, too. The same holds for a pressure on a body in contact, with a history or without: where contact
+    changes a path may end. `falls`: what is driven is let off.
     """
     if problem.setting.leading == len(problem.scene.things):
         return "jump"
-    if not problem.has_history and not (problem.has_kinks and blown(problem)):
+    by_pressure = _by_pressure(problem)
+    if not (problem.has_history or problem.has_kinks and by_pressure):
         return "follow"
-    return "blow" if blown(problem) and not falls else "jump"
+    return "blow" if by_pressure and not falls else "jump"
 
 
-def blown(problem: Any) -> bool:
+def _by_pressure(problem: Any) -> bool:
     """True if a pressure is what is driven."""
     leading, things = problem.setting.leading, problem.scene.things
     return leading is not None and leading < len(things) and things[leading].quantity == "pressure"

@@ -129,9 +129,9 @@ class Run:
 
     @property
     def _may_jump(self) -> bool:
-        """True if the body may jump: at folds, or, where a fold is followed, where contact leaves no next state."""
-        on_the_way = self.problem.has_history or self.problem.has_kinks
-        return self._at_fold in ("jump", "blow") or self._at_fold == "follow" and on_the_way
+        """True if the body may jump: at folds, or, if these are followed, where contact or friction ends the path."""
+        may_end = self.problem.has_history or self.problem.has_kinks
+        return self._at_fold in ("jump", "blow") or self._at_fold == "follow" and may_end
 
     @property
     def _jumps_soon(self) -> bool:
