@@ -3,11 +3,14 @@
 import base64
 import gzip
 import json
+import os
 import re
 import shutil
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path as FilePath
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
@@ -466,3 +469,38 @@ def test_unwritable(inflated, write):
     suffix = {"to_vtx": "bp", "to_xdmf": "xdmf", "to_csv": "csv", "animate": "gif", "report": "html"}[write]
     with pytest.raises(OSError, match=f"'/proc/run.{suffix}' could not be written"):
         getattr(inflated, write)(f"/proc/run.{suffix}")
+
+
+@pytest.mark.parametrize("name", ["to_csv", "report", "animate", "view3d", "mesh"])
+def test_pipes_links_and_modes_stay(inflated, tmp_path, name):
+    """What is no regular file is written to; a link stays one, a mode and its file too; nothing is left beside."""
+    ending = {"to_csv": "csv", "report": "html", "animate": "gif", "view3d": "png", "mesh": "msh"}[name]
+    write = getattr(inflated, name, lambda file: fx.mesh.write(inflated.problem.scene.mesh, file))
+    pipe, file, link = (tmp_path / f"{word}.{ending}" for word in ("pipe", "file", "link"))
+    os.mkfifo(pipe)
+    with ThreadPoolExecutor() as pool:
+        read = pool.submit(pipe.read_bytes)
+        write(pipe)
+        assert len(read.result(10)) > 200 and pipe.is_fifo()
+    write(file)
+    before = file.read_bytes()
+    file.write_text("earlier")
+    file.chmod(0o600)
+    link.symlink_to(file.name)
+    write(link)
+    assert link.is_symlink() and file.stat().st_mode & 0o777 == 0o600 and len(file.read_bytes()) == len(before)
+    assert len(list(tmp_path.iterdir())) == 3
+    with pytest.raises(OSError, match="full.* could not be written"):
+        (tmp_path / f"full.{ending}").symlink_to("/dev/full")
+        write(tmp_path / f"full.{ending}")
+    assert FilePath("/dev/full").is_char_device()
+
+
+def test_a_folder_of_something_else_is_left_alone(inflated, tmp_path):
+    (tmp_path / "run.bp").mkdir()
+    (tmp_path / "run.bp" / "thesis.tex").write_text("years of work")
+    (tmp_path / "run.h5").symlink_to("elsewhere")
+    for write in (inflated.to_vtx, inflated.to_xdmf):
+        with pytest.raises(fx.InputError, match="is there already"):
+            write(tmp_path / f"run.{'bp' if write == inflated.to_vtx else 'xdmf'}")
+    assert (tmp_path / "run.bp" / "thesis.tex").exists() and (tmp_path / "run.h5").is_symlink()

@@ -6,8 +6,8 @@ import pytest
 from conftest import ROOT
 
 PACKAGE = ROOT / "formingx"
-ROOMS = ["errors", "_compat", "notebook", "figures", "units", "csv_files", "tables", "time_temperature", "mesh",
-         "physics", "materials", "scene", "discrete", "solve", "results", "heat"]   # what is not here is above them all
+ROOMS = ["errors", "output", "_compat", "notebook", "figures", "units", "csv_files", "tables", "time_temperature",
+         "mesh", "physics", "materials", "scene", "discrete", "solve", "results", "heat"]   # what is not here is above them all
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError
+from ..output import replace
 from .grid import Grid, counter_clockwise
 
 _KINDS = {1: (1, 2), 2: (2, 3), 3: (2, 4), 4: (3, 4), 5: (3, 8), 6: (3, 6), 7: (3, 5), 8: (1, 3), 9: (2, 6),
@@ -129,8 +130,7 @@ def write(grid: Grid, file: str | os.PathLike) -> None:
              "$PhysicalNames", str(len(named)), *sorted(named, key=lambda line: line[0]), "$EndPhysicalNames",
              "$Nodes", str(len(nodes)), *nodes, "$EndNodes",
              "$Elements", str(len(elements)), *(f"{k} {row}" for k, row in enumerate(elements, 1)), "$EndElements"]
-    with open(file, "w", encoding="utf-8") as stream:
-        stream.write("\n".join(lines) + "\n")
+    replace(file, lambda stream: stream.write("\n".join(lines) + "\n"))
 
 
 def _parts(found: Content, dim: int, kinds: dict[int, int], numbers: np.ndarray, file: str) -> dict[str, np.ndarray]:

@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..output import replace
 from .grid import Grid, counter_clockwise
 
 _FORMAT = "six-node triangles 1"
@@ -53,8 +54,7 @@ def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> No
     for name, edges in grid.boundaries.items():
         lines.append(f"boundary {len(edges)} {name}")
         lines += [" ".join(map(str, row)) for row in grid.numbers[edges[:, [0, 2, 1]]]]
-    with open(file, "w") as stream:
-        stream.write("\n".join(lines) + "\n")
+    replace(file, lambda stream: stream.write("\n".join(lines) + "\n"))
 
 
 def read(file: str | os.PathLike) -> Grid:

@@ -33,7 +33,7 @@ from dolfinx import fem, has_adios2, io
 from dolfinx import mesh as dolfinx_mesh
 from mpi4py import MPI
 
-from ...errors import InputError, place
+from ...errors import InputError
 from .. import files
 from ..evaluate.contact_face import ContactFace
 from ..evaluate.relaxed import ElasticStretches
@@ -127,9 +127,7 @@ def to_xdmf(path: Any, file: Any, states: Any = None) -> None:
 
 
 def _write(path: Any, file: Any, states: Any, suffix: str, write: Callable) -> None:
-    file, comm = place("file", file), path.problem.comm
-    if file.suffix != suffix:
-        raise InputError(f"file {str(file)!r}: its name must end in {suffix}")
+    file, comm = files.named("to_vtx" if suffix == ".bp" else "to_xdmf", file, suffix), path.problem.comm
     chosen = _chosen(path, states)
     fields = Fields(path)
     points = _gather(fields.points, comm)
@@ -139,6 +137,8 @@ def _write(path: Any, file: Any, states: Any, suffix: str, write: Callable) -> N
         steps.append((float(number), {name: _gather(v, comm) for name, v in values.items()}))
 
     def write_all():
+        for target in (file, file.with_suffix(".h5")) if suffix == ".xdmf" else (file,):
+            _check_replaceable(target)
         size = 2**17 + sum(8 * (array.size + points.size) for _, values in steps for array in values.values())
         part = file.with_name(f"part-{file.name}")
         try:
@@ -220,6 +220,14 @@ def _xdmf(part: FilePath, file: FilePath, body: _Body, steps: list) -> None:
     os.replace(data, file.with_suffix(".h5"))
     part.unlink()
     files.replace(file, lambda stream: stream.write(text))
+
+
+def _check_replaceable(file: FilePath) -> None:
+    """An InputError unless there is nothing of this name, a regular file, or a folder that an earlier run wrote."""
+    ours = file.suffix.lower() == ".bp" and file.is_dir() and (not any(file.iterdir()) or (file / "md.idx").exists())
+    if file.is_symlink() or file.exists() and not (file.is_file() or ours):
+        raise InputError(f"file {str(file)!r} is there already, a link, a device or a folder of something else: give"
+                         f" another name, or remove it")
 
 
 def _together(text: str) -> str:

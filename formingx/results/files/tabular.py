@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import errno
 import json
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, place
+from ...output import replace
 
 
 def write_path(path: Any, file: Any) -> None:
@@ -72,25 +72,6 @@ def on_root(comm: Any, action: Callable[[], Any]) -> Any:
     if error is not None:
         raise error
     return result
-
-
-def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:
-    """Write beside the file, then rename: an earlier file survives a failure.
-
-    Raises:
-        OSError: the file cannot be written; it names the file, and no part is left behind.
-    """
-    file = place("file", file)
-    part = file.with_name(file.name + ".part")
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with open(part, mode, newline=None if "b" in mode else "", encoding=None if "b" in mode else "utf-8") as stream:
-            write(stream)
-        os.replace(part, file)
-    except OSError as error:
-        with contextlib.suppress(OSError):
-            part.unlink()
-        raise OSError(error.errno, f"{os.fspath(file)!r} could not be written: {error.strerror}") from None
 
 
 def named(who: str, file: Any, *endings: str) -> Any:

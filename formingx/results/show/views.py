@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -63,17 +63,17 @@ def _mirrored(profile: Any) -> Any:
 
 def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any, comm: Any, title: str) -> None:
     """Draw the section swept through `stations`; place(points (n, 2), station) gives its x, y, z there, each (n,)."""
-    if FilePath(file).suffix.lower() != ".png":
-        raise InputError(f"file {str(file)!r}: its name must end in .png")
+    file = files.named("view3d", file, ".png")
 
     def draw():
-        FilePath(file).parent.mkdir(parents=True, exist_ok=True)
+        picture = io.BytesIO()
         with _screen():
-            _draw(profile, stations, place, camera, os.fspath(file), title)
+            _draw(profile, stations, place, camera, picture, title)
+        files.replace(file, lambda stream: stream.write(picture.getvalue()), "wb")
     files.on_root(comm, draw)
 
 
-def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: str, title: str) -> None:
+def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any, title: str) -> None:
     import pyvista
 
     def swept(line, values):
