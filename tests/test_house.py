@@ -7,7 +7,7 @@ from conftest import ROOT
 
 PACKAGE = ROOT / "formingx"
 ROOMS = ["errors", "output", "_compat", "notebook", "figures", "units", "csv_files", "tables", "time_temperature",
-         "mesh", "physics", "materials", "scene", "discrete", "solve", "results", "heat"]   # what is not here is above them all
+         "mesh", "physics", "materials", "scene", "discrete", "solve", "results", "heat"]   # others are above them
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 
