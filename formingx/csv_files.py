@@ -92,7 +92,7 @@ def read(file: Any) -> Table:
     if not lines:
         raise InputError(f"table {name!r} is empty")
     delimiter = max(",;\t", key=lines[0][1].count)
-    cells = [(n, [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]) for n, line in lines]
+    cells = [(n, _cells(name, n, line, delimiter)) for n, line in lines]
     heads = [_name_and_unit(cell) for cell in cells[0][1]]
     names = [head for head, _ in heads]
     if all(is_number(cell) for cell in cells[0][1]):
@@ -108,6 +108,13 @@ def read(file: Any) -> Table:
     columns = {head: np.array([float(c) if is_number(c) else np.nan for c in column]) for head, column in text.items()
                if any(is_number(c) for c in column)}
     return Table(name, columns, {head: unit for head, unit in heads if head in columns}, text.get("kind"))
+
+
+def _cells(name: str, number: int, line: str, delimiter: str) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+    except csv.Error as error:                               # a cell of more than 131,072 characters, for one
+        raise InputError(f"table {name!r}, line {number}: {error}") from None
 
 
 def from_arrays(name: str, columns: Mapping[str, Any]) -> Table:

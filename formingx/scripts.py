@@ -7,6 +7,7 @@ import runpy
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import formingx
@@ -33,11 +34,12 @@ def look_over(script: Any, arguments: Sequence[str] = ()) -> Report:
         arguments: its command line.
 
     Raises:
-        InputError: there is no such file, it runs no scene, or the scene or a target is refused.
+        InputError: there is no such file, it is no Python, runs no scene, or the scene or a target is refused.
     """
     file = place("doctor: script", script)
     if not file.is_file():
         raise InputError(f"doctor: script {str(file)!r} is not there")
+    _check_python(file)
     before = sys.argv, sys.path[:]
     sys.argv, sys.path[:0] = [os.fspath(file), *arguments], [os.fspath(file.parent)]
     try:
@@ -48,6 +50,15 @@ def look_over(script: Any, arguments: Sequence[str] = ()) -> Report:
     finally:
         sys.argv, sys.path[:] = before
     raise InputError(f"doctor: {str(file)!r} runs no scene in this process: there is nothing to look over")
+
+
+def _check_python(file: Path) -> None:
+    try:
+        compile(file.read_bytes(), os.fspath(file), "exec")
+    except (SyntaxError, ValueError, OverflowError, MemoryError, RecursionError) as error:
+        where = f", line {error.lineno}" if isinstance(error, SyntaxError) and error.lineno else ""
+        words = error.msg if isinstance(error, SyntaxError) else str(error) or type(error).__name__
+        raise InputError(f"doctor: script {str(file)!r} is no Python: {words}{where}") from None
 
 
 @contextmanager

@@ -17,9 +17,11 @@ from __future__ import annotations
 
 import itertools
 import json
+import logging
 import math
 import os
 import pickle
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent import futures
@@ -38,6 +40,8 @@ from .results.show import effects
 
 Measure = Callable[[Any], float] | str
 
+_AT_EDGE = 1e-3        # of the range of a variable
+
 
 @dataclass(frozen=True)
 class StudyRun:
@@ -48,12 +52,14 @@ class StudyRun:
         measures: {name: number}; empty if it failed.
         error: why it failed, or "".
         seconds: that it took.
+        warnings: what it warned of, one text each.
     """
 
     values: dict[str, float]
     measures: dict[str, float] = field(default_factory=dict)
     error: str = ""
     seconds: float = 0.0
+    warnings: list[str] = field(default_factory=list)
 
 
 class _Task(NamedTuple):
@@ -63,7 +69,8 @@ class _Task(NamedTuple):
     measure: dict[str, Measure]
 
     def __call__(self, values: dict[str, float]) -> StudyRun:
-        began = time.perf_counter()
+        began, log, names = time.perf_counter(), logging.getLogger("formingx"), _NamesRun(values)
+        log.addFilter(names)
         try:
             result = self.build(**values)
             found = {name: float(result.last.measures[of] if isinstance(of, str) else of(result))
@@ -71,7 +78,25 @@ class _Task(NamedTuple):
             error = next((f"{name} is not a finite number" for name, v in found.items() if not math.isfinite(v)), "")
         except Exception as failure:                         # whatever a script raises: the others go on
             found, error = {}, f"{type(failure).__name__}: {failure}"
-        return StudyRun(values, {} if error else found, error, time.perf_counter() - began)
+        finally:
+            log.removeFilter(names)
+        return StudyRun(values, {} if error else found, error, time.perf_counter() - began, names.warnings)
+
+
+class _NamesRun(logging.Filter):
+    """Puts the values of a run before what it logs, and keeps its warnings; others may run in other threads."""
+
+    def __init__(self, values: dict[str, float]):
+        super().__init__()
+        self._values, self._thread, self.warnings = values, threading.get_ident(), list[str]()
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        if record.thread == self._thread:
+            text = record.getMessage()
+            record.msg, record.args = f"run {_shown(self._values)}: {text}", ()
+            if record.levelno >= logging.WARNING:
+                self.warnings.append(text)
+        return True
 
 
 class Study(Sheet):
@@ -194,10 +219,24 @@ class Study(Sheet):
         lines = [f"{len(self.runs)} runs" + f", of which {failed} failed" * bool(failed)
                  + f", {sum(run.seconds for run in self.runs):.1f} s in all"]
         if self.goal and self.good:
-            shown = ", ".join(f"{k} = {v:.4g}" for k, v in {**self.best.values, **self.best.measures}.items())
+            shown = _shown({**self.best.values, **self.best.measures})
             lines.append(f"best ({', '.join(f'{way} {name}' for name, way in self.goal.items())}): {shown}")
-        return "\n".join([*lines, *(f"failed: {run.values}: {run.error.splitlines()[0]}" for run in self.runs
-                                    if run.error)])
+            lines += self._edges()
+        lines += [f"failed: {_shown(run.values)}: {run.error.splitlines()[0]}" for run in self.runs if run.error]
+        return "\n".join([*lines, *(f"warning: {_shown(run.values)}: {text}" for run in self.runs
+                                    for text in run.warnings)])
+
+    def _edges(self) -> list[str]:
+        """The variables whose best value is the last that was run on its side, in words."""
+        found = []
+        for name in self.variables:
+            values = [run.values[name] for run in self.runs]
+            low, high, best = min(values), max(values), self.best.values[name]
+            near = _AT_EDGE * (high - low)
+            if low < high and not low + near < best < high - near:
+                found.append(f"the best is at the edge of {name}, which was run from {low:g} to {high:g}: a better one"
+                             f" may lie {'below' if best <= low + near else 'above'}")
+        return found
 
     def _distance(self, run: StudyRun) -> float:
         name, way = next(iter(self.goal.items()))
@@ -256,6 +295,10 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
     order = {tuple(case.items()): k for k, case in enumerate(cases)}
     found.runs.sort(key=lambda run: order.get(tuple(run.values.items()), len(order)))
     return found
+
+
+def _shown(numbers: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} = {value:.4g}" for name, value in numbers.items())
 
 
 def _finished(pool: Any, task: _Task, cases: list[dict]) -> Iterator[StudyRun]:

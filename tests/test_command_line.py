@@ -1,5 +1,6 @@
 """python -m formingx as a user runs it."""
 
+import re
 import subprocess
 import sys
 
@@ -90,6 +91,16 @@ def test_doctor_of_no_scene(tmp_path, capsys):
     assert "script.py' runs no scene" in error and "absent.py' is not there" in error
     (tmp_path / "script.py").write_text("import formingx as fx\nfx.NeoHookean(c10=-1)")
     assert main(["doctor", str(tmp_path / "script.py")]) == 2 and "NeoHookean(c10=-1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text, words", [
+    (b"\x89PNG\r\n\x1a\n\0\0", "is no Python: "), (b"scene = (1,\nprint 2\n", "is no Python: .*, line "),
+    (b"\0" * 9, "is no Python: "), (b"x = " + b"(" * 10_000, "is no Python: ")])
+def test_doctor_of_what_is_no_python(text, words, tmp_path, capsys):
+    (tmp_path / "script.py").write_bytes(text)
+    assert main(["doctor", str(tmp_path / "script.py")]) == 2
+    error = capsys.readouterr().err
+    assert re.search(f"script.py' {words}", error) and len(error.splitlines()) == 1
 
 
 def test_unknown_command():

@@ -148,11 +148,29 @@ def test_bad_tables(tmp_path, text, message):
     ({"columns": ["a"]}, "at least two columns"),
     ({"units": {"z": 1}}, "units: column 'z' is not known"),
     ({"units": {"a": 0}}, "must be greater than 0"),
+    ({"units": 3}, "compare: units = 3: must be"),
+    ({"columns": 3}, "compare: columns = 3: must be a list of names"),
     ({"units": {"a": "cm"}}, "does not state the unit of column 'a'"),
 ])
 def test_bad_arguments(arguments, message):
     with pytest.raises(fx.InputError, match=message):
         fx.compare(GOOD, GOOD, **arguments)
+
+
+def test_numbers_near_the_largest():
+    """A range that is no number is refused; points that fall into one beside a far one are taken as one."""
+    far = {"a": [0.0, 1.0, 2.0, 1e308], "b": [0.0, 1.0, 3.0, 1e308]}
+    assert fx.compare(far, far).differences["b"].maximum < 1e-9 * 1e308
+    for theirs in ({"a": [-1e308, 1e308], "b": [0.0, 1.0]}, {"a": [0.0, 1e200], "b": [0.0, 1.0]}):
+        with pytest.raises(fx.InputError, match="column 'a': ours changes by .* no curves to compare"):
+            fx.compare(GOOD, theirs)
+
+
+def test_a_cell_without_end(tmp_path):
+    file = tmp_path / "long.csv"
+    file.write_text("a,b\n0,0\n1," + "1" * 200_000 + "\n2,2\n")
+    with pytest.raises(fx.InputError, match=r"long.csv', line 3: field larger than field limit \(131072\)"):
+        csv_files.read(file)
 
 
 def test_backwards():

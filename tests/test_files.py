@@ -462,6 +462,8 @@ def test_vtx_bad_input(inflated, tmp_path, name, states, message):
 def test_a_view_is_a_png(inflated, tmp_path):
     with pytest.raises(fx.InputError, match="must end in .png"):
         inflated.view3d(tmp_path / "view.svg")
+    with pytest.raises(fx.InputError, match="view3d: file = 3: must be the name of a file"):
+        inflated.view3d(3)
 
 
 @pytest.mark.parametrize("write", ["to_vtx", "to_xdmf", "to_csv", "animate", "report"])

@@ -275,6 +275,18 @@ def test_bad_input(make, words):
         make()
 
 
+@pytest.mark.parametrize("make, words", [
+    (lambda: fx.Ogden([1.0], [2.0]), r"Ogden: too many positional arguments: must be Ogden\(mu=\.\.\., alpha=\.\.\.\)"),
+    (lambda: fx.NeoHookean(1.0), r"must be NeoHookean\(c10=\.\.\.\)"),
+    (lambda: fx.MooneyRivlin(c10=1.0), "missing a required argument: 'c01'"),
+    (lambda: fx.Gent(mu=1.0, jm=2.0), r"must be Gent\(mu=\.\.\., Jm=\.\.\.\)"),
+    (lambda: fx.Viscoelastic(), r"must be Viscoelastic\(equilibrium, branches, order.*, shift"),
+])
+def test_constants_by_name(make, words):
+    with pytest.raises(fx.InputError, match=words):
+        make()
+
+
 def test_isotropy_holds_for_every_material():
     for (material, _), l in itertools.product(CASES, ([1.3, 0.9], [2.0, 1.1])):
         P, Q = (material.response.stress(np.array([[a], [b]]), material.parameters.values())[:, 0]

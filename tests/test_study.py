@@ -1,5 +1,7 @@
 """Studies: all combinations, failures that end nothing, folders that are gone on with, effects and the best."""
 
+import dataclasses
+import logging
 import math
 from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
@@ -12,6 +14,12 @@ from mpi4py import MPI
 import formingx as fx
 
 RUNS = []
+
+
+def doubtful(x):
+    """In place of a run that warns."""
+    logging.getLogger("formingx").warning("the body folds at %g", x)
+    return SimpleNamespace(f=x)
 
 
 def formula(x, y):
@@ -91,6 +99,32 @@ def test_a_folder_is_gone_on_with(here, tmp_path):
     (tmp_path / "other" / "thesis.txt").write_text("mine")
     with pytest.raises(fx.InputError, match="holds no study"):
         run(here, folder=tmp_path / "other")
+
+
+def test_a_best_at_the_edge_says_so(here):
+    text = str(run(here, x=(0, 1, 2), y=(1, 1.5)))           # the best is at (1, 2)
+    assert "the best is at the edge of y, which was run from 1 to 1.5: a better one may lie above" in text
+    assert "edge of x" not in text and "edge" not in str(run(here, x=(0, 1, 2), y=(1, 2, 3)))
+
+
+def test_warnings_name_their_run(here, caplog, tmp_path):
+    found = fx.study(doubtful, {"x": [2, 3]}, {"f": f}, executor=here, progress=False, folder=tmp_path / "runs")
+    assert [run.warnings for run in found.runs] == [["the body folds at 2"], ["the body folds at 3"]]
+    assert "warning: x = 2: the body folds at 2\nwarning: x = 3: the body folds at 3" in str(found)
+    assert caplog.messages == ["run x = 2: the body folds at 2", "run x = 3: the body folds at 3"]
+    logging.getLogger("formingx").warning("after the runs")
+    assert caplog.messages[-1] == "after the runs"
+    again = fx.study(doubtful, {"x": [2, 3]}, {"f": f}, executor=here, progress=False, folder=tmp_path / "runs")
+    assert again.runs == found.runs
+
+
+def test_an_error_too_long_for_excel(here, tmp_path):
+    found = run(here, x=(0, 1))
+    for error in ("x" * 40_000, "\x01x"):
+        found.runs[1] = dataclasses.replace(found.runs[1], error=error)
+        with pytest.raises(fx.InputError, match=f"column 'error', row 2: {len(error)} characters, .* Excel cell holds"):
+            found.to_excel(tmp_path / "all.xlsx")
+        assert not (tmp_path / "all.xlsx").exists()
 
 
 def test_refining_finds_what_lies_between(here):

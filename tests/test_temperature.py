@@ -101,6 +101,7 @@ def test_entropic_modulus():
     (fx.NeoHookean(c10=fx.of_temperature(lambda T: 160 - T)), 170.0, "no stiffness"),
     (fx.Viscoelastic(None, [(1.0, 1.0)], shift=fx.WLF(8.86, 101.6, 150.0)), 20.0, "must be above reference - c2"),
     (fx.NeoHookean(c10=1.0), fx.table({0.0: 150.0, 0.5: 140.0}), "R = "),
+    (fx.NeoHookean(c10=1.0), fx.Scene, "must be a number, a table over R, .*, not a class"),
     (fx.NeoHookean(c10=1.0), "a\0b.csv", "must be the name of a file"),
     (fx.NeoHookean(c10=1.0), lambda R, Z: R / 0, "not a finite number"),
     (fx.NeoHookean(c10=1.0), lambda R: R, r"the function of arrays \(R, Z\) fails: TypeError"),

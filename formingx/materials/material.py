@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import copy
 import functools
+import inspect
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -41,6 +43,11 @@ class Material:
 
     parameters: dict[str, Any]
     internal: dict[str, Any] = {}
+
+    def __init_subclass__(cls, **options: Any):
+        super().__init_subclass__(**options)
+        if "__init__" in vars(cls):
+            setattr(cls, "__init__", _by_name(cls.__init__))  # noqa: B010  mypy does not let it be assigned
 
     def strain_energy(self, F: Any, *args: Any, **constants: Any) -> Any:
         """Energy per reference volume of F, shape (3, 3); a UFL scalar, zero at F = I.
@@ -287,6 +294,23 @@ class Material:
 
     def __str__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{k}={brief(v)}' for k, v in self.parameters.items())})"
+
+
+def _by_name(make: Callable) -> Callable:
+    """An `__init__` that says in words how its arguments are given, where they are not."""
+    signature = inspect.signature(make)
+
+    @functools.wraps(make)
+    def checked(self: Material, *args: Any, **constants: Any) -> None:
+        try:
+            signature.bind(self, *args, **constants)
+        except TypeError as error:
+            name, parameters = type(self).__name__, list(signature.parameters.values())[1:]
+            words = ", ".join(f"{p.name}=..." if p.kind is p.KEYWORD_ONLY else str(p).partition(":")[0]
+                              for p in parameters)
+            raise InputError(f"{name}: {error}: must be {name}({words})") from None
+        make(self, *args, **constants)
+    return checked
 
 
 def brief(value: Any) -> str:

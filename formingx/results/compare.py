@@ -11,12 +11,13 @@ import numpy as np
 from mpi4py import MPI
 
 from .. import csv_files
-from ..errors import InputError, known
+from ..errors import InputError, instance, known, several
 from . import files
 from .show import plots
 
 _SAMPLES, _FINE = 2000, 33         # of a curve; and of the two pieces that meet at a sample
 _MOST = 10_000                     # points of theirs: each is measured against every sample
+_LARGEST = 1e100                   # range of a side over that of the other: its square is a number
 
 
 @dataclass(frozen=True)
@@ -136,9 +137,10 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     """
     left, right = _table("ours", ours), _table("theirs", theirs)
     pairs = _columns(left, right, columns)
-    for name in units or {}:
+    units = instance("compare: units", {} if units is None else units, Mapping, "{our name: factor or unit}")
+    for name in units:
         known("compare: units: column", name, pairs)
-    in_units: dict[str, Any] = {name: left.units.get(name) for name in pairs} | dict(units or {})
+    in_units: dict[str, Any] = {name: left.units.get(name) for name in pairs} | dict(units)
     a = np.column_stack([left.columns[c] if left.units[c] else left.take(c) for c in pairs])
     b = np.column_stack([right.take(their, in_units[our]) for our, their in pairs.items()])
     names = list(pairs)
@@ -146,6 +148,9 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     for name, size, other in zip(names, scale, _ranges(b)):
         if not size > 0 or not other > 0:
             raise InputError(f"compare: column {name!r} does not vary on {'our' if not size > 0 else 'their'} side")
+        if not min(size, other) > max(size, other) / _LARGEST:
+            raise InputError(f"compare: column {name!r}: ours changes by {size:.3g}, theirs by {other:.3g}: no curves"
+                             f" to compare; are columns and units right?")
     curve = np.column_stack(ours.curve(*names)) if hasattr(ours, "curve") else a
     smooth = Smooth(curve / scale)
     line = smooth.line * scale
@@ -185,7 +190,7 @@ def _columns(left: csv_files.Table, right: csv_files.Table, given: Any) -> dict[
                              f" {', '.join(right.columns)}: fewer than two have the same name; say which belong"
                              f" together, as columns={{our name: their name}}")
         return pairs
-    pairs = dict(given) if isinstance(given, Mapping) else {c: c for c in given}
+    pairs = dict(given) if isinstance(given, Mapping) else {c: c for c in several("compare: columns", given, "names")}
     if len(pairs) < 2:
         raise InputError(f"compare: columns = {given!r}: a curve needs at least two columns")
     for our, their in pairs.items():
@@ -194,6 +199,7 @@ def _columns(left: csv_files.Table, right: csv_files.Table, given: Any) -> dict[
     return pairs
 
 
+@np.errstate(over="ignore")
 def _ranges(points: np.ndarray) -> np.ndarray:
     return np.ptp(points, axis=0)
 
@@ -211,8 +217,9 @@ class Smooth:
 
     def __init__(self, points: np.ndarray):
         from scipy.interpolate import Akima1DInterpolator, interp1d
-        points = points[np.concatenate([[True], np.any(np.diff(points, axis=0) != 0, axis=1)])]
         s = _arc_length(points)
+        grows = np.concatenate([[True], np.diff(s) > 0])
+        points, s = points[grows], s[grows]
         self.at = Akima1DInterpolator(s, points, axis=0) if len(points) > 3 else interp1d(s, points, axis=0)
         self.s = np.linspace(0, s[-1], _SAMPLES)
         self.line = self.at(self.s)

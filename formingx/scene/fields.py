@@ -16,6 +16,9 @@ from ..mesh.locate import locate
 from ..tables import Table
 
 
+_WHAT = "a number, a table over R, a function of (R, Z), a CSV file, what fx.heat returned, or a DOLFINx Function"
+
+
 def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperature") -> np.ndarray:
     """A field at points of a mesh, shape (n, 2), length; each rank may have points of its own. Collective.
 
@@ -37,6 +40,8 @@ def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperatu
 def _values(field: Any, points: np.ndarray, name: str) -> np.ndarray:
     """`values_at` points that are the same on all ranks."""
     R, Z = points.T
+    if isinstance(field, type):
+        raise InputError(f"{name} = {field!r}: must be {_WHAT}, not a class")
     if isinstance(field, Table):
         field.check(R, "R")
         found = field(R)

@@ -12,6 +12,7 @@ from ...units import NONE, Units
 from . import tabular
 
 _SHOWN = 10           # rows that are printed: the first and the last
+_LONGEST = 32_767     # characters of a cell in Excel
 
 
 class Sheet:
@@ -36,16 +37,22 @@ class Sheet:
         """Write an Excel file, its name ending in .xlsx.
 
         Raises:
-            InputError: the name ends otherwise, or openpyxl is not installed. OSError: it cannot be written.
+            InputError: the name ends otherwise, openpyxl is not installed, or a text is none that Excel takes.
+            OSError: it cannot be written.
         """
         file = tabular.named("to_excel", file, ".xlsx")
         try:
             from openpyxl import Workbook
+            from openpyxl.cell.cell import ILLEGAL_CHARACTERS_RE
         except ImportError:
             raise InputError("to_excel: needs openpyxl, which is not installed; to_csv needs nothing") from None
         book = Workbook()
         sheet: Any = book.active
-        for row in (self._header(units), *self._rows()):
+        for n, row in enumerate((self._header(units), *self._rows())):
+            for name, cell in zip(self.columns, row):
+                if isinstance(cell, str) and (len(cell) > _LONGEST or ILLEGAL_CHARACTERS_RE.search(cell)):
+                    raise InputError(f"to_excel: column {name!r}, row {n}: {len(cell)} characters, {cell[:40]!r}...: an"
+                                     f" Excel cell holds {_LONGEST}, and none that cannot be printed; to_csv writes it")
             sheet.append([v.item() if isinstance(v, np.generic) else v for v in row])
         sheet.freeze_panes = "A2"
         tabular.on_root(self.comm, lambda: tabular.replace(file, book.save, "wb"))
