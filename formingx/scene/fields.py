@@ -15,7 +15,6 @@ from ..mesh import Mesh
 from ..mesh.locate import locate
 from ..tables import Table
 
-
 _WHAT = "a number, a table over R, a function of (R, Z), a CSV file, what fx.heat returned, or a DOLFINx Function"
 
 
