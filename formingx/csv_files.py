@@ -11,9 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .errors import InputError, known, place, positive
+from .numerals import is_number
 from .units import LENGTHS, STRESSES
 
 _VOLUMES = {f"{name}3": size**3 for name, size in LENGTHS.items()} | {"l": 1e-3, "ml": 1e-6}
+_DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 UNITS = {"length": LENGTHS, "stress": STRESSES, "volume": _VOLUMES}
 
 
@@ -77,26 +79,17 @@ def conversion(unit: str, wanted: str) -> float:
 def read(file: Any) -> Table:
     """A CSV file: a header of column names, each with its unit in brackets if it has one ("pressure [psi]"), then rows.
 
-    Cells are parted by commas, semicolons or tabs; lines that begin with # are left out.
-
     Raises:
-        InputError: not the name of a file; the file is not there, has no header, a row of another length, or fewer
-            than two rows.
+        InputError: as `records`; the file has no header, a row of another length, or fewer than two rows.
     """
     name = os.fspath(place("table", file))
-    try:
-        with open(name, newline="", encoding="utf-8-sig") as stream:
-            lines = [(n, line) for n, line in enumerate(stream, 1) if line.strip() and not line.startswith("#")]
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"table {name!r} cannot be read: {error}") from None
-    if not lines:
+    cells = records(name)
+    if not cells:
         raise InputError(f"table {name!r} is empty")
-    delimiter = max(",;\t", key=lines[0][1].count)
-    cells = [(n, _cells(name, n, line, delimiter)) for n, line in lines]
-    heads = [_name_and_unit(cell) for cell in cells[0][1]]
+    heads = [name_and_unit(cell) for cell in cells[0][1]]
     names = [head for head, _ in heads]
-    if all(is_number(cell) for cell in cells[0][1]):
-        raise InputError(f"table {name!r}: the first line must name the columns; it reads {lines[0][1].strip()!r}")
+    if any(is_number(cell) for cell in cells[0][1]):
+        raise InputError(f"table {name!r}: the first line must name the columns; it reads {', '.join(names)[:60]!r}")
     if len(set(names)) < len(names):
         raise InputError(f"table {name!r}: a column name stands twice in the header: {', '.join(names)}")
     for n, row in cells[1:]:
@@ -110,11 +103,48 @@ def read(file: Any) -> Table:
     return Table(name, columns, {head: unit for head, unit in heads if head in columns}, text.get("kind"))
 
 
-def _cells(name: str, number: int, line: str, delimiter: str) -> list[str]:
+def records(file: Any) -> list[tuple[int, list[str]]]:
+    """[(line, cells)] of a CSV file, in which numbers have decimal points.
+
+    Cells are parted by semicolons or tabs if the first line has any, else by commas; lines that begin with # are left
+    out. Decimal commas (of semicolons, tabs, or cells in quotes) become points, where no number has a point.
+
+    Raises:
+        InputError: the file cannot be read, quotes do not match, some numbers have commas and others points.
+    """
+    name = os.fspath(file)
     try:
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
-    except csv.Error as error:                               # a cell of more than 131,072 characters, for one
-        raise InputError(f"table {name!r}, line {number}: {error}") from None
+        with open(name, newline="", encoding="utf-8-sig") as stream:
+            lines = _without_remarks(list(stream))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"table {name!r} cannot be read: {error}") from None
+    delimiter = next((mark for mark in ";\t" if lines and mark in lines[0][1]), ",")
+    found, reader = [], csv.reader((line for _, line in lines), delimiter=delimiter, strict=True)
+    try:
+        for row in reader:
+            found.append((lines[reader.line_num - 1][0], [cell.strip() for cell in row]))
+    except csv.Error as error:
+        at = lines[min(reader.line_num, len(lines)) - 1][0] if lines else 0
+        raise InputError(f"table {name!r}, line {at}: {error}") from None
+    commas = [(n, cell) for n, row in found for cell in row if _DECIMAL_COMMA.fullmatch(cell)]
+    if not commas:
+        return found
+    points = [(n, cell) for n, row in found for cell in row if "." in cell and is_number(cell)]
+    if points:
+        raise InputError(f"table {name!r}: {commas[0][1]!r} in line {commas[0][0]} has a decimal comma,"
+                         f" {points[0][1]!r} in line {points[0][0]} a point: all numbers must have the same")
+    return [(n, [cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell for cell in row])
+            for n, row in found]
+
+
+def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:
+    """[(number, line)] without empty lines and those that begin with #, other than inside quotes."""
+    found, quoted = [], False
+    for n, line in enumerate(lines, 1):
+        if quoted or line.strip() and not line.lstrip().startswith("#"):
+            found.append((n, line))
+            quoted ^= line.count('"') % 2 == 1
+    return found
 
 
 def from_arrays(name: str, columns: Mapping[str, Any]) -> Table:
@@ -132,17 +162,9 @@ def from_arrays(name: str, columns: Mapping[str, Any]) -> Table:
     return Table(name, arrays, dict.fromkeys(arrays))
 
 
-def _name_and_unit(cell: str) -> tuple[str, str | None]:
+def name_and_unit(cell: str) -> tuple[str, str | None]:
+    """("pressure", "psi") of "pressure [psi]"; None for a number without a unit."""
     found = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]", cell)
     if not found or not found[1]:
         return cell, None
     return found[1], None if found[2] in ("", "-", "1") else found[2]
-
-
-def is_number(cell: str) -> bool:
-    """True if a cell can be read as a number."""
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True

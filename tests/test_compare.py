@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 from conftest import drawn, run, treloar
+from mpi4py import MPI
 from reference import element
 from test_reference_element import follow, pair
 
 import formingx as fx
 from formingx import csv_files
+from formingx.results import files
 
 
 def spiral(t, shift=0.0):
@@ -131,7 +133,9 @@ GOOD = {"a": [0, 1, 2], "b": [0, 1, 4]}
     (None, "cannot be read"), ("", "is empty"), ("1,2\n3,4\n5,6\n", "the first line must name the columns"),
     ("a,b\n1,2\n", "1 rows of data"), ("a,b\n1,2\n3\n4,5\n", "line 3: 1 cells, but the header names 2"),
     ("a,a\n1,2\n3,4\n", "stands twice"), ("a,b\n1,2\n3,x\n4,5\n", "column 'b': row 2 of the data is empty or not a"),
-    ("a,b\n1,2\n3,nan\n4,5\n", "row 2"), ("a,c\n1,2\n3,4\n", "fewer than two have the same name"),
+    ("a,b\n1,2\n3,nan\n4,5\n", "row 2"),
+    ("a,b\n1,2\n3,1_0\n4,5\n", "row 2"), ("a;b\n1;2,5\n3;4.5\n", "decimal comma"), ("a,3\n1,2\n3,4\n", "must name"),
+    ("a,c\n1,2\n3,4\n", "fewer than two have the same name"),
     ("a,b\n1,2\n1,3\n", "column 'a' does not vary on their side"),
 ])
 def test_bad_tables(tmp_path, text, message):
@@ -171,6 +175,16 @@ def test_a_cell_without_end(tmp_path):
     file.write_text("a,b\n0,0\n1," + "1" * 200_000 + "\n2,2\n")
     with pytest.raises(fx.InputError, match=r"long.csv', line 3: field larger than field limit \(131072\)"):
         csv_files.read(file)
+
+
+@pytest.mark.parametrize("stage", ["#1 blow", "a, b", 'the "plug"', "two\nlines", "a\u2028b"])
+def test_names_of_stages_are_read_back(tmp_path, stage):
+    """Whatever a stage is called: its rows are there when a CSV file is read."""
+    columns = {"stage": [stage, stage, "last"], "a": [0.0, 1.0, 2.5], "b": [3.0, 2.0, 4.0]}
+    files.write_rows(tmp_path / "run.csv", list(columns), zip(*columns.values()), MPI.COMM_SELF)
+    table = csv_files.read(tmp_path / "run.csv")
+    assert [table.columns[name].tolist() for name in "ab"] == [columns["a"], columns["b"]]
+    assert [row[0] for _, row in csv_files.records(tmp_path / "run.csv")] == ["stage", *columns["stage"]]
 
 
 def test_backwards():

@@ -143,11 +143,35 @@ def test_file_and_picture(tmp_path):
     assert axes.lines[0].get_xdata() == pytest.approx(data["uniaxial"][0])
 
 
+@pytest.mark.parametrize("text", [
+    "test,stress,stretch\nuniaxial,{P},{l}\n", "\ufefftest,stretch,stress [MPa]\nuniaxial,{l},{P}\n",
+    "stretch\tspecimen\tNominal_stress (MPa)\tmode\n{l}\tno. 1\t{P}\tuniaxial\n", "uniaxial,{l},{P}\n",
+    "# a remark, 1\ntest;stress;stretch\nuniaxial;{P:,};{l:,}\n", '"uniaxial","{l:,}","{P:,}"\n'])
+def test_columns_go_by_their_names(tmp_path, text):
+    """In any order, with tabs, a byte order mark, decimal commas: the same constant."""
+    l = [1.25, 1.5, 2.0]
+    P = [round(2 * 0.5 * (x - x**-2), 6) for x in l]
+    head, row = ("\n".join(text.split("\n")[:-2]), text.split("\n")[-2])
+    def show(x, comma):
+        return repr(x).replace(".", ",") if comma else repr(x)
+    rows = [row.replace(":,", "").format(l=show(x, ":," in row), P=show(y, ":," in row)) for x, y in zip(l, P)]
+    (tmp_path / "t.csv").write_text("\n".join([*[head] * bool(head), *rows]) + "\n", encoding="utf-8")
+    assert fx.fit(fx.NeoHookean, tmp_path / "t.csv").material.parameters["c10"] == pytest.approx(0.5, rel=1e-5)
+
+
 @pytest.mark.parametrize("text, words", [
     ("", "has no rows"), ("test,stretch,stress\n", "has no rows"),
     ("uniaxial,1.5\n", "line 1: has 2 columns"),
     ("uniaxial,1.5,0.2\nuniaxial,2.0\n", "line 2: has 2 columns"),
-    ("uniaxial;1,5;0,2\n", "line 1: '1,5': must be a number with a decimal point"),
+    ("uniaxial;1,5;0.2\n", "'1,5' in line 1 has a decimal comma, '0.2' in line 1 a point"),
+    ("uniaxial,1_5,0.2\n", "line 1: '1_5': must be a number"),
+    ("test,strain,stress\nuniaxial,0.5,0.2\n", "no 'stretch'; must be test, stretch"),
+    ("test,stretch,true stress\nuniaxial,1.5,0.2\n", "no 'stress'; must be"),
+    ("test,stretch [%],stress\nuniaxial,1.5,0.2\n", "column 'stretch' is in '%': must be without a unit"),
+    ("test,stretch,stress [N]\nuniaxial,1.5,0.2\n", "column 'stress' is in 'N': must be in one of Pa"),
+    ("test,stretch,stress,stress (MPa)\nuniaxial,1.5,0.2,1\n", "two columns 'stress'"),
+    ('uniaxial,1.5,"0.2\nuniaxial,2.0,0.3\n', "line 2: unexpected end of data"),
+    ("uniaxial," + 200_000 * "1" + ",1\n", "field larger than field limit"),
     ("test,stretch,stress\nbiaxial,1.5,0.2\n", "line 2: test 'biaxial' is not known"),
     ("uniaxial,1.5,\n", "line 1: '': must be a number"),
 ])

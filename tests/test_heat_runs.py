@@ -44,7 +44,7 @@ def test_hottest_coldest_and_when_the_sheet_is_in_a_window(heated):
 def test_starts(heated, tmp_path):
     """A number, a function, a table, a file, a run and a Function: the same temperatures where they say the same."""
     heated.field_to_csv(tmp_path / "start.csv")
-    (tmp_path / "line.csv").write_text("R,Z,T\n0,0,20\n0,0.003,80\n")
+    (tmp_path / "line.csv").write_text("Z,T\n0,20\n0.003,80\n")
     places = [(0.0, D * x) for x in (0, 0.31, 1)]
     begin = {name: sides(start=start, times=[1e-3]).at(places, [0.0])[0] for name, start in {
         "run": heated, "function": heated.temperature(), "file": tmp_path / "start.csv",

@@ -6,8 +6,8 @@ import pytest
 from conftest import ROOT
 
 PACKAGE = ROOT / "formingx"
-ROOMS = ["errors", "output", "_compat", "notebook", "figures", "units", "csv_files", "tables", "time_temperature",
-         "mesh", "physics", "materials", "scene", "discrete", "solve", "results", "heat"]   # others are above them
+ROOMS = ["errors", "numerals", "output", "_compat", "notebook", "figures", "units", "csv_files", "tables",
+         "time_temperature", "mesh", "physics", "materials", "scene", "discrete", "solve", "results", "heat"]
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 

@@ -56,6 +56,28 @@ def test_temperature_given_in_all_ways(tmp_path):
     assert moduli["file"] == pytest.approx(moduli["table"], rel=1e-9)
 
 
+@pytest.mark.parametrize("text, words", [
+    ("R,Z,T\n0,0,160\n1,0,140\n", "all its points have the same Z, and the body is not flat: leave the column Z out"),
+    ("R,T\n0,160\n1,140\n0,150\n", "two temperatures, 150 and 160, at R = 0"),
+    ("R,Z,T\n0,0,160\n1,1,140\n2,2,150\n", "lie on one line"), ("R,Z\n0,0\n1,1\n", "column 'T' is not known"),
+    ("x,T\n0,0\n1,1\n", "must have T, and R, Z or both"), ("R,T [C]\n0,0\n1,1\n", "column 'T' is in 'C'"),
+    ("R;T\n0;160\n0,5;140\n", "lies outside"), ("R,T\n0,160\n1,0x10\n", "row 2 of the data is empty or not a")])
+def test_temperature_files_that_are_refused(tmp_path, text, words):
+    (tmp_path / "T.csv").write_text(text)
+    with pytest.raises(fx.InputError, match=words):
+        scene(fx.NeoHookean(c10=1.0), tmp_path / "T.csv", elements=(3, 1))
+
+
+def test_a_temperature_along_the_radius(tmp_path):
+    (tmp_path / "T.csv").write_text("R;T\n1;140\n0;160\n0,5;150,0\n")
+    material = fx.NeoHookean(c10=fx.of_temperature(lambda T: np.exp(-(T - 150) / 20)))
+    found = [scene(material, T, elements=(3, 1)).shear_modulus("sheet") for T in (tmp_path / "T.csv",
+                                                                                lambda R, Z: 160 - 20 * R)]
+    assert found[0] == pytest.approx(found[1], rel=1e-9)
+    with pytest.raises(fx.InputError, match="is a class"):
+        scene(material, type(fx.table({0: 1, 1: 2})), elements=(3, 1))
+
+
 def test_constants_follow_a_temperature_that_changes():
     """The stiffness of the forms is that of the new temperature; one outside the table is refused."""
     here = scene(fx.NeoHookean(c10=fx.table(HOT)), 150.0, fx.MixedPressure())

@@ -76,10 +76,10 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
         data: {test: (stretch, nominal stress)}, each of shape (n,), for any of "uniaxial", "pure_shear" (planar)
             and "equibiaxial". Force over reference area, in any unit: the constants get the same.
             For a material that relaxes: a list of `TimedTest`.
-            Or the name of a CSV file with the columns test, stretch, nominal stress, separated by commas or semicolons,
-            names of the columns in the first line or not, # before remarks; for a material that relaxes a fourth
-            column with the time, in which each test begins where the time falls (rows as of `TimedTest`, a stress that
-            was not measured left empty).
+            Or the name of a CSV file (see `csv_files.records`) with the columns test, stretch, stress (nominal), in any
+            order if the first line names them (units in brackets are checked, not converted), else in this order; for a
+            material that relaxes a column with the time, in which each test begins where the time falls (rows as of
+            `TimedTest`, a stress that was not measured left empty).
         terms: number of terms if `material` is the class `Ogden`, default 3; number of branches if it is one that
             relaxes (its equilibrium is then neo-Hookean), default as many as the data determine.
 

@@ -141,7 +141,7 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     for name in units:
         known("compare: units: column", name, pairs)
     in_units: dict[str, Any] = {name: left.units.get(name) for name in pairs} | dict(units)
-    a = np.column_stack([left.columns[c] if left.units[c] else left.take(c) for c in pairs])
+    a = np.column_stack([left.take(c, left.units[c]) for c in pairs])
     b = np.column_stack([right.take(their, in_units[our]) for our, their in pairs.items()])
     names = list(pairs)
     scale = _ranges(a)

@@ -23,8 +23,8 @@ def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperatu
 
     Args:
         field: a number; a `Table` over R; a function of arrays (R, Z), shape (n,) each; the name of a CSV file with the
-            columns R, Z, T (points of a plane, or of a line along R or Z); what `fx.heat` returned (its last state); a
-            scalar DOLFINx Function on this mesh.
+            columns R, Z, T (points all around the body), or R, T or Z, T (the same along the other);
+            what `fx.heat` returned (its last state); a scalar DOLFINx Function on this mesh.
         name: what it is called in an error.
 
     Raises:
@@ -48,6 +48,8 @@ def _values(field: Any, points: np.ndarray, name: str) -> np.ndarray:
         found = _from_file(field, points)
     elif isinstance(field, fem.Function):
         found = PointReader(field.function_space, points).read(field.x.array)
+    elif isinstance(field, type):
+        raise InputError(f"{name} = {field!r}: is a class: give a number, a table, a function, a file or a run")
     elif hasattr(field, "temperature"):
         return _values(field.temperature(), points, name)
     elif callable(field):
@@ -85,22 +87,42 @@ class PointReader:
 
 
 def _from_file(file: Any, points: np.ndarray) -> np.ndarray:
-    """Linear between the points of a CSV file."""
+    """Linear between the points of a CSV file: over R, over Z, or over both, by its columns."""
     from scipy.interpolate import LinearNDInterpolator
+    from scipy.spatial import QhullError
     table = csv_files.read(file)
-    R, Z, T = (table.take(column) for column in ("R", "Z", "T"))
-    spans = np.ptp(R), np.ptp(Z)
-    for axis, x, other in ((0, R, spans[1]), (1, Z, spans[0])):
-        if other <= 1e-9 * max(spans):
-            order = np.argsort(x)
-            low, high, near = x[order[0]], x[order[-1]], 1e-9 * np.ptp(x)
-            at = points[:, axis]
-            _inside(table.name, points, (at >= low - near) & (at <= high + near))
-            return np.interp(at, x[order], T[order])
-    scale = np.array(spans)
-    centre = np.array([R.mean(), Z.mean()])
-    inner = centre + (points - centre) * (1 - 1e-9)         # a point on the outline is inside
-    found = LinearNDInterpolator(np.column_stack([R, Z]) / scale, T)(inner / scale)
+    axes = [k for k, name in enumerate("RZ") if name in table.columns]
+    if not axes:
+        raise InputError(f"{table.name}: has the columns {', '.join(table.columns)}: must have T, and R, Z or both")
+    for name in ("T", *("RZ"[k] for k in axes)):
+        if name in table.units and table.units[name] is not None:
+            raise InputError(f"{table.name}: column {name!r} is in {table.units[name]!r}: a temperature is read as it"
+                             f" is: turn it into the script's units and leave the unit out of the header")
+    at, T = np.column_stack([table.take("RZ"[k]) for k in axes]), table.take("T")
+    at, place = np.unique(at, axis=0, return_inverse=True)
+    low, high = np.full(len(at), np.inf), np.full(len(at), -np.inf)
+    np.minimum.at(low, place.ravel(), T)
+    np.maximum.at(high, place.ravel(), T)
+    if np.any(low != high):
+        k = int(np.argmax(high - low))
+        raise InputError(f"{table.name}: two temperatures, {low[k]:.6g} and {high[k]:.6g}, at"
+                         f" {' and '.join('RZ'[axis] for axis in axes)} = {', '.join(f'{x:.6g}' for x in at[k])}")
+    wanted, spans = points[:, axes], np.ptp(at, axis=0)
+    if len(axes) == 1:
+        x, near = wanted[:, 0], 1e-9 * spans[0]
+        _inside(table.name, points, (x >= at[0, 0] - near) & (x <= at[-1, 0] + near))
+        return np.interp(x, at[:, 0], low)
+    if spans.min() <= 1e-9 * spans.max():
+        name = "RZ"[int(np.argmin(spans))]
+        raise InputError(f"{table.name}: all its points have the same {name}, and the body is not flat: leave the"
+                         f" column {name} out if the temperature is the same along it")
+    centre = at.mean(0)
+    inner = centre + (wanted - centre) * (1 - 1e-9)         # a point on the outline is inside
+    try:
+        found = LinearNDInterpolator(at / spans, low)(inner / spans)
+    except QhullError:
+        raise InputError(f"{table.name}: its {len(at)} points lie on one line: give R and T alone, Z and T alone, or"
+                         f" points all around the body") from None
     _inside(table.name, points, np.isfinite(found))
     return found
 

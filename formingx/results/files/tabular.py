@@ -38,10 +38,12 @@ def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], 
     file = named("to_csv", file, ".csv")
 
     def write(stream):
-        writer = csv.writer(stream, lineterminator="\n")
+        writer, quoted = (csv.writer(stream, lineterminator="\n", quoting=how)
+                          for how in (csv.QUOTE_MINIMAL, csv.QUOTE_ALL))     # a line that begins with # is a remark
         writer.writerow(header)
         for row in rows:
-            writer.writerow([repr(float(v)) if isinstance(v, (float, np.floating)) else v for v in row])
+            cells = [repr(float(v)) if isinstance(v, (float, np.floating)) else v for v in row]
+            (quoted if str(cells[0]).lstrip().startswith("#") else writer).writerow(cells)
     on_root(comm, lambda: replace(file, write))
 
 
