@@ -74,8 +74,6 @@ def test_a_temperature_along_the_radius(tmp_path):
     found = [scene(material, T, elements=(3, 1)).shear_modulus("sheet") for T in (tmp_path / "T.csv",
                                                                                 lambda R, Z: 160 - 20 * R)]
     assert found[0] == pytest.approx(found[1], rel=1e-9)
-    with pytest.raises(fx.InputError, match="is a class"):
-        scene(material, type(fx.table({0: 1, 1: 2})), elements=(3, 1))
 
 
 def test_constants_follow_a_temperature_that_changes():

@@ -48,8 +48,6 @@ def _values(field: Any, points: np.ndarray, name: str) -> np.ndarray:
         found = _from_file(field, points)
     elif isinstance(field, fem.Function):
         found = PointReader(field.function_space, points).read(field.x.array)
-    elif isinstance(field, type):
-        raise InputError(f"{name} = {field!r}: is a class: give a number, a table, a function, a file or a run")
     elif hasattr(field, "temperature"):
         return _values(field.temperature(), points, name)
     elif callable(field):
