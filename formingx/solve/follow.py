@@ -7,11 +7,10 @@ mesh nor the units. Targets are hit exactly: within reach, the equation "measure
 from __future__ import annotations
 
 import contextlib
-import itertools
 import logging
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -95,7 +94,8 @@ class Run:
             else:
                 self._accept(self._facing_target(start))
             self._at_fold = self._at_fold or usual(self.problem, self._falls)
-            self.step = replace(self._step or StepControl(**kept))
+            same = self._step is None or asdict(self._step) == kept.get("given")
+            self.step = StepControl(**kept.get("step", {})) if same else replace(self._step)
             self._close_met(record.last)
             self._settle()
             while self._is_open(self.until):
@@ -157,18 +157,19 @@ class Run:
         return self.record.states[self._first:]
 
     def _go_on(self) -> dict[str, Any]:
-        """Take up the states with the last one's setting as those of this run; the step control that they left."""
+        """Take up the states with the last one's setting as those of this run; what they left to go on with."""
         record = self.record
-        self._first -= sum(1 for _ in itertools.takewhile(lambda s: s.setting == record.last.setting,
-                                                          reversed(record.states)))
-        self.problem.stand(record.last)
+        self._first -= record.stand()
         for state in self.states:
             with self.problem.at(state):
                 self._values.append(self.curve.value(self._aim, state.x, state.control))
         self._best = max(map(self._gained, self._values))
         met = [s.met[:2] for s in self.states if s.met]
         self.open = [(target, bound) for target, bound in self.open if target[:2] not in met]
-        return next((s.stepping["step"] for s in reversed(self.states) if s.stepping), {})
+        kept = next((s.stepping for s in reversed(self.states) if s.stepping), {})
+        self._ahead, no_rest_at = kept.get("jumps", (AHEAD, None))
+        self._no_rest_at = np.nan if no_rest_at is None else no_rest_at
+        return kept
 
     def _elapsed(self) -> float:
         """Seconds since this was last asked."""
@@ -178,7 +179,9 @@ class Run:
     def _settle(self) -> None:
         """A step is complete."""
         self.record.counts.seconds += self._elapsed()
-        self.record.settle(self.step, self.until)
+        no_rest_at = None if np.isnan(self._no_rest_at) else float(self._no_rest_at)
+        self.record.settle(self.step, self.until, given=self._step and asdict(self._step),
+                           jumps=(self._ahead, no_rest_at))
 
     def _facing_target(self, start: State) -> State:
         """The start, its tangent turned if the target lies the other way.
@@ -417,14 +420,15 @@ class Run:
         return [*found, new]
 
     def _accept(self, state: State) -> None:
-        """Take up a state and close the target that it meets."""
+        """Take up a state and close the targets that it meets."""
         record = self.record
         record.accept(state)
         if self.problem.has_kinks:
             self.curve.look_ahead(state)
         self._values.append(self.curve.value(self._aim, state.x, state.control))
         record.counts.iterations += self.curve.spent()
-        self.open = [(t, b) for t, b in self.open if t is not state.met]
+        self.open = [(t, b) for t, b in self.open if t is not state.met     # another may hold there, too
+                     and not is_met(t, b, self.curve.value(b, state.x, state.control))]
         log.info("state %d: %s, %d iterations", record.counts.steps, record.describe(state), len(state.history) - 1)
 
     def _is_open(self, target: Target) -> bool:

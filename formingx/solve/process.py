@@ -58,7 +58,7 @@ class Execution:
         self._max_steps, self._progress = max_steps, progress
         last = self.record.last.setting if self.record.states else {"stage": 0, "piece": -1}
         if self.record.states:
-            self.problem.stand(self.record.last)
+            self.record.stand()
         for k, plan in enumerate(self.plans[last["stage"]:], last["stage"]):
             self.record.stage, self._stage, self._off, self._k = plan.stage.name, plan.stage, plan.off, k
             piece = last["piece"] if k == last["stage"] else -1     # of this stage, that has begun already
@@ -253,10 +253,12 @@ class Execution:
         change = [0.0] * len(base)
         for i, table in tables:
             first, value = table[0]
-            ahead = float(np.interp(then, *table.T)) / scales[i]
-            if first > then:                                # still on the way from where it stands to its first knot
-                ahead = base[i] + (value / scales[i] - base[i]) * (then - now) / (first - now)
-            change[i] = ahead - base[i] if abs(ahead - base[i]) > _SAME * abs(ahead) else 0.0
+            if now < first - _SAME * abs(first):            # still on the way from where it stands to its first knot
+                part = min((then - now) / (first - now), 1.0)
+                change[i] = part * (value / scales[i] - base[i])
+            else:                                           # a hold has no round-off of the ramp before it to drive
+                base[i], ahead = (float(np.interp(t, *table.T)) / scales[i] for t in (now, then))
+                change[i] = ahead - base[i]
         most = max(map(abs, change))
         base[-1], change[-1] = now, then - now
         self._enter(base, [c / (most or 1.0) for c in change], piece, 0.0)

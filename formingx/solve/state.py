@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -115,6 +116,17 @@ class Record:
         """The last accepted state."""
         return self.segments[-1].states[-1]
 
+    def stand(self) -> int:
+        """Let the problem stand at the last state, its setting taken where it began; the number of states with that.
+
+        (What is held, and what fades, is reckoned from where a setting began: elsewhere it would differ by round-off.)
+        """
+        setting = self.last.setting
+        states = list(itertools.takewhile(lambda s: s.setting == setting, reversed(self.segments[-1].states)))
+        for state in (states[-1], self.last):
+            self.problem.stand(state)
+        return len(states)
+
     def go_on_from(self, other: Record) -> None:
         """Begin with the states of another record, which stays as it is."""
         mine = self.segments[-1]
@@ -137,9 +149,10 @@ class Record:
             raise
         self.counts.steps += state.kind != "start"
 
-    def settle(self, step: Any, until: Target) -> None:
-        """A step is complete: note in the last state how the run goes on from it."""
-        self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value]}
+    def settle(self, step: Any, until: Target, **more: Any) -> None:
+        """A step is complete: note in the last state how the run goes on from it, with more that the run knows."""
+        self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value],
+                              **more}
         for told in self.on_step:
             told()
 

@@ -64,10 +64,11 @@ class Amplitude(Bound):
         slope = 1.0 if self._number is None else setting.rate[self._number]
         if self._acts and setting.fading:                    # it leaves or comes in as the control goes from 0 to 1
             slope = self._amplitude(1.0) - self._amplitude(0.0)
+        base = self._amplitude(0.0)                          # taken off first: of a short ramp in time no digit is lost
 
         def c(x, control, gradient):
             gradient.set(0)
-            return self._amplitude(control) - target / self._scale, slope
+            return slope * control - (target / self._scale - base), slope
         return c
 
 
