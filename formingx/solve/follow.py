@@ -94,8 +94,10 @@ class Run:
             else:
                 self._accept(self._facing_target(start))
             self._at_fold = self._at_fold or usual(self.problem, self._falls)
-            same = self._step is None or asdict(self._step) == kept.get("given")
-            self.step = StepControl(**kept.get("step", {})) if same else replace(self._step)
+            if self._step is None or asdict(self._step) == kept.get("given"):
+                self.step = StepControl(**kept.get("step", {}))
+            else:
+                self.step = replace(self._step)
             self._close_met(record.last)
             self._settle()
             while self._is_open(self.until):
