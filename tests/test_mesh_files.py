@@ -114,6 +114,32 @@ def changed(*pairs):
     return text
 
 
+@pytest.mark.parametrize("version", [2.2, 4.1])
+@pytest.mark.parametrize("binary", [0, 1])
+def test_partitions_are_of_their_groups(tmp_path, version, binary):
+    """A mesh that gmsh cut for several processes is the mesh."""
+    import gmsh
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.occ.addRectangle(0, 0, 0, 2, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(2, [1], name="sheet")
+        gmsh.model.addPhysicalGroup(1, [1], name="bottom")
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.3)
+        gmsh.model.mesh.generate(2)
+        gmsh.model.mesh.partition(3)
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.option.setNumber("Mesh.Binary", binary)
+        gmsh.write(str(tmp_path / "mesh.msh"))
+    finally:
+        gmsh.finalize()
+    mesh = fx.mesh.read(tmp_path / "mesh.msh")
+    plain = fx.mesh.to_grid(mesh)
+    assert _area(plain.layers["sheet"], plain.points) == pytest.approx(2.0, rel=1e-12)
+    assert np.ptp(mesh.nodes_of("bottom"), axis=0) == pytest.approx([2.0, 0.0])
+
+
 QUADS = changed(("4\n1 1 2 2", "3\n1 1 2 2"), ("3 2 2 1 1 1 2 3\n4 2 2 1 1 1 3 4", "3 3 2 1 1 1 2 3 4"))
 BAD = {
     "no mesh": ("hello", "does not begin with"), "empty": ("", "does not begin with"),
@@ -146,10 +172,52 @@ BAD = {
                            ("1 1 3 4\n$End", "1 5 6 4\n$End")), "touches or crosses itself"),
     "in pieces": (changed(("$Nodes\n4", "$Nodes\n7"), ("4 0 1 0\n", "4 0 1 0\n5 3 0 0\n6 4 0 0\n7 4 1 0\n"),
                           ("1 1 3 4\n$End", "1 5 6 7\n$End")), "the body is in pieces: no elements lead from"),
+    "an element beyond the count": (changed(("$Elements\n4", "$Elements\n3")), "8 more numbers follow what its counts"),
+    "a node beyond the count": (changed(("$Nodes\n4", "$Nodes\n3")), "4 more numbers follow"),
+    "a name beyond the count": (changed(("$PhysicalNames\n3", "$PhysicalNames\n2")), "3 names follow the count '2'"),
+    "a fraction of a node's number": (changed(("3 1 1 0", "3.5 1 1 0")), "whole number"),
+    "underscores": (changed(("3 1 1 0", "3 1_0 1 0")), "must be numbers"),
+    "hexadecimal": (changed(("3 1 1 0", "3 0x1 1 0")), "must be numbers"),
+    "Arabic digits": (changed(("3 1 1 0", "3 \u0661 1 0")), "must be numbers"),
+    "a hole": (changed(("4 2 2 1 1 1 3 4", "4 2 2 0 1 1 3 4")), "of surface 1 are of no physical group, and part"),
     "binary without its mark": (changed(("2.2 0 8", "2.2 1 8")), "must hold the number one"),
     "bytes": (b"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n\xff\xfe\x00\n$EndNodes\n$Elements\n$EndElements",
               "must be numbers"),
 }
+
+
+CURVED = """six-node triangles 1
+numbering corners
+nodes 9
+1 0 0
+2 1 0
+3 1 1
+4 0 1
+5 .5 0
+6 1 .5
+7 .5 .5
+8 .5 1
+9 0 .5
+elements 2 sheet
+1 1 2 3 5 6 7
+2 1 3 4 7 8 9
+"""
+
+
+@pytest.mark.parametrize("old, new, words", [
+    ("2 1 3 4 7 8 9", "2 1 3 4 6 8 9", "has two middle nodes"), ("nodes 9", "nodes 9\n", ""),
+    ("2 1 3 4 7 8 9", "1 1 3 4 7 8 9", "element number stands twice"),
+    ("1 1 2 3 5 6 7", "1 1 2 3 5 4 7", "inside out|of another one too or a corner"),
+    ("4 0 1\n", "4 0 1_0\n", "must be number R Z"), ("nodes 9", "nodes 8", "line 12"),
+    ("nodes 9", "numbering around\nnodes 9", "each once"), ("3 1 1\n", "3 \u0661 1\n", "must be number R Z")])
+def test_text_files(tmp_path, old, new, words):
+    """Each edge has one middle, each number is one; what is no number is refused."""
+    assert old in CURVED
+    if not words:
+        assert read(tmp_path, CURVED.replace(old, new, 1), "mesh.txt").check() is None
+        return
+    with pytest.raises(fx.InputError, match=words):
+        read(tmp_path, CURVED.replace(old, new, 1), "mesh.txt")
 
 
 @pytest.mark.parametrize("what", BAD)

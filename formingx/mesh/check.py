@@ -39,6 +39,7 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
         raise InputError(f"{what}: {inside_out.sum()} elements are turned inside out, one at"
                          f" {_show(corners[inside_out][0].mean(0))}: a node is out of place, or a curved edge bent too"
                          f" much for them: use smaller elements there")
+    _check_middles(points, triangles, what)
     outline = _outline(points, triangles[:, :3], np.sign(area), what)
     place = crossing(points, outline)
     if place is not None:
@@ -61,6 +62,24 @@ def _pieces(triangles: np.ndarray) -> np.ndarray:
             return found[:, 0]
         np.minimum.at(piece, found.ravel(), np.repeat(found.min(1), 3))
         piece = piece[piece]
+
+
+def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
+    """An InputError unless each edge has one middle, and each middle one edge and no corner on it."""
+    if triangles.shape[1] != 6:
+        return
+    rows = np.concatenate([np.column_stack([np.sort(triangles[:, [i, j]], axis=1), triangles[:, k]])
+                           for i, j, k in ((0, 1, 3), (1, 2, 4), (2, 0, 5))])
+    rows = np.unique(rows, axis=0)
+    edges, middles = np.unique(rows[:, :2], axis=0, return_counts=True)
+    middle, owners = np.unique(rows[:, 2], return_counts=True)
+    if np.any(middles > 1):
+        raise InputError(f"{what}: the edge at {_show(points[edges[middles > 1][0]].mean(0))} has two middle nodes:"
+                         f" elements that meet share all three nodes of their edge")
+    wrong = (owners > 1) | np.isin(middle, triangles[:, :3])
+    if np.any(wrong):
+        raise InputError(f"{what}: the node at {_show(points[middle[wrong][0]])} is the middle of an edge, and of"
+                         f" another one too or a corner")
 
 
 def turned_inside_out(nodes: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ _KINDS = {1: (1, 2), 2: (2, 3), 3: (2, 4), 4: (3, 4), 5: (3, 8), 6: (3, 6), 7: (
           18: (3, 15), 19: (3, 13), 20: (2, 9), 21: (2, 10), 22: (2, 12), 23: (2, 15), 24: (2, 15), 25: (2, 21),
           26: (1, 4), 27: (1, 5), 28: (1, 6), 29: (3, 20), 36: (2, 16), 37: (2, 25)}
 """gmsh's number of an element type: (dimension, nodes)."""
+_ONCE = ("MeshFormat", "PhysicalNames", "Entities", "PartitionedEntities", "Nodes", "Elements")
 _LINES, _TRIANGLES = {1: 2, 8: 3}, {2: 3, 9: 6}
 
 
@@ -62,7 +63,7 @@ def content(file: str | os.PathLike) -> Content:
                          f" (only a mesh is read, no script: a .geo file is meshed in gmsh first)")
     sections: dict[str, bytes] = {}
     for name, body in _sections(data, file):
-        if name in sections and name in ("MeshFormat", "PhysicalNames", "Entities", "Nodes", "Elements"):
+        if name in sections and name in _ONCE:
             raise InputError(f"mesh file {file!r}: a second section ${name}")
         sections[name] = body
     version, binary, order, width = _format(sections["MeshFormat"], file)
@@ -78,6 +79,8 @@ def content(file: str | os.PathLike) -> Content:
         blocks = _elements_2(numbers("Elements"))
     else:
         groups = _groups(numbers("Entities")) if "Entities" in sections else {}
+        if "PartitionedEntities" in sections:
+            groups |= _groups(numbers("PartitionedEntities"), groups)
         tags, points = _nodes_4(numbers("Nodes"))
         blocks = _elements_4(numbers("Elements"), groups)
     if len(np.unique(tags)) < len(tags):
@@ -109,6 +112,11 @@ def read(file: str | os.PathLike) -> Grid:
     if np.ptp(body[:, 2]) > 1e-9 * size:
         raise InputError(f"mesh file {file!r} is not a plane section: z goes from {body[:, 2].min():.6g} to"
                          f" {body[:, 2].max():.6g}; x must be R, y Z, and z the same everywhere")
+    used = np.unique(np.concatenate([found.numbers[sort][rows].ravel() for rows in layers.values()]))
+    for block in found.blocks:
+        if block.dim == 2 and not block.groups and np.isin(block.nodes, used).any():
+            raise InputError(f"mesh file {file!r}: {len(block.nodes)} elements of surface {block.entity} are of no"
+                             f" physical group, and part of the body: name their layer, or leave them out")
     layers = {name: counter_clockwise(points[:, :2], rows) for name, rows in layers.items()}
     orders = {rows.shape[1] for rows in layers.values()}
     if len(orders) > 1:
@@ -190,13 +198,18 @@ def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:
 
 def _names(body: bytes, file: str) -> dict[tuple[int, int], str]:
     lines = [line for line in body.decode("utf-8", "replace").splitlines() if line.strip()]
-    names = {}
+    names: dict[tuple[int, int], str] = {}
+    if lines and lines[0].strip() != str(len(lines) - 1):
+        raise InputError(f"mesh file {file!r}, section $PhysicalNames: {len(lines) - 1} names follow the count"
+                         f" {lines[0].strip()[:20]!r}")
     for line in lines[1:]:
         match = re.fullmatch(r'\s*([0-3])\s+(\d{1,9})\s+"([^"]*)"\s*', line)
         if not match:
             raise InputError(f'mesh file {file!r}, section $PhysicalNames: {line[:60]!r}: must be DIMENSION NUMBER'
                              f' "NAME"')
-        names[int(match[1]), int(match[2])] = match[3]
+        if (group := (int(match[1]), int(match[2]))) in names:
+            raise InputError(f"mesh file {file!r}, section $PhysicalNames: a second name for group {group[1]}")
+        names[group] = match[3]
     return names
 
 
@@ -208,6 +221,8 @@ class _Numbers:
         self._body, self._at = body, 0
         if not binary:
             try:
+                if re.search(rb"[^\s+\-.0-9a-zA-Z]", body):      # NumPy takes 1_0 for a number
+                    raise ValueError("a character that no number has")
                 self._values = np.array(body.split(), dtype=float)
             except ValueError as error:
                 raise InputError(f"{where}: {error}: must be numbers") from None
@@ -231,7 +246,7 @@ class _Numbers:
 
     def ints(self, n: int) -> np.ndarray:
         """The next n whole numbers of four bytes."""
-        return self._whole(self._take(n, "i4"))
+        return self.whole(self._take(n, "i4"))
 
     def few(self, n: int) -> list[int]:
         """`ints` as a list."""
@@ -239,7 +254,14 @@ class _Numbers:
 
     def sizes(self, n: int) -> np.ndarray:
         """The next n whole numbers of the file's own width (counts, and numbers of nodes and elements)."""
-        return self._whole(self._take(n, f"u{self._width}"))
+        return self.whole(self._take(n, f"u{self._width}"))
+
+    def end(self) -> None:
+        """An InputError unless all of the section was read: what lies beyond its counts would be lost."""
+        left = len(self._body[self._at:].strip()) if self._binary else len(self._values) - self._at
+        if left:
+            raise InputError(f"{self.where}: {left} more {'bytes' if self._binary else 'numbers'} follow what its"
+                             f" counts announce")
 
     def records(self, n: int, fields: list) -> np.ndarray:
         """The next n records of a binary section."""
@@ -260,7 +282,8 @@ class _Numbers:
         self._at += n * kind.itemsize
         return found
 
-    def _whole(self, values: np.ndarray) -> np.ndarray:
+    def whole(self, values: np.ndarray) -> np.ndarray:
+        """The values as whole numbers; an InputError unless they are."""
         with np.errstate(invalid="ignore"):
             whole = np.abs(values) < 2.0**53
             found = np.where(whole, values, 0).astype(np.int64)
@@ -269,20 +292,28 @@ class _Numbers:
         return found
 
 
-def _count(found: np.ndarray, section: _Numbers) -> int:
+def _count(found: Sequence[int] | np.ndarray, section: _Numbers) -> int:
     n = int(found[0])
-    if n < 0:
+    if not 0 <= n < 2**40:
         raise InputError(f"{section.where}: a count is {n}")
     return n
+
+
+def _dimension(dim: int, section: _Numbers) -> int:
+    if not 0 <= dim <= 3:
+        raise InputError(f"{section.where}: a dimension is {dim}")
+    return dim
 
 
 def _nodes_2(section: _Numbers) -> tuple[np.ndarray, np.ndarray]:
     if section.binary:
         rows = section.records(section.line(), [("number", "i4", ()), ("x", "f8", (3,))])
+        section.end()
         return rows["number"].astype(np.int64), rows["x"].astype(float)
     n = _count(section.ints(1), section)
     rows = section.reals(4 * n).reshape(n, 4)
-    return rows[:, 0].astype(np.int64), rows[:, 1:].copy()
+    section.end()
+    return section.whole(rows[:, 0]), rows[:, 1:].copy()
 
 
 def _elements_2(section: _Numbers) -> list[Block]:
@@ -300,39 +331,60 @@ def _elements_2(section: _Numbers) -> list[Block]:
         for row in rows:
             found.setdefault((kind, int(row[0]), int(row[1])), []).append(row[tags:])
         got += many
+    section.end()
     return [Block(_KINDS[kind][0], entity, kind, (abs(group),) if group else (), np.array(rows))
             for (kind, group, entity), rows in found.items()]
 
 
-def _groups(section: _Numbers) -> dict[tuple[int, int], tuple[int, ...]]:
-    """{(dimension, entity): its physical groups}."""
+def _groups(section: _Numbers, whole: dict | None = None) -> dict[tuple[int, int], tuple[int, ...]]:
+    """{(dimension, entity): its physical groups}; `whole`: those of the entities that partitions are parts of."""
     found = {}
-    for dim, many in enumerate(section.sizes(4)):
-        for _ in range(int(many)):
+    if whole is not None:
+        section.sizes(1)                                    # number of partitions
+        section.ints(2 * _count(section.sizes(1), section))         # ghost entities
+    counts = section.sizes(4)
+    for dim in range(4):
+        for _ in range(_count(counts[dim:], section)):
             tag, = section.few(1)
+            if whole is not None:
+                parent = tuple(section.few(2))
+                section.ints(_count(section.sizes(1), section))     # partitions
             section.reals(3 if dim == 0 else 6)
             groups = section.few(_count(section.sizes(1), section))
             if dim:
                 section.ints(_count(section.sizes(1), section))
+            if whole is not None:
+                groups += whole.get(parent, ()) if parent[0] == dim else ()
             found[dim, tag] = tuple(dict.fromkeys(map(abs, groups)))
+    section.end()
     return found
 
 
 def _nodes_4(section: _Numbers) -> tuple[np.ndarray, np.ndarray]:
     numbers: list[np.ndarray] = [np.zeros(0, dtype=np.int64)]
     points: list[np.ndarray] = [np.zeros((0, 3))]
-    for _ in range(_count(section.sizes(4), section)):
+    blocks, total, *_ = section.sizes(4)
+    for _ in range(_count([blocks], section)):
         dim, _, parametric = section.few(3)
         n = _count(section.sizes(1), section)
         numbers.append(section.sizes(n))
-        width = 3 + (dim if parametric else 0)
+        width = 3 + (_dimension(dim, section) if parametric else 0)
         points.append(section.reals(width * n).reshape(n, width)[:, :3])
+    _total(section, "nodes", total, numbers)
     return np.concatenate(numbers), np.concatenate(points)
+
+
+def _total(section: _Numbers, what: str, total: int, parts: list[np.ndarray]) -> None:
+    """The section ends, and its parts are as many as its first line says."""
+    section.end()
+    if (found := sum(map(len, parts))) != total:
+        raise InputError(f"{section.where}: {found} {what}, but its first line says {total}")
 
 
 def _elements_4(section: _Numbers, groups: dict[tuple[int, int], tuple[int, ...]]) -> list[Block]:
     blocks = []
-    for _ in range(_count(section.sizes(4), section)):
+    many, total, *_ = section.sizes(4)
+    for _ in range(_count([many], section)):
         dim, entity, kind = section.few(3)
         n = _count(section.sizes(1), section)
         if kind not in _KINDS or _KINDS[kind][0] != dim:
@@ -340,4 +392,5 @@ def _elements_4(section: _Numbers, groups: dict[tuple[int, int], tuple[int, ...]
         width = 1 + _KINDS[kind][1]
         rows = section.sizes(n * width).reshape(n, width)[:, 1:]
         blocks.append(Block(dim, entity, kind, groups.get((dim, entity), ()), rows))
+    _total(section, "elements", total, [block.nodes for block in blocks])
     return blocks

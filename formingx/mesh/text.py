@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..numerals import number, whole
 from ..output import replace
 from .grid import Grid, counter_clockwise
 
@@ -70,11 +71,12 @@ def read(file: str | os.PathLike) -> Grid:
     layers: dict[str, np.ndarray] = {}
     boundaries: dict[str, np.ndarray] = {}
     index: dict[int, int] = {}
+    elements: set[int] = set()
     for words in lines:
-        if words[0] == "numbering" and len(words) == 2:
+        if words[0] == "numbering" and len(words) == 2 and order is None:
             order = _NUMBERINGS[_known(words[1], lines)]
-        elif words[0] == "nodes" and len(words) == 2:
-            rows = lines.block(words[1], (int, float, float), "number R Z")
+        elif words[0] == "nodes" and len(words) == 2 and not index:
+            rows = lines.block(words[1], (whole, number, number), "number R Z")
             points, numbers = np.array([row[1:] for row in rows]), np.array([row[0] for row in rows])
             index = {n: i for i, n in enumerate(numbers.tolist())}
             if len(index) < len(rows):
@@ -84,15 +86,18 @@ def read(file: str | os.PathLike) -> Grid:
         elif words[0] == "elements" and len(words) > 2:
             if order is None:
                 raise lines.error("'numbering corners' or 'numbering around' must come before the elements")
-            rows = lines.block(words[1], (int,) * 7, "number and six nodes", index)
+            rows = lines.block(words[1], (whole,) * 7, "number and six nodes", index)
+            if len({row[0] for row in rows} | elements) < len(rows) + len(elements):
+                raise lines.error("an element number stands twice")
+            elements |= {row[0] for row in rows}
             triangles = np.array([row[1:] for row in rows])[:, order]
             layers[_new(lines, words, layers)] = counter_clockwise(points, triangles)
         elif words[0] == "boundary" and len(words) > 2:
-            rows = lines.block(words[1], (int,) * 3, "first, middle and last node", index, all_nodes=True)
+            rows = lines.block(words[1], (whole,) * 3, "first, middle and last node", index, all_nodes=True)
             boundaries[_new(lines, words, boundaries)] = np.array(rows)[:, [0, 2, 1]]
         else:
-            raise lines.error("must be 'numbering corners|around', 'nodes COUNT', 'elements COUNT LAYER' or"
-                              " 'boundary COUNT NAME'")
+            raise lines.error("must be 'numbering corners|around' or 'nodes COUNT', each once, 'elements COUNT LAYER'"
+                              " or 'boundary COUNT NAME'")
     if not layers:
         raise InputError(f"mesh file {lines.file!r} has no block 'elements COUNT LAYER'")
     _check_edges(lines.file, layers, boundaries, numbers)
