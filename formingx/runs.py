@@ -48,7 +48,8 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
         max_steps: accepted states before the run gives up; None: it gives up when it comes no nearer to its target.
         progress: show a progress bar on runs of more than two seconds (rank 0).
         start: a path of this scene to go on from, also one that `formingx.load` read; it stays as it is. Its steps go
-            on as they were, unless `step` is given; targets that it has met count as met.
+            on as they were, unless `step` is given; targets that it has met count as met. It goes back where another
+            target lies behind (but for a pressure, which may come again ahead).
         checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
         record: {name: measure} of columns of your own: a function of the `Problem`, called while it stands at the
             state, that returns a number; or a target such as `displacement(0, at=(1, 0))`, whose measure is recorded.
@@ -90,7 +91,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
         targets = [(target, target.bind(problem)) for target in (*through, until)]
         _keep(path, checkpoint)
         run = Run(path.record, targets, step, at_fold)
-        run.follow(max_steps, progress, None if path.states else begin(path.record.curve))
+        run.follow(max_steps, progress, None if path.states else begin(path.record.curve), may_turn=True)
     return path
 
 

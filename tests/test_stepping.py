@@ -1,8 +1,9 @@
-"""Step control alone."""
+"""Step control, alone and in a run."""
 
 import pytest
 
-from formingx import StepControl, Tolerances
+import formingx as fx
+from formingx import InputError, StepControl, Tolerances
 
 
 def test_step_follows_target_over_actual():
@@ -19,6 +20,19 @@ def test_step_halves_down_to_its_floor_and_keeps_its_ceiling():
     step = StepControl(length=1.0, largest=1.5)
     step.accepted(1)
     assert step.length == 1.5
+    assert StepControl(largest=0.005).length == 0.005           # the first step, too
+    for wrong, word in (({"smallest": 0.2, "largest": 0.1}, "smallest = 0.2"), ({"growth": 0.9}, "growth = 0.9")):
+        with pytest.raises(InputError, match=word):
+            StepControl(**wrong)
+
+
+@pytest.mark.parametrize("largest", [0.013, 0.004])
+def test_no_step_is_longer_than_the_largest(largest):
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(6, 1)), materials=fx.NeoHookean(c10=1.0),
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")])
+    path = fx.trace(scene, until=fx.pole_height(0.1), step=StepControl(largest=largest), progress=False)
+    curve = path.record.curve
+    assert max(curve.progress(a, b) for a, b in zip(path.states, path.states[1:])) <= largest * (1 + 1e-9)
 
 
 def test_convergence_needs_residual_and_correction():

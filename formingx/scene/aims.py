@@ -43,6 +43,9 @@ def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -
             return f"the run drives {driven!r}, which has no {name}"
         if value < 0 and driven in scene.contacts and driven.separates:
             return f"it lies behind the start: {driven!r} would move away from the body"
+    if off is None and name == "force" and value < 0 and driven in scene.contacts and driven.separates \
+            and not driven.friction_by_temperature and driven.mu == 0:
+        return f"{driven!r} pushes and never pulls"
     if name.startswith("u_") and "_at_" in name and value != 0:
         holds = _holder(scene, name, [t for t in there if t in scene.supports])
         if holds is not None:

@@ -209,6 +209,15 @@ class Curve:
         self._b.array_w[:] = x
         return bound.value(self._b, control)
 
+    def aim(self, bound: Any, target: float, state: State) -> tuple[float, float]:
+        """What is left over of "measure = target" at a state, and its derivative by arc length along the tangent.
+
+        The measure may be stiff (a force of contact): its values a step ahead along the tangent tell nothing.
+        """
+        self._a.array_w[:], self._b.array_w[:] = state.x, state.direction
+        left, by_control = bound.equation(target)(self._a, state.control, self.newton.gradient)
+        return left, self.newton.gradient.dot(self._b) + by_control * state.slope
+
     def interpolate(self, a: State, b: State, fraction: float) -> tuple[np.ndarray, float]:
         """(x, control) on the cubic through two states and their tangents."""
         s, h = fraction, self.distance(a, b)

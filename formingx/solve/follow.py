@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ConvergenceError
+from ..scene.aims import beyond_all
 from . import extrapolate
 from .curve import Curve
 from .diagnose import diagnose
@@ -75,11 +76,13 @@ class Run:
         self._ahead = AHEAD                                 # by how much the control goes on in a jump
         self._no_rest_at = np.nan                           # control from which a body that jumped came to rest nowhere
         self._values: list[float] = []                      # what is aimed at, in the states of this run
+        self._turned: list[State] = []                      # its first state, if it goes back from there
 
-    def follow(self, max_steps: int | None, progress: bool, start: State | None) -> None:
+    def follow(self, max_steps: int | None, progress: bool, start: State | None, may_turn: bool = False) -> None:
         """Follow the path from a state, or on from the last one, until the last target is met.
 
         max_steps: states before the run gives up; None: it does when `_PATIENCE` states have come no nearer.
+        may_turn: one that goes on, to another target than the states were on their way to, may go back to it.
 
         Raises:
             ConvergenceError: it cannot be reached; without the path, which the record holds.
@@ -90,7 +93,7 @@ class Run:
         bar = progress_bar(self.problem.comm, f"{self._label}to {self.until}", progress)
         try:
             if start is None:
-                kept = self._go_on()
+                kept = self._go_on(may_turn)
             else:
                 self._accept(self._facing_target(start))
             self._at_fold = self._at_fold or usual(self.problem, self._falls)
@@ -104,7 +107,7 @@ class Run:
                 if max_steps is not None and record.counts.steps - before >= max_steps:
                     self._give_up(f"{max_steps} states were accepted before it", pace=self._pace(max_steps))
                 self._check_progress()
-                for state in self._next(record.last):
+                for state in self._next(self.states[-1]):
                     self._accept(state)
                     self._check_jump(state)
                     if state.kind == "limit point" and self._at_fold == "stop":
@@ -156,12 +159,21 @@ class Run:
     @property
     def states(self) -> list[State]:
         """Those of this run."""
-        return self.record.states[self._first:]
+        return [*self._turned, *self.record.states[self._first + len(self._turned):]]
 
-    def _go_on(self) -> dict[str, Any]:
-        """Take up the states with the last one's setting as those of this run; what they left to go on with."""
-        record = self.record
-        self._first -= record.stand()
+    def _go_on(self, may_turn: bool) -> dict[str, Any]:
+        """Take up the states with the last one's setting as those of this run; what they left to go on with.
+
+        If it turns, its first state is the last one. (It does not turn to a pressure, which may come again ahead.)
+        """
+        record, last = self.record, self.record.last
+        there = record.stand()
+        pressure = isinstance(self._aim, Amplitude) and self._aim.of_load
+        if may_turn and last.stepping.get("until") != [*self.until[:2]] and not pressure:
+            with self.problem.at(last):
+                facing = self._facing_target(replace(last))
+            self._turned = [facing] if facing.slope != last.slope else []
+        self._first -= 1 if self._turned else there
         for state in self.states:
             with self.problem.at(state):
                 self._values.append(self.curve.value(self._aim, state.x, state.control))
@@ -191,10 +203,8 @@ class Run:
         (At rest a target that does not change sign with the control may be reached both ways.)
         """
         if self.until.signed or self.record.states:
-            size = 1.0 if self.until.signed else 1e-3
-            now = self.curve.value(self._aim, start.x, start.control)
-            ahead = self.curve.value(self._aim, start.x + size * start.direction, start.control + size * start.slope)
-            if (ahead - now) * (self.until.value - now) < 0:
+            left, rate = self.curve.aim(self._aim, self.until.value, start)
+            if left * rate > 0:
                 start.direction, start.slope = -start.direction, -start.slope
         return start
 
@@ -371,7 +381,13 @@ class Run:
                 self._give_up(f"the body snaps past it, from {before:.6g} to {now:.6g}: no state lies between")
 
     def _check_progress(self) -> None:
-        """Stop if many states have come no nearer to the target."""
+        """Stop if many states have come no nearer to the target, or what is driven has gone beyond all bounds."""
+        scene, leading = self.problem.scene, self.problem.setting.leading
+        if leading is not None and leading < len(scene.things):
+            value = self.problem.shown(self.record.last.control)[1]
+            absurd = beyond_all(scene, scene.things[leading].quantity, value)
+            if absurd is not None:
+                self._give_up(f"the {self._driven} has come to {value:.4g}, and nothing holds it: {absurd}")
         if len(self._values) > _PATIENCE:
             now, then = (self._gained(self._values[k]) for k in (-1, -1 - _PATIENCE))
             if abs(now - then) < 1e-3:
@@ -385,12 +401,9 @@ class Run:
         """(target, its measure, distance) of the first open target that the tangent meets within `length`."""
         best: tuple = (None, None, length)
         for target, bound in self.open:
-            now = self.curve.value(bound, old.x, old.control)
-            ahead = self.curve.value(bound, old.x + length * old.direction, old.control + length * old.slope)
-            if (now - target.value) * (ahead - target.value) < 0:
-                reach = length * (target.value - now) / (ahead - now)
-                if reach < best[2]:
-                    best = (target, bound, reach)
+            left, rate = self.curve.aim(bound, target.value, old)
+            if left * rate < 0 and -left / rate < best[2]:
+                best = (target, bound, -left / rate)
         return best
 
     def _sorted_into(self, old: State, new: State) -> list[State]:

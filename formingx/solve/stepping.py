@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..errors import count, positive
+from ..errors import InputError, count, positive
 
 
 @dataclass
@@ -13,13 +13,14 @@ class StepControl:
     """Step length from the iterations of the last step, eq. (4.21) of Song (1993): target over actual.
 
     Attributes:
-        length: the next step (dimensionless arc length: mean displacement over the size of the body).
+        length: the next step (dimensionless arc length: mean displacement over the size of the body); at most
+            `largest`.
         target: iterations that a step should take.
-        growth: at most this factor from one step to the next; failures halve.
-        smallest, largest: bounds of the length.
+        growth: at most this factor from one step to the next, at least 1; failures halve.
+        smallest, largest: a run gives up below the one; no step is longer than the other.
 
     Raises:
-        InputError: a value that is not greater than 0.
+        InputError: a value that is not greater than 0, a growth below 1, or `smallest` above `largest`.
     """
 
     length: float = 0.1
@@ -34,6 +35,12 @@ class StepControl:
         count("StepControl: target", self.target)
         if not (isinstance(self.largest, float) and self.largest == math.inf):
             positive("StepControl: largest", self.largest)
+        if self.growth < 1:
+            raise InputError(f"StepControl: growth = {self.growth!r}: must be at least 1, or steps never grow again")
+        if self.smallest > self.largest:
+            raise InputError(f"StepControl: smallest = {self.smallest!r}: must not be above largest ="
+                             f" {self.largest!r}")
+        self.length = min(self.length, self.largest)
 
     def accepted(self, iterations: int, error: float = 0.0) -> None:
         """A full step converged in so many iterations with a tangent of their own; error: in time, over what is

@@ -44,6 +44,11 @@ class Amplitude(Bound):
         self.size = 0.0 if number == -1 else self._scale    # a process may be short in any unit of time
 
     @property
+    def of_load(self) -> bool:
+        """True if it is that of a load, as a pressure."""
+        return self._acts
+
+    @property
     def moves(self) -> bool:
         """True if the control changes it now."""
         return self._number is None or self._problem.setting.rate[self._number] != 0

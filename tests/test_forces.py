@@ -1,0 +1,64 @@
+"""Forces as targets: up, on the way, and back down, whichever way the curve bends."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import formingx as fx
+
+
+def pushed(radius=15.0, friction="none"):
+    """A clamped sheet under a ball."""
+    return fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(30, 1)), materials=fx.NeoHookean(c10=0.4),
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                    contacts=[fx.Contact("top", fx.tools.sphere(radius=radius, z=1.2), friction, moves=(0, -1))])
+
+
+def pulled():
+    """A disc that is pulled at its rim: the same stretch everywhere."""
+    return fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=1.0, elements=(8, 1)), materials=fx.NeoHookean(c10=0.5),
+                    supports=[fx.Symmetry("axis"), fx.Displaced("rim", "r"), fx.Symmetry("bottom", normal="z")])
+
+
+def travel(path):
+    return path.last.measures["travel"]
+
+
+@pytest.mark.parametrize("radius, force", [(15.0, 5.0), (24.0, 0.7)])
+def test_a_ball_comes_to_a_force_where_its_travel_has_it(radius, force):
+    scene = pushed(radius)
+    path = fx.trace(scene, until=fx.force(force), through=[fx.force(force / 3)], progress=False)
+    assert path["tool_force"][-1] == pytest.approx(force, rel=1e-7) and travel(path) > 0 and len(path) < 15
+    assert path.met(fx.force(force / 3)).measures["tool_force"] == pytest.approx(force / 3, rel=1e-7)
+    other = fx.trace(scene, until=fx.travel(travel(path)), progress=False)
+    assert other["tool_force"][-1] == pytest.approx(force, rel=1e-6)
+
+
+@pytest.mark.parametrize("friction", ["none", 0.3])
+def test_a_run_goes_back_down_to_a_smaller_force(friction):
+    scene = pushed(friction=friction)
+    path = fx.trace(scene, until=fx.force(30.0), progress=False)
+    for force in (25.0, 4.0):
+        back = fx.trace(scene, until=fx.force(force), start=path, progress=False)
+        assert back["tool_force"][-1] == pytest.approx(force, rel=1e-7)
+        assert np.all(np.diff(back["travel"][len(path) - 1:]) < 0)
+        if friction == "none":                              # nothing is lost: as on the way up
+            assert travel(back) == pytest.approx(travel(fx.trace(scene, until=fx.force(force), progress=False)),
+                                                 rel=1e-6)
+    again = fx.trace(scene, until=fx.travel(0.8 * travel(path)), start=path, progress=False)
+    assert travel(again) == pytest.approx(0.8 * travel(path), rel=1e-12)
+
+
+@pytest.mark.parametrize("force", [-50.0, -7.0, 12.0])
+def test_a_disc_pulled_at_its_rim(force):
+    """2 pi R h 2 c10 (l - l^-5), towards the axis if it is stretched."""
+    path = fx.trace(pulled(), until=fx.force(force), progress=False)
+    stretch = brentq(lambda s: 2 * np.pi * 10.0 * (s - s**-5) + force, 0.5, 3.0)
+    assert path["pole_stretch"][-1] == pytest.approx(stretch, rel=1e-6)
+
+
+def test_a_ball_without_friction_never_pulls():
+    with pytest.raises(fx.InputError, match="pushes and never pulls"):
+        fx.trace(pushed(), until=fx.force(-1.0))
+    with pytest.raises(fx.ConvergenceError, match="nothing holds it"):
+        fx.trace(pushed(friction=0.1), until=fx.force(-1.0), progress=False)
