@@ -21,10 +21,11 @@ from .scene import aims, clearance
 from .scene.scene import Scene
 from .solve.curve import Curve
 from .solve.fixed import FixedControlCurve
-from .solve.follow import Run, begin
+from .solve.follow import Run
 from .solve.newton import Tolerances
 from .solve.process import Execution
 from .solve.stage import AT_FOLD, Stage, plan
+from .solve.start import begin
 from .solve.state import Record, State
 from .solve.stepping import StepControl
 from .solve.targets import Amplitude, Target

@@ -18,7 +18,6 @@ import numpy as np
 from ..errors import ConvergenceError
 from ..scene.aims import beyond_all
 from . import extrapolate
-from .curve import Curve
 from .diagnose import diagnose
 from .folds import snaps, usual, was_passed
 from .jump import AHEAD, MOST, NoEquilibrium, jump
@@ -498,30 +497,3 @@ class _Late(Exception):
 
 class _Astray(Failure):
     """A state was found, but not one that a step should come to: a shorter one will do better."""
-
-
-def begin(curve: Curve) -> State:
-    """The first state of a path: the body at control 0, in equilibrium with whatever else acts on it.
-
-    Fixed loads for which Newton's method finds no equilibrium from rest are brought in gradually.
-
-    Raises:
-        ConvergenceError: there is none.
-    """
-    problem = curve.problem
-    try:
-        return curve.start()
-    except Failure as failure:
-        first, rest = problem.setting, np.zeros(problem.x.getLocalSize())
-        if not any(not load.driven for load in problem.scene.loads):
-            raise curve.no_start(failure) from None
-        record = Record(problem, curve)
-        target = Target("change", 1.0, None)
-        try:
-            problem.enter(replace(first, rate=[0.0] * len(first.rate), fading=True), rest, 0.0)
-            run = Run(record, [(target, Amplitude(problem, None))])
-            run.follow(1000, False, curve.resume(rest, 0.0))
-        except (ConvergenceError, Failure):
-            raise curve.no_start(failure) from None
-        problem.enter(first, record.last.x, 0.0)
-        return curve.resume(record.last.x, 0.0)

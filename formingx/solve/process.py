@@ -18,9 +18,10 @@ from ..discrete.schedule import Setting
 from ..errors import ConvergenceError, InputError
 from ..scene import clearance
 from .flow import Flow
-from .follow import Run, begin
+from .follow import Run
 from .newton import UNLOADED, Failure
 from .stage import Plan
+from .start import begin
 from .state import Record, State
 from .stepping import StepControl
 from .targets import Amplitude, Bound, Target, changed, process_time

@@ -1,0 +1,41 @@
+"""The first state of a path."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import ConvergenceError
+from .curve import Curve
+from .follow import Run
+from .newton import Failure
+from .state import Record, State
+from .targets import Amplitude, Target
+
+
+def begin(curve: Curve) -> State:
+    """The first state of a path: the body at control 0, in equilibrium with whatever else acts on it.
+
+    Fixed loads for which Newton's method finds no equilibrium from rest are brought in gradually.
+
+    Raises:
+        ConvergenceError: there is none.
+    """
+    problem = curve.problem
+    try:
+        return curve.start()
+    except Failure as failure:
+        first, rest = problem.setting, np.zeros(problem.x.getLocalSize())
+        if not any(not load.driven for load in problem.scene.loads):
+            raise curve.no_start(failure) from None
+        record = Record(problem, curve)
+        target = Target("change", 1.0, None)
+        try:
+            problem.enter(replace(first, rate=[0.0] * len(first.rate), fading=True), rest, 0.0)
+            run = Run(record, [(target, Amplitude(problem, None))])
+            run.follow(1000, False, curve.resume(rest, 0.0))
+        except (ConvergenceError, Failure):
+            raise curve.no_start(failure) from None
+        problem.enter(first, record.last.x, 0.0)
+        return curve.resume(record.last.x, 0.0)
