@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import formingx as fx
+from formingx.mesh import check
+from formingx.mesh.boxes import overlapping
 
 SQUARE = """$MeshFormat
 2.2 0 8
@@ -264,6 +266,31 @@ def bend_an_edge(x):
 def test_tangled_meshes_are_refused(change, words):
     with pytest.raises(fx.InputError, match=words):
         moved(change).check()
+
+
+@pytest.mark.parametrize("shape", ["scattered", "a row", "a column", "all over each other"])
+def test_overlapping_boxes_are_found(shape):
+    """Each pair once, the same as by looking at all of them."""
+    random = np.random.default_rng(3)
+    for n in (1, 2, 3, 64, 65, 200):
+        low = random.uniform(0, 1, (n, 2)) * {"a row": (1, 0), "a column": (0, 1)}.get(shape, (1, 1))
+        high = low + (2 if shape == "all over each other" else random.uniform(0, 0.1, (n, 2)))
+        found = sorted(tuple(sorted(pair)) for i, j in overlapping(low, high) for pair in zip(i.tolist(), j.tolist()))
+        assert found == [(i, j) for i in range(n) for j in range(i + 1, n)
+                         if np.all((low[i] <= high[j]) & (low[j] <= high[i]))]
+
+
+def test_a_long_row_of_elements_takes_no_long_look(monkeypatch):
+    """Ten times as many elements, some ten times as many pairs of edges to look at (it were a hundred)."""
+    looked = []
+    monkeypatch.setattr(check, "overlapping", lambda *boxes: (looked.append(len(i)) or (i, j)
+                                                              for i, j in overlapping(*boxes)))
+    numbers = []
+    for n in (100, 1000):
+        looked.clear()
+        fx.mesh.disc(radius=1.0, thickness=0.1, elements=(n, 1))
+        numbers.append(sum(looked))
+    assert 0 < numbers[1] < 15 * numbers[0]
 
 
 def test_bodies_that_only_bend_pass():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
+from .boxes import overlapping
 
 _SMALLEST, _LARGEST = 1e-50, 1e50      # lengths whose squares and products are still numbers
 _FLAT = 1e-12                          # of the square of the longest edge: an area that is nothing
@@ -118,32 +119,23 @@ def crossing(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
     """
     low, high = points[edges].min(1), points[edges].max(1)
     near = 1e-9 * float((high - low).max())
-    pairs = min((_overlapping(low[:, k] - near, high[:, k] + near) for k in (0, 1)), key=lambda p: len(p[0]))
-    first, second = pairs
-    both = np.all((low[first] <= high[second] + near) & (low[second] <= high[first] + near), axis=1)
-    e, f = edges[first[both]], edges[second[both]]
-    a, b, c, d = points[e[:, 0]], points[e[:, 1]], points[f[:, 0]], points[f[:, 1]]
-    apart = (e[:, :1] != f).all(1) & (e[:, 1:] != f).all(1)
-    crosses = apart & (_cross(b - a, c - a) * _cross(b - a, d - a) < 0)
-    crosses &= _cross(d - c, a - c) * _cross(d - c, b - c) < 0
-    for point, node, p, q, other in ((a, e[:, 0], c, d, f), (b, e[:, 1], c, d, f), (c, f[:, 0], a, b, e),
-                                     (d, f[:, 1], a, b, e)):
-        along = q - p
-        length = (along**2).sum(1)
-        t = np.clip(((point - p) * along).sum(1) / length, 0, 1)
-        gap = ((point - p - t[:, None] * along) ** 2).sum(1)
-        crosses |= (node[:, None] != other).all(1) & (gap <= 1e-18 * length)
-    k = int(np.argmax(crosses)) if crosses.any() else None
-    return None if k is None else (a[k] + b[k]) / 2
-
-
-def _overlapping(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs (i, j) of intervals that overlap, each pair once."""
-    order = np.argsort(low)
-    many = np.searchsorted(low[order], high[order], side="right") - np.arange(len(low)) - 1
-    first = np.repeat(np.arange(len(low)), many)
-    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(many) - many, many)
-    return order[first], order[second]
+    for first, second in overlapping(low - near, high + near):
+        e, f = edges[first], edges[second]
+        a, b, c, d = points[e[:, 0]], points[e[:, 1]], points[f[:, 0]], points[f[:, 1]]
+        apart = (e[:, :1] != f).all(1) & (e[:, 1:] != f).all(1)
+        crosses = apart & (_cross(b - a, c - a) * _cross(b - a, d - a) < 0)
+        crosses &= _cross(d - c, a - c) * _cross(d - c, b - c) < 0
+        for point, node, p, q, other in ((a, e[:, 0], c, d, f), (b, e[:, 1], c, d, f), (c, f[:, 0], a, b, e),
+                                         (d, f[:, 1], a, b, e)):
+            along = q - p
+            length = (along**2).sum(1)
+            t = np.clip(((point - p) * along).sum(1) / length, 0, 1)
+            gap = ((point - p - t[:, None] * along) ** 2).sum(1)
+            crosses |= (node[:, None] != other).all(1) & (gap <= 1e-18 * length)
+        if crosses.any():
+            k = int(np.argmax(crosses))
+            return (a[k] + b[k]) / 2
+    return None
 
 
 def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:

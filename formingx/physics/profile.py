@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError, finite, instance, non_negative, pair, positive, several
+from ..mesh.boxes import overlapping
 
 _FLAT = 1e-9          # radians: a joint that turns less is smooth
 TURN = 2 * math.pi
@@ -252,27 +253,29 @@ class Tool:
         return tuple(found)
 
     def _check_crossing(self) -> None:
-        parts = [_sampled(p, 64) for p in self.pieces]
+        parts = [_sampled(p, _straight_pieces(p)) for p in self.pieces]
         a = np.concatenate([part[:-1] for part in parts])
         b = np.concatenate([part[1:] for part in parts])
-        near = 1e-9 * self.size
-        for i in range(len(a) - 2):
-            stop = len(a) - (1 if i == 0 and (self.closed or math.dist(a[0], b[-1]) < 1e-9 * self.size) else 0)
-            c, e = a[i + 2:stop], b[i + 2:stop]
-            u, v, w = b[i] - a[i], e - c, c - a[i]
-            det = u[0] * v[:, 1] - u[1] * v[:, 0]
+        near, n = 1e-9 * self.size, len(a)
+        closes = self.closed or math.dist(a[0], b[-1]) < near
+        for i, j in overlapping(np.minimum(a, b) - near, np.maximum(a, b) + near):
+            i, j = np.minimum(i, j), np.maximum(i, j)
+            apart = (j - i > 1) & ~((i == 0) & (j == n - 1) & closes)
+            i, j = i[apart], j[apart]
+            u, v, w = b[i] - a[i], b[j] - a[j], a[j] - a[i]
+            det = _cross(u, v)
             with np.errstate(divide="ignore", invalid="ignore"):
-                s = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / det
-                t = (w[:, 0] * u[1] - w[:, 1] * u[0]) / det
-            hit = np.flatnonzero((s >= 0) & (s <= 1) & (t >= 0) & (t <= 1) & np.isfinite(s))
-            if len(hit):
-                raise InputError(f"Tool: the profile crosses itself near (R, Z) = {_show(a[i] + s[hit[0]] * u)}")
-            length = max(math.hypot(*u), 1e-300)
-            across = np.abs(np.stack([w, e - a[i]]) @ (-u[1], u[0])) / length        # parallel: one along the other
-            lies = np.stack([w, e - a[i]]) @ u / length
+                s, t = _cross(w, v) / det, _cross(w, u) / det
+            hit = (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1) & np.isfinite(s)
+            if hit.any():
+                k = int(np.argmax(hit))
+                raise InputError(f"Tool: the profile crosses itself near (R, Z) = {_show(a[i[k]] + s[k] * u[k])}")
+            length = np.maximum(np.hypot(*u.T), 1e-300)
+            both = np.stack([w, b[j] - a[i]])                                # parallel: one along the other
+            across, lies = np.abs(_cross(u, both)) / length, (u * both).sum(-1) / length
             over = (across.max(0) < near) & (lies.max(0) > near) & (lies.min(0) < length - near)
             if over.any():
-                raise InputError(f"Tool: the profile doubles back at (R, Z) = {_show(c[np.argmax(over)])}")
+                raise InputError(f"Tool: the profile doubles back at (R, Z) = {_show(a[j[np.argmax(over)]])}")
 
 
 def _rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) -> list[Line | Arc]:
@@ -363,6 +366,15 @@ def _sampled(piece: Line | Arc, n: int) -> np.ndarray:
         return np.array([piece.a, piece.b])
     angles = piece.start + piece.sweep * np.linspace(0, 1, n + 1)
     return piece.centre + piece.radius * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def _straight_pieces(piece: Line | Arc) -> int:
+    """How many straight pieces stand for one where crossings are looked for: 64 for a quarter of a turn, at least 4."""
+    return 1 if isinstance(piece, Line) else max(4, math.ceil(256 * abs(piece.sweep) / TURN))
+
+
+def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
 
 
 def _show(point: np.ndarray) -> str:

@@ -90,31 +90,36 @@ def _along(pieces: list[Line | Arc], tag: int) -> list[Line | Arc]:
 
 def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | Arc], bool]:
     """All curves one after the other, each turned as it must be, from a free end; and whether they close."""
+    from scipy.spatial import cKDTree
     curves = [pieces for pieces in curves if pieces]
     if not curves:
         raise InputError(f"tool file {file!r} has no curves")
-    ends = np.array([[pieces[0].ends[0], pieces[-1].ends[1]] for pieces in curves])
-    near = 1e-6 * max(float(np.ptp(ends.reshape(-1, 2), axis=0).max()), 1e-300)
-    gap = np.hypot(*(ends.reshape(-1, 1, 2) - ends.reshape(1, -1, 2)).transpose(2, 0, 1))
-    meets = gap <= near
-    number = meets.sum(1)
-    if number.max() > 2 or len(curves) > 1 and np.any(meets[0::2, 1::2].diagonal()):
-        at = ends.reshape(-1, 2)[np.argmax(number)]
+    ends = np.array([[pieces[0].ends[0], pieces[-1].ends[1]] for pieces in curves]).reshape(-1, 2)
+    near = 1e-6 * max(float(np.ptp(ends, axis=0).max()), 1e-300)
+    meets: list[list[int]] = [[] for _ in ends]             # other ends at an end
+    for a, b in cKDTree(ends).query_pairs(near, output_type="ndarray").tolist():
+        meets[a].append(b)
+        meets[b].append(a)
+    number = np.array([1 + len(others) for others in meets])
+    if number.max() > 2 or len(curves) > 1 and any(k ^ 1 in others for k, others in enumerate(meets)):
+        at = ends[np.argmax(number)]
         raise InputError(f"tool file {file!r}: more than two ends of curves meet near ({at[0]:.6g}, {at[1]:.6g}), or a"
                          f" curve closes in itself: name the curves of the profile, curves=[...]")
     free = np.flatnonzero(number == 1)
     if len(free) not in (0, 2):
         raise InputError(f"tool file {file!r}: its curves have {len(free)} free ends: a profile has two, or none if it"
                          f" is closed; name the curves of the profile, curves=[...]")
+    if len(curves) == 1:
+        return curves[0], not len(free)
     at, found = int(free[0]) if len(free) else 0, list[Line | Arc]()
     for k in range(len(curves)):
         found += _along(curves[at // 2], -1 if at % 2 else 1)
         last = at ^ 1
-        following = np.flatnonzero(meets[last] & (np.arange(len(number)) != last))
-        if k < len(curves) - 1 and (not len(following) or len(free) == 0 and following[0] == 0):
+        following = meets[last]
+        if k < len(curves) - 1 and (not following or not len(free) and following[0] == 0):
             raise InputError(f"tool file {file!r}: its curves are in several parts: name those of the profile,"
                              f" curves=[...]")
-        at = int(following[0]) if len(following) else at
+        at = following[0] if following else at
     return found, not len(free)
 
 

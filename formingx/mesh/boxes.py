@@ -1,0 +1,46 @@
+"""Which of many boxes overlap, found in a tree of boxes around boxes: n log n where few do, wherever they lie."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+_MOST = 2**18           # pairs looked at together
+
+
+def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Pairs (i, j) of boxes that overlap or touch, each once, in parts, as indices, shape (k,) each.
+
+    low, high: the boxes' corners, shape (n, 2), finite.
+    """
+    if len(low) < 2:
+        return
+    order = np.argsort(_along_a_curve((low + high) / 2), kind="stable")
+    depth = int(np.ceil(np.log2(len(low))))
+    ends = np.full((2, 2**depth, 2), [[[np.inf]], [[-np.inf]]])             # boxes of no size overlap none
+    ends[0, :len(low)], ends[1, :len(low)] = low[order], high[order]
+    tree = [ends]
+    while len(tree) <= depth:
+        two = tree[-1].reshape(2, -1, 2, 2)
+        tree.append(np.stack([two[0].min(1), two[1].max(1)]))
+    waiting = [(depth, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))]
+    while waiting:
+        level, a, b = waiting.pop()
+        if level == 0:
+            yield order[a[a < b]], order[b[a < b]]
+            continue
+        a, b = (2 * a[:, None] + (0, 0, 1, 1)).ravel(), (2 * b[:, None] + (0, 1, 0, 1)).ravel()
+        lower, upper = tree[level - 1]
+        kept = (a <= b) & np.all((lower[a] <= upper[b]) & (lower[b] <= upper[a]), axis=1)
+        a, b = a[kept], b[kept]
+        waiting += [(level - 1, a[k:k + _MOST], b[k:k + _MOST]) for k in range(0, len(a), _MOST)]
+
+
+def _along_a_curve(points: np.ndarray) -> np.ndarray:
+    """Places of points on Morton's space-filling curve, on which neighbours are mostly near, shape (n,)."""
+    size = np.ptp(points, axis=0).max() or 1.0
+    grid = ((points - points.min(0)) / size * (2**16 - 1)).astype(np.int64)
+    for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
+        grid = (grid | grid << shift) & mask
+    return grid[:, 0] | grid[:, 1] << 1
