@@ -24,15 +24,12 @@ def plug(radius, thickness, fillet, height=60.0):
     return fx.tools.male(radius=radius, height=height, base=-height, fillet=fillet).mirrored().moved(z=thickness)
 
 
-def sheet(radius, thickness, plug_radius, law, elements, near=None, through=(1,), comm=COMM):
+def sheet(radius, thickness, plug_radius, law, elements, near=None, comm=COMM):
     """Small elements where the law asks for them: around the edge, or wherever the sheet slides over it.
 
-    near: {radius: size of the elements there over that of the largest}, if they are to be elsewhere; through: thickness
-    of layers, in proportion, from the bottom to the top.
+    near: {radius: size of the elements there over that of the largest}, if they are to be elsewhere.
     """
     near = near or ({1.1 * plug_radius: 0.2} if law in ("held", "stick") else {0.65 * plug_radius: 0.2})
-    if len(through) > 1:
-        thickness = {f"layer {k}": thickness * part / sum(through) for k, part in enumerate(through)}
     return fx.mesh.disc(radius=radius, thickness=thickness, elements=elements, concentrate=near, comm=comm)
 
 
@@ -41,11 +38,11 @@ def name_of(law) -> str:
     return law if isinstance(law, str) else f"coulomb_{law:g}"
 
 
-def scene(radius, thickness, plug_radius, fillet, material, law, elements, support=None, near=None, through=(1,),
-          model=None, comm=COMM, **options):
+def scene(radius, thickness, plug_radius, fillet, material, law, elements, support=None, near=None, model=None,
+          comm=COMM, **options):
     """A sheet held at its rim under a plug that moves down. law: of LAWS, or a coefficient of friction."""
     friction, separates = LAWS.get(law, (law, True))
-    mesh = sheet(radius, thickness, plug_radius, law, elements, near, through, comm)
+    mesh = sheet(radius, thickness, plug_radius, law, elements, near, comm)
     return fx.Scene(mesh=mesh, materials=material, supports=[fx.Symmetry("axis"), support or fx.Clamped("rim")],
                     model=model,
                     contacts=[fx.Contact("top", plug(plug_radius, thickness, fillet), friction, separates=separates,
@@ -55,8 +52,8 @@ def scene(radius, thickness, plug_radius, fillet, material, law, elements, suppo
 def sliding(radius, thickness, plug_radius, fillet, material, mu, face_stretch, refine=1, through=(1,), **options):
     """(scene, elements) of a sheet that slides over the edge with Coulomb friction; options: of `scene`.
 
-    refine: divides the elements along the sheet; through: thickness, in proportion, of those through it, the last one
-    at the face that touches.
+    refine: divides the elements along the sheet; through: relative sizes of those through it, the last one at the face
+    that touches.
 
     Elements in proportion to the radius: whatever comes to the edge has as many around it. At the axis they are a third
     of what the edge holds when the face is stretched by face_stretch; half way to the rim they begin to fall to AT_RIM
@@ -65,8 +62,8 @@ def sliding(radius, thickness, plug_radius, fillet, material, mu, face_stretch, 
     smallest = 2 * plug_radius / radius / face_stretch / 3
     along = (np.log(1 / smallest) + np.log(1 / AT_RIM) / (1 - AT_RIM)) / GROWTH
     elements = int(np.ceil(refine * along))
-    made = scene(radius, thickness, plug_radius, fillet, material, mu, (elements, 1),
-                 near={0.0: smallest, radius: AT_RIM}, through=through, model=fx.MixedPressure(space="P1"), points=4,
+    made = scene(radius, thickness, plug_radius, fillet, material, mu, (elements, through),
+                 near={0.0: smallest, radius: AT_RIM}, model=fx.MixedPressure(space="P1"), points=4,
                  nodes_per_step=16, **options)
     return made, (elements, len(through))
 

@@ -61,6 +61,26 @@ def test_concentrate_refuses(wrong, words):
         fx.mesh.disc(**{"radius": 1.0, "thickness": 0.1, "elements": (10, 1), **wrong})
 
 
+@pytest.mark.parametrize("layers, through, ends", [
+    ({"sheet": 0.7}, [1, 2, 4], [0, 0.1, 0.3, 0.7]), ({"a": 0.3, "b": 0.1, "c": 0.1}, [1, 1, 2], [0, 0.3, 0.4, 0.45, 0.5]),
+    ({"a": 0.6, "b": 0.4}, ([2.0, 1.0], 2), [0, 0.4, 0.6, 0.8, 1.0])])
+def test_grading_through_the_thickness(layers, through, ends):
+    """Relative sizes of the elements of a layer from its bottom up; rows of counts are what they were."""
+    mesh = fx.mesh.disc(radius=1.0, thickness=layers, elements=(3, through))
+    assert mesh.nodes_of("axis")[::2, 1] == pytest.approx(ends, abs=1e-15)
+    assert mesh.nodes_of("axis")[1::2, 1] == pytest.approx(np.add(ends[1:], ends[:-1]) / 2, abs=1e-15)
+    assert set(mesh.layers) == set(layers)
+
+
+@pytest.mark.parametrize("through, words", [
+    ([1, -2], "relative size of an element through a layer = -2: must be greater than 0"),
+    ([1, 1e7], "largest at most 1e6 times"), ([[]], "must be at least one"), (10**18, "must be at most 250000"),
+    ([1, "x"], "relative size of an element through a layer = 'x'")])
+def test_grading_through_the_thickness_refuses(through, words):
+    with pytest.raises(fx.InputError, match=words):
+        fx.mesh.disc(radius=1.0, thickness=0.1, elements=(3, through))
+
+
 def test_sphere_is_curved_to_second_order():
     """Every node, mid-edge nodes too, on its circle; the volume converges with the fourth power of the size."""
     errors = []

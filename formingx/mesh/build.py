@@ -45,8 +45,9 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
         accuracy: "draft", "standard" or "fine": how many elements; more of them through sheets that bend near the rim,
             and through layers so thick that they would be more than 1.5 times taller than wide (as for `thickness` =
             `radius` in thicker ones); one through each layer of films, thinner than 1/400 of the radius.
-        elements: (along the radius, through each layer), in place of `accuracy`; the latter may be a tuple, one count
-            per layer. Each rectangle is two triangles.
+        elements: (along the radius, through each layer), in place of `accuracy`; the latter may be a row, of each layer
+            a count, or the relative sizes of its elements from the bottom up, (60, [[1, 2, 4], 2]); those of a single
+            layer may stand alone, (60, [1, 2, 4]). Each rectangle is two triangles.
         grading: size of the last element at the rim over that of the first at the axis, 1e-6 to 1e6.
         concentrate: in place of `grading`, {reference radius: size of the elements there over that of the largest}, for
             example around a plug's edge. Sizes grow linearly with the distance from these radii; nodes lie on them.
@@ -231,18 +232,36 @@ def _grading(kind: str, grading: Any) -> float:
     return grading
 
 
-def _counts(kind: str, along_what: str, elements: Any, layers: int) -> tuple[int, list[int]]:
-    """Numbers of elements along the sheet and through each layer."""
+def _counts(kind: str, along_what: str, elements: Any, layers: int) -> tuple[int, list[np.ndarray]]:
+    """Number of elements along the sheet, and the ends of those through each layer, on [0, 1]."""
     if not _is_row(elements) or len(elements) != 2:
         raise InputError(f"{kind}: elements = {elements!r}: must be (along the {along_what}, through each layer)")
     along = count(f"{kind}: elements along the {along_what}", elements[0])
     through = list(elements[1]) if _is_row(elements[1]) else [elements[1]] * layers
+    if layers == 1 and len(through) > 1:
+        through = [through]
     if len(through) != layers:
         raise InputError(f"{kind}: elements through the layers = {through!r}: {layers} layers need as many counts")
-    through = [count(f"{kind}: elements through a layer", n) for n in through]
-    if along * sum(through) > _MOST:
-        raise InputError(f"{kind}: elements = {elements!r}: {along * sum(through)} rectangles: at most {_MOST}")
-    return along, through
+    ends = [_ends(kind, given) for given in through]
+    rectangles = along * sum(len(found) - 1 for found in ends)
+    if rectangles > _MOST:
+        raise InputError(f"{kind}: elements = {elements!r}: {rectangles} rectangles: at most {_MOST}")
+    return along, ends
+
+
+def _ends(kind: str, given: Any) -> np.ndarray:
+    """Ends of the elements through a layer on [0, 1], of their number or their relative sizes."""
+    if not _is_row(given):
+        n = count(f"{kind}: elements through a layer", given)
+        if n > _MOST:
+            raise InputError(f"{kind}: elements through a layer = {given!r}: must be at most {_MOST}")
+        return np.linspace(0.0, 1.0, n + 1)
+    sizes = np.array([positive(f"{kind}: relative size of an element through a layer", size) for size in given])
+    if not len(sizes) or sizes.max() > 1e6 * sizes.min():
+        raise InputError(f"{kind}: relative sizes of elements through a layer = {given!r}: must be at least one, the"
+                         f" largest at most 1e6 times the smallest")
+    ends = np.concatenate([[0.0], np.cumsum(sizes / sizes.max())])
+    return ends / ends[-1]
 
 
 def _is_row(values: Any) -> bool:
@@ -263,16 +282,17 @@ def _with_middles(joints: np.ndarray) -> np.ndarray:
     return both
 
 
-def _levels(layers: Mapping[str, Callable], through: list[int], coordinates: np.ndarray) -> np.ndarray:
-    """Distance of all rows of nodes from the first face, shape (2 sum(through) + 1, number of coordinates)."""
+def _levels(layers: Mapping[str, Callable], through: list[np.ndarray], coordinates: np.ndarray) -> np.ndarray:
+    """Distance of all rows of nodes from the first face, shape (number of rows, number of coordinates)."""
     rows = [np.zeros(len(coordinates))]
-    for thickness_at, n in zip(layers.values(), through):
+    for thickness_at, ends in zip(layers.values(), through):
         h, base = thickness_at(coordinates), rows[-1]
-        rows += [base + h * (k / (2 * n)) for k in range(1, 2 * n + 1)]
+        rows += [base + h * at for at in _with_middles(ends)[1:]]
     return np.array(rows)
 
 
-def _mesh(kind: str, points: np.ndarray, layers: list[str], through: list[int], sides: tuple, comm: MPI.Comm) -> Mesh:
+def _mesh(kind: str, points: np.ndarray, layers: list[str], through: list[np.ndarray], sides: tuple,
+          comm: MPI.Comm) -> Mesh:
     """Triangles on rows and columns of nodes, shape (rows, columns, 2); `sides`: names of left, right, bottom, top.
 
     Diagonals alternate, as a chessboard's fields in each layer.
@@ -281,7 +301,7 @@ def _mesh(kind: str, points: np.ndarray, layers: list[str], through: list[int], 
     triangles, first = {}, 0
     halves = np.array([[[(0, 0), (1, 0), (1, 1)], [(1, 1), (0, 1), (0, 0)]],          # (column, row) of corners
                        [[(0, 0), (1, 0), (0, 1)], [(0, 1), (1, 0), (1, 1)]]])
-    for name, n in zip(layers, through):
+    for name, n in zip(layers, (len(ends) - 1 for ends in through)):
         i, j = np.meshgrid(np.arange(points.shape[1] // 2), np.arange(n), indexing="ij")
         corners = 2 * (halves[(i + j) % 2] + np.stack([i, j], axis=-1)[..., None, None, :]).reshape(-1, 3, 2)
         nodes = np.concatenate([corners, (corners + np.roll(corners, -1, axis=1)) // 2], axis=1)
