@@ -198,6 +198,7 @@ def test_heat_stored_is_heat_given(kinematics):
     assert given["HeatFlux('rim')"] == pytest.approx(-200 * rim * 5, rel=1e-10)
     # the heat stored by density and heat capacity: two layers at their mean temperatures
     weight = (lambda R: 2 * np.pi * R) if kinematics.dimension_of_volume == 3 else (lambda R: 1)
+    mesh = run.mesh
     T, dx = run.temperature(), ufl.Measure("dx", mesh.domain, subdomain_data=mesh.cells)
     R = ufl.SpatialCoordinate(mesh.domain)[0]
     stored = sum(fem.assemble_scalar(fem.form(c * (T - 25) * weight(R) * dx(mesh.layers[name])))

@@ -62,7 +62,8 @@ def test_concentrate_refuses(wrong, words):
 
 
 @pytest.mark.parametrize("layers, through, ends", [
-    ({"sheet": 0.7}, [1, 2, 4], [0, 0.1, 0.3, 0.7]), ({"a": 0.3, "b": 0.1, "c": 0.1}, [1, 1, 2], [0, 0.3, 0.4, 0.45, 0.5]),
+    ({"sheet": 0.7}, [1, 2, 4], [0, 0.1, 0.3, 0.7]),
+    ({"a": 0.3, "b": 0.1, "c": 0.1}, [1, 1, 2], [0, 0.3, 0.4, 0.45, 0.5]),
     ({"a": 0.6, "b": 0.4}, ([2.0, 1.0], 2), [0, 0.4, 0.6, 0.8, 1.0])])
 def test_grading_through_the_thickness(layers, through, ends):
     """Relative sizes of the elements of a layer from its bottom up; rows of counts are what they were."""
@@ -101,7 +102,7 @@ def test_sphere_is_curved_to_second_order():
 @pytest.mark.parametrize("wrong, words", [
     ({"inner_radius": 0.0}, "sphere: inner_radius = 0.0: must be greater than 0"),
     ({"thickness": {"x": -1}}, "sphere: thickness of 'x' = -1"),
-    ({"elements": (4, (1, 2))}, "sphere: elements through the layers"),
+    ({"thickness": {"x": 1, "y": 1}, "elements": (4, (1, 2, 3))}, "sphere: elements through the layers"),
     ({"elements": 4}, "along the meridian")])
 def test_sphere_refuses(wrong, words):
     with pytest.raises(fx.InputError, match=words):

@@ -135,9 +135,9 @@ def test_what_is_refused(material, temperature, words):
 SHEET = fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=1800.0)      # SI
 
 
-def cooled(tools=None, contacts=(), h=100.0, **more):
+def cooled(tools=None, contacts=(), h=100.0, through=2, **more):
     """A sheet of 1 mm at 150 C with air of 20 C above."""
-    body = fx.mesh.disc(radius=0.02, thickness=1e-3, elements=(6, 2))
+    body = fx.mesh.disc(radius=0.02, thickness=1e-3, elements=(6, through))
     heat = fx.Cooling(SHEET, [fx.Convection("top", h=h, air=20.0)] if h else [], unit="C", tools=tools, tolerance=0.01)
     return fx.Scene(mesh=body, materials=fx.NeoHookean(c10=fx.table({20: 4e6, 130: 1e6, 150: 0.6e6})),
                     loads=[] if contacts else [fx.Pressure("bottom")], contacts=contacts, temperature=150.0, heat=heat,
@@ -146,7 +146,7 @@ def cooled(tools=None, contacts=(), h=100.0, **more):
 
 def test_a_sheet_cools_while_it_waits():
     """At rest the temperature is that of `fx.heat`, and comes back with each state."""
-    scene = cooled()
+    scene = cooled(through=4)
     path = fx.Process(scene).run([fx.Stage("wait", duration=2.0)], progress=False, accuracy="draft")
     alone = fx.heat(scene.mesh, SHEET, [fx.Convection("top", h=100.0, air=20.0)], start=150.0, times=2.0, unit="C",
                     tolerance=0.01)

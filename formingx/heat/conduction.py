@@ -49,7 +49,8 @@ class Conduction:
     """The equations, in a stage of a time step.
 
     Attributes:
-        mesh, comm: where. space: P2. T: the `Function` that the forms see. points: of its nodes, (R, Z), owned part.
+        mesh, comm: where. space: P2 (or of `degree`). T: the `Function` that the forms see. points: of its
+            nodes, (R, Z), owned part.
         capacity: of the whole body, heat per degree; volume: of the reference body.
         touches: [`Touch`], one for each ContactWithTool; who changes a conductance in it calls `update`.
         power: heat that is given at the nodes per time, over `capacity`, owned part, shape (n,), or 0.
@@ -57,16 +58,17 @@ class Conduction:
     """
 
     def __init__(self, mesh: Mesh, materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any],
-                 kinematics: Any, absolute_zero: float, displacement: Any = None):
-        self.mesh, self.comm = mesh, mesh.comm
+                 kinematics: Any, absolute_zero: float, displacement: Any = None, degree: int = 2):
+        self.mesh, self.comm, self._degree = mesh, mesh.comm, degree
         self._kinematics, self._u, self._zero = kinematics, displacement, absolute_zero
         domain = mesh.domain
-        self.space = fem.functionspace(domain, ("Lagrange", 2))
+        self.space = fem.functionspace(domain, ("Lagrange", degree))
         self.T, self._change, self._held_at = (fem.Function(self.space) for _ in range(3))
         self._n = self.space.dofmap.index_map.size_local
         self.points = self.space.tabulate_dof_coordinates()[: self._n, :2]
         self._X, self._v = ufl.SpatialCoordinate(domain), ufl.TestFunction(self.space)
-        self._dx = ufl.Measure("dx", domain, subdomain_data=mesh.cells, metadata={"quadrature_degree": 6})
+        self._dx = ufl.Measure("dx", domain, subdomain_data=mesh.cells,
+                               metadata={"quadrature_degree": 2 * degree + 2})
         self._scale, self._c = self.constant(1.0), self.constant(1.0)
         self.power: Any = 0.0
         self._buffer = la.vector(self.space.dofmap.index_map, 1)
@@ -148,9 +150,10 @@ class Conduction:
     def difference(self, known: list[np.ndarray], c: float) -> float:
         """Largest change, of body and tools, that heat `known` makes in an implicit step: (M - c R') change = known.
 
-        With a tangent of the last `stage`, which must have had the same c.
+        With the tangent of the last `stage` if that had the same c, else with that at the T last set.
         """
         answers = [touch.answer(0 * k, k, c, absolute=False) for touch, k in zip(self.touches, known[1:])]
+        self._factorise(c, answers, afresh=False)
         left = known[0].copy()
         for touch, answer in zip(self.touches, answers):
             left[touch.dofs] += c * touch.area * answer.g * answer.free
@@ -159,6 +162,11 @@ class Conduction:
         for touch, answer, k in zip(self.touches, answers, known[1:]):
             sizes.append(self._largest(touch.finish(answer, k, change[touch.dofs], c)[1]))
         return max(sizes)
+
+    def slope(self, rate: np.ndarray) -> np.ndarray:
+        """dT/dt, owned part, of rates of heat M dT/dt; 0 where the temperature is held."""
+        self._factorise(0.0, [], afresh=True)
+        return self._solve(rate)
 
     def stored(self, change: np.ndarray) -> float:
         """Heat that a change of T, owned part, stores in the whole body."""
@@ -239,7 +247,7 @@ class Conduction:
         tangent = self._stored(materials, ufl.TrialFunction(self.space), v) - self._c * ufl.derivative(R, T)
         self._rate_form, self._mass_form = self._form(R), self._form(self._stored(materials, self._change, v))
         self._scalars = [self._form(s) for s in scalars]
-        gll = {"quadrature_rule": "GLL", "quadrature_degree": 3}
+        gll = {"quadrature_rule": "GLL", "quadrature_degree": 2 * self._degree - 1}    # points at the nodes
         self._areas = [self._form(self._scale * self._area * v * self._ds(touch.on, gll)) for touch in self.touches]
         self._tangent = self._form(tangent)
         self._matrix = fem_petsc.create_matrix(self._tangent)
@@ -280,7 +288,7 @@ class Conduction:
         if self._u is None:
             return None
         if self._displaced is None:
-            space = fem.functionspace(self.mesh.domain, ("Lagrange", 2, (2,)))
+            space = fem.functionspace(self.mesh.domain, ("Lagrange", self._degree, (2,)))
             self._displaced = fem.Function(space), fem.Expression(self._u, _compat.interpolation_points(space))
         u, expression = self._displaced
         u.interpolate(expression)

@@ -37,8 +37,9 @@ class HeatRun:
     At a time between two steps the temperature is a cubic in time; times of output are ends of steps.
 
     Attributes:
-        mesh: of the body.
+        mesh: that the temperature was computed on: the one given, its elements cut into layers where heat passes faces.
         outputs: times asked for.
+        errors_in_space: estimated largest error of the temperature that is due to the mesh, at these times, degrees.
         unit: of temperatures, "C" or "K".
         states: [[T of the nodes, own part, then the lines of each conducting tool]] of the steps.
     """
@@ -49,6 +50,7 @@ class HeatRun:
         self.states = [body.start()]
         self._times, self._errors, self._stored = [0.0], [0.0], [0.0]
         self._heats = [np.zeros(len(body.names))]
+        self.errors_in_space: np.ndarray = np.zeros(len(outputs))
 
     def record(self, time: float, step: Any) -> None:
         """Take up an accepted step (`formingx.heat.stepping.Step`)."""

@@ -4,20 +4,30 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
+from dolfinx import fem
 from mpi4py import MPI
 
+from .. import _compat
 from ..errors import ConvergenceError, InputError, finite, instance, known, positive, several
 from ..mesh import Mesh
 from ..physics.kinematics import Axisymmetric
 from ..scene import fields
 from ..time_temperature import ABSOLUTE_ZERO
 from . import stepping
-from .boundaries import FixedTemperature, ThermalProperties
+from .boundaries import Absorption, FixedTemperature, ThermalProperties
 from .conduction import Conduction
+from .layers import layered
 from .result import HeatRun
+from .space_error import SpaceError
+
+PROMISE = 3e-4
+"""Of the error in space, over the span of temperatures in a run."""
+_EARLY = 0.01
+"""Part of the time of a run from which on temperatures are as exact as at the times of output."""
 
 _log = logging.getLogger(__name__)
 
@@ -57,14 +67,55 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
     if displacement is not None and getattr(displacement, "ufl_shape", None) != (2,):
         raise InputError(f"heat: displacement = {displacement!r}: must be a Function or expression (u_r, u_z)")
     tolerance = positive("heat: tolerance", tolerance)
-    body = Conduction(mesh, materials, boundaries, kinematics, ABSOLUTE_ZERO[unit], displacement)
+    moved = None if displacement is None else _Displaced(displacement, mesh)
+    fine = layered(mesh, _depths(materials, boundaries, outputs), moved)
+    make = partial(Conduction, fine, materials, boundaries, kinematics, ABSOLUTE_ZERO[unit],
+                   displacement if moved is None or fine is mesh else moved.on(fine))
+    body = make()
     try:
         _begin(body, start, unit)
         run = HeatRun(body, unit, outputs)
         _advance(run, body, outputs, tolerance, max_steps)
+        _look_at_space(run, SpaceError(body, make(degree=3)), tolerance)
     finally:
         body.destroy()
     return run
+
+
+def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any],
+            times: np.ndarray) -> dict[str, tuple[float, float]]:
+    """{boundary: depths that heat has gone at the first and the last time of interest}, of those that heat passes."""
+    slowest = min(material.diffusivity for material in materials.values())
+    fastest = max(material.diffusivity for material in materials.values())
+    first = np.sqrt(slowest * min(times[0], _EARLY * times[-1]))
+    last = np.sqrt(fastest * times[-1])
+    depths: dict[str, tuple[float, float]] = {}
+    for law in boundaries:
+        depth = 1 / law.coefficient if isinstance(law, Absorption) else first
+        depths[law.on] = min(depth, depths.get(law.on, (depth,))[0]), last
+    return depths
+
+
+class _Displaced:
+    """A displacement on a mesh, at points of the body and on another mesh of it; collective."""
+
+    def __init__(self, displacement: Any, mesh: Mesh):
+        space = fem.functionspace(mesh.domain, ("Lagrange", 2, (2,)))
+        u = fem.Function(space)
+        u.interpolate(fem.Expression(displacement, _compat.interpolation_points(space)))
+        self._mesh, self._parts = mesh, [u.sub(k).collapse() for k in (0, 1)]
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Where points, shape (n, 2), are in the deformed body."""
+        return points + np.column_stack([fields.values_at(part, points, self._mesh, "heat: displacement")
+                                         for part in self._parts])
+
+    def on(self, mesh: Mesh) -> fem.Function:
+        """The displacement as a P2 Function on another mesh."""
+        u = fem.Function(fem.functionspace(mesh.domain, ("Lagrange", 2, (2,))))
+        points = u.function_space.tabulate_dof_coordinates()[:, :2]
+        u.x.array[:] = (self(points) - points).ravel()
+        return u
 
 
 def _begin(body: Conduction, start: Any, unit: str) -> None:
@@ -98,6 +149,22 @@ def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: flo
             state = found.state
             run.record(t, found)
     _log.info("heat: %d steps to time %g", len(run.times) - 1, t)
+
+
+def _look_at_space(run: HeatRun, estimate: SpaceError, tolerance: float) -> None:
+    """Estimate the error in space at the times of output, and say where it is more than is promised."""
+    try:
+        run.errors_in_space = np.array([estimate.of(run.states[k], run.times[k])
+                                        for k in np.searchsorted(run.times, run.outputs)])
+    finally:
+        estimate.destroy()
+    allowed = max(tolerance, PROMISE * (max(run.hottest(t).temperature for t in run.times)
+                                        - min(run.coldest(t).temperature for t in run.times)))
+    worst = int(np.argmax(run.errors_in_space))
+    if run.errors_in_space[worst] > allowed:
+        _log.warning("heat: the error in space is about %.2g degrees at time %g, more than %.2g: use more elements"
+                     " along the body, or through it where it is curved", run.errors_in_space[worst],
+                     run.outputs[worst], allowed)
 
 
 def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties]:

@@ -15,6 +15,7 @@ from .mesh import Mesh
 
 # DOLFINx numbers a mid-edge node like the opposite corner; in a grid edges are 01, 12, 20
 _TO_DOLFINX, _FROM_DOLFINX = [0, 1, 2, 4, 5, 3], [0, 1, 2, 5, 3, 4]
+_EDGES = ((0, 1, 3), (1, 2, 4), (2, 0, 5))              # ends, middle
 
 
 class Grid(NamedTuple):
@@ -45,23 +46,37 @@ def counter_clockwise(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 def to_grid(mesh: Mesh) -> Grid:
     """The mesh as plain arrays (serial only); node i of the mesh has the number i + 1."""
-    from dolfinx.mesh import entities_to_geometry
-    domain = mesh.domain
     if mesh.comm.size > 1:
         raise InputError("the nodes of a mesh are numbered and written on one rank only: run this on one")
+    return gathered(mesh)
+
+
+def gathered(mesh: Mesh) -> Grid:
+    """The whole mesh as plain arrays, the same on all ranks; collective."""
+    from dolfinx.mesh import entities_to_geometry
+    domain, comm = mesh.domain, mesh.comm
     domain.topology.create_connectivity(1, 2)
-    points = domain.geometry.x[:, :2].copy()
-    triangles = np.asarray(_compat.cell_nodes(domain))
-    triangles = counter_clockwise(points, triangles[:, _FROM_DOLFINX[: triangles.shape[1]]])
-    corners = ((0, 1, 3), (1, 2, 4), (2, 0, 5))
+    own, X = domain.topology.index_map(2).size_local, domain.geometry.x
+    numbers = domain.geometry.index_map().local_to_global(np.arange(len(X), dtype=np.int32))
+    cells = numbers[np.asarray(_compat.cell_nodes(domain))[:own]]
+    marks = {name: mesh.cells.find(tag) for name, tag in mesh.layers.items()}
+    ends = {name: entities_to_geometry(domain, 1, mesh.facets_of(name))[:, :2] if len(mesh.facets_of(name))
+            else np.zeros((0, 2), dtype=np.int32) for name in mesh.boundaries}
+    parts = comm.allgather((numbers, X[:, :2], {name: cells[found[found < own]] for name, found in marks.items()},
+                            {name: numbers[found] for name, found in ends.items()}))
+    points = np.zeros((domain.geometry.index_map().size_global, 2))
+    for number, x, _, _ in parts:
+        points[number] = x
+    layers = {name: np.concatenate([rows[name] for _, _, rows, _ in parts]) for name in mesh.layers}
+    layers = {name: counter_clockwise(points, rows[:, _FROM_DOLFINX[: rows.shape[1]]]) for name, rows in layers.items()}
+    triangles = np.concatenate(list(layers.values()))
     edges = {frozenset(row[[i, j]].tolist()): row[[n for n in (i, j, k) if n < len(row)]]
-             for row in triangles for i, j, k in corners}
-    layers = {name: triangles[mesh.cells.find(tag)] for name, tag in mesh.layers.items()}
+             for row in triangles for i, j, k in _EDGES}
     boundaries = {}
     for name in mesh.boundaries:
-        ends = entities_to_geometry(domain, 1, mesh.facets_of(name))[:, :2]
-        rows = [edges[frozenset((int(a), int(b)))] for a, b in ends]
-        boundaries[name] = np.array(rows, dtype=np.int64).reshape(len(rows), 3 if triangles.shape[1] == 6 else 2)
+        pairs = dict.fromkeys(frozenset(pair) for _, _, _, rows in parts for pair in rows[name].tolist())
+        boundaries[name] = np.array([edges[pair] for pair in pairs], dtype=np.int64).reshape(
+            len(pairs), 3 if triangles.shape[1] == 6 else 2)
     return Grid(points, np.arange(1, len(points) + 1), layers, boundaries)
 
 
@@ -131,7 +146,7 @@ def _tagged(grid: Grid, what: str) -> tuple:
 def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
     """{the two ends, the lower first: the middle} of all edges; without middles: {ends: []}."""
     found: dict[tuple[int, int], list[int]] = {}
-    for i, j, k in ((0, 1, 3), (1, 2, 4), (2, 0, 5)):
+    for i, j, k in _EDGES:
         ends = np.sort(triangles[:, [i, j]], axis=1).tolist()
         found |= {(a, b): middle for (a, b), middle in zip(ends, triangles[:, k:k + 1].tolist())}
     return found

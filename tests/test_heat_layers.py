@@ -1,0 +1,122 @@
+"""Temperatures on any mesh: layers below faces that heat passes, and what is said of the error in space."""
+
+import logging
+
+import numpy as np
+import pytest
+import ufl
+from conftest import run_json
+from dolfinx import fem
+
+import formingx as fx
+from formingx.heat import reference
+from formingx.heat import run as running
+from formingx.heat.layers import layered
+from formingx.mesh.grid import gathered
+
+SHEET = fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=1800.0)
+STEEL, ALUMINIUM = {"conductivity": 40.0, "heat_capacity": 3.611e6}, {"conductivity": 200.0, "heat_capacity": 2.43e6}
+
+
+def chilled(accuracy, thickness, conductance, metal, times, start=150.0, **options):
+    """(a sheet on a cold tool, errors at the times, against the transform)."""
+    mesh = fx.mesh.disc(radius=50 * thickness, thickness=thickness, accuracy=accuracy)
+    tool = fx.ConductingTool(thickness=0.02, back=30.0, **metal)
+    run = fx.heat(mesh, SHEET, [fx.ContactWithTool("bottom", conductance=conductance, tool=tool)], start=start,
+                  times=times, unit="C", tolerance=0.02)
+    x = np.linspace(0, thickness, 15)
+    exact, _ = reference.on_tool(reference.Slab(thickness, 0.17, 1050 * 1800.0), reference.Slab(0.02, *metal.values()),
+                                 conductance, start, 30.0, 0.0, 25.0, x, [0.0], times)
+    return run, np.abs(run.at(np.column_stack([0 * x, x])) - exact).max(1)
+
+
+@pytest.mark.parametrize("accuracy, thickness, conductance, metal, start", [
+    ("draft", 1e-3, 1000.0, ALUMINIUM, 150.0), ("standard", 1e-3, 1000.0, ALUMINIUM, 150.0),
+    ("draft", 4e-3, 3e4, STEEL, 200.0), ("draft", 0.3e-3, 300.0, ALUMINIUM, 90.0),
+    pytest.param("fine", 1e-3, 1000.0, ALUMINIUM, 150.0, marks=pytest.mark.slow)])
+def test_presets_promise_the_temperature(accuracy, thickness, conductance, metal, start, caplog):
+    """The promise of docs/heat.md, right after the sheet was laid on the tool."""
+    with caplog.at_level(logging.WARNING, "formingx"):
+        run, errors = chilled(accuracy, thickness, conductance, metal, [0.05, 0.1, 0.2], start)
+    assert errors.max() < running.PROMISE * (start - 30) and not caplog.records
+    assert run.errors_in_space.max() < running.PROMISE * (start - 30)
+
+
+@pytest.mark.parametrize("accuracy", ["draft", "standard"])
+def test_the_error_in_space_is_estimated(accuracy, monkeypatch, caplog):
+    """Without the layers: errors of 0.2 to 26 degrees, the estimate within a factor of 3; and a warning."""
+    monkeypatch.setattr(running, "layered", lambda mesh, *_: mesh)
+    with caplog.at_level(logging.WARNING, "formingx"):
+        run, errors = chilled(accuracy, 1e-3, 1000.0, ALUMINIUM, [0.05, 0.1, 0.2, 1.0])
+    assert errors.min() > 0.1
+    assert np.all(errors < 3 * run.errors_in_space) and np.all(run.errors_in_space < 3 * errors)
+    assert "the error in space is about" in caplog.text
+
+
+def test_a_deformed_sheet_has_layers_too():
+    """Stretched to twice its radius it is a sheet of a quarter of the thickness."""
+    mesh = fx.mesh.disc(radius=0.05, thickness=4e-3, accuracy="draft")
+    X = ufl.SpatialCoordinate(mesh.domain)
+    law = fx.Convection("top", h=500.0, air=20.0)
+    run = fx.heat(mesh, SHEET, [law], start=150.0, times=[0.5, 1.0], unit="C", tolerance=0.02,
+                  displacement=ufl.as_vector([X[0], -0.75 * X[1]]))
+    x = np.linspace(0, 1, 9)
+    exact = reference.series(reference.Slab(1e-3, 0.17, 1050 * 1800.0), 150.0, (500.0, 0.0), (20.0, 25.0),
+                             1e-3 * x, [0.5, 1.0])
+    assert run.at(np.column_stack([0 * x, 4e-3 * (1 - x)])) == pytest.approx(exact, abs=running.PROMISE * 130)
+
+
+def bodies():
+    return {"two faces and a rim": (fx.mesh.disc(radius=4e-3, thickness={"a": 1e-3, "b": 1e-3}, elements=(4, (2, 1))),
+                                    {"bottom": (1e-4, 1e-3), "top": (3e-4, 1e-3), "rim": (2e-4, 1e-3)}),
+            "curved": (fx.mesh.sphere(inner_radius=1.0, thickness=0.3, elements=(6, 2)), {"inner": (0.02, 0.2)})}
+
+
+@pytest.mark.parametrize("name", bodies())
+def test_layers_are_the_same_body(name):
+    """Area, boundaries and layers stay, elements below a face are as thin as was asked for, and edges are shared."""
+    mesh, depths = bodies()[name]
+    fine = layered(mesh, depths)
+    fine.check()
+    for m in (mesh, fine):
+        assert set(m.boundaries) == set(mesh.boundaries)
+    sizes = [[fem.assemble_scalar(fem.form(fem.Constant(m.domain, 1.0) * measure(tags))) for measure, names in
+              ((ufl.Measure("dx", m.domain, subdomain_data=m.cells), m.layers),
+               (ufl.Measure("ds", m.domain, subdomain_data=m.facets), m.boundaries)) for tags in names.values()]
+             for m in (mesh, fine)]
+    assert sizes[1] == pytest.approx(sizes[0], rel=1e-12)
+    face, (first, _) = next(iter(depths.items()))
+    grid = gathered(fine)
+    a, b = grid.boundaries[face][0, :2]
+    rows = np.concatenate(list(grid.layers.values()))[:, :3]
+    p, q, r = grid.points[rows[np.isin(rows, (a, b)).sum(1) == 2][0]]
+    area = abs((q - p)[0] * (r - p)[1] - (q - p)[1] * (r - p)[0])
+    assert area / np.hypot(*(grid.points[b] - grid.points[a])) < 0.45 * first
+    assert len(depths) > 1 or layered(fine, depths) is fine
+
+
+def test_an_element_that_is_too_curved_is_left_and_said(caplog):
+    mesh = fx.mesh.parison(inner_radius=1e-2, thickness=3e-3, length=2e-2, elements=(6, 2))
+    with caplog.at_level(logging.WARNING, "formingx"):
+        run = fx.heat(mesh, SHEET, [fx.ContactWithTool("outer", conductance=1000.0, tool=20.0)], start=100.0,
+                      times=[0.1], unit="C", tolerance=0.1)
+    assert run.mesh is mesh and "more elements along" in caplog.text
+
+
+RANKS = """
+import json
+import numpy as np
+import formingx as fx
+from test_heat_layers import SHEET
+mesh = fx.mesh.disc(radius=0.05, thickness=1e-3, elements=(2, 1))
+laws = [fx.ContactWithTool("bottom", conductance=1e3, tool=20.0), fx.Convection("rim", h=50.0, air=30)]
+run = fx.heat(mesh, SHEET, laws, start=100.0, times=[0.1, 0.5], unit="C", tolerance=1.0)
+numbers = [*run.at([(0.0, 0.0), (0.03, 2e-4), (0.0499, 5e-4)]).ravel(), *run.errors_in_space]
+if mesh.comm.rank == 0:
+    print(json.dumps(list(map(float, numbers))))
+"""
+
+
+def test_ranks_agree():
+    one, three = (run_json("import sys; sys.path.insert(0, 'tests')" + RANKS, ranks) for ranks in (1, 3))
+    assert three == pytest.approx(one, rel=1e-7)
