@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 from conftest import treloar
+from test_admissible import displaced
 from test_contact import cup
 
 import formingx as fx
 from formingx import csv_files
+from formingx.discrete.probes import probe
+from formingx.discrete.problem import Problem
 
 
 @pytest.fixture(scope="module")
@@ -200,3 +203,77 @@ def test_units():
     assert {name: units.of(name) for name in labels} == labels
     with pytest.raises(fx.InputError, match="length 'furlong' is not known"):
         fx.Units("furlong")
+
+
+def ring(until, **scene):
+    """Inner radius 1, outer 2, 0.4 high, between two planes, blown from inside."""
+    mesh = fx.mesh.disc(radius=2.0, inner_radius=1.0, thickness=0.4, elements=(48, 1))
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.5), loads=[fx.Pressure("inner")],
+                     supports=[fx.Symmetry("bottom", "z"), fx.Symmetry("top", "z")], **scene)
+    return fx.trace(scene, until=until, progress=False)
+
+
+@pytest.mark.parametrize("inner", [1.25, 1.6])
+def test_volume_swept_by_a_ring(inner):
+    """The ends of its face move along planes of symmetry; a target of the volume arrives."""
+    swept = np.pi * (inner**2 - 1) * 0.4
+    path = ring(fx.displacement(inner - 1, at=(1.0, 0.0), component="r"))
+    assert path["enclosed_volume"][-1] == pytest.approx(swept, rel=1e-5)
+    again = ring(fx.enclosed_volume(swept))
+    assert again["pressure"][-1] == pytest.approx(path["pressure"][-1], rel=1e-5)
+
+
+@pytest.mark.parametrize("u, swept", [
+    (lambda X: (0 * X[0], 0.3 + 0 * X[0]), np.pi * 1.25**2 * 0.3), (lambda X: (0.2 * X[0], 0 * X[0]), 0.0),
+    (lambda X: (0.2 * X[0], 0.3 + 0 * X[0]), np.pi / 3 * 0.3 * 1.25**2 * (1 + 1.2 + 1.2**2))],
+    ids=["lifted", "widened", "both"])
+def test_volume_swept_where_the_rim_moves(u, swept):
+    """Between the face at rest and now, closed by straight lines: a cylinder, nothing, a frustum."""
+    problem = Problem(treloar((4, 1)))
+    displaced(problem, u)
+    problem.fill(problem.x, problem.forms.w.x.array[: problem.n_owned])
+    assert fx.enclosed_volume(1.0).bind(problem).value(problem.x, 0.0) == pytest.approx(swept, rel=1e-12, abs=1e-12)
+
+
+def test_what_has_no_volume_is_refused():
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(2, 1)), materials=fx.NeoHookean(c10=0.5),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[Weight()])
+    with pytest.raises(fx.InputError, match="enclosed_volume: the scene has .*Weight.*, which has no face"):
+        fx.trace(scene, until=fx.enclosed_volume(1.0), progress=False)
+
+
+class Weight(fx.Load):
+    """Of the body, along -Z."""
+
+    def virtual_work(self, body, value):
+        return body.integral(-value * body.du[1])
+
+
+def test_columns_of_the_user_change_no_work(inflated):
+    again = fx.trace(treloar((20, 2)), until=fx.pole_stretch(2.5), progress=False,
+                     record={"gauge_pressure": lambda problem: 7.0})
+    assert again.work()["pressure"] == pytest.approx(inflated.work()["pressure"], rel=1e-12)
+
+
+def test_weight_is_that_of_the_body_at_rest():
+    """A hot part that is larger weighs what it did."""
+    weights = []
+    for temperature in (0.0, 100.0):
+        scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1)), temperature=temperature,
+                         materials=fx.NeoHookean(c10=0.5), expansion=fx.ThermalExpansion(linear=1e-3, stress_free=0.0),
+                         supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0)])
+        part = fx.Process(scene).run([fx.Stage("stand", duration=1.0)], progress=False).part(density=1.3)
+        assert part.volume == pytest.approx(np.pi * 0.1 * (1 + 1e-3 * temperature) ** 3, rel=1e-4)
+        weights.append(part.weight)
+    assert weights == pytest.approx([1.3 * np.pi * 0.1] * 2, rel=1e-12)
+
+
+@pytest.mark.parametrize("kinematics", [fx.Axisymmetric(), fx.PlaneStrain()])
+@pytest.mark.parametrize("model", [fx.MixedPressure(), fx.Membrane()])
+def test_pole_stretch_is_that_of_the_fibre(kinematics, model):
+    scene = treloar((12, 2) if isinstance(model, fx.MixedPressure) else (12, 1), model=model, kinematics=kinematics)
+    path = fx.trace(scene, until=fx.pole_height(0.9), progress=False)
+    R = np.array([[1e-3, 0.041]])
+    with path.problem.at(path.last) as problem:
+        along = 1 + probe(problem, R).displacement(problem.x)[0, 0] / 1e-3
+    assert path["pole_stretch"][-1] == pytest.approx(along, rel=2e-3) and along > 1.2

@@ -50,6 +50,7 @@ class Formulation(ABC):
             without histories. dissipation: power, over stress times volume (UFL, rank 0), or None.
         residual: dpotential/dw - external virtual work (UFL, rank 1); control_derivative, time_derivative: its
             derivative by the control, in the loads and by way of the time in materials, or None.
+        load_works: of each load of the scene its virtual work at the value that it has (UFL, rank 1, user's units).
         slack_at_rest: True if the body at rest has no stiffness in some direction.
     """
 
@@ -273,11 +274,13 @@ class Formulation(ABC):
         by_time = ufl.derivative(ufl.diff(timed, control), self.w, v) if timed.integrals() else None
         terms = []
         self._loads = []
+        self.load_works = []
         for load, scale in zip(self.scene.loads, self.scales):
             base, rate = self.constant(0.0 if load.driven else load.value), self.constant(0.0)
             self._loads.append((load, base, rate))
             value = self.constant(scale) * (base + rate * control) if load.driven else base
             work = body.work(load, value)
+            self.load_works.append(work)
             residual -= self._scale * work
             if load.driven:
                 terms.append(-self._scale * ufl.diff(work, control))

@@ -45,9 +45,10 @@ class Probe:
         return self._problem.comm.allreduce(values, MPI.SUM)
 
     def across(self) -> tuple[np.ndarray, float]:
-        """(row, power) with in-plane stretch = (1 + row . x)^power for two points, one above the other on the axis."""
+        """(row, power) with stretch along the sheet = (1 + row . x)^power, of two points on the axis, lower first."""
         (_, low), (_, high) = self.points
-        return self.row(np.array([[0.0, -1.0], [0.0, 1.0]])) * self._problem.forms.length / (high - low), -0.5
+        row = self.row(np.array([[0.0, -1.0], [0.0, 1.0]])) * self._problem.forms.length / (high - low)
+        return row, -0.5 if self._problem.scene.kinematics.axisymmetric else -1.0
 
     def row(self, factors: np.ndarray) -> np.ndarray:
         """c with c . x = sum over points and components of factors (n, 2) times u over length; owned unknowns."""
@@ -98,10 +99,9 @@ class MidSurfaceProbe(Probe):
             self._slopes[k, 0, [far, 2]] = -1 / (3 * h), 8 / (3 * h)
 
     def across(self):
-        """See `Probe.across`: at the pole the membrane stays normal to the axis, and both stretches are 1 + du_r/dR."""
-        axisymmetric = self._problem.scene.kinematics.axisymmetric
+        """See `Probe.across`: at the pole the membrane stays normal to the axis, and is stretched by 1 + du_r/dR."""
         row = self._row(np.array([[1.0, 0.0], [0.0, 0.0]]), self._slopes[:, 0] * self._problem.forms.length)
-        return row, 1.0 if axisymmetric else 0.5
+        return row, 1.0
 
     def row(self, factors):
         """See `Probe.row`; only points of the mid-surface."""

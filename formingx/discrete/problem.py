@@ -242,6 +242,21 @@ class Problem:
         self.set_state(x, control)
         return self._forces(x.array_r[: self._n], control)
 
+    def body_forces(self, x: np.ndarray, control: float) -> np.ndarray:
+        """`forces` without those of contact: what supports and tools do to the body. x: own part; shape (n,)."""
+        self.look_at(x, control)
+        return self.assemble(self._residual)
+
+    def look_at(self, x: np.ndarray, control: float) -> None:
+        """Put the fields of x, own part, and the control where the forms see them."""
+        self.forms.control.value = control
+        self._set_own(x)
+
+    @property
+    def fading_forces(self) -> np.ndarray | None:
+        """Forces on the body, owned part of the fields, that a setting takes away as the control goes to 1, or None."""
+        return None if self._stage.left is None else self._stage.left[: self._n]
+
     def _forces(self, fields: np.ndarray, control: float) -> np.ndarray:
         """`forces` at the state last set."""
         values = self.assemble(self._residual)

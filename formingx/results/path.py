@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ConvergenceError, InputError
+from ..solve import extrapolate
 from ..solve.follow import Run
 from ..solve.newton import Failure
 from ..solve.state import Counts, Record, Segment, State
@@ -244,13 +245,40 @@ class Path:
     def _measure(self, state: State) -> None:
         """Fill the columns of an accepted state."""
         state.measures = self._measures(self.segments[-1], state)
-        if "dissipated_power" in state.measures:                             # by the trapezoidal rule
-            states, lost = self.segments[-1].states, 0.0
-            if len(states) > 1:
-                before = states[-2]
-                power = before.measures["dissipated_power"] + state.measures["dissipated_power"]
-                lost = before.measures["dissipated_energy"] + (state.time - before.time) * power / 2
+        if "dissipated_power" in state.measures:
+            segment, lost = self.segments[-1], 0.0
+            if len(segment.states) > 1:
+                lost = segment.states[-2].measures["dissipated_energy"] + self._dissipated(segment)
             state.measures["dissipated_energy"] = lost
+
+    def _dissipated(self, segment: Segment) -> float:
+        """Energy that materials have dissipated between the last two states, by Simpson's rule.
+
+        Half way in time the body is on the curve that the run takes it along; what it remembers is advanced to there.
+        """
+        before, state = segment.states[-2:]
+        if not before.time < state.time:
+            return 0.0
+        column, time = self._view(segment).columns["dissipated_power"], (before.time + state.time) / 2
+        if state.setting["rate"][-1]:
+            x, control = segment.curve.interpolate(before, state, 0.5)
+        else:                                                # a flow, whose tangents are at a fixed time
+            past = [*extrapolate.before(segment.states[:-1], time, extrapolate.CUBIC - 1), state]
+            weights = extrapolate.weights(past, time)
+            x, control = weights @ [s.x for s in past], float(weights @ [s.control for s in past])
+        with segment.problem.at(before) as problem:
+            if not state.setting["rate"][-1]:
+                problem.forms.clock = time
+            time = problem.forms.time_at(control)
+            for number, memory in problem.foretell(x, control).items():
+                problem.histories[number].put(memory)
+            problem.x.array_w[:] = x
+            half = column.value(problem.x, control)
+        a, b = (s.measures["dissipated_power"] for s in (before, state))
+        # the parabola through the three powers, at times that need not be even
+        share = (time - before.time) / (state.time - before.time)
+        return (state.time - before.time) * (
+            a * (3 - 1 / share) + half / (share * (1 - share)) + b * (3 - 1 / (1 - share))) / 6
 
     def _measures(self, segment: Segment, state: State) -> dict[str, float]:
         columns = self._view(segment).columns
@@ -366,7 +394,8 @@ class Path:
 
         Args:
             state: default the last.
-            density: in g/cm3, for the weight in grams; say the unit of length with `units` (without, it is cm).
+            density: of the material at rest (under `ThermalExpansion` where it is free of stress), in g/cm3, for the
+                weight in grams; say the unit of length with `units` (without, it is cm).
             trim: the radius at which the part is cut off, or ("height", h), lengths: the last place from the axis where
                 the middle line goes beyond it.
             heights: give the wall at these heights too (`Wall.height`).
@@ -404,7 +433,14 @@ class Path:
         return tool_forces(self)
 
     def work(self) -> dict[str, np.ndarray]:
-        """{what: work done on the body up to each state}: by the pressure, by tools; and the energy that it holds."""
+        """The ledger: {what: energy up to each state, shape (states,)}, stress length^3 (per depth: length^2).
+
+        Work done on the body by each load (its column; of a fixed one "pressure_on_bottom"), each driven support (its
+        name, or "support") and each tool that moves; by forces that a stage leaves without balance, as they fade
+        ("change"). Energy that comes with a change of temperature ("heat"). Where it went: "strain_energy", above that
+        of the first state; "dissipated_energy" in materials that relax; "friction"; "jumps" of the body. "unbalanced"
+        is what is left of the sum: the error of the integrals over the steps, and of the run.
+        """
         from .evaluate.work import work
         return work(self)
 

@@ -10,6 +10,9 @@ import ufl
 from ..discrete.probes import probe
 from ..errors import InputError, finite, known, pair, positive
 
+_GAUSS = (0.5 - 12**-0.5, 0.5 + 12**-0.5)
+"""Points of Gauss's rule from 0 to 1, both of weight 1/2."""
+
 
 class Bound:
     """A measure of one problem: its value, and the equation measure = target for a run that aims at it.
@@ -177,7 +180,8 @@ def pole_height(value: float) -> Target:
 
 
 def pole_stretch(value: float) -> Target:
-    """The in-plane stretch at the pole, (thickness/original)^(-1/2), reaches `value`.
+    """The stretch at the pole reaches `value`: (thickness/original)^(-1/2), which is that along the sheet in a solid
+    of revolution; in plane strain, where the sheet is stretched one way only, (thickness/original)^(-1).
 
     A run raises an InputError if no material of the scene can be stretched so far (Gent, Arruda-Boyce).
     """
@@ -185,7 +189,10 @@ def pole_stretch(value: float) -> Target:
 
 
 def enclosed_volume(value: float) -> Target:
-    """The volume swept by the driven face reaches `value` (length^3; per depth in plane strain)."""
+    """The volume that the driven face has swept reaches `value` (length^3; per depth in plane strain).
+
+    It lies between the face at rest and now; where an end of the face has moved, straight lines close it.
+    """
     return Target("enclosed_volume", finite("enclosed_volume", value), bind_volume)
 
 
@@ -214,17 +221,19 @@ def bind_pole_stretch(problem: Any) -> Bound:
 
 
 def bind_volume(problem: Any) -> Bound:
-    """See `enclosed_volume`: minus the integral of (z - z_lowest) n_z da over the face of the (first) driven load."""
+    """See `enclosed_volume`: minus the integral of u . n da over the face of the (first) driven load, from X to X + u.
+
+    The area vector of X + t u is of degree 2 in t (axisymmetric): Gauss's rule with two points in t is exact.
+    """
     driven = next((t for t in problem.scene.drivable if t.quantity == "pressure"), problem.scene.driven)
-    if driven is None:
-        raise InputError("enclosed_volume: the scene has no driven pressure whose face would enclose it")
+    if driven is None or driven.on is None:
+        what = "no driven pressure whose face would enclose" if driven is None else f"{driven!r}, which has no face for"
+        raise InputError(f"enclosed_volume: the scene has {what} it")
     kinematics, forms = problem.scene.kinematics, problem.forms
-    z0 = forms.constant(problem.scene.mesh.nodes_of(driven.on)[:, 1].min())
     N, face = forms.face(driven.on, 5)
-    area = kinematics.area_vector(forms.u, forms.X, N)
     scale = forms.length**kinematics.dimension_of_volume
-    height = forms.X[1] + forms.u[1] - z0
-    return _Form(problem, -height * area[1] / forms.constant(scale) * face, scale)
+    swept = sum(ufl.inner(forms.u, kinematics.area_vector(forms.constant(t) * forms.u, forms.X, N)) for t in _GAUSS)
+    return _Form(problem, -swept / forms.constant(2 * scale) * face, scale)
 
 
 def _displacement(problem, points, factors):

@@ -25,7 +25,8 @@ class Part:
         least_wall: length; and where: reference radius, (r, z) of the middle line, height (as in `Wall`).
         evenness: least wall over mean wall, 1 for an even part.
         variation: standard deviation of the wall over the middle surface, over its mean: coefficient of variation.
-        weight: grams if a density in g/cm3 was given; else None.
+        weight: grams if a density in g/cm3 was given; else None: of what the material was at rest, before anything
+            expanded, so that it does not change with the temperature.
         walls: {height: wall there}, lengths.
         scrap: volume beyond the trim over the volume of the whole sheet.
         units: of the labels.
@@ -76,9 +77,10 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     strips = _strips(fine(profile.bottom), fine(profile.top), axisymmetric)
     middle = _surface(fine(profile.middle), axisymmetric)
     rest = _surface(fine((profile.rest_bottom + profile.rest_top) / 2), axisymmetric)
+    at_rest = _strips(fine(profile.rest_bottom), fine(profile.rest_top), axisymmetric)
     inside = _inside(wall, trim)
-    volume, area, area_at_rest = (_sums(v, len(wall.r)) for v in (strips, middle, rest))
-    kept = [float((v * inside).sum()) for v in (volume, area, area_at_rest)]
+    volume, area, *before = (_sums(v, len(wall.r)) for v in (strips, middle, rest, at_rest))
+    kept = [float((v * inside).sum()) for v in (volume, area, *before)]
     reached = np.append(inside > 0, False) | np.append(False, inside == 1)
     reached[0] = True
     k = int(np.argmin(np.where(reached, wall.wall, np.inf)))
@@ -86,7 +88,7 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     of_strip = (wall.wall[1:] + wall.wall[:-1]) / 2
     average = (of_strip * area * inside).sum() / kept[1]
     spread = ((of_strip - average) ** 2 * area * inside).sum() / kept[1]
-    weight = None if density is None else units.mass(kept[0], positive("part: density", density))
+    weight = None if density is None else units.mass(kept[3], positive("part: density", density))
     at = {finite("part: heights", h): wall.at_height(h) for h in several("part: heights", heights, "numbers")}
     return Part(kept[0], kept[1], kept[1] / kept[2], mean, float(wall.wall[k]), float(wall.reference_radius[k]),
                 (float(wall.r[k]), float(wall.z[k])), float(wall.height[k]), float(wall.wall[k] / mean),

@@ -1,37 +1,251 @@
-"""Work that is put into the body, by what puts it in."""
+"""The ledger of a run: work that is put into the body, by what puts it in, and where it went.
+
+Between two states of one control the body moves on the cubic through both and their tangents. Loads are integrated
+along it (Gauss's rule). Reactions of supports and tools are no smooth functions of a guessed body, so their force is a
+cubic in arc length, too: through both values, with the slopes that the body's forces have along the tangents. Where a
+point is about to touch, a parabola does without the slope there; in a flow, and in a jump, straight lines serve.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
+from mpi4py import MPI
 
 from ...discrete.tooling import Tooling
-from .contact_face import tool_forces
+
+_GAUSS = tuple((1 + s) / 2 for s in (-(0.6**0.5), 0.0, 0.6**0.5)), (5 / 18, 8 / 18, 5 / 18)
+_FOOT = 0.06           # of half the width of the ramp: points nearer to its foot are at it
+_SMALL = 1e-5          # of the arc length of a state: half of a difference quotient
+
+
+class _Line(NamedTuple):
+    """A function of 0 <= s <= 1: its coefficients (numbers or arrays), from the constant on."""
+
+    coefficients: tuple
+
+    def at(self, s: float) -> Any:
+        """Value."""
+        return sum(c * s**k for k, c in enumerate(self.coefficients))
+
+    def slope(self, s: float) -> Any:
+        """Derivative."""
+        return sum(k * c * s ** (k - 1) for k, c in enumerate(self.coefficients) if k)
+
+
+def _through(a: Any, b: Any, start: Any = None, end: Any = None) -> _Line:
+    """From a to b, with slopes at the ends that have one."""
+    by = b - a
+    if start is None and end is None:
+        return _Line((a, by))
+    if end is None:
+        return _Line((a, start, by - start))
+    if start is None:
+        return _Line((a, 2 * by - end, end - by))
+    return _Line((a, start, 3 * by - 2 * start - end, start + end - 2 * by))
+
+
+def _integral(f: _Line, y: _Line) -> float:
+    """Of f dy, exact for two cubics."""
+    return float(sum(w * np.sum(f.at(s) * y.slope(s)) for s, w in zip(*_GAUSS)))
+
+
+class _Reaction(NamedTuple):
+    """What a driven support or a tool does to the body at a state: force along its travel, and the travel, length;
+    slope and by_arc: their slopes by arc length."""
+
+    force: float
+    slope: float
+    travel: float
+    by_arc: float
+
+
+class Ledger:
+    """The ledger of the states of one problem.
+
+    Args:
+        segment: the `Segment`.
+    """
+
+    def __init__(self, segment: Any):
+        self._states, self._curve, self._problem = segment.states, segment.curve, segment.problem
+        problem, scene = segment.problem, segment.problem.scene
+        forms = problem.forms
+        self._energy = forms.stress * forms.volume
+        self._loads = [(_called(scene, load), forms.compile(work))
+                       for load, work in zip(scene.loads, forms.load_works, strict=True)]
+        self._driven = [(i, thing) for i, thing in enumerate(scene.things)
+                        if any(thing is d for d in scene.drivable) and thing not in scene.loads]
+        self._stored = forms.compile(forms.energy) if scene.heat is not None else None
+        self._ends: dict[int, dict[str, _Reaction]] = {}
+
+    def rows(self) -> dict[str, np.ndarray]:
+        """{what: what is added in each state to what was there before, shape (states,)}."""
+        rows: list[dict[str, float]] = [{}]
+        rows += [self._between(a, b) for a, b in zip(self._states, self._states[1:])]
+        names = dict.fromkeys(name for row in rows for name in row)
+        return {name: np.array([row.get(name, 0.0) for row in rows]) for name in names}
+
+    def _between(self, a: Any, b: Any) -> dict[str, float]:
+        """What is added from a state to the next."""
+        found: dict[str, float] = {}
+        if b.kind == "jump":
+            found["jumps"] = b.jump.get("dissipated", 0.0)
+        elif any(c.law.has_friction for c in self._problem.contacts):
+            found["friction"] = self._friction(a, b)
+        if self._problem.scene.heat is not None:
+            found["heat"] = self._warmed(a, b)
+        if a.setting != b.setting:                          # the same body, seen under another setting
+            return found
+        straight = b.kind == "jump" or b.time != a.time and not b.setting["rate"][-1]      # no tangents of the way
+        h = self._curve.distance(a, b)
+        start = None if straight or a.kind == "start" and self._kinked(a) else h           # a body at rest on a tool
+        end = None if straight else h
+        x = _through(a.x, b.x, start and h * a.direction, end and h * b.direction)
+        control = _through(a.control, b.control, start and h * a.slope, end and h * b.slope)
+        found |= self._by_loads(a, x, control)
+        after = self._reactions(b)
+        end = None if end is None or after and self._kinked(b) else h
+        for name, before in self._reactions(a).items():
+            (f, df, y, dy), (g, dg, z, dz) = before, after[name]
+            force = _through(f, g, start and h * df, end and h * dg)
+            found[name] = _integral(force, _through(y, z, start and h * dy, end and h * dz))
+        return found
+
+    def _by_loads(self, a: Any, x: _Line, control: _Line) -> dict[str, float]:
+        """Work of loads, and of forces that fade, along a line from a state."""
+        problem = self._problem
+        names = [name for name, _ in self._loads]
+        found = dict.fromkeys(names, 0.0)
+        with problem.at(a):
+            n, fading = problem.n_owned, problem.fading_forces
+            for s, w in zip(*_GAUSS):
+                by = x.slope(s)[:n]
+                problem.look_at(x.at(s), control.at(s))
+                for name, form in self._loads:
+                    found[name] += w * self._sum(problem.assemble(form) * by)
+                if fading is not None:
+                    left = (1 - control.at(s)) * self._energy * fading
+                    found["change"] = found.get("change", 0.0) + w * self._sum(left * by)
+        return found
+
+    def _reactions(self, state: Any) -> dict[str, _Reaction]:
+        """Of driven supports and tools at a state; computed once."""
+        if id(state) not in self._ends:
+            self._ends[id(state)] = self._found(state) if self._driven else {}
+        return self._ends[id(state)]
+
+    def _found(self, state: Any) -> dict[str, _Reaction]:
+        problem, found = self._problem, {}
+        scene, forms = problem.scene, problem.forms
+        scale = forms.stress * forms.volume / forms.length
+        with problem.at(state) as at:
+            fields, n = at.x.array_r.copy(), at.n_owned
+            e, d = _SMALL, state.direction
+            ahead, behind = (at.body_forces(fields + sign * e * d, state.control + sign * e * state.slope)
+                             for sign in (1, -1))
+            change = scale * (ahead - behind)[:n] / (2 * e)
+            free = change.copy()
+            free[at.held] = 0                               # what supports do
+            for i, thing in self._driven:
+                setting = at.setting
+                travel = forms.length * setting.amplitude(i, state.control)
+                by_arc = forms.length * setting.rate[i] * state.slope
+                if i in setting.off:
+                    force = slope = 0.0
+                elif thing in scene.contacts:
+                    together = [scene.things[k] for k in scene.together(i)]
+                    tools = [c for c in at.touching if c.contact in together]
+                    force = -sum(float(c.force(fields, state.control) @ np.array(c.contact.moves)) for c in tools)
+                    slope = sum(self._sum(free[self._nodes(c, fields, state.control)] @ np.array(c.contact.moves))
+                                for c in tools)
+                else:
+                    force = -at.reaction(i, at.x, state.control)
+                    slope = self._sum(change[at.driven_unknowns(i)])
+                found[_called(scene, thing)] = _Reaction(force, slope, travel, by_arc)
+        return found
+
+    def _nodes(self, contact: Any, fields: np.ndarray, control: float) -> np.ndarray:
+        """Owned unknowns (u_r, u_z) of its face, shape (n, 2); of what touches, where it shares the face."""
+        problem, dofs = self._problem, contact.dofs
+        if dofs.shape[1] == 2 and sum(c.contact.on == contact.contact.on for c in problem.contacts) > 1:
+            return dofs[contact.touching(fields, control)]
+        dofs = np.unique(dofs.reshape(-1, 2), axis=0)
+        return dofs[dofs[:, 0] < problem.n_owned]
+
+    def _kinked(self, state: Any) -> bool:
+        """True if a point of the body is where a tool begins to resist."""
+        with self._problem.at(state) as at:
+            x, control = state.x[: at.n_owned], state.control
+            return self._sum([np.any(np.abs(c.law.distance(c.positions(x, control)) / c.law.theta + 1) < _FOOT)
+                              for c in at.touching]) > 0
+
+    def _friction(self, a: Any, b: Any) -> float:
+        """What friction has dissipated: mean traction times what has slid, not elastically, while the point touched."""
+        problem, lost, before = self._problem, 0.0, {}
+        contacts = [c for c in problem.contacts if c.law.has_friction and not c.contact.sticks]
+        if a.setting != b.setting or not contacts:
+            return lost
+        with problem.at(a):
+            for c in (c for c in contacts if c in problem.touching):
+                before[c] = c.positions(a.x[: problem.n_owned], a.control), c.touch, _friction_of(c, a, problem)
+        with problem.at(b):
+            for c, (x, touch, T) in before.items():
+                slid = _slid(c.law, x, touch, c.positions(b.x[: problem.n_owned], b.control)) - c.touch.slip
+                lost += self._sum(c.area * (T + _friction_of(c, b, problem)) / 2 * slid)
+        return lost
+
+    def _warmed(self, a: Any, b: Any) -> float:
+        """Stored energy that comes with the temperature, which changes when a state is accepted."""
+        problem = self._problem
+        with problem.at(replace(b, memory=[*b.memory[:-1], a.memory[-1]])):       # that of the temperature is last
+            return b.measures["strain_energy"] - self._energy * problem.assemble_scalar(self._stored)
+
+    def _sum(self, values: Any) -> float:
+        return float(self._problem.comm.allreduce(float(np.sum(values)), MPI.SUM))
+
+
+def _friction_of(contact: Any, state: Any, problem: Any) -> np.ndarray:
+    return contact.tractions(state.x[: problem.n_owned], state.control).tangential
+
+
+def _slid(law: Any, x: np.ndarray, touch: Any, end: np.ndarray) -> np.ndarray:
+    """Slip, elastic or not, of points that went straight from x to `end`, shape (n, 2), while they touched, (n,)."""
+    near, foot = law.nearest(end), -law.theta
+    touched, touches = touch.distance > foot, near.distance > foot
+    way = near.distance - touch.distance
+    crosses = np.clip(np.divide(foot - touch.distance, way, out=np.zeros(len(way)), where=way != 0), 0.0, 1.0)
+    share = np.where(touched, np.where(touches, 1.0, crosses), np.where(touches, 1 - crosses, 0.0))
+    motion = share[:, None] * (end - x)
+    return touch.slip + np.sign(np.einsum("ni,ni->n", near.tangent, motion)) * np.hypot(*motion.T)
+
+
+def _called(scene: Any, thing: Any) -> str:
+    """What a thing is called in the ledger."""
+    if thing in scene.contacts:
+        return Tooling(scene.contacts, 0, 1.0).names[scene.contacts.index(thing)]
+    if thing in scene.supports:
+        return thing.name or "support"
+    if any(thing is d for d in scene.drivable):
+        return scene.column(thing)
+    if thing.name is not None:
+        return f"{thing.name}_{thing.quantity}"
+    return thing.quantity if thing.on is None else f"{thing.quantity}_on_{thing.on}"
 
 
 def work(path: Any) -> dict[str, np.ndarray]:
-    """{what: work done on the body up to each state, shape (states,)}, stress length^3 (per depth: length^2).
-
-    Of the pressure, over the enclosed volume, if there is one pressure; of each tool that moves, over its travel; and
-    the energy that the body holds. By the trapezium rule from state to state: its error falls with the square of
-    the steps.
-    """
-    found = {}
-    pressures = [c for c in path.columns if c.endswith("pressure")]
-    if len(pressures) == 1 and "enclosed_volume" in path.columns:
-        found[pressures[0]] = _integral(path[pressures[0]], path["enclosed_volume"])
-    tooling = Tooling.of_problem(path.problem)
-    travels = [tooling.travels(s.setting, s.control) for s in path.states]
-    forces = tool_forces(path)
-    for k, (contact, name) in enumerate(zip(tooling.contacts, tooling.names, strict=True)):
-        if contact.moves is not None and name not in found:
-            travelled = [0.0]
-            for row in travels:                              # a tool that takes no part goes nowhere
-                travelled.append(travelled[-1] if (travel := row[k]) is None else travel)
-            found[name] = _integral(forces[name], np.array(travelled[1:]) * np.hypot(*contact.moves))
-    return found | {"strain_energy": path["strain_energy"] - path["strain_energy"][0]}
-
-
-def _integral(y: np.ndarray, x: np.ndarray) -> np.ndarray:
-    return np.concatenate([[0.0], np.cumsum((y[1:] + y[:-1]) / 2 * np.diff(x))])
+    """See `Path.work`."""
+    ledgers = [Ledger(segment).rows() for segment in path.segments]
+    names = dict.fromkeys(name for rows in ledgers for name in rows)
+    empty = [np.zeros(len(segment.states)) for segment in path.segments]
+    found = {name: np.cumsum(np.concatenate([rows.get(name, zero) for rows, zero in zip(ledgers, empty)]))
+             for name in names}
+    lost: dict[str, np.ndarray] = {name: found.pop(name) for name in ("friction", "jumps") if name in found}
+    if "dissipated_energy" in path.columns:
+        lost["dissipated_energy"] = path["dissipated_energy"]
+    stored = path["strain_energy"] - path["strain_energy"][0]
+    zero = np.zeros(len(path))
+    left = sum(found.values(), zero) - stored - sum(lost.values(), zero)
+    return found | {"strain_energy": stored} | lost | {"unbalanced": left}
