@@ -45,11 +45,34 @@ def test_error_falls_with_the_points():
 def test_known_shift():
     """A straight line moved along its normal: half of the distance on each scaled axis."""
     t = np.linspace(0, 1, 21)
-    found = fx.compare({"a": 2 * t, "b": 10 * t}, {"a": 2 * t + 0.02, "b": 10 * t - 0.1})
+    found = fx.compare({"a": 2 * t, "b": 10 * t}, {"a": 2 * t + 0.02, "b": 10 * t - 0.1}, along="arc length")
     for name, value in (("a", 0.02), ("b", -0.1)):
         d = found.differences[name]
         assert np.allclose(d.values, value) and d.rms == pytest.approx(abs(value)) == d.maximum
     assert found.differences["a"].range == 2.0
+
+
+@pytest.mark.parametrize("factor", [1.03, 0.8])
+def test_walls_are_compared_at_the_same_radius(factor):
+    """Theirs is thicker everywhere by a factor, on other nodes, from the rim in: that is what is reported."""
+    def wall(r):
+        return 0.2 + np.exp(-8 * (r - 0.9) ** 2) + 0.3 * np.tanh(20 * (r - 0.5))
+    r, s = np.linspace(0, 1, 160), np.linspace(1, 0, 57)
+    found = fx.compare({"r": r, "wall": wall(r)}, {"r": s, "wall": factor * wall(s)})
+    assert found.along == "r" and found.beyond == 0 and "at the same r" in str(found)
+    d = found.differences["wall"]
+    assert d.values == pytest.approx((factor - 1) * wall(s), abs=2e-4)
+    slid = fx.compare({"r": r, "wall": wall(r)}, {"r": s[::-1], "wall": factor * wall(s[::-1])}, along="arc length")
+    assert slid.differences["wall"].rms < 0.6 * d.rms
+
+
+def test_curves_that_turn_back_are_paired_by_arc_length():
+    t = np.linspace(0, 6, 60)
+    assert fx.compare(spiral(t), spiral(t)).along == ""
+    with pytest.raises(fx.InputError, match="along = 'pressure': it turns back"):
+        fx.compare(spiral(t), spiral(t), along="pressure")
+    with pytest.raises(fx.InputError, match="along 'x' is not known"):
+        fx.compare(GOOD, GOOD, along="x")
 
 
 def test_a_longer_curve_is_cut():
@@ -190,7 +213,9 @@ def test_names_of_stages_are_read_back(tmp_path, stage):
 def test_backwards():
     t = np.linspace(0, 2, 30)
     with pytest.raises(fx.InputError, match="backwards"):
-        fx.compare({"a": t, "b": t**2}, {"a": t[::-1], "b": t[::-1] ** 2})
+        fx.compare({"a": t, "b": t**2}, {"a": t[::-1], "b": t[::-1] ** 2}, along="arc length")
+    with pytest.raises(fx.InputError, match="backwards"):
+        fx.compare(spiral(3 * t), {k: v[::-1] for k, v in spiral(3 * t).items()})
 
 
 def test_on_two_ranks(tmp_path):

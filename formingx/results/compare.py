@@ -46,6 +46,7 @@ class Comparison:
         line: our curve as compared, shape (m, columns).
         pairs: the points of `theirs` that were compared (indices), and their partners on our curve, shape (k, columns).
         differences: {column: `Difference`}.
+        along: the column that is the independent variable, at which the others are compared; "": none, by arc length.
         limit_points: ours and theirs, each a list of {column: value}: those that a run located, else those of the
             parabola through the three points where the control (pressure or travel; else the first column) turns.
         resolution: how much each side's curve changes, as a share of the ranges, if every other point is left out: a
@@ -61,6 +62,7 @@ class Comparison:
     differences: dict[str, Difference]
     limit_points: tuple[list[dict[str, float]], list[dict[str, float]]]
     resolution: tuple[float, float]
+    along: str = ""
 
     @property
     def beyond(self) -> int:
@@ -69,10 +71,13 @@ class Comparison:
 
     def __str__(self) -> str:
         compared = self.theirs[self.pairs[0]]
+        how = f"at the same {self.along}" if self.along else "paired by arc length"
         lines = [f"{len(compared)} of {len(self.theirs)} points of theirs compared with our curve through"
-                 f" {len(self.ours)}" + (f"; {self.beyond} lie beyond its ends" if self.beyond else ""),
+                 f" {len(self.ours)}, {how}" + (f"; {self.beyond} lie beyond its ends" if self.beyond else ""),
                  f"{'theirs minus ours':24}{'largest':>13}{'of range':>10}{'rms':>13}{'of range':>10}   largest at"]
         for name, d in self.differences.items():
+            if name == self.along:
+                continue
             where = ", ".join(f"{c} {v:.6g}" for c, v in zip(self.columns, compared[d.at]))
             lines.append(f"{name:24}{d.values[d.at]:13.5g}{_percent(d.maximum / d.range)}{d.rms:13.5g}"
                          f"{_percent(d.rms / d.range)}   {where}")
@@ -115,13 +120,15 @@ class Comparison:
 
 
 def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str] | None = None,
-            units: Mapping[str, float | str] | None = None) -> Comparison:
+            units: Mapping[str, float | str] | None = None, along: str | None = None) -> Comparison:
     """Compare a run with another program's curve, also one that turns back.
 
-    Each column is divided by its range, and a side is a curve in the space of the columns, with its rows in order
-    along the path. Points of theirs are paired with points of our curve so that both arc lengths grow together and the
-    sum of squared distances is least: no column is taken for the independent one, so nothing depends on which of them
-    turns back. Points of theirs beyond our ends are left out, and counted.
+    A side is a curve in the space of the columns, with its rows in order along it. A column that grows, or falls, all
+    along both sides is the independent variable (of several the one over which the curve is least steep): the others
+    are compared at the same value of it, as walls at the same radius. Where every column turns back, points are paired
+    by arc length: each column is divided by its range, both arc lengths grow together and the sum of squared distances
+    is least. Then a shift along the curve is none: differences are those across it. Points of theirs beyond our ends
+    are left out, and counted.
 
     Args:
         ours: a `Path`, a CSV file (of `Path.to_csv`, for one), or {column: values}.
@@ -130,6 +137,7 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
             next measure of ours that theirs also has.
         units: {our name: factor} that turns their values into our units, or {our name: our unit} where their header
             states theirs ("m", "cm", "mm", "in", "Pa", "MPa", "bar", "psi", "kg/cm2", "cm3", ...).
+        along: our name of the independent variable, or "arc length"; default as said.
 
     Raises:
         InputError: a file that cannot be read, an unknown column or unit, a column that does not vary, rows that run
@@ -154,7 +162,8 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     curve = np.column_stack(ours.curve(*names)) if hasattr(ours, "curve") else a
     smooth = Smooth(curve / scale)
     line = smooth.line * scale
-    matched, partners = _pair(b / scale, smooth)
+    k = _independent(names, curve / scale, b / scale, along)
+    matched, partners = _pair(b / scale, smooth) if k is None else _at_same(b / scale, curve / scale, k)
     if not len(matched):
         raise InputError("compare: no point of theirs lies along our curve: are columns, units, order of rows right?")
     partners = partners * scale
@@ -164,7 +173,7 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
                        for k, n in enumerate(names)},
                       (_limit_points(left, a, names, control),
                        _limit_points(right, b, names, control)),
-                      (_resolution(a / scale), _resolution(b / scale)))
+                      (_resolution(a / scale, k), _resolution(b / scale, k)), "" if k is None else names[k])
 
 
 def _percent(share: float) -> str:
@@ -268,6 +277,46 @@ def _pair(points: np.ndarray, curve: Smooth) -> tuple[np.ndarray, np.ndarray]:
     return np.array(kept, dtype=int), partners[kept]
 
 
+def _independent(names: list[str], a: np.ndarray, b: np.ndarray, along: str | None) -> int | None:
+    """Number of the column that is the independent variable; None: arc length. a, b: both sides, scaled."""
+    rising = [k for k in range(len(names)) if _rises(a[:, k]) and _rises(b[:, k])]
+    if along is None:
+        return min(rising, key=lambda k: _steepest(a, k), default=None)
+    known("compare: along", along, [*names, "arc length"])
+    if along == "arc length":
+        return None
+    if names.index(along) not in rising:
+        raise InputError(f"compare: along = {along!r}: it turns back, or stands still, on one of the sides: use"
+                         f" 'arc length'")
+    return names.index(along)
+
+
+def _rises(values: np.ndarray) -> bool:
+    """True if values rise, or fall, all the way."""
+    steps = np.diff(values)
+    return bool(np.all(steps > 0) or np.all(steps < 0))
+
+
+def _steepest(points: np.ndarray, k: int) -> float:
+    """Largest slope of a curve over column k."""
+    steps = np.abs(np.diff(points, axis=0))
+    return float((steps.max(1) / steps[:, k]).max())
+
+
+def _over(points: np.ndarray, k: int) -> Any:
+    """The curve through points as a function of column k, which rises or falls."""
+    from scipy.interpolate import Akima1DInterpolator, interp1d
+    points = points[np.argsort(points[:, k])]
+    return (Akima1DInterpolator if len(points) > 3 else interp1d)(points[:, k], points, axis=0)
+
+
+def _at_same(points: np.ndarray, curve: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
+    """(indices of the points within the curve's ends, their partners on it): at the same value of column k."""
+    low, high = curve[:, k].min(), curve[:, k].max()
+    inside = np.flatnonzero((points[:, k] >= low - 1e-9) & (points[:, k] <= high + 1e-9))
+    return inside, _over(curve, k)(np.clip(points[inside, k], low, high))
+
+
 def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Difference:
     s = _arc_length(partners)
     weights = np.ones(len(s))
@@ -298,12 +347,15 @@ def _limit_points(table: csv_files.Table, points: np.ndarray, names: list[str], 
     return [dict(zip(names, point.tolist())) for point in found]
 
 
-def _resolution(points: np.ndarray) -> float:
-    """How far the dropped points lie from the curve through every other one (scaled)."""
+def _resolution(points: np.ndarray, k: int | None) -> float:
+    """How far the dropped points lie from the curve through every other one (scaled), over column k or across it."""
     if len(points) < 5:
         return float("inf")
     kept = np.unique(np.append(np.arange(0, len(points), 2), len(points) - 1))
+    dropped = np.setdiff1d(np.arange(len(points)), kept)
+    if k is not None:
+        return float(np.abs(_over(points[kept], k)(points[dropped, k]) - points[dropped]).max())
     curve = Smooth(points[kept])
-    feet = [(curve.foot(points[k], int(np.argmin(((curve.line - points[k]) ** 2).sum(1))))[0], points[k])
-            for k in np.setdiff1d(np.arange(len(points)), kept)]
+    feet = [(curve.foot(point, int(np.argmin(((curve.line - point) ** 2).sum(1))))[0], point)
+            for point in points[dropped]]
     return float(max(np.linalg.norm(foot - point) for foot, point in feet))
