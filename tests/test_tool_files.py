@@ -1,11 +1,13 @@
 """Tools from drawings: splines as arcs to a tolerance, DXF, curves put end to end, the solid on the right side."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 
 import formingx as fx
+from formingx.physics import cad
 from formingx.physics.arcs import arcs_along
 
 tools = fx.tools
@@ -137,7 +139,131 @@ def test_dxf_splines_and_ellipses(tmp_path):
         tools.read(file, [1])
 
 
+def hidden(space, **layer):
+    made = space.doc.layers.add("hidden")
+    for name in layer:
+        getattr(made, name)()
+    space.add_line((0, 0), (5, 5), dxfattribs={"layer": "hidden"})
+
+
+def test_what_cannot_be_seen_is_no_curve(tmp_path):
+    for hide in (lambda s: hidden(s, off=1), lambda s: hidden(s, freeze=1),
+                 lambda s: s.add_line((0, 0), (5, 5), dxfattribs={"invisible": 1})):
+        file = drawing(tmp_path, lambda s, hide=hide: (hide(s), s.add_line((3, 0), (0, 0))))
+        assert repr(tools.read(file)) == repr(tools.read(file, [1])) == "Tool(1 line from (3, 0) to (0, 0))"
+
+
+@pytest.mark.parametrize("code, of, factor", [
+    (4, "mm", 1), (5, "mm", 10), (1, "cm", 2.54), (6, "um", 1e6), (6, 2.5, 2.5)])
+def test_units_of_a_drawing(tmp_path, code, of, factor):
+    """What a drawing states is turned into the script's; a tolerance is in the script's."""
+    def fill(space):
+        space.doc.header["$INSUNITS"] = code
+        space.add_arc((0, 2), 2, 270, 360), space.add_ellipse((0, 0), (3, 0), 1 / 3, 0, math.pi / 2)
+    file = drawing(tmp_path, fill)
+    arc = tools.read(file, [1], units=of).pieces[0]
+    assert arc.radius == pytest.approx(2 * factor) and arc.centre == pytest.approx([0, 2 * factor])
+    tool = tools.read(file, [2], units=of, tolerance=1e-4 * factor)
+    off = np.abs(tool.signed_distance(factor * ellipse(np.linspace(0.01, 0.99, 100))[0])).max()
+    assert 1e-6 * factor < off < 1e-4 * factor
+
+
+def test_units_that_are_not_stated(tmp_path):
+    (tmp_path / "cup.geo").write_text(CUP)
+    none = drawing(tmp_path, lambda s: (s.add_line((0, 0), (1, 0)), s.doc.header.__setitem__("$INSUNITS", 0)))
+    for file in (tmp_path / "cup.geo", none):
+        with pytest.raises(fx.InputError, match="units = 'mm': .* does not state its own: give a factor"):
+            tools.read(file, units="mm")
+    assert tools.read(none, units=25.4).pieces[0].b == pytest.approx([25.4, 0])
+    with pytest.raises(fx.InputError, match="units 'yard' is not known"):
+        tools.read(none, units="yard")
+
+
+@pytest.mark.parametrize("more, words", [
+    ("Spline(9) = {1, 2, 3};", "curve 9 is a Spline"), ("BSpline(9) = {1, 2, 3};", "curve 9 is a BSpline"),
+    ("Ellipse(9) = {1, 2, 3, 4};", "curve 9 is a Ellipse"), ("Bezier(9) = {1, 2, 3};", "curve 9 is a Bezier"),
+    ("Point(5) = {1, 1, 0};", "a second point 5"), ("Point(9) = {1_0, 1, 0};", "is not a number"),
+    ("Point(9) = {0x10, 1, 0};", "is not a number"), ("Point(9) = {\u0661, 1, 0};", "is not a number"),
+    ("r = 12", "does not end in a semicolon")])
+def test_geo_is_read_right_or_refused(tmp_path, more, words):
+    """A curve that was passed over left a hole in the profile."""
+    (tmp_path / "cup.geo").write_text(CUP + more, encoding="utf-8")
+    with pytest.raises(fx.InputError, match=words):
+        tools.read(tmp_path / "cup.geo")
+    if "curve 9" in words:
+        assert len(tools.read(tmp_path / "cup.geo", [3, -2, -1]).pieces) == 3
+
+
+def solid(tmp_path, kind, draw):
+    import gmsh
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        draw(gmsh.model.occ)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(tmp_path / f"a.{kind}"))
+    finally:
+        gmsh.finalize()
+    return tmp_path / f"a.{kind}"
+
+
+@pytest.mark.parametrize("kind", ["step", "brep"])
+def test_curves_out_of_the_plane(tmp_path, kind):
+    """An arc in the x-z plane was taken for a line."""
+    file = solid(tmp_path, kind, lambda occ: occ.addCircle(0, 0, 0, 1, angle1=0, angle2=1, zAxis=[0, -1, 0],
+                                                           xAxis=[1, 0, 0]))
+    with pytest.raises(fx.InputError, match="z must be 0"):
+        tools.read(file)
+    with pytest.raises(fx.InputError, match="z must be 0"):
+        tools.read(file, tolerance=1e-3)
+
+
+def test_units_of_step(tmp_path):
+    file = solid(tmp_path, "step", lambda occ: occ.addCircle(0, 2, 0, 30, angle1=0, angle2=1))
+    assert tools.read(file).pieces[0].radius == pytest.approx(30)
+    assert tools.read(file, units="cm").pieces[0].radius == pytest.approx(3)
+    text = file.read_text()
+    for wrong, words in ((text[:len(text) // 2], "cut off"), (re.sub(r"#\d+ = CIRCLE.*\n", "", text), "refers to #")):
+        file.write_text(wrong)
+        with pytest.raises(fx.InputError, match=words):
+            tools.read(file)
+
+
+@pytest.mark.parametrize("body, words", [
+    ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", r"Open CASCADE ended at it \(SIGSEGV\)"),
+    ("import resource; resource.setrlimit(resource.RLIMIT_CPU, (1, 1))\nwhile True: pass", "took more than"),
+    ("print('{\"curves\": {\"1\": [0, 1]}}')", "Open CASCADE ended at it")])
+def test_a_file_that_ends_its_reader(tmp_path, monkeypatch, body, words):
+    file = solid(tmp_path, "brep", lambda occ: occ.addCircle(0, 2, 0, 30, angle1=0, angle2=1))
+    (tmp_path / "reader.py").write_text(body)
+    monkeypatch.setattr(cad.cad_process, "__file__", str(tmp_path / "reader.py"))
+    with pytest.raises(fx.InputError, match=f"cannot be read: .*{words}"):
+        tools.read(file)
+
+
+@pytest.mark.parametrize("old, new, words", [
+    (" 11\n", " 41\n", "has 0 values of group code 11"), ("\nLINE\n", "\nLIME\n", "no kind of curve"),
+    ("  0\nEOF\n", "", "cut off"), (" 20\n", " 20.\n", "no group code")])
+def test_damaged_dxf(tmp_path, old, new, words):
+    """ezdxf ends such a line in (0, 0), or leaves it out."""
+    file = drawing(tmp_path, lambda s: (s.add_line((3, 0), (4, 1)), s.add_line((4, 1), (5, 5))))
+    assert len(tools.read(file).pieces) == 2
+    head, entities = file.read_text().split("\nENTITIES\n")
+    assert old in entities
+    file.write_text(head + "\nENTITIES\n" + entities.replace(old, new, 1))
+    with pytest.raises(fx.InputError, match=words):
+        tools.read(file)
+
+
+def test_tolerances_too_fine_are_refused():
+    with pytest.raises(fx.InputError, match="tolerance = 1e-12: must be at least 1e-07 of the curve's size, 3e-07"):
+        arcs_along(ellipse, 1e-12, "ellipse")
+
+
 @pytest.mark.parametrize("fill, words", [
+    (lambda s: s.add_lwpolyline([(0, 0), (1, 0)], dxfattribs={"elevation": 2}), "z must be 0"),
+    (lambda s: s.add_arc((0, 0, 1), 1, 0, 90), "z must be 0"),
+    (lambda s: s.add_polyline2d([(0, 0), (1, 0), (2, 1)], dxfattribs={"flags": 4}), "fitted with a spline"),
     (lambda s: s.add_line((0, 0, 1), (1, 0, 0)), "z must be 0"), (lambda s: s.add_text("a"), "has no curves"),
     (lambda s: s.add_3dface([(0, 0), (1, 0), (1, 1)]), "3DFACE, which is no curve"),
     (lambda s: s.add_arc((0, 0), 1, 0, 90, dxfattribs={"extrusion": (0, 0, -1)}), "extrusion"),

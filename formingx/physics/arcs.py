@@ -11,6 +11,8 @@ from ..errors import InputError
 from .profile import Arc, Line
 
 _DEEPEST = 14              # halvings of a curve
+_MOST = 2000               # arcs for one curve
+_FINEST = 1e-7             # of a curve's size: the finest tolerance
 
 
 def arcs_along(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tolerance: float,
@@ -22,21 +24,64 @@ def arcs_along(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tol
         name: begins the message.
 
     Raises:
-        InputError: the curve is not smooth enough for it, or too long for the tolerance.
+        InputError: the curve is not smooth enough for it, or the tolerance is too fine.
     """
+    size = float(np.ptp(curve(np.linspace(0, 1, 17))[0], axis=0).max())
+    if tolerance < _FINEST * size:
+        raise InputError(f"{name}: tolerance = {tolerance:g}: must be at least {_FINEST:g} of the curve's size,"
+                         f" {_FINEST * size:.3g}")
+    made = 0
+
     def between(low: float, high: float, depth: int) -> list[Line | Arc]:
+        nonlocal made
         points, along = curve(np.linspace(low, high, 17))
         lengths = np.hypot(*along.T)
         if not np.all(np.isfinite(points)) or not lengths[[0, -1]].min() > 0:
             raise InputError(f"{name}: it has a corner or no direction near ({points[0, 0]:.6g}, {points[0, 1]:.6g})")
         found = _biarc(points[0], along[0] / lengths[0], points[-1], along[-1] / lengths[-1])
         if found and np.min([_away(points, piece) for piece in found], axis=0).max() <= tolerance:
+            made += len(found)
             return found
-        if depth == _DEEPEST:
-            raise InputError(f"{name}: 2^{_DEEPEST} arcs are not within tolerance = {tolerance:g} of it")
+        if depth == _DEEPEST or made > _MOST:
+            raise InputError(f"{name}: {_MOST} arcs, or one 2^{_DEEPEST} times shorter, are not within tolerance ="
+                             f" {tolerance:g} of it")
         middle = (low + high) / 2
         return between(low, middle, depth + 1) + between(middle, high, depth + 1)
     return between(0.0, 1.0, 0)
+
+
+def in_plane(points: np.ndarray, name: str) -> np.ndarray:
+    """(x, y) of points, shape (n, 3), as shape (n, 2); an InputError unless z is 0, to round-off."""
+    points = np.asarray(points, dtype=float).reshape(-1, 3)
+    off = ~(np.abs(points[:, 2]) <= 1e-9 * max(np.abs(points[:, :2]).max(initial=0.0), 1e-300))
+    if np.any(off):
+        x, y, z = points[np.argmax(off)]
+        raise InputError(f"{name} has the point ({x:.6g}, {y:.6g}, {z:.6g}): z must be 0: a profile is drawn in the"
+                         f" x-y plane, x for R and y for Z")
+    return points[:, :2]
+
+
+def piece_through(points: np.ndarray, name: str) -> Line | Arc:
+    """The line or the arc on which all points lie, in their order, shape (n, 2)."""
+    if not np.all(np.isfinite(points)):
+        raise InputError(f"{name}: its coordinates are not all finite numbers")
+    n, near = len(points), 1e-7 * max(np.ptp(points, axis=0).max(initial=0.0), 1e-300)
+    a, b = points[[0, -1]] if n > 1 else (np.zeros(2), np.zeros(2))
+    chord = b - a
+    off = (points - a) @ (-chord[1], chord[0]) / max(math.hypot(*chord), near)
+    if n > 1 and math.hypot(*chord) > near and np.abs(off).max() <= near:
+        return Line(a, b)
+    if n > 3:                                              # three points always lie on a circle
+        p, q, r = points[[0, n // 3, 2 * n // 3]]
+        centre = p + np.linalg.lstsq(2 * np.array([q - p, r - p]), [(q - p) @ (q - p), (r - p) @ (r - p)])[0]
+        radius = math.dist(p, centre)
+        if np.abs(np.hypot(*(points - centre).T) - radius).max() <= near:
+            angles = np.unwrap([math.atan2(*(x - centre)[::-1]) for x in points])
+            if np.all(np.diff(angles) * (angles[-1] - angles[0]) > 0):
+                return Arc(centre, radius, float(angles[0]), float(angles[-1] - angles[0]))
+    raise InputError(f"{name} is neither a straight line nor a circular arc"
+                     + (f" (of a mesh, {n} nodes; four are needed to know an arc)" if n < 4 else
+                        "; give tolerance=..., a length, and one of .step, .brep or .dxf is taken for arcs that close"))
 
 
 def _biarc(p: np.ndarray, t: np.ndarray, q: np.ndarray, s: np.ndarray) -> list[Line | Arc]:

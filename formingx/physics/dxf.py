@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -11,15 +12,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .arcs import arcs_along
+from . import dxf_tags
+from .arcs import arcs_along, in_plane
 from .profile import TURN, Arc, Line
 
 
 def curves(file: str | os.PathLike, tolerance: float | None) -> dict[int, Callable[[], list[Line | Arc]]]:
     """{number: what makes its pieces} of the curves of a drawing's model space, counted from 1 in its order.
 
-    Texts, dimensions, hatches and points count as nothing. Ellipses and splines become arcs within `tolerance`
-    (length).
+    Texts, dimensions, hatches and points count as nothing, nor does what cannot be seen. Ellipses and splines become
+    arcs within `tolerance` (length).
 
     Raises:
         InputError: ezdxf is not there, the file cannot be read, a curve of another kind or outside the plane, a spline
@@ -32,12 +34,18 @@ def curves(file: str | os.PathLike, tolerance: float | None) -> dict[int, Callab
     file = os.fspath(file)
     found: dict[int, Callable[[], list[Line | Arc]]] = {}
     try:
-        for entity in ezdxf.readfile(file).modelspace():
-            if entity.dxftype() in _READERS or entity.dxftype() in _NO_TOOL:
+        there = dxf_tags.check(file, _NO_TOOL)
+        drawing = ezdxf.readfile(file)
+        read = Counter(e.dxftype() for layout in drawing.layouts for e in layout)
+        lost = [kind for kind in _READERS if read[kind] != there[kind]]
+        if lost:
+            raise ValueError(f"{there[lost[0]]} {lost[0]} stand in it, {read[lost[0]]} can be read")
+        for entity in drawing.modelspace():
+            if (entity.dxftype() in _READERS or entity.dxftype() in _NO_TOOL) and _is_seen(entity, drawing):
                 number = len(found) + 1
                 found[number] = partial(_pieces, entity, tolerance, f"tool file {file!r}: curve {number}")
     except Exception as error:      # whatever a damaged file makes of the reader
-        raise InputError(f"tool file {file!r} cannot be read: {type(error).__name__}: {error}") from None
+        raise InputError(f"tool file {file!r} cannot be read: {error or type(error).__name__}") from None
     return found
 
 
@@ -61,16 +69,16 @@ def _read(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
 
 
 def _line(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    return [Line(_flat(entity.dxf.start), _flat(entity.dxf.end))]
+    return [Line(_flat(entity.dxf.start, name), _flat(entity.dxf.end, name))]
 
 
 def _arc(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
     start, end = math.radians(entity.dxf.start_angle), math.radians(entity.dxf.end_angle)
-    return [Arc(_flat(entity.dxf.center), float(entity.dxf.radius), start, (end - start) % TURN or TURN)]
+    return [Arc(_flat(entity.dxf.center, name), float(entity.dxf.radius), start, (end - start) % TURN or TURN)]
 
 
 def _circle(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    return [Arc(_flat(entity.dxf.center), float(entity.dxf.radius), 0.0, TURN)]
+    return [Arc(_flat(entity.dxf.center, name), float(entity.dxf.radius), 0.0, TURN)]
 
 
 def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
@@ -78,9 +86,12 @@ def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Ar
     if entity.dxftype() == "POLYLINE" and not entity.is_2d_polyline:
         raise InputError(f"{name} is a polyline in space or a mesh: draw it as a plane polyline")
     if entity.dxftype() == "POLYLINE":
-        rows = [(*_flat(v.dxf.location), v.dxf.get("bulge", 0.0)) for v in entity.vertices]
+        if entity.dxf.flags & 4:
+            raise InputError(f"{name} is a polyline that was fitted with a spline: draw it as a spline")
+        rows = [(*_flat(v.dxf.location, name), v.dxf.get("bulge", 0.0)) for v in entity.vertices]
     else:
-        rows = [tuple(row) for row in entity.get_points("xyb")]
+        elevation = entity.dxf.get("elevation", 0.0)
+        rows = [(*_flat((x, y, elevation), name), bulge) for x, y, bulge in entity.get_points("xyb")]
     closed = entity.is_closed if entity.dxftype() == "POLYLINE" else entity.closed
     pieces: list[Line | Arc] = []
     for (x, y, bulge), (x1, y1, _) in zip(rows, rows[1:] + (rows[:1] if closed else [])):
@@ -98,6 +109,9 @@ def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Ar
 
 
 def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
+    _flat(entity.dxf.center, name), _flat(entity.dxf.major_axis, name)
+    if not 0 < entity.dxf.ratio <= 1:
+        raise InputError(f"{name}: its axes have the ratio {entity.dxf.ratio:g}: must be above 0, at most 1")
     tool = entity.construction_tool()
     low, high = tool.start_param, tool.end_param
     high += TURN if high <= low else 0.0
@@ -110,6 +124,8 @@ def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc
 
 def _spline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
     """Between its knots it is smooth: each part for itself."""
+    for point in (*entity.control_points, *entity.fit_points):
+        _flat(point, name)
     tool = entity.construction_tool()
     knots = sorted({float(k) for k in tool.knots() if tool.knots()[tool.order - 1] <= k <= tool.max_t})
     pieces: list[Line | Arc] = []
@@ -124,13 +140,30 @@ def _spline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]
 
 _READERS = {"LINE": _line, "ARC": _arc, "CIRCLE": _circle, "LWPOLYLINE": _polyline, "POLYLINE": _polyline,
             "ELLIPSE": _ellipse, "SPLINE": _spline}
+_UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 13: "um"}
 _NO_TOOL = ("3DFACE", "3DSOLID", "BODY", "HELIX", "INSERT", "MESH", "MLINE", "RAY", "REGION", "SURFACE", "XLINE")
 
 
-def _flat(point: Any) -> np.ndarray:
-    if abs(point[2]) > 1e-9 * max(abs(point[0]), abs(point[1]), 1e-300):
-        raise InputError(f"a DXF drawing has the point ({point[0]:.6g}, {point[1]:.6g}, {point[2]:.6g}): z must be 0")
-    return np.array([float(point[0]), float(point[1])])
+def _is_seen(entity: Any, drawing: Any) -> bool:
+    layer = drawing.layers.get(entity.dxf.layer) if entity.dxf.layer in drawing.layers else None
+    return not (entity.dxf.get("invisible", 0) or layer is not None and (layer.is_off() or layer.is_frozen()))
+
+
+def unit(file: str) -> str | None:
+    """The unit of length that a drawing states, $INSUNITS; None if it states none."""
+    import ezdxf
+    try:
+        code = ezdxf.readfile(file).header.get("$INSUNITS", 0)
+    except Exception as error:      # whatever a damaged file makes of the reader
+        raise InputError(f"tool file {file!r} cannot be read: {type(error).__name__}: {error}") from None
+    if code and code not in _UNITS:
+        raise InputError(f"tool file {file!r}: its unit, $INSUNITS = {code!r}, is not one of"
+                         f" {', '.join(_UNITS.values())}: give a factor as units")
+    return _UNITS.get(code)
+
+
+def _flat(point: Any, name: str) -> np.ndarray:
+    return in_plane(np.array([tuple(point)]), name)[0]
 
 
 def _rows(points: Any) -> np.ndarray:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..numerals import is_number
 from .profile import Arc, Line
 
 _OPERATORS: dict[type, Any] = {
@@ -25,18 +26,18 @@ _OPERATORS: dict[type, Any] = {
     ast.Pow: operator.pow, ast.USub: operator.neg, ast.UAdd: operator.pos}
 _FUNCTIONS: dict[str, Any] = {"Sqrt": math.sqrt, "Sin": math.sin, "Cos": math.cos, "Tan": math.tan, "Fabs": abs}
 _NUMBER = re.compile(r"[A-Za-z_]\w*")
-_ENTITY = re.compile(r"(Point|Line|Circle)\s*\(([^(){}]*)\)\s*=\s*\{([^{}]*)\}")
+_ENTITY = re.compile(r"(Point|Line|Circle|Ellipse|Spline|BSpline|Bezier)\s*\(([^(){}]*)\)\s*=\s*\{([^{}]*)\}")
 _PASSED_OVER = re.compile(r"(?:(?:Curve|Line) Loop|Plane Surface|Surface|Ruled Surface"
-                          r"|Physical (?:Point|Curve|Line|Surface)|Ellipse|Spline|BSpline|Bezier)"
+                          r"|Physical (?:Point|Curve|Line|Surface))"
                           r"\s*\([^{}]*\)\s*\+?=\s*\{[^{}]*\}"
                           r"|(?:MeshSize|Characteristic Length)\s*\{[^{}]*\}\s*=\s*[^{}\"]*"
                           r"|Mesh\.\w+\s*=\s*[^{}\"]*|SetFactory\s*\(\s*\"(?:Built-in|OpenCASCADE)\"\s*\)")
-_ALLOWED = ("points, lines, circles, splines, loops, surfaces, physical groups, mesh sizes and numbers with a name,"
+_ALLOWED = ("points, lines, circles, loops, surfaces, physical groups, mesh sizes and numbers with a name,"
             " because a .geo file is a script and nothing in it is run: export anything else as .step or .brep")
 
 
-def curves(file: str | os.PathLike) -> dict[int, Line | Arc]:
-    """{number: the line or the arc} of the curves of a .geo file.
+def curves(file: str | os.PathLike) -> dict[int, Line | Arc | str]:
+    """{number: the line or the arc, or the kind of another curve} of the curves of a .geo file.
 
     Raises:
         InputError: it cannot be read, or holds a statement that is not a drawing's; the message names the line.
@@ -47,12 +48,14 @@ def curves(file: str | os.PathLike) -> dict[int, Line | Arc]:
             text = stream.read()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"tool file {file!r} cannot be read: {error}") from None
-    drawing = _Drawing()
+    drawing, text = _Drawing(), _without_remarks(text)
     for line, statement in _statements(text):
         try:
             drawing.add(statement)
         except (ValueError, ArithmeticError, KeyError, TypeError, RecursionError, MemoryError, SyntaxError) as error:
             raise InputError(f"tool file {file!r} cannot be read: line {line}: {statement[:60]!r}: {error}") from None
+    if text.strip() and not text.rstrip().endswith(";"):
+        raise InputError(f"tool file {file!r} cannot be read: its last statement does not end in a semicolon")
     return drawing.curves
 
 
@@ -62,13 +65,16 @@ class _Drawing:
     def __init__(self) -> None:
         self.values: dict[str, float] = {"Pi": math.pi}
         self.points: dict[int, np.ndarray] = {}
-        self.curves: dict[int, Line | Arc] = {}
+        self.curves: dict[int, Line | Arc | str] = {}
 
     def add(self, statement: str) -> None:
         """Take one statement in; a ValueError that says what is wrong with it."""
         if entity := _ENTITY.fullmatch(statement):
             kind, tag, numbers = entity[1], self._number(entity[2]), [self._number(n) for n in entity[3].split(",")]
-            getattr(self, f"_add_{kind.lower()}")(self._tag(tag), numbers)
+            if kind in ("Point", "Line", "Circle"):
+                getattr(self, f"_add_{kind.lower()}")(self._tag(tag), numbers)
+            else:
+                self._keep(self._tag(tag), kind)
         elif _PASSED_OVER.fullmatch(statement):
             return
         else:
@@ -80,6 +86,8 @@ class _Drawing:
     def _add_point(self, tag: int, numbers: list[float]) -> None:
         if len(numbers) not in (3, 4) or numbers[2] != 0 or not all(map(math.isfinite, numbers)):
             raise ValueError("a point must be {x, y, 0} or {x, y, 0, mesh size}, finite numbers")
+        if tag in self.points:
+            raise ValueError(f"a second point {tag}")
         self.points[tag] = np.array(numbers[:2])
 
     def _add_line(self, tag: int, numbers: list[float]) -> None:
@@ -104,7 +112,7 @@ class _Drawing:
         else:
             raise ValueError("a circle must be {first point, centre, last point}")
 
-    def _keep(self, tag: int, piece: Line | Arc) -> None:
+    def _keep(self, tag: int, piece: Line | Arc | str) -> None:
         if tag in self.curves:
             raise ValueError(f"a second curve {tag}")
         self.curves[tag] = piece
@@ -123,7 +131,9 @@ class _Drawing:
 
     def _number(self, text: str) -> float:
         """The value of an expression of numbers, names and + - * / ^."""
-        if len(text) > 1000 or "**" in text or not re.fullmatch(r"[\w\s.+\-*/^()]*", text):
+        words = re.findall(r"(?<![\w.])[0-9.][\w.]*", text)            # Python takes 1_0, 0x10 and 1j for numbers
+        if len(text) > 1000 or "**" in text or not re.fullmatch(r"[\w\s.+\-*/^()]*", text, re.ASCII) or not all(
+                is_number(word.removesuffix("e").removesuffix("E")) for word in words):
             raise ValueError(f"{text.strip()[:40]!r} is not a number")
         return float(self._value(ast.parse(text.strip().replace("^", "**"), mode="eval").body))
 
@@ -148,9 +158,12 @@ def _real(value: Any) -> float:
     return value
 
 
+def _without_remarks(text: str) -> str:
+    return re.sub(r"//[^\n]*|/\*.*?\*/", lambda found: re.sub(r"[^\n]", " ", found[0]), text, flags=re.DOTALL)
+
+
 def _statements(text: str) -> Iterator[tuple[int, str]]:
-    """(line, statement without its semicolon) of a script; comments are left out."""
-    text = re.sub(r"//[^\n]*|/\*.*?\*/", lambda found: re.sub(r"[^\n]", " ", found[0]), text, flags=re.DOTALL)
+    """(line, statement without its semicolon) of a script without remarks."""
     line = 1
     for part in text.split(";"):
         begin = line + part[: len(part) - len(part.lstrip())].count("\n")

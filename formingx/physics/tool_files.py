@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, count, finite, pair, place, positive, several
+from ..errors import InputError, count, finite, known, pair, place, positive, several
 from ..mesh import msh
-from . import dxf, geo
-from .arcs import arcs_along
+from ..units import LENGTHS
+from . import cad, dxf, geo
+from .arcs import in_plane, piece_through
 from .profile import Arc, Line, Tool
 
 _HEADERS = {"step": (b"ISO-10303-21",), "brep": (b"DBRep_DrawableShape", b"CASCADE Topology", b"Open CASCADE Topology")}
@@ -24,12 +25,13 @@ _Curves = dict[int, Callable[[], list[Line | Arc]]]
 
 
 def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: bool = False, *,
-         tolerance: float | None = None, body: Any = None) -> Tool:
+         tolerance: float | None = None, body: Any = None, units: str | float | None = None) -> Tool:
     """A tool from curves of a file.
 
     A curve is taken for the line or the arc that it is, exactly; the curves of a mesh (.msh) by their nodes. The ending
     says what a file is: .step or .stp, .brep, .dxf, .msh, or .geo. A .geo file is a script, which is not run: it may
     hold points, lines, circles, numbers with a name, and what a tool does not need (loops, surfaces, physical groups).
+    Curves lie in the plane z = 0. Of a .dxf file what cannot be seen (layers off or frozen, invisible) is no curve.
 
     Args:
         curves: numbers of the curves in order; a negative one runs a curve backwards (in a .dxf file curves are counted
@@ -38,11 +40,14 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
         tolerance: length; splines and ellipses (.step, .brep, .dxf) become arcs no farther away than this.
         body: a point (R, Z) outside the tool, or the mesh of the body: the solid is then put on the other side of the
             profile. None: it is to the left of the profile.
+        units: the script's unit of length ("mm", "cm", "m", "um", "in", "ft"): curves of a file that states its own (a
+            .dxf file's $INSUNITS; a .step file always comes in mm) are turned into it; or a factor. None: numbers as
+            they come.
 
     Raises:
         InputError: the file is not what its ending says or cannot be read, a statement that a .geo file may not hold,
-            a curve that is neither a line nor a circular arc where no tolerance is given, curves that do not follow one
-            another, a body on both sides of the profile.
+            a unit that the file does not state, a curve outside the plane, one that is neither a line nor a circular
+            arc where no tolerance is given, curves that do not follow one another, a body on both sides of the profile.
     """
     name = os.fspath(place("tools.read: file", file))
     tags = None if curves is None else [_tag(t) for t in several("tools.read: curves", curves, "numbers of curves")]
@@ -59,15 +64,18 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
         head = stream.read(200).lstrip()
     if kind in _HEADERS and not head.startswith(_HEADERS[kind]):
         raise InputError(f"tool file {name!r} cannot be read: it does not begin as a {kind.upper()} file does")
-    known = {"geo": _of_geo, "msh": _of_mesh, "dxf": dxf.curves}.get(kind, _of_solid)(name, tolerance)
+    factor = 1.0 if units is None else _factor(units, kind, name)
+    own = None if tolerance is None else tolerance / factor
+    found = ({"geo": _of_geo, "msh": _of_mesh}[kind](name) if kind in ("geo", "msh") else
+             dxf.curves(name, own) if kind == "dxf" else cad.curves(name, kind, own))
     for tag in tags or []:
-        if abs(tag) not in known:
-            raise InputError(f"tool file {name!r} has no curve {abs(tag)}; it has {sorted(known)}")
+        if abs(tag) not in found:
+            raise InputError(f"tool file {name!r} has no curve {abs(tag)}; it has {sorted(found)}")
     if tags is None:
-        pieces, closed = _end_to_end([known[tag]() for tag in sorted(known)], name)
+        pieces, closed = _end_to_end([found[tag]() for tag in sorted(found)], name)
     else:
-        pieces = [piece for tag in tags for piece in _along(known[abs(tag)](), tag)]
-    tool = Tool.of_pieces(pieces, closed)
+        pieces = [piece for tag in tags for piece in _along(found[abs(tag)](), tag)]
+    tool = Tool.of_pieces([_scaled(piece, factor) for piece in pieces], closed)
     return tool if body is None else _beside(tool, body, name)
 
 
@@ -128,13 +136,34 @@ def _tag(tag: Any) -> int:
     return int(math.copysign(count("tools.read: number of a curve", abs(number)), number))
 
 
-def _of_geo(file: str, tolerance: float | None) -> _Curves:
-    return {tag: partial(list, [piece]) for tag, piece in geo.curves(file).items()}
+def _factor(units: Any, kind: str, file: str) -> float:
+    """What the file's lengths are multiplied with."""
+    if not isinstance(units, str):
+        return positive("tools.read: units", units)
+    known("tools.read: units", units, LENGTHS)
+    own = {"step": "mm", "dxf": dxf.unit(file) if kind == "dxf" else None}.get(kind)
+    if own is None:
+        raise InputError(f"tools.read: units = {units!r}: tool file {file!r} does not state its own: give a factor")
+    return LENGTHS[own] / LENGTHS[units]
 
 
-def _of_mesh(file: str, tolerance: float | None) -> _Curves:
+def _scaled(piece: Line | Arc, factor: float) -> Line | Arc:
+    return (Line(piece.a * factor, piece.b * factor) if isinstance(piece, Line)
+            else piece._replace(centre=piece.centre * factor, radius=piece.radius * factor))
+
+
+def _of_geo(file: str) -> _Curves:
+    def pieces(tag: int, piece: Line | Arc | str) -> list[Line | Arc]:
+        if isinstance(piece, str):
+            raise InputError(f"tool file {file!r}: curve {tag} is a {piece}, which is read from no .geo file: export it"
+                             f" as .step or .brep and give a tolerance")
+        return [piece]
+    return {tag: partial(pieces, tag, piece) for tag, piece in geo.curves(file).items()}
+
+
+def _of_mesh(file: str) -> _Curves:
     found = msh.content(file)
-    points = dict(zip(map(int, found.numbers), found.points[:, :2]))
+    points = dict(zip(map(int, found.numbers), found.points))
     lines: dict[int, list[tuple[int, int]]] = {}
     for block in found.blocks:
         if block.kind in (1, 8):
@@ -145,74 +174,6 @@ def _of_mesh(file: str, tolerance: float | None) -> _Curves:
         nodes = [ends[0][0], *(end for _, end in ends)]
         if any(a[1] != b[0] for a, b in zip(ends, ends[1:])) or not all(n in points for n in nodes):
             raise InputError(f"tool file {file!r}: the elements of curve {tag} do not follow one another")
-        return [_piece_through(np.array([points[n] for n in nodes]), f"tool file {file!r}: curve {tag}")]
+        name = f"tool file {file!r}: curve {tag}"
+        return [piece_through(in_plane(np.array([points[n] for n in nodes]), name), name)]
     return {tag: partial(piece, tag) for tag in lines}
-
-
-def _of_solid(file: str, tolerance: float | None) -> _Curves:
-    """Of a STEP or BREP file, which Open CASCADE reads: it knows no commands."""
-    import gmsh
-    ours = not gmsh.isInitialized()
-    if ours:
-        gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.model.add("formingx tool")
-        kind = _KINDS[os.path.splitext(file)[1].lower()]
-        try:
-            gmsh.model.occ.importShapes(file, highestDimOnly=False, format=kind)
-            gmsh.model.occ.synchronize()
-        except Exception as error:
-            raise InputError(f"tool file {file!r} cannot be read: {error}") from None
-        return {tag: _of_curve(gmsh.model, tag, tolerance, f"tool file {file!r}: curve {tag}")
-                for _, tag in gmsh.model.getEntities(1)}
-    finally:
-        gmsh.model.remove()
-        if ours:
-            gmsh.finalize()
-
-
-def _of_curve(model: Any, tag: int, tolerance: float | None, name: str) -> Callable[[], list[Line | Arc]]:
-    """What makes the pieces of a curve of Open CASCADE, or raises the error that it has, if it is asked for."""
-    (low,), (high,) = model.getParametrizationBounds(1, tag)
-
-    def curve(t):
-        at = low + (high - low) * t
-        return (np.array(model.getValue(1, tag, at)).reshape(-1, 3)[:, :2],
-                np.array(model.getDerivative(1, tag, at)).reshape(-1, 3)[:, :2])
-    try:
-        try:
-            pieces = [_piece_through(curve(np.linspace(0, 1, 9))[0], name)]
-        except InputError:
-            if tolerance is None:
-                raise
-            pieces = arcs_along(curve, tolerance, name)
-    except InputError as error:
-        return partial(_raise, error)
-    return lambda: pieces
-
-
-def _raise(error: InputError) -> list[Line | Arc]:
-    raise error
-
-
-def _piece_through(points: np.ndarray, name: str) -> Line | Arc:
-    """The line or the arc on which all points lie, in their order, shape (n, 2)."""
-    n, near = len(points), 1e-7 * max(np.ptp(points, axis=0).max(initial=0.0), 1e-300)
-    a, b = points[[0, -1]] if n > 1 else (np.zeros(2), np.zeros(2))
-    chord = b - a
-    off = (points - a) @ (-chord[1], chord[0]) / max(math.hypot(*chord), near)
-    if n > 1 and math.hypot(*chord) > near and np.abs(off).max() <= near:
-        return Line(a, b)
-    if n > 3:                                              # three points always lie on a circle
-        p, q, r = points[[0, n // 3, 2 * n // 3]]
-        centre = p + np.linalg.lstsq(2 * np.array([q - p, r - p]), [(q - p) @ (q - p), (r - p) @ (r - p)])[0]
-        radius = math.dist(p, centre)
-        if np.abs(np.hypot(*(points - centre).T) - radius).max() <= near:
-            angles = np.unwrap([math.atan2(*(x - centre)[::-1]) for x in points])
-            if np.all(np.diff(angles) * (angles[-1] - angles[0]) > 0):
-                return Arc(centre, radius, float(angles[0]), float(angles[-1] - angles[0]))
-    raise InputError(f"{name} is neither a straight line nor a circular arc"
-                     + (f" (of a mesh, {n} nodes; four are needed to know an arc)" if n < 4 else
-                        "; give tolerance=..., a length, and one of .step, .brep or .dxf is taken for arcs that close"))
-

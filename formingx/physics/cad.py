@@ -1,0 +1,125 @@
+"""The curves of a STEP or BREP file, as a process of its own reads them (`cad_process`)."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from threading import Timer
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from . import cad_process
+from .arcs import arcs_along, in_plane, piece_through
+from .profile import Arc, Line
+
+_SECONDS = 30             # of a processor's time to read a file and to follow its curves
+_LONGEST = 20 * _SECONDS  # of any: the machine may be busy
+
+
+def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[[], list[Line | Arc]]]:
+    """{number: what makes its pieces, or raises the error of one that is no tool's}; `kind`: "step" or "brep".
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    if kind == "step":
+        _check_references(file)
+    with _Reader(file, kind) as reader:
+        return {tag: _of_curve(partial(reader.at, tag), bounds, tolerance, f"tool file {file!r}: curve {tag}")
+                for tag, bounds in reader.bounds.items()}
+
+
+class _Reader:
+    """The process that reads a file."""
+
+    def __init__(self, file: str, kind: str):
+        self._file = file
+        # not a rank of a run under mpirun
+        apart = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_COMM", "PMIX_", "PMI_", "PRTE_"))}
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", cad_process.__file__, file, kind, str(_SECONDS)], env=apart, text=True,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        self._timer = Timer(_LONGEST, self._process.kill)
+        self._timer.start()
+
+    def __enter__(self) -> _Reader:
+        try:
+            self.bounds = {int(tag): ends for tag, ends in self._answer()["curves"].items()}
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self._timer.cancel()
+        self._process.kill()
+        self._process.communicate()
+
+    def at(self, tag: int, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points of a curve and its derivatives, shape (n, 3) each, at parameters, shape (n,)."""
+        points, along = self._answer([tag, parameters.tolist()])
+        return np.array(points).reshape(-1, 3), np.array(along).reshape(-1, 3)
+
+    def _answer(self, question: Any = None) -> Any:
+        process, line = self._process, ""
+        assert process.stdin is not None and process.stdout is not None
+        try:
+            if question is not None:
+                process.stdin.write(json.dumps(question) + "\n")
+                process.stdin.flush()
+            line = process.stdout.readline()
+        except BrokenPipeError:
+            pass
+        if not line.endswith("\n"):
+            ended = process.wait()
+            why = (f"it took more than {_SECONDS} s" if ended in (-signal.SIGXCPU, -signal.SIGKILL) else
+                   f"Open CASCADE ended at it ({signal.Signals(-ended).name if ended < 0 else ended})")
+            raise InputError(f"tool file {self._file!r} cannot be read: {why}: is it damaged?")
+        found = json.loads(line)
+        if "error" in found:
+            raise InputError(f"tool file {self._file!r} cannot be read: {found['error']}")
+        return found
+
+
+def _of_curve(at: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], bounds: list[float],
+              tolerance: float | None, name: str) -> Callable[[], list[Line | Arc]]:
+    low, high = bounds
+
+    def curve(t):
+        points, along = at(low + (high - low) * t)
+        return in_plane(points, name), along[:, :2]
+    try:
+        try:
+            pieces = [piece_through(curve(np.linspace(0, 1, 9))[0], name)]
+        except InputError:
+            if tolerance is None:
+                raise
+            pieces = arcs_along(curve, tolerance, name)
+    except InputError as error:
+        return partial(_raise, error)
+    return lambda: pieces
+
+
+def _raise(error: InputError) -> list[Line | Arc]:
+    raise error
+
+
+def _check_references(file: str) -> None:
+    """An InputError unless a STEP file ends, and defines once whatever it refers to: else parts are left out."""
+    text = re.sub(r"'[^']*'|/\*.*?\*/", "", Path(file).read_bytes().decode("latin-1"), flags=re.DOTALL)
+    if "END-ISO-10303-21" not in text:
+        raise InputError(f"tool file {file!r} cannot be read: it has no end: it was cut off")
+    defined = re.findall(r"#(\d+)\s*=", text)
+    missing = set(re.findall(r"#(\d+)", text)) - set(defined)
+    if missing or len(set(defined)) < len(defined):
+        what = f"refers to #{min(missing, key=int)}, which is not in it" if missing else "defines a number twice"
+        raise InputError(f"tool file {file!r} cannot be read: it {what}: it is damaged")

@@ -1,0 +1,45 @@
+"""Curves of a STEP or BREP file, read by Open CASCADE in a process of its own, which a damaged file may end.
+
+    python3 cad_process.py FILE step|brep SECONDS
+
+It imports nothing of formingx. It prints one line of JSON, {"curves": {number: [lowest, highest parameter]}} or
+{"error": words}; then, for each line [number, [parameters]] that it gets, [points, derivatives] there or an error.
+"""
+
+import json
+import os
+import resource
+import sys
+
+
+def main(file: str, kind: str, seconds: int) -> None:
+    """Read the file, then answer until the input ends."""
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    out = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)                                           # what the libraries print goes nowhere
+    import gmsh
+    gmsh.initialize([], readConfigFiles=False, interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    model = gmsh.model
+    model.add("formingx tool")
+    try:
+        model.occ.importShapes(file, highestDimOnly=False, format=kind)
+        model.occ.synchronize()
+        bounds = {tag: [float(end[0]) for end in model.getParametrizationBounds(1, tag)]
+                  for _, tag in model.getEntities(1)}
+        out.write(json.dumps({"curves": bounds}) + "\n")
+    except Exception as error:  # noqa: BLE001  whatever a damaged file makes of the reader
+        out.write(json.dumps({"error": str(error)}) + "\n")
+        return
+    for line in sys.stdin:
+        tag, at = json.loads(line)
+        try:
+            answer = [list(model.getValue(1, tag, at)), list(model.getDerivative(1, tag, at))]
+            out.write(json.dumps(answer) + "\n")
+        except Exception as error:  # noqa: BLE001
+            out.write(json.dumps({"error": str(error)}) + "\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2], int(sys.argv[3]))

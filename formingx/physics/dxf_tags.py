@@ -1,0 +1,81 @@
+"""The tags of a DXF drawing as they stand: whether its curves are whole.
+
+ezdxf gives what a damaged curve lacks a usual value, such as (0, 0) for an end, and leaves out what it does not know.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+from ..numerals import number, whole
+
+_NEEDED = {"LINE": (10, 20, 11, 21), "ARC": (10, 20, 40, 50, 51), "CIRCLE": (10, 20, 40), "VERTEX": (10, 20),
+           "ELLIPSE": (10, 20, 11, 21, 40, 41, 42), "LWPOLYLINE": (), "POLYLINE": (), "SPLINE": (), "SEQEND": ()}
+"""{curve: group codes that it has once}."""
+_COUNTED: dict[str, dict[int, tuple[int, ...]]] = {
+    "LWPOLYLINE": {90: (10, 20)}, "SPLINE": {72: (40,), 73: (10, 20), 74: (11, 21)}}
+"""{curve: {group code of a count: the codes that follow so many times}}."""
+_LETTERING = ("ACAD_PROXY_ENTITY", "ACAD_TABLE", "ARC_DIMENSION", "ATTDEF", "ATTRIB", "DIMENSION", "HATCH", "IMAGE",
+              "LEADER", "LIGHT", "MTEXT", "MULTILEADER", "OLE2FRAME", "OLEFRAME", "POINT", "SHAPE", "SOLID", "TEXT",
+              "TOLERANCE", "TRACE", "VIEWPORT", "WIPEOUT")
+"""What a drawing has beside its curves."""
+
+
+def check(file: str, others: tuple[str, ...]) -> Counter:
+    """{kind: how many} of the curves in the drawing; `others`: kinds that are let through as they are.
+
+    Raises:
+        ValueError: what is wrong, and in which line.
+    """
+    data = Path(file).read_bytes()
+    if data.startswith(b"AutoCAD Binary DXF"):
+        raise ValueError("it is binary: save it as text")
+    lines = [line.strip() for line in data.decode("latin-1").rstrip().split("\n")]
+    section, kinds, entity = "", Counter[str](), list[tuple[int, str]]()
+    begun, last = "", ""
+    for n in range(0, len(lines), 2):
+        try:
+            code = whole(lines[n])
+        except ValueError:
+            raise ValueError(f"line {n + 1}: {lines[n][:40]!r} is no group code") from None
+        if n + 1 == len(lines):
+            raise ValueError("it ends within a tag")
+        value = lines[n + 1]
+        if 10 <= code <= 59 and section == "ENTITIES" and begun in _NEEDED:
+            try:
+                number(value)
+            except ValueError as error:
+                raise ValueError(f"line {n + 2}: {error}") from None
+        if code != 0:
+            section = value if begun == "SECTION" and code == 2 else section
+            entity.append((code, value))
+            continue
+        if section == "ENTITIES" and begun not in ("", "SECTION"):
+            _check_entity(begun, entity, n, others)
+            kinds[begun] += begun in _NEEDED
+        begun, entity, last = value, [], value
+        section = "" if value == "ENDSEC" else section
+    if last != "EOF":
+        raise ValueError("it has no end: it was cut off")
+    return kinds
+
+
+def _check_entity(kind: str, tags: list[tuple[int, str]], line: int, others: tuple[str, ...]) -> None:
+    where = f"the {kind} that ends before line {line + 1}"
+    if kind not in _NEEDED:
+        if kind not in _LETTERING and kind not in others:
+            raise ValueError(f"{where}: no kind of curve or of lettering that is known")
+        return
+    many = Counter(code for code, _ in tags)
+    wrong = [code for code in _NEEDED[kind] if many[code] != 1]
+    if wrong:
+        raise ValueError(f"{where}: has {many[wrong[0]]} values of group code {wrong[0]}, must have one")
+    for code, counted in _COUNTED.get(kind, {}).items():
+        found = [value for c, value in tags if c == code]
+        if len(found) > 1 or not found and code != 74:
+            raise ValueError(f"{where}: has {len(found)} counts of group code {code}, must have one")
+        for other in counted:
+            if many[other] != whole((found or ["0"])[0]):
+                raise ValueError(f"{where}: announces {(found or ['0'])[0]} and has {many[other]} values of group code"
+                                 f" {other}")
