@@ -101,6 +101,19 @@ class Admissible:
                    for quantity, values in found.items())
         return all(self._forms.comm.allgather(mine))
 
+    def inside_out(self) -> tuple[int, int, tuple[float, float]]:
+        """(elements with a point where J <= 0, all elements, the worst point (R, Z)) at the state last set; collective.
+
+        Of a solid.
+        """
+        J = np.prod(list(self.quantities().values()), axis=0)
+        mine = (np.inf, (0.0, 0.0))
+        if J.size:
+            k = np.unravel_index(np.argmin(J), J.shape)
+            mine = float(J[k]), tuple(self._X[k].tolist())
+        counts = self._forms.comm.allgather((int((J <= 0).any(1).sum()), len(J), mine))
+        return sum(c[0] for c in counts), sum(c[1] for c in counts), min(c[2] for c in counts)[1]
+
     def quantities(self) -> dict[str, np.ndarray]:
         """{quantity: its values at the points of this rank's own cells, shape (cells, points)}."""
         w, size = self._forms.w.x.array, self._forms.length

@@ -20,6 +20,10 @@ _AT_END = 0.95
 _SLIDES = 1e-2
 """How far (over the length of face that is its own) a node may slide so."""
 
+_CUT_OFF, _MOST_PLACES = 0.5, 4000
+"""How deep the way of a node in a step may lead through a tool, over the length of face that is its own; at how many
+places the way is looked at."""
+
 _SAME_STIFFNESS = 1e-3
 """Of the stiffness of a node: what it may differ by to count as the same in the tangent ahead."""
 
@@ -336,6 +340,23 @@ class ContactNodes:
         found = int(np.sum((a <= -self.law.theta - HOVERING * self.thickness) & (b > -self.law.theta)))
         return self._comm.allreduce(found, MPI.SUM) > 2 * max(self._allowed, self._foreseen) + 2
 
+    def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+        """True if a point's straight way from one state to another, seen from the tool, leads through the tool.
+
+        That is, deeper than both its ends by `_CUT_OFF`: so much a point may cut off an edge that it slides over.
+        """
+        a, b = self.positions(old, old_control), self.positions(new, control)
+        way, most = np.hypot(*(b - a).T), _CUT_OFF * self.lengths
+        ends = np.maximum(np.maximum(self.law.distance(a), self.law.distance(b)), 0.0)
+        between = (self.law.distance(a) + self.law.distance(b) + way) / 2          # no place of the way is deeper
+        far = np.flatnonzero((between > ends + most) & (self.lengths > 0))
+        found = False
+        if len(far):
+            parts = int(min(np.ceil((way / most)[far].max() * 2), _MOST_PLACES)) + 1
+            places = a[far] + np.linspace(0, 1, parts)[:, None, None] * (b - a)[far]
+            found = bool(np.any(self.law.part(far).distance(places).max(0) > (ends + most)[far]))
+        return self._comm.allreduce(found, MPI.LOR)
+
     def touches_by(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """Part of a step by which the first of the nodes touched whose slip the step got wrong; 1 if there is none.
 
@@ -398,6 +419,10 @@ class ContactNodes:
         """
         total = (self.area[:, None] * self.tractions(fields, control).force).sum(0)
         return self._comm.allreduce(total, MPI.SUM)
+
+    def pressing(self, fields: np.ndarray, control: float) -> float:
+        """Sum of the normal forces at the points, in the units of `force`, all ranks."""
+        return self._comm.allreduce(float(self.area @ self.tractions(fields, control).normal), MPI.SUM)
 
 
 def _no_area(lumped: np.ndarray, lengths: np.ndarray) -> np.ndarray:

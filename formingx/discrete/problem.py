@@ -274,6 +274,10 @@ class Problem:
         with self.at(state):
             return self._admissible.furthest_volume_ratio()
 
+    def inside_out(self) -> tuple[int, int, tuple[float, float]]:
+        """See `Admissible.inside_out`; of the state last set."""
+        return self._admissible.inside_out()
+
     def begin(self, old: Any = None) -> None:
         """Newton's method begins at a guess ahead of a state (None: of none)."""
         for contact in self.touching:
@@ -374,6 +378,11 @@ class Problem:
         """True if more happened between two states than one step may bring. Arrays: own part."""
         n = self._n
         return any([c.grew_too_much(old[:n], old_control, new[:n], control) for c in self.touching])
+
+    def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+        """True if a contact point goes through its tool on the straight way from one state to another."""
+        n = self._n
+        return any([c.passes_through(old[:n], old_control, new[:n], control) for c in self.touching])
 
     def touches_by(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """Part of a step, which came to `new` along (direction, slope), that will do; 1: it was short enough.

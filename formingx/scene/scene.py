@@ -20,6 +20,7 @@ from ..physics.loads import Load
 from ..physics.models import MixedPressure, Model
 from ..physics.part import Part
 from ..physics.supports import Held, Support
+from . import tool_width
 from .sampling import sample
 from .temperature import BodyTemperature
 
@@ -242,6 +243,7 @@ class Scene:
                 and contact.tool.outline()[:, 0].min() <= near:
             raise InputError(f"{contact!r}: it moves along R, but its tool covers the axis: no rigid tool of revolution"
                              f" does that; must be moves=(0, ...), or PlaneStrain()")
+        tool_width.check(mesh, contact, self.kinematics.axisymmetric)
         face = mesh.nodes_of(contact.on)
         comm = mesh.comm
         points = np.concatenate(comm.allgather(mesh.domain.geometry.x[:, :2]))

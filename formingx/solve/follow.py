@@ -267,6 +267,8 @@ class Run:
             new.met = target
         if self.problem.too_far(old.x, old.control, new.x, new.control):
             raise _Astray("too much came into contact in one step", [])
+        if self.problem.passes_through(old.x, old.control, new.x, new.control):
+            raise _Astray("a tool would pass through the face that it touches", [])
         part = self.problem.touches_by(new.x, new.control, new.direction, new.slope, reach)
         if part < 1 and reach > _SHORT:
             raise _Late(part)

@@ -114,7 +114,8 @@ class _Way:
             self.curve.spend(len(failure.history))
             return self._hold_back()
         self.curve.spend(len(history) - 1)
-        if self.problem.folded(self._x, self.control):
+        if self.problem.folded(self._x, self.control) or self.problem.passes_through(
+                self.at.x, self.at.control, self._x.array_r, self.control):
             return self._hold_back()
         x, drag = self._x.array_r.copy(), viscous.drag(self._x.array_r)
         last, new = self.at, replace(self.at, x=x, control=self.control)

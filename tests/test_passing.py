@@ -1,0 +1,60 @@
+"""A tool never passes through the body: shorter steps, or words."""
+
+import numpy as np
+import pytest
+
+import formingx as fx
+from formingx import tools
+
+
+def ball(radius, *, elements=12, friction="none", gap=0.0, **more):
+    return fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(elements, 1)),
+                    materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                    contacts=[fx.Contact("top", tools.sphere(radius=radius, z=1.2 + gap), friction, moves=(0, -1),
+                                         **more)])
+
+
+@pytest.mark.parametrize("radius, friction, more", [(1.0, "none", {}), (1.0, 0.2, {}), (2.0, "stick", {}),
+                                                    (1.5, "none", {"points": 4})])
+def test_a_ball_does_not_pass_in_the_first_step(radius, friction, more):
+    """As with steps that are short from the start."""
+    scene = ball(radius, friction=friction, **more)
+    path = fx.trace(scene, until=fx.travel(8.0), progress=False)
+    short = fx.trace(scene, until=fx.travel(8.0), step=fx.StepControl(length=0.005), progress=False)
+    assert path["tool_force"][-1] == pytest.approx(short["tool_force"][-1], rel=0.02) and path["pole_height"][-1] < -7
+
+
+def test_a_ball_that_comes_from_afar_does_not_pass_on_its_way():
+    """It ends in words or touches, always from above."""
+    scene = ball(3.0, elements=16, gap=25.0)
+    try:
+        path = fx.trace(scene, until=fx.travel(50.0), progress=False)
+    except fx.ConvergenceError as error:
+        path = error.path
+    touches = path["travel"] > 25.0 + 1e-9
+    assert touches.any() and np.all(path["tool_force"][touches] > 0)
+    assert path["pole_height"][touches] == pytest.approx(25.0 - path["travel"][touches], abs=1.0)      # under the ball
+
+
+@pytest.mark.parametrize("radius, elements, narrow", [(0.02, 12, True), (0.4, 12, True), (0.2, 40, True),
+                                                      (0.4, 40, False), (1.0, 12, False)])
+def test_a_tool_between_two_points_is_refused(radius, elements, narrow):
+    if not narrow:
+        ball(radius, elements=elements)
+        return
+    with pytest.raises(fx.InputError, match="it would pass between them; use elements of") as refused:
+        ball(radius, elements=elements)
+    fits = float(str(refused.value).split("use elements of ")[1].split()[0])
+    ball(radius, elements=int(np.ceil(40.0 / fits)))
+
+
+def test_where_a_point_slides_over_a_convex_tool_its_way_may_cut_it():
+    scene = ball(2.0, elements=24)
+    path = fx.trace(scene, until=fx.travel(0.5), progress=False)
+    with path.problem.at(path.last) as problem:
+        contact, x = problem.contacts[0], path.last.x
+        node = np.argmin(np.hypot(*(contact.points - (0.0, 1.2)).T))
+        for by, passes in ((0.0, False), (0.1, False), (10.0, True)):      # seen from the tool, across it
+            other = x.copy()
+            other[contact.dofs[node, 1]] += by / problem.forms.length
+            assert problem.passes_through(x, path.last.control, other, path.last.control) == passes
