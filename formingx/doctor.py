@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
+from . import doctor_sizes
+from .doctor_sizes import Body
 from .errors import instance, several
-from .mesh.triangles import Triangles
+from .findings import Finding, Report
 from .physics.models import DisplacementPenalty
+from .physics.supports import Displaced, Symmetry
 from .physics.tools import Arc
 from .scene.aims import unreachable
 from .scene.scene import Scene
+from .solve.stage import Stage
 from .solve.targets import Target
+from .units import NONE, Units
 
 _FLATTEST = 110.0          # longest edge over height: discs of aspect 100 end right in benchmarks/extremes.py
 _LONGEST = 2.0             # of elements of a soft layer over its thickness: measured, hard layers around it 150 to 1000
@@ -22,74 +27,47 @@ _PER_FILLET = 2.0          # elements along a fillet
 _PENETRATION = 0.01        # of the thickness
 
 
-class Finding(NamedTuple):
-    """One thing found: severity ("error": the run is refused; "warning": it may fail), what it is about, text."""
-
-    severity: str
-    about: str
-    text: str
-
-    def __str__(self) -> str:
-        return f"{self.severity}: {self.about}: {self.text}"
-
-
-class Report:
-    """What `doctor` found, worst first; prints in plain words.
-
-    Attributes:
-        findings: list of `Finding`; empty for a good scene.
-    """
-
-    def __init__(self, findings: Sequence[Finding]):
-        self.findings = sorted(findings, key=lambda f: f.severity)
-
-    @property
-    def healthy(self) -> bool:
-        """True if nothing was found."""
-        return not self.findings
-
-    def __str__(self) -> str:
-        return "\n".join(map(str, self.findings)) or "nothing was found that stands against this scene"
-
-
-def doctor(scene: Scene, *, targets: Sequence[Target] = ()) -> Report:
+def doctor(scene: Scene, *, targets: Sequence[Target] = (), stages: Sequence[Stage] = (),
+           units: Units = NONE) -> Report:
     """Look a scene over before the run; collective, no form is compiled and nothing is solved.
 
-    Elements (shape, number through a thick layer), the mesh against the fillets of the tools, penalties against the
-    precision that they leave, and sizes that look like mixed units. What makes every run impossible or wrong, such as
-    a body that is free to move, elements that lie over each other or lock, is an `InputError` of `Scene` already; an
-    "error" here is a target that `trace` refuses.
+    Elements (shape, number through a thick layer), the mesh against the edges of the tools, penalties against the
+    precision that they leave, sizes that look like mixed units, pressures and blow ratios that the material does not
+    bear, tools that move away or leave a way past them. What makes every run impossible or wrong, such as a body that
+    is free to move, elements that lie over each other or lock, is an `InputError` of `Scene` already; an "error" here
+    is a target that `trace` refuses.
 
     Args:
         targets: what the run will aim at, to be looked over too.
+        stages: of the process that it will be: their targets and tables.
+        units: for the numbers in what is found.
 
     Raises:
-        InputError: `scene` is not a Scene, or a target not a target.
+        InputError: `scene` is not a Scene, a target not a target, a stage not a stage or of another scene.
     """
     instance("doctor: scene", scene, Scene, "a formingx.Scene")
-    for target in several("doctor: targets", targets, "targets, such as [pole_stretch(3)]"):
+    instance("doctor: units", units, Units, "a formingx.Units")
+    targets = several("doctor: targets", targets, "targets, such as [pole_stretch(3)]")
+    stages = several("doctor: stages", stages, "stages, such as [Stage('blow', drive='air', until=pressure(1))]")
+    for target in targets:
         instance("doctor: targets: target", target, Target, "a target, such as pole_stretch(3)")
-    sheet = _Sheet(scene)
+    for stage in stages:
+        instance("doctor: stages: stage", stage, Stage, "a formingx.Stage")
+    body = Body(scene, targets, stages, units)
+    targets = [*targets, *(target for stage in stages for target in (*stage.through, stage.until) if target)]
     checks = (_driven, _elements, _locking, _layers, _fillets, _contact_penalties, _volume_penalty, _units)
-    findings = [finding for check in checks for finding in check(scene, sheet, targets)]
-    return Report([*findings, *_targets(scene, sheet, targets)])
+    findings = [finding for check in checks for finding in check(scene, body, targets)]
+    findings += [Finding("warning", about, text) for check in doctor_sizes.CHECKS for about, text in check(body)]
+    return Report([*findings, *_targets(scene, body, targets)])
 
 
-class _Sheet(Triangles):
-    """The triangles of the body. moduli: {layer: shear modulus}."""
-
-    def __init__(self, scene: Scene):
-        super().__init__(scene.mesh)
-        self.moduli = {name: scene.shear_modulus(name) for name in scene.materials}
-
-
-def _driven(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+def _driven(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
     if not scene.drivable:
         yield Finding("warning", "loads", "nothing is driven: only a process that waits can run; give one load no"
                                           " value, as Pressure('bottom'), or add a Displaced support")
 
 
-def _elements(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+def _elements(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
     if not scene.model.solid:
         return
     worst = int(np.argmax(sheet.slenderness))
@@ -99,13 +77,13 @@ def _elements(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
                                          f" or Membrane() for one so thin")
 
 
-def _locking(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+def _locking(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
     found = scene.model.locking(scene.mesh)
     if found is not None:
         yield Finding("warning", "mesh", str(found))
 
 
-def _layers(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+def _layers(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
     """A thick layer that one element spans cannot show how strain varies through it.
 
     Nor can long elements how a soft one is sheared at a rim: hinged, 1000 times softer, it jumped by 66 % with elements
@@ -113,7 +91,8 @@ def _layers(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
     """
     if not scene.model.solid:
         return
-    for name in scene.mesh.layers:
+    bends = scene.contacts or not any(isinstance(s, Symmetry | Displaced) and s.component == 1 for s in scene.supports)
+    for name in scene.mesh.layers if bends else ():          # between planes that it slides on a slice stays straight
         mine = sheet.layer == name
         depth = sheet.area[mine].sum() / sheet.length
         span = np.ptp(sheet.corners[mine][:, :, 1], axis=1).max(initial=0.0)
@@ -135,7 +114,7 @@ def _layers(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
                                               f" of stress the same (Pa and MPa)?")
 
 
-def _fillets(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+def _fillets(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
     """Rounded edges of a tool that the face cannot follow: fewer than two of its elements along one."""
     for contact in scene.contacts:
         nodes = scene.mesh.nodes_of(contact.on)
@@ -160,7 +139,7 @@ def _own(scene: Scene, facets: np.ndarray) -> int:
     return int(np.sum(facets < scene.mesh.domain.topology.index_map(1).size_local))
 
 
-def _contact_penalties(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+def _contact_penalties(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
     """Penetration over thickness is traction / (penalty mu); the tangent's condition grows with the penalty."""
     stress = max(sheet.moduli.values())
     pressed = scene.driven is not None and scene.driven.quantity == "pressure"
@@ -181,7 +160,7 @@ def _contact_penalties(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Fi
                           f" {100 * contact.ramp:.3g} % of the thickness before it; the default is 1e-5 or less")
 
 
-def _volume_penalty(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+def _volume_penalty(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
     """The volume changes by about eps stretch^2 / 8: pressure near mu stretch^2 over a bulk modulus 8 mu/eps."""
     model = scene.model
     if not model.solid:
@@ -201,17 +180,9 @@ def _volume_penalty(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Findi
                           f" MixedPressure(), whose cost does not depend on eps")
 
 
-def _units(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
+def _units(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
     """Sizes that belong together and differ by orders of magnitude."""
-    natural = max(sheet.moduli.values()) * sheet.thickness / sheet.length
-    fixed = [(repr(load), load.value) for load in scene.loads if load.quantity == "pressure" and not load.driven]
-    aimed = [(str(t), t.value) for t in targets if t.name.endswith("pressure")]
-    for name, value in (*fixed, *aimed):
-        large = abs(value) > 1e3 * natural and not (scene.contacts and (name, value) in aimed)   # a mould holds more
-        if large or 0 < abs(value) < 1e-4 * natural:
-            yield Finding("warning", name, f"it is {abs(value) / natural:.2g} times shear modulus x thickness"
-                          f" / length = {natural:.3g}: are the units of stress the same (Pa, kPa, MPa)?")
-    natural *= sheet.length ** (scene.kinematics.dimension_of_volume - 1)
+    natural = sheet.natural * sheet.length ** (scene.kinematics.dimension_of_volume - 1)
     for target in targets:
         if target.name.endswith("force") and not 1e-4 < (abs(target.value) or natural) / natural < 1e6:
             yield Finding("warning", str(target), f"it is {abs(target.value) / natural:.2g} times shear modulus x"
@@ -230,7 +201,7 @@ def _units(scene: Scene, sheet: _Sheet, targets: Any) -> Iterator[Finding]:
                           f" are the units of length the same (mm and m)?")
 
 
-def _targets(scene: Scene, sheet: _Sheet, targets: Sequence[Target]) -> Iterator[Finding]:
+def _targets(scene: Scene, sheet: Body, targets: Sequence[Target]) -> Iterator[Finding]:
     for target in targets:
         why = unreachable(scene, target)
         if why is not None:                                  # a stage may leave out what is in its way

@@ -74,7 +74,7 @@ def _no_runs() -> Iterator[None]:
         build(**design(variables)[0])
 
     def run(process, stages, **_):
-        raise _Looked(doctor(process.scene, targets=[stage.until for stage in stages if stage.until]))
+        raise _Looked(doctor(process.scene, stages=stages))
     others: list[Any] = [(formingx, trace), (formingx, solve), (formingx, study), (Process, run)]
     kept = [getattr(owner, other.__name__) for owner, other in others]
     try:

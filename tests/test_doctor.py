@@ -2,11 +2,15 @@
 
 import re
 
+import numpy as np
 import pytest
 import test_process
-from conftest import treloar
+from conftest import ROOT, treloar
+from scipy.optimize import brentq
 
 import formingx as fx
+from formingx.materials.inflation import Inflated, first_peak
+from formingx.scripts import look_over
 
 CUP = {"radius": 1.25, "depth": 0.4, "mouth": 0.082}
 
@@ -21,6 +25,34 @@ def pushed(moves=(0, -1)):
     return fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(40, 1)), materials=fx.NeoHookean(c10=2.0),
                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                     contacts=[fx.Contact("top", fx.tools.sphere(radius=0.5).moved(z=0.582), moves=moves)])
+
+
+def pot(c10=0.4, pressure=0.09, moves=(0, 1), travel=22.0, mould=None, plug_at=0.0, material=None):
+    """README's pot: (scene, stages). Millimetres, MPa."""
+    tools = fx.tools.pot(mouth=38.0, base=28.0, depth=40.0, sheet=1.2, fillet=8.0, lip=3.0, nose=20.0)
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(30, 1)),
+                     materials=material or fx.NeoHookean(c10=c10), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     loads=[fx.Pressure("bottom", name="vacuum")],
+                     contacts=[fx.Contact("top", mould or tools.mould, "stick", separates=False, name="mould"),
+                               fx.Contact("bottom", tools.plug.moved(z=plug_at), "none", moves=moves, name="plug")])
+    return scene, [fx.Stage("plug", drive="plug", until=fx.travel(travel)),
+                   fx.Stage("vacuum", drive="vacuum", until=fx.pressure(pressure))]
+
+
+def bottle(material, blow_ratio, length=1.0):
+    """A parison 13 mm in radius in a mould; `length`: of the mould's unit in mm."""
+    R = 13.0 * blow_ratio
+    sizes = {"radius": R, "height": 100.0, "neck": 15.0, "shoulder": R - 10, "neck_height": 40.0, "base": -29.0,
+             "fillet": 8.0, "shoulder_fillet": 8.0}
+    return fx.Scene(mesh=fx.mesh.parison(inner_radius=10.0, thickness=3.0, length=106.0, elements=(60, 1)),
+                    materials=material, supports=[fx.Symmetry("axis"), fx.Clamped("neck")],
+                    loads=[fx.Pressure("inner")], contacts=[fx.Contact("outer", fx.tools.bottle(
+                        **{k: v / length for k, v in sizes.items()}), "stick")])
+
+
+def drilled(z=0.082):
+    """A hole right through, in a plate."""
+    return fx.tools.Tool([(1.1, z + 1.5), (1.1, z), (3.0, z)], [0.0, 0.2, 0.0])
 
 
 def test_a_tool_on_the_axis_moves_along_it():
@@ -53,13 +85,91 @@ def test_good_scenes(scene):
     assert "nothing was found" in str(report)
 
 
+MM = fx.Units(length="mm", stress="MPa")
+
+
+@pytest.mark.parametrize("given, words", [
+    ({"c10": 0.4e6}, "pressure = 0.09: it is 3.7e-06 times shear modulus x thickness / length = 2.4e.04 MPa"),
+    ({"pressure": 0.09e6}, "pressure = 90000: it is 1.1e.05 times shear modulus = 0.8 MPa"),
+    ({"moves": (0, -1)}, r"moves away from the body: over a travel of 22 mm .* from 0 mm .*moves = \(0, 1\)"),
+    ({"mould": fx.tools.Tool([(28.0, 31.2), (28.0, 1.2), (80.0, 1.2)], [0.0, 3.0, 0.0])},
+     r"does not close: from \(R, Z\) = \(0, 1.2\).* pressure = 0.09 is more than the 0.04405 MPa"),
+])
+def test_what_engineers_mistake(given, words):
+    """In the pot of the README, in which nothing else is found."""
+    scene, stages = pot()
+    assert fx.doctor(scene, stages=stages, units=MM).healthy and fx.doctor(scene).healthy
+    scene, stages = pot(**given)
+    finding, = fx.doctor(scene, stages=stages, units=MM).findings
+    assert re.search(words, str(finding)), str(finding)
+
+
+def test_the_table_of_a_stage_is_looked_at():
+    scene, _ = pot()
+    stage = fx.Stage("vacuum", follow={"vacuum": [(0.0, 0.0), (1.0, 9e4), (2.0, 0.0)]})
+    assert "the table of 'vacuum' in Stage 'vacuum': it is 1.1e+05" in str(fx.doctor(scene, stages=[stage]))
+
+
+@pytest.mark.parametrize("make, targets, words", [
+    (lambda: treloar(), [fx.pressure(0.56)], r"a free sheet of NeoHookean\(c10=2.0\) bears at most about 0.4816"),
+    (lambda: pushed_from(z=3.0), [fx.travel(2.0)], "touches nothing on its way: .* no nearer to 'top' than 0.9"),
+    (lambda: bottle(fx.NeoHookean(c10=0.4), 3.0), [fx.pressure(1.0)], r"ratio of 1.58.* 63 % .* mould's 3: .*Gent"),
+    (lambda: bottle(fx.MooneyRivlin(c10=0.4, c01=0.02), 3.0), [fx.pressure(1.0)], "76 % .* material that stiffens"),
+    (lambda: bottle(fx.Gent(mu=0.8, Jm=30.0), 10.0), [fx.pressure(1.0)], "blown up 10-fold .* units of length"),
+    (lambda: formed(tool=drilled()), [fx.pressure(1.0)], "does not close"),
+    (lambda: formed(tool=drilled()), [], "does not close"),
+])
+def test_what_no_state_follows(make, targets, words):
+    finding, = fx.doctor(make(), targets=targets).findings
+    assert finding.severity == "warning" and re.search(words, str(finding)), str(finding)
+
+
+@pytest.mark.parametrize("make, targets", [
+    (lambda: treloar(), [fx.pressure(0.48)]), (lambda: formed(tool=drilled()), [fx.pole_height(0.5)]),
+    (lambda: pushed_from(z=3.0), [fx.travel(4.0)]),
+    (lambda: treloar(), [fx.pole_stretch(8.5)]), (lambda: bottle(fx.MooneyRivlin(c10=0.4, c01=0.12), 3.0), []),
+    (lambda: bottle(fx.Gent(mu=0.8, Jm=30.0), 3.0), [fx.pressure(1.0)]),
+    (lambda: bottle(fx.NeoHookean(c10=0.4), 2.0), [fx.pressure(1.0)]),
+])
+def test_what_has_states(make, targets):
+    assert fx.doctor(make(), targets=targets).healthy
+
+
+def pushed_from(z):
+    return fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(40, 1)), materials=fx.NeoHookean(c10=2.0),
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                    contacts=[fx.Contact("top", fx.tools.sphere(radius=0.5, z=z), "none", moves=(0, -1))])
+
+
+def test_a_parison_in_mm_in_a_mould_in_cm():
+    with pytest.raises(fx.InputError, match=r"the tool is 16.* large, the body 119: are the units of length the same"):
+        bottle(fx.Gent(mu=0.8, Jm=30.0), 3.0, length=10.0)
+
+
+def sharp(along, through, friction="none"):
+    """Williams' sheet (Song 1993, section 6.2) under a plug with a sharp edge."""
+    return fx.Scene(mesh=fx.mesh.disc(radius=8.89, thickness=0.6985, elements=(along, through)),
+                    materials=fx.NeoHookean(c10=0.448), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                    contacts=[fx.Contact("top", fx.tools.cylinder(radius=1.905, z=0.6985), friction, moves=(0, -1))])
+
+
+def test_rows_of_elements_under_a_sharp_edge():
+    """Forces at a travel of 2 cm, 80 x 1, 80 x 4 and 160 x 4: 0.8486, 0.8349 and 0.8489."""
+    coarse, rows, fine = (fx.trace(sharp(*n), until=fx.travel(2.0), progress=False).last.measures["tool_force"]
+                          for n in ((80, 1), (80, 4), (160, 4)))
+    assert abs(rows - fine) > 10 * abs(coarse - fine) and abs(rows - fine) > 0.01 * fine
+    assert "is sharp: forces there are off by 1 to 3 %" in str(fx.doctor(sharp(80, 4)))
+    assert fx.doctor(sharp(80, 1)).healthy and fx.doctor(sharp(80, 4, "stick")).healthy
+
+
 @pytest.mark.parametrize("make, targets, severity, words", [
     (lambda: formed((20, 1), fx.tools.cup(fillet=0.02, **CUP)), [], "warning",
      "fillet of radius 0.02 .* is 0.0314 long, 0.5 elements .* use 80 or more"),
     (lambda: formed(penalty=1.0), [], "warning", "6.6 % of the thickness into the tool"),
     (lambda: formed(penalty=1e12), [], "warning", "of 16 digits"),
     (lambda: formed(ramp=0.2), [], "warning", "20 % of the thickness before it"),
-    (lambda: formed(), [fx.pressure(1e4)], "warning", "the target pressure"),
+    (lambda: formed(penalty=2e3), [fx.pressure(120.0)], "warning", "the target pressure"),
+    (lambda: formed(), [fx.pressure(3e3)], "warning", "7.5e.02 times shear modulus .*units of stress"),
     (lambda: formed(tool=fx.tools.cup(radius=1250.0, depth=400.0, mouth=82.0, fillet=100.0)), [], "warning",
      "units of length"),
     (lambda: treloar(elements=(1, 40)), [], "warning", "times longer than high"),
@@ -160,6 +270,31 @@ def test_layers_and_nothing_driven():
 
 def test_a_scene_for_a_process_is_driven():
     assert fx.doctor(test_process.plugged()).healthy
+
+
+def test_free_inflation():
+    """Tubes and caps of a neo-Hookean material in closed form, and Treloar's sheet; two layers as one."""
+    m = fx.NeoHookean(c10=0.5)                               # mu = 1
+    one, two = Inflated([(m, 0.1)], 2.0), Inflated([(m, 0.04), (m, 0.06)], 2.0)
+    hoop = np.array([1.2, 1.577, 3.0])
+    axial = np.array([brentq(lambda z, h=h: 2 * z**2 - h**2 - 1 / (h * z) ** 2, 0.5, h) for h in hoop])
+    assert one.tube(hoop) == pytest.approx(0.05 * (hoop**2 - (hoop * axial) ** -2) / (hoop**2 * axial), rel=1e-10)
+    s = np.array([0.5, 1.0, 2.0])
+    cap = 0.05 * 4 * s * (1 - (1 + s**2) ** -3) / (1 + s**2)
+    assert one.disc(np.sqrt(1 + s**2)) == pytest.approx(cap, rel=1e-10) and two.disc(hoop) == pytest.approx(
+        one.disc(hoop), rel=1e-12)
+    limit = fx.trace(treloar(), until=fx.pole_stretch(2.5), progress=False).limit_points[0].measures["pressure"]
+    peak = first_peak(Inflated([(fx.NeoHookean(c10=2.0), 0.082)], 1.25).disc)
+    assert 0.96 * limit < peak.pressure < limit
+    assert first_peak(Inflated([(fx.Gent(mu=1.0, Jm=3.0), 0.1)], 2.0).tube) is None
+
+
+def test_every_demo_is_sound():
+    """And the pot of the README; of those that run a scene before they have computed anything."""
+    without = {"chilling", "cold_plug", "fit_treloar", "heated_disc", "heating", "plates", "plugs", "slab"}
+    for file in sorted((ROOT / "demos").glob("*.py")):
+        if "def main" in file.read_text() and file.stem not in without:
+            assert str(look_over(file)) == "nothing was found that stands against this scene", file.stem
 
 
 def test_bad_input():

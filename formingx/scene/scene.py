@@ -28,6 +28,10 @@ _HIGHEST = 30
 """Degree of a quadrature: more are asked for by mistake, and their points fill the memory."""
 
 
+_LARGER = 4.0
+"""A body so many times larger than a tool that it starts in is one in other units of length."""
+
+
 class Scene:
     """A body, what it is made of, how it is held and what loads it.
 
@@ -251,9 +255,13 @@ class Scene:
         worst = int(np.argmax(depth))
         if depth[worst] > near:
             free = contact.tool.reversed().signed_distance(points).max() <= near
+            size, length = np.ptp(contact.tool.outline(), axis=0).max(), max(self.extent)
+            why = ("; the other side of its profile is free of it: use tool.reversed()" if free else "")
+            if not length < _LARGER * size:
+                why = (f"; the tool is {size:.4g} large, the body {length:.4g}: are the units of length the same (mm"
+                       f" and cm)?")
             raise InputError(f"{contact!r}: the body starts inside the tool: {depth[worst]:.6g} deep at (R, Z) ="
-                             f" ({points[worst, 0]:.6g}, {points[worst, 1]:.6g})"
-                             + ("; the other side of its profile is free of it: use tool.reversed()" if free else ""))
+                             f" ({points[worst, 0]:.6g}, {points[worst, 1]:.6g}){why}")
         if depth[worst] > contact.tool.signed_distance(face).max() + near:
             raise InputError(f"{contact!r}: the tool is behind this face of the body: another face is closer to it;"
                              f" boundaries are {list(mesh.boundaries)}")
