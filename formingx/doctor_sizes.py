@@ -225,8 +225,8 @@ def _closing(body: Body) -> Found:
                 if aims and peak else "a sheet bears little alone"
             yield repr(pushed.tools[0]), (f"the tool does not close: from (R, Z) = ({open_at[0, 0]:.4g},"
                                           f" {open_at[0, 1]:.4g}) straight on there is nothing, and {why}: the body"
-                                          f" goes past its end. Give the profile a floor to R = 0, or aim at a pole height"
-                                          f" or a volume")
+                                          f" goes past its end. Give the profile a floor to R = 0, or aim at a pole"
+                                          f" height or a volume")
 
 
 def _across(pushed: Pushed, points: np.ndarray) -> np.ndarray:
