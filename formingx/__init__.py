@@ -1,6 +1,6 @@
 """formingx: how polymers are formed, simulated with finite elements on FEniCSx."""
 
-from . import mesh
+from . import _interrupts, mesh
 from .doctor import doctor
 from .errors import ConvergenceError, InputError, Interrupted
 from .heat.boundaries import Absorption, Convection, FixedTemperature, HeatFlux, Radiation, ThermalProperties
@@ -45,3 +45,5 @@ from .time_temperature import WLF, Arrhenius
 from .units import Units
 
 __version__ = "0.1.0"
+
+_interrupts.imported()

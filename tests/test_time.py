@@ -262,3 +262,21 @@ def test_flow_ends_where_it_is_told():
 def test_bad_input(make, words):
     with pytest.raises(fx.InputError, match=words):
         make()
+
+
+def test_limit_points_of_pressure_in_a_flow():
+    """A sheet blown by a volume in time: the pressure's maximum is a state, and the corner of the hold is none.
+
+    Of an elastic one it is the limit point of a run that is driven by the pressure.
+    """
+    for scene in (sheet(), sheet(material=RUBBER)):
+        path = run(scene, blow(T=1.0, volume=4.0, held=0.5), accuracy=2e-3)
+        assert len(path.limit_points) == 1
+        top = path.limit_points[0].measures["pressure"]
+        assert top == path["pressure"].max()
+        if scene.materials["sheet"].internal:
+            finer = run(scene, blow(T=1.0, volume=4.0), accuracy=2e-4)
+            assert top == pytest.approx(finer["pressure"].max(), rel=2e-3)
+        else:
+            alone = fx.trace(scene, until=fx.enclosed_volume(4.0), progress=False)
+            assert top == pytest.approx(alone.limit_points[0].measures["pressure"], rel=1e-6)

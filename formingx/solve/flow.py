@@ -6,6 +6,7 @@ with the measure at its value for that time: so a pressure passes its maximum as
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -18,6 +19,7 @@ from .stepping import StepControl
 from .targets import Bound, Target, is_met, process_time
 
 _SAME = 1e-12          # relative: times that are the same
+_STILL = 1e-7          # relative: a change that is none
 
 
 class Flow(Run):
@@ -58,14 +60,15 @@ class Flow(Run):
                 error = self._error_in_time(new)
                 if dt < 1.5 * self.step.length * self._duration:
                     self.step.accepted(tangents(new.history), error)
-                return [self._met_before(old, new)]
+                return [self._met_before(old, self._limit_before(old, new))]
             except Inaccurate as found:
-                self.record.counts.failures += 1
                 self.step.length = found.share * dt / self._duration
+                self._failed("the error in time", self.step.length)
             except Failure as failure:
-                self.record.counts.failures += 1
                 self.step.length = dt / self._duration
-                if not self.step.failed():
+                good = self.step.failed()
+                self._failed(failure.reason, self.step.length)
+                if not good:
                     self._give_up(f"the step in time became shorter than {self.step.smallest * self._duration:.3g}:"
                                   f" {failure.reason}", failure.attempt)
 
@@ -86,6 +89,32 @@ class Flow(Run):
         new = self.curve.solve(x, control, self._measure.equation(value), "step", old, chords=True)
         if problem.too_far(old.x, old.control, new.x, new.control):
             raise Failure("too much came into contact in one step", [])
+        return new
+
+    def _limit_before(self, old: State, new: State) -> State:
+        """The state between two in time at which what is driven has a maximum or a minimum, if it has; else the second.
+
+        Not where the course turns, or where what is driven stands still but for round-off.
+        """
+        if len(self.states) < 2 or old.time in self._times or old.kind == "limit point":
+            return new
+        before, after = (
+            _rate([*extrapolate.before(self.states[:-1], old.time, 2), old]),
+            _rate([*extrapolate.before(self.states, new.time, 2), new])) if self.problem.relaxes else (
+            old.slope, new.slope)                            # else a path, whose tangents say it
+        still = _STILL * max(abs(old.control), abs(new.control)) / (new.time - old.time)
+        if before * after >= 0 or min(abs(before), abs(after)) < still or self.curve.distance(old, new) < _STILL:
+            return new
+        tried: list[State] = []
+
+        def below(time):
+            tried.append(self._at(old, time))
+            return -np.sign(before) * tried[-1].control
+        from scipy.optimize import minimize_scalar
+        with contextlib.suppress(Failure):                   # then there is no state of its own
+            minimize_scalar(below, bounds=(old.time, new.time), options={"xatol": 1e-4 * (new.time - old.time)})
+            new = max(tried, key=lambda state: np.sign(before) * state.control)
+            new.kind = "limit point"
         return new
 
     def _foretold(self, old: State, time: float, value: float) -> tuple[np.ndarray, float]:
@@ -141,6 +170,13 @@ class Flow(Run):
             raise Failure(f"{target} was passed but could not be solved for", [])
         state.met = target
         return state
+
+
+def _rate(states: Sequence[State]) -> float:
+    """Of the control in time, at the last of two or three states, on the polynomial through them."""
+    t = np.array([state.time - states[-1].time for state in states])
+    return float(np.polynomial.Polynomial(np.polynomial.polynomial.polyfit(
+        t, [state.control for state in states], len(t) - 1)).deriv()(0.0))
 
 
 def _root(function: Callable[[float], float], low: float, high: float) -> float:

@@ -22,7 +22,7 @@ from .diagnose import diagnose
 from .folds import snaps, usual, was_passed
 from .jump import AHEAD, MOST, NoEquilibrium, jump
 from .newton import Failure, tangents
-from .progress import progress_bar, show
+from .progress import Progress
 from .state import Record, State
 from .stepping import StepControl
 from .targets import Amplitude, Bound, Target, is_met
@@ -89,7 +89,7 @@ class Run:
         record, before = self.record, self.record.counts.steps
         kept: dict[str, Any] = {}
         self._first = len(record.states)
-        bar = progress_bar(self.problem.comm, f"{self._label}to {self.until}", progress)
+        self._progress = Progress(self.problem.comm, f"{self._label}to {self.until}", progress)
         try:
             if start is None:
                 kept = self._go_on(may_turn)
@@ -119,12 +119,12 @@ class Run:
                 if record.ended:
                     break
                 self._check_direction()
-                show(bar, self._gained(self._values[-1]), len(self.states))
+                self._progress.show(self._gained(self._values[-1]), len(self.states), self.step.length)
         except BaseException:
             record.counts.seconds += self._elapsed()
             raise
         finally:
-            bar.close()
+            self._progress.close()
 
     @property
     def _driven(self) -> str:
@@ -227,19 +227,21 @@ class Run:
         while True:
             length = self.problem.reach(old.x, old.control, old.direction, old.slope, min(self.step.length, most))
             target, bound, reach = self._within_reach(old, length)
+            if length < self.step.length:
+                self._progress.limited("contact arriving", length)
             try:
                 return self._take(old, length, target, bound, reach)
             except _Late as late:
-                self.record.counts.failures += 1
                 most = late.part * reach
+                self._failed("contact arriving", most)
             except Inaccurate as found:
-                self.record.counts.failures += 1
                 self.step.length = found.share * reach
+                self._failed("the error in time", self.step.length)
             except Failure as failure:
-                self.record.counts.failures += 1
                 self.step.length = length
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good = self.step.failed()
+                self._failed(failure.reason, self.step.length)
                 failed += not isinstance(failure, _Astray)
                 soon = (self._jumps_soon and failed > 1 and length < jumps[0]
                         and (old.kind != "start" or not self.problem.has_history) and not self._found_no_rest_near(old))
@@ -251,6 +253,11 @@ class Run:
                 if not good:
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
                                   failure.attempt)
+
+    def _failed(self, why: str, length: float) -> None:
+        """A step was not taken; `length` is tried next."""
+        self.record.counts.failures += 1
+        self._progress.limited(why, length)
 
     def _take(self, old: State, length: float, target: Target | None, bound: Any, reach: float) -> list[State]:
         """One step of a length, or to a target that is within reach; raises `Failure`, `Inaccurate` or `_Late`."""
@@ -328,7 +335,8 @@ class Run:
             self._ahead = ahead
             try:
                 by = 1 - old.control if fading else self._change(old, max(ahead, length * abs(old.slope)))
-                new = jump(self.curve, old, by, length > 0 and not fading, self._solutions(old))
+                new = jump(self.curve, old, by, length > 0 and not fading, self._solutions(old),
+                           lambda: self._progress.limited("a jump", self.step.length))
                 break
             except Failure as last:
                 failure = last

@@ -13,6 +13,7 @@ it is 0 the body is at rest. What is out of balance on the way does work that is
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -179,12 +180,14 @@ class _Way:
         self._x.destroy()
 
 
-def jump(curve: Any, old: State, by: float, ahead: bool, solutions: int = MOST) -> State:
+def jump(curve: Any, old: State, by: float, ahead: bool, solutions: int = MOST,
+         told: Callable[[], None] = lambda: None) -> State:
     """The state that the body comes to from `old` when the control goes on; of kind "jump".
 
     Args:
         curve: the `Curve`. by: change of the control, dimensionless; its sign is the way that the process drives.
-        ahead: start where the tangent leads to, not where the body is. solutions: viscous ones, at most.
+        ahead: start where the tangent leads to, not where the body is. solutions: viscous ones, at most; `told` is
+            called before each.
 
     Raises:
         Failure: none was found, `NoEquilibrium` if the body comes to rest nowhere. The problem's histories are then
@@ -197,6 +200,7 @@ def jump(curve: Any, old: State, by: float, ahead: bool, solutions: int = MOST) 
     try:
         while (way.solved < solutions and _LEAST < eta < _LARGEST[way.solved > 0]
                and curve.moved(old, way.at) < _TOO_FAR):
+            told()
             state = way.end() if way.settles else None
             if state is not None:
                 if state.slope * by < 0:
