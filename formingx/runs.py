@@ -14,7 +14,7 @@ from .discrete.problem import Problem
 from .errors import ConvergenceError, InputError, Interrupted, count, finite, instance, known, several
 from .physics.contact import Contact
 from .results.columns import Measure
-from .results.evaluate import edges, volume
+from .results.evaluate import edges, tension, volume
 from .results.files.checkpoint import Checkpoint, holds_states, read
 from .results.path import Path
 from .scene import aims, clearance
@@ -291,6 +291,7 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
     path = paths[0]
     of_volume = volume.doubts(path.last.measures["volume_error"], "the last state",
                               path.problem.furthest_volume_ratio(path.last))
-    for bad, text in of_volume + edges.doubts(edges.coarsest(path, path.last)):
+    for bad, text in (of_volume + edges.doubts(edges.coarsest(path, path.last))
+                      + tension.doubts(tension.first_compression(path))):
         if bad == "serious" and path.problem.comm.rank == 0:
             log.warning("%s", text)

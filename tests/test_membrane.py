@@ -9,6 +9,7 @@ from test_derivatives import assert_derivatives, difference, random_state
 import formingx as fx
 from formingx.discrete.problem import Problem
 from formingx.reference import membrane_inflation, membrane_limit_point
+from formingx.results.evaluate.tension import Tension
 
 MATERIALS = [
     fx.NeoHookean(c10=2.0),
@@ -259,3 +260,23 @@ def test_negative_ogden_exponents(alpha):
         mooney = trace(sheet(40, fx.MooneyRivlin(c10=0.0, c01=1.0), thickness=0.05, model=fx.MixedPressure()),
                        fx.pole_stretch(2.5)).last.measures
         assert solid["pressure"] == pytest.approx(mooney["pressure"], rel=1e-9)
+
+
+@pytest.mark.parametrize("material", [MATERIALS[1], fx.Viscoelastic(MATERIALS[0], [(1.0, 1.0)])],
+                         ids=["rubber", "relaxes"])
+@pytest.mark.parametrize("stretch", [0.93, 1.04])
+def test_compression_is_said(material, stretch, caplog, tmp_path):
+    """A flat sheet whose rim moves: the resultant over mu h is (1 - l^-6)(c10 + l^2 c01)/(c10 + c01) all over."""
+    body = fx.mesh.disc(radius=1.0, thickness={"a": 0.01, "b": 0.02}, elements=(4, 1))
+    scene = fx.Scene(mesh=body, materials=material, model=fx.Membrane(),
+                     supports=[fx.Symmetry("axis"), fx.Displaced("rim", "r"), fx.Symmetry("rim", "z")])
+    try:
+        path = trace(scene, fx.travel(stretch - 1))
+    except fx.ConvergenceError as error:
+        path = error.path
+    least = Tension(path.problem).least(path.last)
+    c10, c01 = (1.5, 0.4) if material is MATERIALS[1] else (1.0, 0.0)
+    assert least.value == pytest.approx((1 - stretch**-6) * (c10 + stretch**2 * c01) / (c10 + c01), rel=1e-9)
+    said = "membrane is in compression, first in state" in caplog.text
+    assert said == least.compressed == (stretch < 1)
+    assert ("membrane is in compression" in path.report(tmp_path / "run.html").read_text()) == said

@@ -31,6 +31,9 @@ _FIRST_STRETCH = 1e-6
 class MidSurface(Formulation):
     """The forms of a scene as a membrane; the only field is the displacement of the mid-surface.
 
+    Attributes:
+        thicknesses: {layer: its thickness normal to the mid-surface at rest (`Function`, length)}.
+
     Raises:
         InputError: the sheet is not a graph over R, or a load or support is where a membrane has neither face nor end.
     """
@@ -76,7 +79,7 @@ class MidSurface(Formulation):
 
     def weighted(self, density, layers, metadata=None):
         dx = self.dx(metadata=metadata) if metadata else self.dx
-        return sum(density * self._thicknesses[name] * self._area() * dx for name in layers)
+        return sum(density * self.thicknesses[name] * self._area() * dx for name in layers)
 
     def cells_of(self, layers):
         topology = self.domain.topology
@@ -146,11 +149,11 @@ class MidSurface(Formulation):
         direction = direction / ufl.sqrt(ufl.inner(direction, direction))
         self._tangent = ufl.sign(direction[0]) * direction                     # towards growing R
         space = fem.functionspace(self.domain, ("Lagrange", 2))
-        self._thicknesses = {}
+        self.thicknesses = {}
         for name, values in self._layers.items():
-            h = self._thicknesses[name] = fem.Function(space, name=f"thickness of {name}")
+            h = self.thicknesses[name] = fem.Function(space, name=f"thickness of {name}")
             h.interpolate(lambda X, values=values: np.interp(X[0], self._R, values))
-        return self._area() * sum(self._thicknesses.values())
+        return self._area() * sum(self.thicknesses.values())
 
     def _area(self) -> Any:
         return self.scene.kinematics.weight(self.X) * self._tangent[0]

@@ -12,7 +12,7 @@ from ...discrete.admissible import Least
 from ...discrete.tooling import Tooling
 from ...errors import InputError
 from .. import files
-from ..evaluate import edges, volume
+from ..evaluate import edges, tension, volume
 from ..evaluate.contact_face import ContactFace, ContactTable, tool_forces
 from ..evaluate.folding import first_fold
 from ..evaluate.profile import Profile
@@ -41,7 +41,7 @@ class Record:
             the profiles say; empty of a checkpoint.
         layers: of the last state, as in `Wall`; script: the file that ran; or "".
         furthest: where J is furthest from 1 in the last state, or None: not known of a checkpoint or a membrane.
-        edge: `edges.coarsest` in the last state, or None.
+        edge: `edges.coarsest` in the last state, or None; compression: `tension.first_compression`, or None.
     """
 
     summary: dict[str, str]
@@ -62,6 +62,7 @@ class Record:
     script: str = ""
     furthest: Least | None = None
     edge: edges.Edge | None = None
+    compression: tuple[int, tension.Resultant] | None = None
 
     @property
     def control(self) -> str:
@@ -92,6 +93,7 @@ class Record:
             found.append(("serious" if worst > 10 * MASS else "minor",
                           f"The mass changes by up to {100 * worst:.2g} %: a smaller eps, or a finer mesh, keeps it."))
         found += self._of_volume() + self._of_folding() + edges.doubts(self.edge)
+        found += tension.doubts(self.compression)
         if self.counts.get("failures", 0) > len(self.kinds):
             found.append(("note", f"{self.counts['failures']} attempts at a step failed and were repeated with half its"
                                   f" length; the results do not suffer."))
@@ -137,7 +139,8 @@ def of_path(path: Any) -> Record:
                   [list(s.history) for s in path.states], profiles, vars(path.counts), stepping.get("until"), tooling,
                   [tooling.travels(s.setting, s.control) for s in path.states], tool_forces(path),
                   _fields(path, profiles), dict(wall.layers) if wall else {}, sys.argv[0],
-                  problem.furthest_volume_ratio(path.last), edges.coarsest(path, path.last))
+                  problem.furthest_volume_ratio(path.last), edges.coarsest(path, path.last),
+                  tension.first_compression(path))
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:

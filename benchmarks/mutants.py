@@ -1,0 +1,203 @@
+"""Do the tests notice? Lines that matter, each changed in a scratch copy of the tree, against the tests beside it.
+
+    ./fx python3 benchmarks/mutants.py [number or word ...]
+
+A mutant is killed if one of its tests fails. The table, `mutants.csv` beside this file, is written anew row by row, so
+a run may be stopped and go on with the numbers that are left. It takes hours: it is no part of continuous integration.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[1]
+TABLE = Path(__file__).with_suffix(".csv")
+LIMIT = 900          # seconds for the tests of one mutant; one that makes a run endless is killed
+
+
+class Mutant(NamedTuple):
+    """A text that stands once in a file of the package, what stands there instead, and the tests that should fail."""
+
+    file: str
+    old: str
+    new: str
+    tests: str
+
+
+MUTANTS = [Mutant(*row) for row in [
+    # contact and friction
+    ("discrete/contact_nodes.py", "+= share * at", "+= share * at / 2", "details"),
+    ("discrete/contact_nodes.py", "        if ahead:\n            arrived", "        if False:\n            arrived",
+     "contact plugs jumps"),
+    ("discrete/contact_nodes.py", "-self._scale[:, None] * (stiffness @", "self._scale[:, None] * (stiffness @",
+     "contact derivatives"),
+    ("discrete/contact_nodes.py", "> 2 * max(self._allowed, self._foreseen) + 2", "> 10**6", "details"),
+    ("discrete/contact_nodes.py", "arrival = np.where(at_end[:, None], np.nan, start + times[:, None] * velocity)",
+     "arrival = start + length * velocity", "contact plugs"),
+    ("discrete/contact_nodes.py", "        self._start_at(self.positions(fields, control))", "        pass", "process"),
+    ("physics/contact.py", "pressed, ahead = k * F, d - at", "pressed, ahead = k * F, 0 * d", "contact plugs"),
+    ("physics/contact.py", "sliding, limit = (np.abs(trial) > self.mu * pressed)",
+     "sliding, limit = (np.abs(trial) > 2 * self.mu * pressed)", "contact plugs"),
+    ("physics/contact.py", "limit * N, T), np.clip", "limit * pressed, T), np.clip", "contact derivatives plugs"),
+    ("physics/contact.py", "(1 - near.curvature * across)", "(1 + near.curvature * across)", "contact derivatives"),
+    ("physics/contact.py", "- (bent * bend)[:, None] * t)", "+ (bent * bend)[:, None] * t)", "contact derivatives"),
+    ("physics/contact.py", "found = old.slip + along,", "found = along,", "contact compression plugs"),
+    ("physics/contact.py", "theta * slope**2, d), slope", "theta * slope**2, d + self.theta), slope",
+     "contact closed_forms"),
+    ("physics/contact.py", "return slope * (d + self.theta), slope", "return slope * d, slope", "contact"),
+    ("discrete/contact_points.py", "np.tile(weights / 2, len(nodes))", "np.tile(weights / 2.1, len(nodes))",
+     "contact_points answers"),
+    # the body and its loads
+    ("physics/kinematics.py", "return _block(ufl.Identity(2) + ufl.grad(u), 1 + u[0] / X[0])",
+     "return _block(ufl.Identity(2) + ufl.grad(u), 1 + u[0] / X[0] / 1.001)", "closed_forms materials"),
+    ("physics/kinematics.py", "return 2 * ufl.pi * (X[0] + u[0]) * _cofactor", "return 2 * ufl.pi * X[0] * _cofactor",
+     "closed_forms derivatives"),
+    ("physics/kinematics.py", "ufl.conditional(near, series, large**a + small**a)", "(large**a + small**a)",
+     "derivatives materials"),
+    ("discrete/solid.py", "W -= terms.rest_stress * ufl.ln(J)", "W -= 0.9 * terms.rest_stress * ufl.ln(J)",
+     "details"),
+    ("discrete/formulation.py", "residual -= self._scale * work", "residual -= 1.001 * self._scale * work",
+     "closed_forms treloar"),
+    ("discrete/formulation.py", "base.value = there * (", "base.value = (", "process"),
+    ("discrete/membrane.py", "l1, l2 = ufl.sqrt(ufl.inner(t, t)), F[2, 2]",
+     "l1, l2 = ufl.sqrt(ufl.inner(t, t)), 1 + (F[2, 2] - 1) / 1.01", "membrane"),
+    ("discrete/probes.py", "row, -0.5 if", "row, -0.49 if", "treloar closed_forms"),
+    ("discrete/problem.py", "return -float(self.comm.allreduce(left, MPI.SUM))",
+     "return -1.002 * float(self.comm.allreduce(left, MPI.SUM))", "compression closed_forms"),
+    ("discrete/problem.py", "out.array_w += (control - 1) * stage.left", "out.array_w += (control - 0.5) * stage.left",
+     "process"),
+    ("discrete/problem.py", "        self.memory = memory\n            self._take(stage)",
+     "        self._take(stage)", "restart time viscoelastic"),
+    ("discrete/admissible.py", "> 0))\n                   for", "> -0.5))\n                   for", "admissible"),
+    ("discrete/constraints.py", "there * row for (_, row), there", "row for (_, row), there", "process"),
+    # materials
+    ("materials/hyperelastic.py", "return c10 * (I1 - 3) + c01 * (I2 - 3)", "return c01 * (I1 - 3) + c10 * (I2 - 3)",
+     "materials closed_forms"),
+    ("materials/hyperelastic.py", "s / 2 - s**2 / 20 - s**3 / 15", "s / 2 - s**2 / 20 + s**3 / 15", "materials"),
+    ("materials/viscoelastic.py", "x / 2 * (1 + x / 3 * _inner", "x / 2 * (1 + 0 * x / 3 * _inner", "viscoelastic"),
+    ("materials/viscoelastic.py", "return 3 * s / (q**2 + p * q + p**2) - 3", "return s / q**2 - 3", "viscoelastic"),
+    ("materials/viscoelastic.py", "(_mean_decay(x) - decay) * c", "(1 - decay) * c", "viscoelastic"),
+    ("materials/viscoelastic.py", "mu / (2 * tau) * ufl.max_value", "mu / tau * ufl.max_value", "viscoelastic time"),
+    ("materials/kbkz.py", "rested + np.sum", "np.sum", "kbkz"),
+    ("materials/expansion.py", "return self.stretch(temperature) ** 3", "return self.stretch(temperature) ** 2",
+     "temperature"),
+    ("time_temperature.py", "self.c1 * (above - self.c2) / above", "self.c1 * above / above", "temperature materials"),
+    # solution path
+    ("solve/follow.py", "if (limit.control - old.control) * old.slope < 0:", "if False:", "treloar"),
+    ("solve/follow.py", "if was_passed(self.curve", "if False and was_passed(self.curve", "treloar contact jumps"),
+    ("solve/follow.py", "if error > _TOO_MUCH:", "if False:", "time accuracy viscoelastic"),
+    ("solve/follow.py", "if not 0 < self.curve.progress(old, new) < 2 * length:", "if False:",
+     "treloar contact process"),
+    ("solve/follow.py", "by *= now / (now - then) if now * then < 0 else 1.0", "by *= 1.0", "jumps process"),
+    ("solve/curve.py", "if self.problem.folded(self._x, control):               # forces", "if False:  # forces",
+     "admissible contact"),
+    ("solve/curve.py", "share = (length / h) ** 2", "share = -(length / h) ** 2", "treloar stepping limit"),
+    ("solve/curve.py", "if found.slope**2 < 2e-12 * curvature * abs(found.control):", "if True:", "treloar limit"),
+    ("solve/jump.py", "self.lost += 0.5 * (max(self._sum(self._drag * by), 0.0) + self._sum(drag * by))",
+     "self.lost += self._sum(drag * by)", "jumps process"),
+    ("solve/jump.py", "        problem.memory = kept\n        raise", "        raise", "jumps"),
+    ("solve/forces.py", "self._by_control)\n            return (force - target) / self._scale, slope",
+     "self._by_control)\n            return (force - target) / self._scale, 0.0", "process time derivatives"),
+    ("solve/process.py", "rate[-1] = np.sign(way) * scale / stage.speed", "rate[-1] = scale / stage.speed",
+     "process time"),
+    ("solve/flow.py", "best = found if found.time < best.time else best", "best = found", "time viscoelastic"),
+    ("solve/targets.py", "return self._scale * self._problem.assemble_scalar(self._value) - self._rest",
+     "return self._scale * self._problem.assemble_scalar(self._value)", "answers treloar process"),
+    ("solve/newton.py", "step = (-c - self.gradient.dot(self.a)) / self._slope",
+     "step = (-c - 0.9 * self.gradient.dot(self.a)) / self._slope", "treloar process"),
+    ("solve/extrapolate.py", "if after.kind == \"jump\":\n            return None",
+     "if False:\n            return None",
+     "jumps relaxed"),
+    ("solve/time_error.py", "6.0][n - 1]", "1.0][n - 1]", "accuracy time"),
+    # heat
+    ("heat/conduction.py", "F[1, 1]]])).T", "F[1, 1]]]))", "details"),
+    ("heat/conduction.py", "self._area = ufl.sqrt(ufl.inner(area, area))", "self._area = self._weight",
+     "cooling heat heat_runs"),
+    ("heat/conduction.py", "* ufl.exp(-kappa * depth) * J * self._weight", "* ufl.exp(-kappa * depth) * self._weight",
+     "details"),
+    ("heat/cooling.py", "(contact.present & (depth", "(True & (depth", "details"),
+    ("heat/cooling.py", "self._body.power, self._power = (self._power + power) / 2, power",
+     "self._body.power, self._power = power, power", "cooling"),
+    ("heat/contact.py", "self.conductance / (1 + self.conductance * column[0])", "self.conductance + 0 * column[0]",
+     "heat"),
+    ("heat/stepping.py", "_D, _W = 1 - np.sqrt(0.5), np.sqrt(0.125)", "_D, _W = 1 - np.sqrt(0.5), 0.36", "heat"),
+    ("heat/boundaries.py", "(kelvin[0] ** 4 - kelvin[1] ** 4)", "(kelvin[0] ** 4 - kelvin[1] ** 4) * 1.01", "heat"),
+    # answers
+    ("results/evaluate/work.py", "np.array(c.contact.moves)) for c in tools)\n                    slope",
+     "np.sign(c.contact.moves)) for c in tools)\n                    slope", "ledger"),
+    ("results/evaluate/work.py", "f.at(s) * y.slope(s)", "f.at(1) * y.slope(s)", "ledger"),
+    ("results/evaluate/work.py", "+ _friction_of(c, b, problem)) / 2 * slid", "+ 0) / 2 * slid", "ledger"),
+    ("results/evaluate/work.py", "a.memory[-1]]", "b.memory[-1]]", "ledger"),
+    ("results/path.py", "problem.histories[number].put(memory)", "pass", "ledger"),
+    ("results/evaluate/tension.py", "- F[1, 1] * P[1, 1])", "+ F[1, 1] * P[1, 1])", "membrane"),
+    ("results/evaluate/part.py", "(r * r + r * s + s * s) * (w - z)", "(r * r + s * s) * 1.5 * (w - z)", "answers"),
+    ("results/evaluate/contact_face.py", "(traction / ratio).T", "traction.T", "answers"),
+    ("results/evaluate/filling.py", "left[k] - gap) / (left[k]", "left[k] - gap) / (gap + left[k]", "answers"),
+    ("results/evaluate/stress.py", "n[:, 1], -n[:, 0]", "n[:, 1], n[:, 0]", "stress"),
+]]
+
+
+def missing() -> list[str]:
+    """Mutants whose text does not stand exactly once in its file."""
+    return [f"{m.file}: {m.old!r} stands there {n} times" for m in MUTANTS
+            if (n := (ROOT / "formingx" / m.file).read_text().count(m.old)) != 1]
+
+
+def outcome(mutant: Mutant, tree: Path) -> str:
+    """"killed", "survived", or why it cannot be told; the tree is as it was afterwards."""
+    file = tree / "formingx" / mutant.file
+    before = file.read_text()
+    file.write_text(before.replace(mutant.old, mutant.new))
+    tests = [f"tests/test_{name}.py" for name in mutant.tests.split()]
+    command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-rfE", "-p", "no:cacheprovider", *tests]
+    try:
+        done = subprocess.run(command, cwd=tree, timeout=LIMIT, capture_output=True, text=True, check=False,
+                              env=os.environ | {"PYTHONPATH": str(tree)}, start_new_session=True)
+        if done.returncode > 1:
+            return f"pytest ended with {done.returncode}"
+        said = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+        first = said[0].split()[1].removeprefix("tests/") if said else done.stdout.strip()[-200:]
+        return f"killed by {first}" if done.returncode else "survived"
+    except subprocess.TimeoutExpired:
+        return f"killed by the limit of {LIMIT} s"
+    finally:
+        file.write_text(before)
+
+
+def chosen(words: list[str]) -> list[int]:
+    """Numbers of the mutants that words name: a number, or a part of a file's name; all without words."""
+    return [k for k, mutant in enumerate(MUTANTS, 1)
+            if not words or any(word == str(k) or not word.isdigit() and word in mutant.file for word in words)]
+
+
+def main(words: list[str]) -> None:
+    if stale := missing():
+        raise SystemExit("\n".join(stale))
+    known = {}
+    if TABLE.exists():
+        with TABLE.open(newline="") as stream:
+            known = {tuple(row[1:4]): row[5] for row in list(csv.reader(stream))[1:]}
+    with tempfile.TemporaryDirectory() as scratch:
+        tree = Path(scratch) / "tree"
+        shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".git", ".cache", "__pycache__"))
+        for k in chosen(words):
+            mutant = MUTANTS[k - 1]
+            known[tuple(mutant[:3])] = found = outcome(mutant, tree)
+            print(f"{k:3} {mutant.file}: {mutant.new.splitlines()[0].strip()}: {found}", flush=True)
+            with TABLE.open("w", newline="") as stream:
+                rows = csv.writer(stream, lineterminator="\n")
+                rows.writerow(["number", "file", "line", "instead", "tests", "outcome"])
+                rows.writerows([n, *m, known[tuple(m[:3])]] for n, m in enumerate(MUTANTS, 1) if tuple(m[:3]) in known)
+    survived = [k for k in chosen([]) if known.get(tuple(MUTANTS[k - 1][:3])) == "survived"]
+    print(f"{len(survived)} of {len(known)} survive: {survived}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,88 @@
+"""Whether a membrane is in tension: in compression it wrinkles, and has no state, as nothing in it resists bending.
+
+(Tension field theory begins there: Steigmann, Proc. R. Soc. London A 429 (1990) 141.)
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from ... import _compat
+from ...physics.models import Membrane
+
+_COMPRESSED = 1e-3
+"""Compressive resultant over shear modulus times thickness above which a membrane has no state."""
+
+
+class Resultant(NamedTuple):
+    """The least principal stress resultant of a membrane: its direction ("meridional" or "hoop"), its value over shear
+    modulus times thickness, and the reference point (R, Z) of the mid-surface where it is, length."""
+
+    direction: str
+    value: float
+    point: tuple[float, float]
+
+    @property
+    def compressed(self) -> bool:
+        """True if it is a compression, and no round-off."""
+        return self.value < -_COMPRESSED
+
+
+class Tension:
+    """Finds the least principal resultant of a membrane in a state, per deformed length.
+
+    With F = diag(l1, l3, l2) and P = dW/dF of the stored energy, that of a layer of thickness h is
+    h l3 (l_i P_ii - l3 P_33).
+
+    Args:
+        problem: of a scene whose model is a `Membrane`.
+    """
+
+    def __init__(self, problem: Any):
+        forms, self._problem = problem.forms, problem
+        resultants: Any = [0, 0]
+        for terms in forms.terms:
+            F = ufl.variable(forms.F)
+            P = ufl.diff(terms.stored_energy(F), F)
+            h = F[1, 1] * forms.thicknesses[terms.names[0]]
+            resultants = [N + h * (F[i, i] * P[i, i] - F[1, 1] * P[1, 1]) for N, i in zip(resultants, (0, 2))]
+        unit = forms.constant(forms.stress) * sum(forms.thicknesses.values())
+        self._found = fem.Expression(ufl.as_vector([*(N / unit for N in resultants), forms.X[0], forms.X[1]]),
+                                     forms.terms[0].places, jit_options=_compat.JIT_OPTIONS)
+
+    def least(self, state: Any) -> Resultant:
+        """Of a state; in plane strain along the section alone: nothing wrinkles across it; collective."""
+        problem, domain = self._problem, self._problem.forms.domain
+        with problem.at(state):
+            cells = np.arange(domain.topology.index_map(1).size_local, dtype=np.int32)
+            values = self._found.eval(domain, cells).reshape(-1, 4) if len(cells) else np.zeros((0, 4))
+        values = np.concatenate(problem.comm.allgather(values))
+        n = 2 if problem.scene.kinematics.axisymmetric else 1
+        k, i = np.unravel_index(np.argmin(values[:, :n]), (len(values), n))
+        return Resultant(("meridional", "hoop")[i], float(values[k, i]), (float(values[k, 2]), float(values[k, 3])))
+
+
+def first_compression(path: Any) -> tuple[int, Resultant] | None:
+    """(number of the first state of a path in which a membrane is compressed, where) or None; collective."""
+    k = 0
+    for segment in path.segments:
+        tension = Tension(segment.problem) if isinstance(segment.problem.scene.model, Membrane) else None
+        for state in segment.states:
+            if tension is not None and (least := tension.least(state)).compressed:
+                return k, least
+            k += 1
+    return None
+
+
+def doubts(first: tuple[int, Resultant] | None) -> list[tuple[str, str]]:
+    """(how bad: "serious"; what) of what `first_compression` found."""
+    if first is None:
+        return []
+    k, (direction, value, point) = first
+    return [("serious", f"The membrane is in compression, first in state {k}: its {direction} resultant is {value:.2g}"
+                        f" of shear modulus times thickness at (R, Z) = ({point[0]:.5g}, {point[1]:.5g}): it would"
+                        f" wrinkle there, and has no state: use a solid, MixedPressure(), for one.")]

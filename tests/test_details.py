@@ -1,0 +1,92 @@
+"""Lines that whole runs hardly feel, each by itself: found by `benchmarks/mutants.py`."""
+
+import numpy as np
+import pytest
+import ufl
+from test_heat import body_of
+
+import formingx as fx
+from formingx import Stage, tools
+from formingx.discrete.problem import Problem
+
+
+def moved(mesh, by):
+    """The same mesh, its nodes at X + by(X)."""
+    mesh.domain.geometry.x[:, :2] += np.column_stack(by(mesh.domain.geometry.x[:, :2].T))
+    return mesh
+
+
+def as_ufl(by, mesh):
+    return ufl.as_vector(by(ufl.SpatialCoordinate(mesh.domain)))
+
+
+@pytest.mark.parametrize("by", [lambda X: (0.7 * X[1], 0 * X[1]), lambda X: (0.3 * X[1], 0.4 * X[0] + 0.2 * X[1])],
+                         ids=["sheared", "sheared and grown"])
+def test_heat_flows_in_the_deformed_body(by):
+    """A deformed body, pulled back, is the body that has that shape: conduction and what is absorbed in depth."""
+    def sheet():
+        return fx.mesh.disc(radius=0.01, thickness=0.004, elements=(4, 2))
+
+    light, mesh = [fx.Absorption("top", flux=3000.0, coefficient=500.0)], sheet()
+    kinematics = fx.PlaneStrain()
+    bodies = [body_of(mesh, light, displacement=as_ufl(by, mesh), kinematics=kinematics),
+              body_of(moved(sheet(), by), light, kinematics=kinematics)]
+    rates = []
+    for body in bodies:
+        T = np.cos(300 * np.arange(len(body.points)) / len(body.points))     # the same at the same nodes
+        found, _ = body.rates([T])
+        rates.append(found[0] * body.capacity)
+    assert np.abs(rates[0]).max() > 0
+    assert rates[0] == pytest.approx(rates[1], abs=1e-9 * np.abs(rates[0]).max())
+
+
+def test_a_tool_that_is_away_takes_no_heat():
+    plug = fx.Contact("top", tools.cylinder(radius=0.5, z=0.05), "none", moves=(0, -1), name="plug")
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(4, 1)), temperature=150.0, contacts=[plug],
+                     materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     heat=fx.Cooling(fx.ThermalProperties(conductivity=0.01, density=1.0, heat_capacity=1.0), [],
+                                     unit="C", tools={"plug": (0.3, 30.0)}))
+    path = fx.Process(scene).run([Stage("touch", duration=0.1), Stage("away", duration=0.5, without=["plug"])],
+                                 progress=False)
+    means = []
+    for stage in ("touch", "away"):
+        state = [s for s in path.states if s.stage == stage][-1]
+        with path.problem.at(state) as problem:
+            T, X = problem.scene.temperature.T, ufl.SpatialCoordinate(scene.mesh.domain)
+            dx = ufl.dx(scene.mesh.domain, metadata={"quadrature_degree": 4})
+            means.append(problem.forms.integral(T * X[0] * dx))
+    cold = 150.0 * 0.5 * 0.05
+    assert means[0] < 0.99 * cold and means[1] == pytest.approx(means[0], rel=1e-8)
+
+
+def test_area_of_the_node_on_the_axis():
+    """L/24 times the weight at L, of which the middle of the facet gives twice as much: sums and moments stay."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(5, 1)), materials=fx.NeoHookean(c10=1.0),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("bottom")],
+                     contacts=[fx.Contact("top", tools.plane(0.1), "none", moves=(0, -1))])
+    contact, = Problem(scene).contacts
+    order = np.argsort(contact.points[:, 0])
+    R, area, lumped = contact.points[order, 0], contact.area[order], contact.lumped[order]
+    L = R[2]
+    assert area[0] == pytest.approx(2 * np.pi * L**2 / 24, rel=1e-12) and abs(lumped[0]) < 1e-14
+    assert area - lumped == pytest.approx(2 * np.pi * L**2 / 24 * np.array([1, -2, 1, *[0] * (len(R) - 3)]), abs=1e-14)
+
+
+def test_a_step_may_not_bring_a_whole_region_into_touch():
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(8, 1)), materials=fx.NeoHookean(c10=1.0),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("bottom")],
+                     contacts=[fx.Contact("top", tools.plane(0.2), 0.3, moves=(0, -1))])
+    problem = Problem(scene)
+    x = np.zeros(problem.n_owned)
+    near, far = (d / problem.forms.length for d in (0.05, 0.11))
+    assert not problem.too_far(x, 0.0, x, near) and problem.too_far(x, near, x, far)
+
+
+def test_rest_is_free_of_stress_under_the_penalty():
+    """The energy is split so that F = I is its minimum, which a pressure field would otherwise hide."""
+    problem = Problem(fx.Scene(
+        mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1)), materials=fx.MooneyRivlin(c10=1.0, c01=0.3),
+        model=fx.DisplacementPenalty(eps=0.1), supports=[fx.Symmetry("axis"), fx.Clamped("rim")]))
+    forces = problem.forces(problem.x.duplicate(), 0.0)
+    forces[problem.held] = 0
+    assert np.abs(forces).max() < 1e-14
