@@ -1,6 +1,6 @@
 """How reliable the package is, in figures: bad input, ranks, and files that cannot be written.
 
-    python3 benchmarks/reliability.py [bad] [ranks] [restarts] [files]
+    python3 benchmarks/reliability.py [bad] [ranks] [restarts] [files]      (damaged files: benchmarks/damaged_files.py)
 
 bad: every public argument wrong in turn; counts how many gave an InputError (or a TypeError, for an unknown or a
 missing argument) before any solve. ranks: a free and a formed sheet on 1, 2, 3, 4 ranks; the largest relative

@@ -21,8 +21,10 @@ import logging
 import math
 import os
 import pickle
+import re
 import threading
 import time
+import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent import futures
 from contextlib import nullcontext
@@ -249,8 +251,11 @@ class Study(Sheet):
     def _keep(self, run: StudyRun) -> None:
         """Take up a run, and write it to the folder."""
         if self._folder is not None:
-            file = self._folder / f"{len(list(self._folder.glob('run-*.json'))):05d}"
-            replace(file.with_name(f"run-{file.name}.json"), lambda stream: json.dump(asdict(run), stream, indent=1))
+            # numbered behind all others; the values tell apart two that are written at once
+            last = max((int(file.name[4:9]) for file in _files(self._folder)), default=-1)
+            values = zlib.crc32(json.dumps(run.values, sort_keys=True).encode())
+            file = self._folder / f"run-{last + 1:05d}-{values:08x}.json"
+            replace(file, lambda stream: json.dump(asdict(run), stream, indent=1))
         self.runs.append(run)
 
 
@@ -284,7 +289,7 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
         known(f"study: goal of {name}: way", way, ("max", "min"))
     place_of = None if folder is None else _folder(place("study: folder", folder), task, list(cases[0]))
     found = Study(task, list(cases[0]), ways, place_of)
-    found.runs += [] if place_of is None else _there(place_of)
+    found.runs += [] if place_of is None else _there(place_of, found.variables)
     todo = [case for case in cases if not any(run.values == case for run in found.runs)]
     with _pool(executor, min(workers or os.cpu_count() or 1, max(len(todo), 1))) as pool:
         if isinstance(pool, futures.ProcessPoolExecutor):
@@ -356,7 +361,7 @@ def _folder(folder: FilePath, task: _Task, variables: list[str]) -> FilePath:
              "measures": list(task.measure)}
     file = folder / "study.json"
     if file.exists():
-        there = json.loads(file.read_text())
+        there = _read(file)
         if there != about:
             raise InputError(f"study: folder {str(folder)!r} holds another study: {there}; here: {about}")
     elif folder.exists() and any(folder.iterdir()):
@@ -366,5 +371,30 @@ def _folder(folder: FilePath, task: _Task, variables: list[str]) -> FilePath:
     return folder
 
 
-def _there(folder: FilePath) -> list[StudyRun]:
-    return [StudyRun(**json.loads(file.read_text())) for file in sorted(folder.glob("run-*.json"))]
+def _there(folder: FilePath, variables: list[str]) -> list[StudyRun]:
+    """The runs in a folder, one for each set of values."""
+    found: list[StudyRun] = []
+    for file in sorted(_files(folder)):
+        try:
+            run = StudyRun(**_read(file))
+            right = (set(run.values) == set(variables) and isinstance(run.error, str)
+                     and all(math.isfinite(v) for v in (*run.values.values(), *run.measures.values(), run.seconds)))
+        except (TypeError, AttributeError):
+            right = False
+        if not right:
+            raise InputError(f"study: {str(file)!r} is damaged: it holds no run of this study; remove it, and the run"
+                             f" is made again")
+        found += [run] if all(run.values != other.values for other in found) else []
+    return found
+
+
+def _files(folder: FilePath) -> list[FilePath]:
+    return [file for file in folder.glob("run-*.json") if re.match(r"run-[0-9]{5}[-.]", file.name)]
+
+
+def _read(file: FilePath) -> Any:
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"study: {str(file)!r} is damaged or cannot be read: {error}; remove it, and what it held is"
+                         f" made again") from None

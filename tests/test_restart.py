@@ -301,6 +301,20 @@ def test_unwritable_folder():
         treloar_path("/proc/run")
 
 
+def test_a_folder_that_vanishes_and_one_that_two_write_to(copied):
+    """What is lost is not called kept; a second writer is told of the first."""
+    folder, scene = copied
+    longer = fx.trace(scene, until=fx.pole_stretch(3.5), start=fx.load(folder, scene), progress=False)
+    first, second = (checkpoint.Checkpoint(folder, longer) for _ in range(2))
+    first.write()
+    with pytest.raises(OSError, match=r"state \d+ could not be written: it is there already: does another run write"):
+        second.write()
+    assert len(fx.load(folder, scene)) == len(longer)
+    shutil.rmtree(folder)
+    with pytest.raises(OSError, match=r"could not be written: the folder is gone, and the states in it$"):
+        second.write()
+
+
 def test_full_disk(copied):
     """A limit on the size of files stands for a disk that is full: the states that are there are kept."""
     folder, scene = copied

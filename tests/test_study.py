@@ -127,6 +127,27 @@ def test_an_error_too_long_for_excel(here, tmp_path):
         assert not (tmp_path / "all.xlsx").exists()
 
 
+def test_no_run_of_a_folder_is_written_over(here, tmp_path):
+    """A file that was removed leaves a gap, which no other run's number comes from."""
+    run(here, x=(0, 1), folder=tmp_path)
+    next(tmp_path.glob("run-00001*.json")).unlink()
+    kept = {file: file.read_text() for file in tmp_path.glob("run-*.json")}
+    found = run(here, x=(0, 1, 2), folder=tmp_path)
+    assert len(found.runs) == 6 and all(file.read_text() == text for file, text in kept.items())
+    assert run(here, folder=tmp_path).runs == found.runs and len(RUNS) == 7
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3", '{"values": {"x": 1}}', '{"values": {"x": 0, "y": NaN}}', "\xff",
+                                  '{"values": {"x": 0, "y": 1}, "measures": 3}', '{"valves": {}}', "[" * 100_000])
+@pytest.mark.parametrize("name", ["run-00002", "study"])
+def test_a_damaged_folder_is_refused(here, tmp_path, text, name):
+    run(here, x=(0, 1), folder=tmp_path)
+    file = next(tmp_path.glob(f"{name}*.json"))
+    file.write_bytes(text.encode("latin-1"))
+    with pytest.raises(fx.InputError, match=f"{name}.*is damaged|holds another study"):
+        run(here, folder=tmp_path)
+
+
 def test_refining_finds_what_lies_between(here):
     """The maximum of the quadratic at (1, 2), which no run of the design is at."""
     found = run(here, x=(0.0, 2.5), y=(0.5, 3.0))

@@ -21,7 +21,7 @@ from . import cad_process
 from .arcs import arcs_along, in_plane, piece_through
 from .profile import Arc, Line
 
-_SECONDS = 30             # of a processor's time to read a file and to follow its curves
+_SECONDS = 10             # of a processor's time to read a file and to follow its curves
 _LONGEST = 20 * _SECONDS  # of any: the machine may be busy
 
 
@@ -118,6 +118,10 @@ def _check_references(file: str) -> None:
     text = re.sub(r"'[^']*'|/\*.*?\*/", "", Path(file).read_bytes().decode("latin-1"), flags=re.DOTALL)
     if "END-ISO-10303-21" not in text:
         raise InputError(f"tool file {file!r} cannot be read: it has no end: it was cut off")
+    for record in text.split(";"):
+        if record.count("(") != record.count(")") or record.count("=") > 1:
+            raise InputError(f"tool file {file!r} cannot be read: the record {' '.join(record.split())[:60]!r} is not"
+                             f" whole: it is damaged")
     defined = re.findall(r"#(\d+)\s*=", text)
     missing = set(re.findall(r"#(\d+)", text)) - set(defined)
     if missing or len(set(defined)) < len(defined):

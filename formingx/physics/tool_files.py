@@ -103,6 +103,8 @@ def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | 
     if not curves:
         raise InputError(f"tool file {file!r} has no curves")
     ends = np.array([[pieces[0].ends[0], pieces[-1].ends[1]] for pieces in curves]).reshape(-1, 2)
+    if not np.abs(ends).max() < 1e50:                       # squares and products are still numbers
+        raise InputError(f"tool file {file!r}: a curve ends {np.abs(ends).max():.3g} away: must be below 1e50")
     near = 1e-6 * max(float(np.ptp(ends, axis=0).max()), 1e-300)
     meets: list[list[int]] = [[] for _ in ends]             # other ends at an end
     for a, b in cKDTree(ends).query_pairs(near, output_type="ndarray").tolist():

@@ -11,6 +11,7 @@ remember, by node or by cell, likewise.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shutil
@@ -105,10 +106,17 @@ class Checkpoint:
             data[f"{name}_tail"] = tails[-1]
         library, what = _compat.adios4dolfinx(), f"state {number} could not be written; the states before it are kept"
 
+        def look():
+            if not self.folder.is_dir():
+                raise FileNotFoundError(errno.ENOENT, "the folder is gone, and the states in it")
+            if final.exists():
+                raise FileExistsError(errno.EEXIST, "it is there already: does another run write to this folder?")
+
         def prepare():
             shutil.rmtree(part, ignore_errors=True)
             part.mkdir()
             files.reserve(part / "reserved", self._size(len(json.dumps(data))))
+        files.on_root(comm, lambda: _plainly(look, self.folder, f"state {number} could not be written"))
         files.on_root(comm, lambda: _plainly(prepare, self.folder, what))
         for name in _FIELDS:
             self._w.x.array[:n] = getattr(state, name)[:n]
@@ -117,7 +125,12 @@ class Checkpoint:
         def finish():
             data["checksums"] = _checksums(part, data)
             files.replace(part / "state.json", lambda stream: json.dump(data, stream))
-            os.rename(part, final)
+            try:
+                os.rename(part, final)
+            except OSError as error:
+                if not final.exists():
+                    raise
+                raise FileExistsError(errno.EEXIST, "another run wrote it: each needs a folder of its own") from error
         files.on_root(comm, lambda: _plainly(finish, self.folder, what))
 
     def _size(self, more: int) -> int:
