@@ -3,9 +3,9 @@
     python3 benchmarks/damaged_files.py [--files 5000] [--seed 0] [--kinds KIND ...]
 
 A kind is a format (msh22, msh41, msh22b, msh41b, text, geo, dxf, step, brep, mshtool, csv, tests, heat, checkpoint).
-File k of a seed is always the same. A file that lost its end, or in which a line is lost or there twice, must be refused
-or read as it was, where the format counts or closes what it holds; what a changed digit says cannot be known to be wrong,
-and is only counted ("another").
+File k of a seed is always the same. A file that lost its end, or in which a line is lost or there twice, must be
+refused or read as it was, where the format counts or closes what it holds; what a changed digit says cannot be known to
+be wrong, and is only counted ("another").
 """
 
 from __future__ import annotations

@@ -184,7 +184,8 @@ def test_units_that_are_not_stated(tmp_path):
     ("Ellipse(9) = {1, 2, 3, 4};", "curve 9 is a Ellipse"), ("Bezier(9) = {1, 2, 3};", "curve 9 is a Bezier"),
     ("Point(5) = {1, 1, 0};", "a second point 5"), ("Point(9) = {1_0, 1, 0};", "is not a number"),
     ("Point(9) = {0x10, 1, 0};", "is not a number"), ("Point(9) = {\u0661, 1, 0};", "is not a number"),
-    ("Point(9) = {1e308, 0, 0}; Line(9) = {5, 9};", "1e.308 away: must be below"), ("r = 12", "does not end in a semicolon")])
+    ("Point(9) = {1e308, 0, 0}; Line(9) = {5, 9};", "1e.308 away: must be below"),
+    ("r = 12", "does not end in a semicolon")])
 def test_geo_is_read_right_or_refused(tmp_path, more, words):
     """A curve that was passed over left a hole in the profile."""
     (tmp_path / "cup.geo").write_text(CUP + more, encoding="utf-8")
