@@ -63,7 +63,8 @@ def test_the_tangent_ahead_comes_from_the_factors_at_hand(monkeypatch, friction)
     assert (max(changed) > 1e-3) == (friction == "stick")           # nodes that have just arrived
 
 
-def test_what_materials_remember_is_computed_once_a_step(monkeypatch):
+def test_what_materials_remember_is_computed_three_times_a_step(monkeypatch):
+    """Once, and in two halves for the error: an accepted state takes what was foretold."""
     calls, after = [0], MaterialHistory._after
 
     def counted(self, cells):
@@ -76,7 +77,7 @@ def test_what_materials_remember_is_computed_once_a_step(monkeypatch):
                      supports=[fx.Symmetry("bottom", "z"), fx.Symmetry("top", "z")], loads=[fx.Pressure("inner")])
     course = {lambda value: fx.displacement(value, at=(1.0, 0.0), component="r"): [(0, 0), (1, 1)]}
     path = fx.Process(scene).run([fx.Stage("widen", drive=scene.loads[0], follow=course)], progress=False)
-    assert len(path) > 8 and calls[0] <= path.counts.steps + path.counts.failures + 1
+    assert len(path) > 8 and calls[0] <= 3 * (path.counts.steps + path.counts.failures) + 1
     before, last = path.states[-2:]
     with path.problem.at(last) as problem:
         problem.memory = before.memory

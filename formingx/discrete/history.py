@@ -21,8 +21,11 @@ class History(Protocol):
     def start(self) -> None:
         """Nothing has happened yet."""
 
-    def advance(self, x: np.ndarray, control: float) -> None:
-        """The state that the forms hold now is accepted; x: its owned unknowns. It becomes the beginning of a step."""
+    def advance(self, x: np.ndarray, control: float, start: np.ndarray | None = None) -> None:
+        """The state that the forms hold now is accepted; x: its owned unknowns. It becomes the beginning of a step.
+
+        start: the unknowns at the beginning of the step that ends now, if that is a state, too.
+        """
 
     def get(self) -> Any:
         """The memory now."""
@@ -55,16 +58,13 @@ class MaterialHistory:
     def __init__(self, forms: Any, terms: Any):
         self._forms, self._terms = forms, terms
         self._cells = terms.cells                                   # a ghost is computed as its owner computes it
-        topology = forms.domain.topology
-        self._own = self._cells[self._cells < topology.index_map(topology.dim).size_local]
-        self._numbers = topology.original_cell_index[self._own]     # in the script's mesh, whatever the ranks
+        self._own = terms.own_cells
+        self._numbers = forms.domain.topology.original_cell_index[self._own]     # in the script's mesh, whatever the ranks
         updated = terms.updated(forms.elastic_F)
         self._sizes = {name: int(np.prod(f.ufl_shape, dtype=int)) for name, f in terms.internal.items()}
         flat = [ufl.as_ufl(updated[name])[i] if i else ufl.as_ufl(updated[name])
                 for name, f in terms.internal.items() for i in np.ndindex(f.ufl_shape)]
         self._updated = fem.Expression(ufl.as_vector(flat), terms.places, jit_options=_compat.JIT_OPTIONS)
-        weights = terms.material.error_weights
-        self.weights = {name: weights.get(name, 1.0) for name in terms.internal}     # of errors in time
         self._now: Memory | None = None                              # what was put or got last, if it still holds
         self.start()
 
@@ -75,16 +75,12 @@ class MaterialHistory:
             self._set(name, self._cells, np.asarray(rest, dtype=float).ravel())
         self._terms.start.value = 0.0
 
-    def advance(self, x: np.ndarray, control: float) -> None:
+    def advance(self, x: np.ndarray, control: float, start: np.ndarray | None = None) -> None:
         """See `History`."""
         self._now = None
         for name, values in self._after(self._cells).items():
             self._set(name, self._cells, values)
         self._terms.start.value = self._forms.time_at(control)
-
-    def foretell(self, control: float) -> Memory:
-        """What `get` would give, were the state that the forms hold now accepted."""
-        return _unchangeable(Memory(self._forms.time_at(control), self._after(self._own)))
 
     def _after(self, cells: np.ndarray) -> dict[str, np.ndarray]:
         """{name: values in some cells, shape (cells, points, components)} at the end of the step."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import basix
@@ -12,6 +13,7 @@ from dolfinx import fem
 
 from ..errors import InputError
 from ..materials.constants import Varying
+from .followed import Followed
 
 
 class MaterialTerms:
@@ -25,22 +27,33 @@ class MaterialTerms:
         rest_stress: stress that the energy leaves at F = I (UFL scalar).
         internal: {name: `Function` of a quadrature element} of the internal variables at the beginning of the step.
         start: the process time there (`Constant`).
+        cells, own_cells: in which it is, ghosts included, and this rank's own.
         places: of the quadrature points of the energy in the reference cell, shape (q, dimension).
     """
 
     def __init__(self, forms: Any, material: Any, names: list[str]):
         self.forms, self.material, self.names = forms, material, names
         self.cells = forms.cells_of(names)
+        topology = forms.domain.topology
+        self.own_cells = self.cells[self.cells < topology.index_map(topology.dim).size_local]
         self.X = forms.X
-        self._of_temperature: list[tuple[fem.Function, Any]] = []
+        self._followed: list[Followed] = []
         cell, degree = forms.domain.basix_cell(), forms.scene.quadrature_degree
         self.places = basix.make_quadrature(cell, degree)[0]
-        self.constants = {name: value.expression(self) if isinstance(value, Varying) else forms.constant(value)
-                          for name, value in material.constants().items()}
+        self.start = forms.constant(0.0)
+        self.constants = {name: self._constant(name, value) for name, value in material.constants().items()}
         self.rest_stress = self._rest_stress(self.constants) if material.varies else forms.constant(
             material.rest_stress)
         self.internal = {name: self.quadrature_function(np.shape(value)) for name, value in material.internal.items()}
-        self.start = forms.constant(0.0)
+
+    def _constant(self, name: str, value: Any) -> Any:
+        self._in_middle = name in self.material.of_flow
+        return value.expression(self) if isinstance(value, Varying) else self.forms.constant(value)
+
+    @property
+    def follows_temperature(self) -> bool:
+        """True if a constant depends on the temperature."""
+        return bool(self._followed)
 
     def quadrature_function(self, shape: tuple[int, ...] = ()) -> fem.Function:
         """A `Function` with a value of a shape at every quadrature point of the energy."""
@@ -54,12 +67,12 @@ class MaterialTerms:
         found.interpolate(lambda X: function(X[0], self.forms.mid(layer, X[0], X[1])), self.cells)
         return found
 
-    def of_temperature(self, function: Any) -> fem.Function:
-        """f(T) at the quadrature points of the energy, exactly; see `take_temperature`."""
-        found = self.quadrature_function()
-        self._of_temperature.append((found, function))
-        self.take_temperature()
-        return found
+    def of_temperature(self, function: Any) -> Any:
+        """f(T) at the quadrature points of the energy, exactly, at the end of a step, or in its middle."""
+        forms, found = self.forms, self.quadrature_function()
+        followed = Followed(forms, found, [(self.cells, function, partial(forms.temperatures, self))])
+        self._followed.append(followed)
+        return followed.at(forms.time - (self._time_step / 2 if self._in_middle else 0))
 
     def take_temperature(self) -> None:
         """The temperature has changed: constants follow it.
@@ -67,11 +80,8 @@ class MaterialTerms:
         Raises:
             InputError: a constant has no value at a temperature.
         """
-        if not self._of_temperature:
-            return
-        T = self.forms.temperatures(self)
-        for found, function in self._of_temperature:
-            found.x.array[found.function_space.dofmap.list[self.cells]] = function(T)
+        for followed in self._followed:
+            followed.take_temperature()
 
     def of_mesh(self, expression: Any) -> Any:
         """A UFL scalar of the scene's mesh, where the fields live on it."""

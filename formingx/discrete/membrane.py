@@ -85,7 +85,7 @@ class MidSurface(Formulation):
         topology = self.domain.topology
         return np.arange(topology.index_map(1).size_local + topology.index_map(1).num_ghosts, dtype=np.int32)
 
-    def temperatures(self, terms):
+    def temperatures(self, terms, values=None):
         """That halfway between the faces of the layer."""
         nodes = self.domain.geometry.x[_compat.cell_nodes(self.domain)[terms.cells], :2]
         geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(self.domain).degree)

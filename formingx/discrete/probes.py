@@ -38,7 +38,7 @@ class Probe:
 
     def displacement(self, x: Any) -> np.ndarray:
         """u at the points in the user's unit, shape (n, 2), all ranks."""
-        self._problem.set_fields(x)
+        self._problem.place(x.array_r)
         w = self._problem.forms.w.x.array
         values = np.zeros((len(self.points), 2))
         values[self._mine] = self._problem.forms.length * self._local(w[self._dofs])

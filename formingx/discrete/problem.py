@@ -24,7 +24,6 @@ from .constraints import Active, Constraints
 from .contact_nodes import ContactNodes
 from .contact_points import ContactPoints
 from .formulations import formulate
-from .history import MaterialHistory
 from .matrix import ExtendedMatrix
 from .schedule import Setting
 from .viscosity import Viscosity
@@ -87,7 +86,7 @@ class Problem:
                                       [row for _, row in self._constraints.means], self.comm, self.symmetric)
         self.matrix = self._matrix.mat
         self.x = self.matrix.createVecRight()
-        self._foretold: tuple[Any, dict[int, Any]] = None, {}   # x, and what histories would remember there
+        self._foretold: tuple[Any, list[Any]] = None, []    # x, and what the forms' histories would remember there
         self._stage: Any = None
         self.enter(Setting.first(scene), np.zeros(self.x.getLocalSize()), 0.0)
         self._metric = np.maximum(self.assemble(forms.compile(forms.metric_row())), 0)
@@ -160,7 +159,7 @@ class Problem:
 
     @memory.setter
     def memory(self, memory: list[Any]) -> None:
-        self._foretold = None, {}
+        self._foretold = None, []
         for history, remembered in zip(self.histories, memory, strict=True):
             history.put(remembered)
 
@@ -332,14 +331,13 @@ class Problem:
         """A state is accepted: what has a history takes it up. x: own part, shape (n,)."""
         if self.forms.histories:
             self.forms.control.value = control
-            self._set_own(x)
-        known = self._foretold[1] if self._foretold[0] is x else {}
-        for k, history in enumerate(self.histories):
-            if k in known:
-                history.put(known[k])
-            else:
-                history.advance(x[: self._n], control)
-        self._foretold = None, {}
+            self.place(x)
+        known = self._foretold[1] if self._foretold[0] is x else []
+        for history in self.histories[: len(self.histories) - len(known)]:
+            history.advance(x[: self._n], control)
+        for history, memory in zip(self.forms.histories, known):
+            history.put(memory)
+        self._foretold = None, []
 
     def take_temperature(self) -> None:
         """The scene's temperature has changed: constants and friction follow it; collective.
@@ -349,15 +347,21 @@ class Problem:
         """
         together(self.comm, [self.forms.take_temperature, *(contact.take_temperature for contact in self.contacts)])
 
-    def foretell(self, x: np.ndarray, control: float) -> dict[int, Any]:
-        """{number of a material's history: what it would remember, were a state accepted}."""
-        relaxing = {k: one for k, one in enumerate(self.histories) if isinstance(one, MaterialHistory)}
-        if relaxing:
-            self.forms.control.value = control
-            self._set_own(x)
-        found = {k: history.foretell(control) for k, history in relaxing.items()}
-        self._foretold = x, found
-        return found
+    def foretell(self, start: np.ndarray, x: np.ndarray, control: float) -> list[Any]:
+        """What the histories of the forms would remember, were a state accepted; they stay as they are.
+
+        start: the unknowns at the state that the step begins at.
+        """
+        self.forms.control.value = control
+        self.place(x)
+        before = [history.get() for history in self.forms.histories]
+        for history in self.forms.histories:
+            history.advance(x[: self._n], control, start)
+        after = [history.get() for history in self.forms.histories]
+        for history, memory in zip(self.forms.histories, before):
+            history.put(memory)
+        self._foretold = x, after
+        return after
 
     def reach(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step of at most `length` from x along (direction, slope) may be. Arrays: own part."""
@@ -409,7 +413,7 @@ class Problem:
     def set_state(self, x: PETSc.Vec, control: float) -> np.ndarray:
         """Put the fields of x and the control where the forms see them; returns the multipliers, all ranks."""
         self.forms.control.value = control
-        self.set_fields(x)
+        self.place(x.array_r)
         multipliers, last = np.zeros(len(self._stage.active.rows)), self.comm.size - 1
         if self.comm.rank == last:
             multipliers[:] = x.array_r[self._n:]
@@ -417,11 +421,8 @@ class Problem:
             self.comm.Bcast(multipliers, root=last)
         return multipliers
 
-    def set_fields(self, x: PETSc.Vec) -> None:
-        """Put the fields of x where the forms see them."""
-        self._set_own(x.array_r)
-
-    def _set_own(self, x: np.ndarray) -> None:
+    def place(self, x: np.ndarray) -> None:
+        """Put the fields of x, own part, where the forms see them."""
         w = self.forms.w.x
         w.array[: self._n] = x[: self._n]
         w.scatter_forward()

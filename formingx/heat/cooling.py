@@ -101,32 +101,30 @@ class Cooling:
 
 
 class Memory(NamedTuple):
-    """Process time, and the state of the heat equation: {"temperature": T from absolute zero, own part, shape (n, 1)},
-    and the lines of each tool; the step in time to go on with, if there is one; heat of dissipated work
-    (`Conduction.power`), own part, or None."""
+    """Process time, and the state of the heat equation: the temperature, own part, shape (n,), and the lines of each
+    tool; the step in time to go on with, if there is one; heat of dissipated work (`Conduction.power`), own part, or
+    None; an earlier time, and the temperature then, or None."""
 
     time: float
-    values: dict[str, np.ndarray]
+    temperature: np.ndarray
     lines: list[np.ndarray]
     step: float | None
     power: np.ndarray | None
+    before: tuple[float, np.ndarray] | None
 
 
 class CoolingHistory:
-    """The temperature as a history: it advances in accepted steps only."""
-
-    weights = {"temperature": 0.1}
-    """Of errors in time: relative ones of the absolute temperature."""
+    """The temperature as a history."""
 
     def __init__(self, cooling: Cooling, problem: Any):
         forms, scene = problem.forms, problem.scene
         self._cooling, self._problem, self._forms = cooling, problem, forms
-        self._zero = ABSOLUTE_ZERO[cooling.unit]
-        self._T = scene.temperature.T
+        zero = ABSOLUTE_ZERO[cooling.unit]
+        self._field = scene.temperature
         touches = cooling._touches(scene)
         self._body = Conduction(scene.mesh, checked_materials(scene.mesh, cooling.materials),
-                                checked_boundaries(scene.mesh, [*cooling.boundaries, *touches], self._zero),
-                                scene.kinematics, self._zero, forms.u)
+                                checked_boundaries(scene.mesh, [*cooling.boundaries, *touches], zero),
+                                scene.kinematics, zero, forms.u)
         touching = [c for c in problem.contacts if cooling.conducts(c.contact)]
         self._touches = [(touch, contact, touch.conductance.copy())
                          for touch, contact in zip(self._body.touches, touching, strict=True)]
@@ -144,11 +142,12 @@ class CoolingHistory:
         self._time = 0.0
         self._dt: float | None = None
         self._power: Any = None if self._dissipated is None else np.zeros(self._n)
-        self._take(self._first)
+        self._before: Any = None
         self._state = [self._first.copy(), *(touch.start() for touch in self._body.touches)]
+        self._take()
 
-    def advance(self, x: np.ndarray, control: float) -> None:
-        """See `History`."""
+    def advance(self, x: np.ndarray, control: float, start: np.ndarray | None = None) -> None:
+        """See `History`; heat flows in the body as it is half-way, which makes the step one of second order."""
         until = self._forms.time_at(control)
         if self._power is not None:                         # the materials have advanced
             power = self._cooling.work_to_heat * self._body.assembled(self._dissipated)
@@ -159,10 +158,14 @@ class CoolingHistory:
         for touch, contact, conductance in self._touches:
             depth = contact.contact.tool.signed_distance(touch.points + u[touch.dofs] - contact.travelled(control))
             touch.conductance[:] = conductance * (contact.present & (depth > -_NEAR * contact.thickness))
+        self._before = self._time, self._state[0]
+        if start is not None:
+            self._problem.place((start[: len(x)] + x) / 2)
         self._body.update()
         self._state[0] = self._body.held(self._state[0])
         self._go(until)
-        self._take(self._state[0])
+        self._problem.place(x)
+        self._take()
 
     def _go(self, until: float) -> None:
         """Steps of the heat equation, the body standing still."""
@@ -181,22 +184,22 @@ class CoolingHistory:
 
     def get(self) -> Memory:
         """See `History`."""
-        return Memory(self._time, {"temperature": (self._state[0] - self._zero)[:, None]},
-                      [lines.copy() for lines in self._state[1:]], self._dt, self._power)
+        return Memory(self._time, self._state[0].copy(), [lines.copy() for lines in self._state[1:]], self._dt,
+                      self._power, self._before)
 
     def put(self, memory: Memory) -> None:
         """See `History`."""
-        self._time, self._dt, self._power = memory.time, memory.step, memory.power
-        T = memory.values["temperature"][:, 0] + self._zero
-        self._state = [T, *(lines.copy() for lines in memory.lines)]
-        self._take(T)
+        self._time, self._dt, self._power, self._before = memory.time, memory.step, memory.power, memory.before
+        self._state = [memory.temperature.copy(), *(lines.copy() for lines in memory.lines)]
+        self._take()
 
     def save(self, memory: Memory) -> dict[str, Any]:
         """See `History`."""
         def plain(own):
             return self._gathered(own).tolist()
         return {"time": memory.time, "step": memory.step, "points": plain(self._body.points),
-                "temperature": plain(memory.values["temperature"][:, 0]),
+                "temperature": plain(memory.temperature),
+                **({} if memory.before is None else {"before": [memory.before[0], plain(memory.before[1])]}),
                 **({} if memory.power is None else {"power": plain(memory.power)}),
                 "lines": [{"points": plain(touch.points), "above_back": plain(lines)}
                           for touch, lines in zip(self._body.touches, memory.lines, strict=True)]}
@@ -209,21 +212,36 @@ class CoolingHistory:
         power = np.array(data["power"])[rows] if "power" in data else None
         lines = [np.array(d["above_back"])[_rows(touch.points, d["points"])].reshape(len(touch.points), -1)
                  for touch, d in zip(self._body.touches, data["lines"], strict=True)]
-        return Memory(float(data["time"]), {"temperature": np.array(data["temperature"])[rows, None]}, lines,
-                      data["step"], power)
+        before = (float(data["before"][0]), np.array(data["before"][1])[rows]) if "before" in data else None
+        return Memory(float(data["time"]), np.array(data["temperature"])[rows], lines, data["step"], power, before)
 
     def _gathered(self, own: np.ndarray) -> np.ndarray:
         """Of all ranks, one after the other."""
         return np.concatenate(self._problem.comm.allgather(own))
 
-    def _take(self, T: np.ndarray) -> None:
+    def _take(self) -> None:
         """The temperature of the scene, which other problems may have changed, and the constants of this one."""
-        here = self._T.x.array[: self._n]
-        same = self._seen is not None and np.array_equal(T, self._seen) and np.array_equal(T, here)
+        field, T, before = self._field, self._state[0], self._before
+        seen = self._time, T, before
+        same = self._seen is not None and self._time == field.time and _equal(seen, self._seen) and np.array_equal(
+            T, field.T.x.array[: self._n])
         if self._problem.comm.allreduce(int(not same)):
-            self._seen = here[:] = T
-            self._T.x.scatter_forward()
+            self._seen = seen
+            field.T.x.array[: self._n] = T
+            field.T.x.scatter_forward()
+            field.time, field.before = self._time, None
+            if before is not None:
+                earlier = field.T.copy()
+                earlier.x.array[: self._n] = before[1]
+                earlier.x.scatter_forward()
+                field.time_before, field.before = before[0], earlier.x.array
             self._problem.take_temperature()
+
+
+def _equal(a: Any, b: Any) -> bool:
+    """True if two (time, temperature, before) are the same."""
+    same = a[0] == b[0] and np.array_equal(a[1], b[1]) and (a[2] is None) == (b[2] is None)
+    return same and (a[2] is None or a[2][0] == b[2][0] and np.array_equal(a[2][1], b[2][1]))
 
 
 def _extremes(temperatures: list[float], laws: Sequence[Any]) -> tuple[float, float]:

@@ -61,9 +61,9 @@ class Material:
         return self.step_energy(F, rest, ufl.as_ufl(0.0), **constants)
 
     @property
-    def error_weights(self) -> dict[str, float]:
-        """{internal variable: what its relative error counts when steps in time are chosen}; default 1."""
-        return {}
+    def of_flow(self) -> tuple[str, ...]:
+        """Names of constants that say how fast something flows: of those a step takes the value in its middle."""
+        return ()
 
     def step_energy(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
         """The potential of a step, per reference volume: its derivative by F is the stress at the end of the step."""

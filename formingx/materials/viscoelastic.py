@@ -23,7 +23,7 @@ from ..errors import InputError, instance, known, positive, several
 from ..figures import figure
 from ..physics import kinematics
 from . import branches as tests
-from .constants import OfTemperature, Sample, varying
+from .constants import OfTemperature, Sample
 from .homogeneous import MODES
 from .in_time import HistoryTests
 from .material import Material, brief
@@ -119,13 +119,9 @@ class RelaxingMaterial(HistoryTests, Material):
         return dict.fromkeys(names, _IDENTITY)
 
     @property
-    def error_weights(self) -> dict[str, float]:
-        """Of each branch its share of the instantaneous modulus, all of it if moduli vary; C is no unknown in time."""
-        rest = self.equilibrium
-        if rest is not None and rest.varies or any(varying(mu) is not None for mu, _ in self.branches):
-            return {"C": 0.0}
-        total = sum(mu for mu, _ in self.branches) + (0.0 if rest is None else rest.shear_modulus)
-        return {"C": 0.0} | {f"{self._tensor}_{k}": mu / total for k, mu, _ in self._branches(self.parameters)}
+    def of_flow(self) -> tuple[str, ...]:
+        """See `Material`: the relaxation times."""
+        return tuple(f"tau_{k}" for k, *_ in self._branches(self.parameters))
 
     def equilibrium_energy(self, F, **constants):
         return None if self._equilibrium is None else self._relaxed_energy(F, constants)

@@ -23,5 +23,5 @@ def sample(mesh: Mesh, layer: str, degree: int, temperature: BodyTemperature | N
     geometry = basix.ufl.element("Lagrange", "triangle", _compat.coordinate_map(domain).degree)
     shapes: Any = geometry.tabulate(0, places)
     nodes = domain.geometry.x[_compat.cell_nodes(domain)[cells], :2]
-    T = None if temperature is None else temperature.in_cells(cells, places, first=True).ravel()
+    T = None if temperature is None else temperature.in_cells(cells, places, temperature.first).ravel()
     return Sample(np.einsum("qk,nkd->nqd", shapes[0], nodes).reshape(-1, 2), cells, places, domain, T)

@@ -21,6 +21,7 @@ class BodyTemperature:
     Attributes:
         T: the DOLFINx `Function` (P2). Who changes it calls `take_temperature` of the problem's `forms`.
         first: its values as given, ghosts included.
+        before: values at an earlier time, or None; time, time_before: of the values and of those.
         limits: lowest and highest temperature that there can be. Next to a face that is chilled at once quadratic
             elements overshoot: what lies beyond is cut off where temperatures are read.
 
@@ -35,16 +36,18 @@ class BodyTemperature:
         points = self.T.function_space.tabulate_dof_coordinates()[:, :2]
         self.T.x.array[:] = fields.values_at(given, points, mesh, "Scene: temperature")
         self.first = self.T.x.array.copy()
+        self.before: Any = None
+        self.time = self.time_before = 0.0
         self.limits = (-np.inf, np.inf)
 
-    def in_cells(self, cells: np.ndarray, places: np.ndarray, first: bool = False) -> np.ndarray:
+    def in_cells(self, cells: np.ndarray, places: np.ndarray, values: Any = None) -> np.ndarray:
         """Temperatures in some cells (local numbers) at places in the reference cell, shape (q, 2): (cells, q).
 
-        first: those that were given, in place of those now.
+        values: in place of those now, such as `first` or `before`.
         """
         space = self.T.function_space
         basis = space.element.basix_element.tabulate(0, places)[0, :, :, 0]
-        found = (self.first if first else self.T.x.array)[space.dofmap.list[cells]] @ basis.T
+        found = (self.T.x.array if values is None else values)[space.dofmap.list[cells]] @ basis.T
         return np.clip(found, *self.limits)
 
     def at(self, points: np.ndarray) -> np.ndarray:

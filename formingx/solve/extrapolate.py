@@ -8,8 +8,8 @@ import numpy as np
 
 from .state import State
 
-CUBIC = 4
-"""States that a cubic goes through."""
+CUBIC, QUADRATIC = 4, 3
+"""States that a cubic, and a parabola, go through."""
 
 _CLOSE = 0.1
 """States closer than this part of the step ahead are not told apart: what they are not exact in would be magnified."""

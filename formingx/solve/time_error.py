@@ -1,28 +1,24 @@
-"""How far off a step in time is: what the materials remember, against its smooth course through the states before.
-
-The local error of the second-order rules is that of the trapezoidal one, h^3 y'''/12 (Hairer, Norsett and Wanner 1993,
-section II.7), with y''' from the third divided difference of an internal variable y over the last four states. At the
-beginning of a stage, where y has too short a past, it is taken as |h y'/y|^3 |y|/12, then as |h^2 y''/y|^(3/2) |y|/12.
-"""
+"""Whether a step in time keeps its accuracy, and how long the next one may be."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
+from ..discrete.step_error import StepError
 from ..errors import InputError, finite
+from . import extrapolate
 from .state import State
 
 ACCURACY = {"draft": 1e-2, "standard": 2e-3, "fine": 3e-4}
 """Error of stress and thickness that each promises."""
 
-_OF_A_STEP = 0.5
-"""Local error allowed over the promised one to the power 3/2: steps of the third root of it add up to the promise."""
+_ONCE = 0.5
+"""Error of the stress at the end of a step, over the promised one, that is allowed if the next step forgets it."""
 
-_FLOOR = 0.05
-"""Entries of a tensor smaller than this part of its largest are measured against that."""
+_ADDING_UP = 0.5
+"""Error allowed over the promised one to the power 3/2 if it lasts: steps of the third root of it add up to that."""
 
 
 def allowed(who: str, accuracy: str | float) -> float:
@@ -45,37 +41,15 @@ class TimeError:
     """
 
     def __init__(self, problem: Any, accuracy: float):
-        self._problem, self._allowed = problem, _OF_A_STEP * accuracy**1.5
+        self._problem, self._error = problem, StepError(problem)
+        self._once, self._adding_up = _ONCE * accuracy, _ADDING_UP * accuracy**1.5
 
-    def of(self, past: list[State], x: np.ndarray, control: float) -> float:
-        """Error of the step from the last of some states to (x, control) over what is allowed; 0: nothing relaxes."""
-        problem, worst = self._problem, 0.0
-        for k, after in problem.foretell(x, control).items():
-            before = [state.memory[k] for state in past[-3:]]
-            first = next((i for i in reversed(range(1, len(before))) if not before[i - 1].time < before[i].time), 0)
-            points = [*before[first:], after]
-            if not points[-2].time < after.time:
-                continue
-            times = np.array([point.time for point in points])
-            divided = _divided(times)
-            for name, weight in problem.histories[k].weights.items():
-                if weight:
-                    worst = max(worst, weight * self._local(times, divided, [p.values[name] for p in points]))
-        return worst / self._allowed
-
-    def _local(self, times: np.ndarray, weights: np.ndarray, values: list[np.ndarray]) -> float:
-        """Root mean square of the relative local error of an internal variable, all ranks."""
-        y, n = np.abs(values[-1]), len(times) - 1
-        size = y + _FLOOR * y.max(axis=-1, keepdims=True, initial=1e-300)
-        ratio = sum(w * v for w, v in zip(weights, values)) / size
-        comm = self._problem.comm
-        total, number = (comm.allreduce(v, MPI.SUM) for v in (float(np.sum(ratio**2)), y.size))
-        derivative = [1.0, 2.0, 6.0][n - 1] * np.sqrt(total / max(number, 1)) * (times[-1] - times[-2]) ** n
-        return float(derivative ** (3 / n)) / 12
-
-
-def _divided(times: np.ndarray) -> np.ndarray:
-    """Of values at these times, their weights in the divided difference."""
-    apart = times[:, None] - times
-    np.fill_diagonal(apart, 1.0)
-    return 1 / apart.prod(axis=1)
+    def of(self, states: list[State], x: np.ndarray, control: float) -> float:
+        """Error of the step from the last of some states to (x, control) over what is allowed; 0: no time goes by."""
+        time = self._problem.forms.time_at(control)
+        past = extrapolate.before(states, time, extrapolate.QUADRATIC - 1)
+        end = State(x, control, x, 0.0, time=time)
+        middle = (past[-1].time + time) / 2
+        share = extrapolate.weights([*past, end], middle) if time > past[-1].time else np.array([])
+        once, lasting = self._error.of(past, share, x, control)
+        return max(once / self._once, lasting / self._adding_up)

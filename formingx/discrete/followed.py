@@ -1,0 +1,53 @@
+"""What depends on the temperature, in the forms: as it is at the beginning of a step, and as it goes on in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+
+class Followed:
+    """f(T) at the quadrature points of the energy, above 0 or below, where the temperature may change with time.
+
+    The temperature is known at the beginning of a step. In the step f goes on as it went in the step before, its
+    logarithm in proportion to the time: the error is of second order in the step, and f does not change its sign.
+
+    Args:
+        forms: the `Formulation`; values: a `Function` of a quadrature element, which holds f(T).
+        parts: [(cells, by local numbers; f; the temperature there by the `values` of `BodyTemperature.in_cells`)].
+    """
+
+    def __init__(self, forms: Any, values: fem.Function, parts: list[tuple[np.ndarray, Callable, Callable]]):
+        self._temperature, self._values, self._parts = forms.scene.temperature, values, parts
+        self._rate = None
+        if forms.scene.heat is not None:
+            self._rate, self._since = fem.Function(values.function_space), forms.constant(0.0)
+        self.take_temperature()
+
+    def at(self, time: Any) -> Any:
+        """f at a time (UFL scalar) of the step."""
+        return self._values if self._rate is None else self._values * ufl.exp(self._rate * (time - self._since))
+
+    def take_temperature(self) -> None:
+        """The temperature has changed.
+
+        Raises:
+            InputError: f has no value at a temperature.
+        """
+        temperature = self._temperature
+        for cells, function, at in self._parts:
+            rows = self._values.function_space.dofmap.list[cells]
+            now = function(at(None))
+            self._values.x.array[rows] = now
+            if self._rate is not None and temperature.before is not None:
+                before = function(at(temperature.before))
+                with np.errstate(all="ignore"):
+                    rate = np.log(now / before) / (temperature.time - temperature.time_before)
+                self._rate.x.array[rows] = np.where(np.isfinite(rate), rate, 0.0)
+                self._since.value = temperature.time
+            elif self._rate is not None:
+                self._rate.x.array[rows] = 0.0

@@ -1,0 +1,115 @@
+"""How far the stress at the end of a step in time is off: against two steps of half the length.
+
+What materials remember is advanced once more, in two halves, along the displacements that the states before and the new
+one make likely, at the temperatures that the step has led to. The stress that this leaves at the end is compared with
+that of the step (step doubling: Hairer, Norsett and Wanner 1993, section II.4): point by point, at a given deformation,
+so nothing is solved for. Nothing need be known of a material but its step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from .. import _compat
+from .history import MaterialHistory
+
+_AT_REST = 1e-6
+"""Stress, over the largest modulus, that counts as none."""
+
+
+class StepError:
+    """Of the steps in time of a problem.
+
+    Args:
+        problem: the `Problem`.
+    """
+
+    def __init__(self, problem: Any):
+        self._problem, self._forms = problem, problem.forms
+        forms = self._forms
+        self._materials = [h for h in forms.histories if isinstance(h, MaterialHistory)]
+        heat = len(self._materials) < len(forms.histories)
+        self._stresses = [_Stress(forms, terms) for terms in forms.terms
+                          if terms.internal or heat and terms.follows_temperature]
+
+    def of(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
+        """(error of the stress at the end of a step, what is left of it after another step as long), relative.
+
+        Root mean squares over the body. What is left adds up from step to step; what is forgotten does not.
+
+        Args:
+            past: states before, the last of which the step begins at; its end is (x, control).
+            share: of each of them, and of the new one, in the displacements half-way in time.
+        """
+        forms, old = self._forms, past[-1]
+        start, clock, end = [h.get() for h in forms.histories], forms.clock, forms.time_at(control)
+        after = self._problem.foretell(old.x, x, control)
+        if not end > old.time or not self._stresses:
+            return 0.0, 0.0
+        step, first, found = end - old.time, self._at(old.x, old.time), self._at(x, end)
+        for history, memory in zip(forms.histories, after):
+            if history not in self._materials:
+                history.put(memory)
+        errors = []
+        if self._materials:
+            self._advance(share @ np.array([*(state.x for state in past), x]), control, end - step / 2)
+        errors.append((self._at(x, end), found))
+        if self._materials:
+            self._advance(x, control, end)
+            better = self._at(x, end + step)
+            for history, memory in zip(forms.histories, after):
+                history.put(memory)
+            errors.append((better, self._at(x, end + step)))
+        for history, memory in zip(forms.histories, start):
+            history.put(memory)
+        self._at_time(end)
+        forms.clock = clock
+        scale = max(self._norm(first), self._norm(found), _AT_REST * forms.stress)
+        once, lasting = [*(self._norm([a - b for a, b in zip(*pair)]) / scale for pair in errors), 0.0][:2]
+        return once, lasting
+
+    def _at_time(self, time: float) -> None:
+        self._forms.clock += time - self._problem.time
+
+    def _at(self, x: np.ndarray, time: float) -> list[np.ndarray]:
+        """Stresses of the materials at the end of a step from what is remembered now to x at a time."""
+        self._problem.place(x)
+        self._at_time(time)
+        return [stress.values() for stress in self._stresses]
+
+    def _advance(self, x: np.ndarray, control: float, time: float) -> None:
+        self._problem.place(x)
+        self._at_time(time)
+        for history in self._materials:
+            history.advance(x, control)
+
+    def _norm(self, values: list[np.ndarray]) -> float:
+        """Root mean square over all points, all ranks."""
+        comm = self._problem.comm
+        total, number = (comm.allreduce(v, MPI.SUM)
+                         for v in (float(sum(np.sum(v**2) for v in values)), sum(v.shape[0] for v in values)))
+        return float(np.sqrt(total / max(number, 1)))
+
+
+class _Stress:
+    """Deviator of the Kirchhoff stress of a material at the end of a step, at the quadrature points of the energy."""
+
+    def __init__(self, forms: Any, terms: Any):
+        F = ufl.variable(forms.elastic_F)
+        tau = ufl.diff(terms.step_energy(F), F) * F.T
+        tau -= ufl.tr(tau) / 3 * ufl.Identity(3)
+        entries = [tau[0, 0], tau[1, 1], np.sqrt(2) * tau[0, 1], tau[2, 2]]
+        self._forms, self._cells = forms, terms.own_cells
+        self._expression = fem.Expression(ufl.as_vector(entries), terms.places, jit_options=_compat.JIT_OPTIONS)
+
+    def values(self) -> np.ndarray:
+        """Shape (points, 4), own cells."""
+        if not len(self._cells):
+            return np.zeros((0, 4))
+        return self._expression.eval(self._forms.domain, self._cells).reshape(-1, 4)
