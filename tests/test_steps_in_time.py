@@ -101,7 +101,8 @@ COOLED = {"elastic": (fx.NeoHookean(c10=STIFFENS), 0.05),
 def test_accuracy_is_kept_while_a_body_cools(name):
     """A sheet that is blown and held in cold air; nothing but materials controlled the steps before (2.4 % off)."""
     material, pressure = COOLED[name]
-    scene = fx.Scene(mesh=fx.mesh.disc(radius=1, thickness=0.05, elements=(6, 1)), materials=material, temperature=150.0,
+    mesh = fx.mesh.disc(radius=1, thickness=0.05, elements=(6, 1))
+    scene = fx.Scene(mesh=mesh, materials=material, temperature=150.0,
                      heat=fx.Cooling(fx.ThermalProperties(conductivity=0.01, density=1.0, heat_capacity=1.0),
                                      [fx.Convection("top", h=0.05, air=20.0)], unit="C", tolerance=0.01),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")])
@@ -113,3 +114,21 @@ def test_accuracy_is_kept_while_a_body_cools(name):
     exact = heights(2e-4)
     for accuracy, promised in (("draft", 1e-2), ("standard", 2e-3)):
         assert heights(accuracy) == pytest.approx(exact, rel=promised)
+
+
+def test_a_state_between_two_is_as_accurate_as_the_run():
+    """It took 2e-3 whatever the run had, and did not know what was dissipated."""
+    target = fx.travel(5.0)
+    def measured(state):
+        return [state.measures[c] for c in ("ball_force", "strain_energy", "dissipated_energy", "process_time")]
+    stage = {"drive": "ball", "until": fx.travel(7), "speed": 20}
+    exact = measured(run(sheet(0), Stage("in", through=[target], **stage), accuracy=1e-4).met(target))
+    for accuracy, step in ((1e-2, StepControl(target=8)), (1e-3, None)):
+        path = run(sheet(0), Stage("in", **stage), accuracy=accuracy, step=step)
+        assert measured(path.at(target)) == pytest.approx(exact, rel=accuracy)
+
+
+def test_between_states_of_a_flow_there_is_none_to_find():
+    path = run(block(), Stage("flow", drive="pull", follow={fx.travel: [(0, 0), (1, 1)]}), accuracy=1e-2)
+    with pytest.raises(fx.InputError, match="within a flow"):
+        path.at(fx.travel(0.987654))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ class Followed:
         parts: [(cells, by local numbers; f; the temperature there by the `values` of `BodyTemperature.in_cells`)].
     """
 
-    def __init__(self, forms: Any, values: fem.Function, parts: list[tuple[np.ndarray, Callable, Callable]]):
+    def __init__(self, forms: Any, values: fem.Function, parts: Sequence[tuple[Any, Callable, Callable]]):
         self._temperature, self._values, self._parts = forms.scene.temperature, values, parts
         self._rate = None
         if forms.scene.heat is not None:

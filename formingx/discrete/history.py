@@ -57,9 +57,8 @@ class MaterialHistory:
 
     def __init__(self, forms: Any, terms: Any):
         self._forms, self._terms = forms, terms
-        self._cells = terms.cells                                   # a ghost is computed as its owner computes it
-        self._own = terms.own_cells
-        self._numbers = forms.domain.topology.original_cell_index[self._own]     # in the script's mesh, whatever the ranks
+        self._cells, self._own = terms.cells, terms.own_cells       # a ghost is computed as its owner computes it
+        self._numbers = forms.domain.topology.original_cell_index[self._own]      # in the script's mesh
         updated = terms.updated(forms.elastic_F)
         self._sizes = {name: int(np.prod(f.ufl_shape, dtype=int)) for name, f in terms.internal.items()}
         flat = [ufl.as_ufl(updated[name])[i] if i else ufl.as_ufl(updated[name])

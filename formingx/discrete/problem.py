@@ -24,8 +24,10 @@ from .constraints import Active, Constraints
 from .contact_nodes import ContactNodes
 from .contact_points import ContactPoints
 from .formulations import formulate
+from .history import MaterialHistory
 from .matrix import ExtendedMatrix
 from .schedule import Setting
+from .step_error import StepError
 from .viscosity import Viscosity
 
 
@@ -73,9 +75,9 @@ class Problem:
                                            for form in (forms.control_derivative, forms.time_derivative))
         self.contacts = [(ContactNodes if contact.points == "nodes" else ContactPoints)(forms, contact, self.assemble)
                          for contact in scene.contacts]
-        if scene.heat is not None:                              # after the materials: they relax at the old temperature
+        if scene.heat is not None:                              # after the materials, which heat it
             forms.histories.append(scene.heat.history(self))
-        self.histories = [*(contact for contact in self.contacts if contact.law.remembers), *forms.histories]
+        self.histories: list[Any] = [*(contact for contact in self.contacts if contact.law.remembers), *forms.histories]
         self._admissible = Admissible(forms)
         self._constraints = Constraints(forms, self.assemble)
         self._by_motion = self._lift = None
@@ -141,6 +143,11 @@ class Problem:
     def has_history(self) -> bool:
         """True if F depends on more than x and control."""
         return bool(self.histories)
+
+    @property
+    def materials(self) -> list[MaterialHistory]:
+        """The histories of materials."""
+        return [history for history in self.forms.histories if isinstance(history, MaterialHistory)]
 
     @property
     def relaxes(self) -> bool:
@@ -249,7 +256,7 @@ class Problem:
     def look_at(self, x: np.ndarray, control: float) -> None:
         """Put the fields of x, own part, and the control where the forms see them."""
         self.forms.control.value = control
-        self._set_own(x)
+        self.place(x)
 
     @property
     def fading_forces(self) -> np.ndarray | None:
@@ -305,6 +312,11 @@ class Problem:
         return Viscosity(self._viscosity, self._stage.active.bcs)
 
     @cached_property
+    def step_error(self) -> StepError:
+        """Of steps in time."""
+        return StepError(self)
+
+    @cached_property
     def _viscosity(self) -> Any:
         return self.forms.compile(self.forms.viscosity())
 
@@ -352,8 +364,7 @@ class Problem:
 
         start: the unknowns at the state that the step begins at.
         """
-        self.forms.control.value = control
-        self.place(x)
+        self.look_at(x, control)
         before = [history.get() for history in self.forms.histories]
         for history in self.forms.histories:
             history.advance(x[: self._n], control, start)

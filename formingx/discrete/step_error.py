@@ -17,7 +17,6 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from .. import _compat
-from .history import MaterialHistory
 
 _AT_REST = 1e-6
 """Stress, over the largest modulus, that counts as none."""
@@ -33,7 +32,7 @@ class StepError:
     def __init__(self, problem: Any):
         self._problem, self._forms = problem, problem.forms
         forms = self._forms
-        self._materials = [h for h in forms.histories if isinstance(h, MaterialHistory)]
+        self._materials = problem.materials
         heat = len(self._materials) < len(forms.histories)
         self._stresses = [_Stress(forms, terms) for terms in forms.terms
                           if terms.internal or heat and terms.follows_temperature]

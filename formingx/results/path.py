@@ -155,27 +155,33 @@ class Path:
     def _between(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
         """The state between two neighbours that meets a target; the problem stands at the first."""
         if segment.problem.has_history:                      # what lies between depends on how it is come to
-            found = self._run_to(segment, left, target, bound)
+            found = self._run_to(segment, left, right, target, bound)
         else:
             found = segment.curve.find(left, right, bound, target)
             found.stage, found.setting = left.stage, left.setting
+            found.measures = self._measures(segment, found)
         segment.curve.spent()
-        found.measures = self._measures(segment, found)
         return found
 
-    def _run_to(self, segment: Segment, left: State, target: Target, bound: Bound) -> State:
+    def _run_to(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
         """The state that a run would come to that goes on from `left` to the target."""
+        if left.time < right.time and not left.setting["rate"][-1]:
+            raise InputError(f"the path passes {target} within a flow, between two of its states: run with"
+                             f" through=[...] to have a state there")
         record = Record(segment.problem, segment.curve)
         record.segments[-1].states.append(replace(left, met=None))
         record.stage = left.stage
         before = segment.states[: segment.states.index(left) + 1]
-        step: dict[str, Any] = next((s.stepping["step"] for s in reversed(before)
-                                     if s.stepping and s.setting == left.setting), {})
+        kept: dict[str, Any] = next((s.stepping for s in reversed(before) if s.stepping and s.setting == left.setting),
+                                    {})
+        step, given = StepControl(**kept.get("step", {})), {k: v for k, v in kept.items() if k == "accuracy"}
         try:
-            Run(record, [(target, bound)], StepControl(**step)).follow(200, False, None)
+            Run(record, [(target, bound)], step, **given).follow(200, False, None)
         except (ConvergenceError, Failure) as error:
             raise ConvergenceError(f"the path passes {target} between two of its states, but no state was found there:"
                                    f" {error}; run with through=[...] to have one") from None
+        for k in range(2, len(record.states) + 1):
+            self._fill(segment, record.states[:k])
         return record.last
 
     def between(self, a: State, b: State, fraction: float) -> State:
@@ -244,35 +250,40 @@ class Path:
 
     def _measure(self, state: State) -> None:
         """Fill the columns of an accepted state."""
-        state.measures = self._measures(self.segments[-1], state)
-        if "dissipated_power" in state.measures:
-            segment, lost = self.segments[-1], 0.0
-            if len(segment.states) > 1:
-                lost = segment.states[-2].measures["dissipated_energy"] + self._dissipated(segment)
-            state.measures["dissipated_energy"] = lost
+        segment = self.segments[-1]
+        self._fill(segment, segment.states)
 
-    def _dissipated(self, segment: Segment) -> float:
-        """Energy that materials have dissipated between the last two states, by Simpson's rule.
+    def _fill(self, segment: Segment, states: list[State]) -> None:
+        """Fill the columns of the last of some states, which may be the first of all."""
+        state = states[-1]
+        state.measures = self._measures(segment, state)
+        if "dissipated_power" in state.measures:
+            state.measures["dissipated_energy"] = 0.0 if len(states) == 1 else (
+                states[-2].measures["dissipated_energy"] + self._dissipated(segment, states))
+
+    def _dissipated(self, segment: Segment, states: list[State]) -> float:
+        """Energy that materials have dissipated between the last two of some states, by Simpson's rule.
 
         Half way in time the body is on the curve that the run takes it along; what it remembers is advanced to there.
         """
-        before, state = segment.states[-2:]
+        before, state = states[-2:]
         if not before.time < state.time:
             return 0.0
         column, time = self._view(segment).columns["dissipated_power"], (before.time + state.time) / 2
         if state.setting["rate"][-1]:
             x, control = segment.curve.interpolate(before, state, 0.5)
         else:                                                # a flow, whose tangents are at a fixed time
-            past = [*extrapolate.before(segment.states[:-1], time, extrapolate.CUBIC - 1), state]
+            past = [*extrapolate.before(states[:-1], time, extrapolate.CUBIC - 1), state]
             weights = extrapolate.weights(past, time)
             x, control = weights @ [s.x for s in past], float(weights @ [s.control for s in past])
         with segment.problem.at(before) as problem:
             if not state.setting["rate"][-1]:
                 problem.forms.clock = time
             time = problem.forms.time_at(control)
-            for number, memory in problem.foretell(x, control).items():
-                problem.histories[number].put(memory)
             problem.x.array_w[:] = x
+            problem.look_at(x, control)
+            for history in problem.materials:
+                history.advance(x, control)
             half = column.value(problem.x, control)
         a, b = (s.measures["dissipated_power"] for s in (before, state))
         # the parabola through the three powers, at times that need not be even

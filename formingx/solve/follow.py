@@ -68,6 +68,7 @@ class Run:
                  at_fold: str | None = None, accuracy: float = 2e-3, label: str = ""):
         self.record, self._label, self.curve, self.problem = record, label, record.curve, record.problem
         self._at_fold = at_fold or ""
+        self._accuracy = accuracy
         self._time_error = TimeError(self.problem, accuracy) if self.problem.relaxes else None
         self.open = list(targets)
         self.until, self._aim = self.open[-1]
@@ -194,7 +195,7 @@ class Run:
         self.record.counts.seconds += self._elapsed()
         no_rest_at = None if np.isnan(self._no_rest_at) else float(self._no_rest_at)
         self.record.settle(self.step, self.until, given=self._step and asdict(self._step),
-                           jumps=(self._ahead, no_rest_at))
+                           accuracy=self._accuracy, jumps=(self._ahead, no_rest_at))
 
     def _facing_target(self, start: State) -> State:
         """The start, its tangent turned if the target lies the other way.

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from ..discrete.step_error import StepError
 from ..errors import InputError, finite
 from . import extrapolate
 from .state import State
@@ -41,7 +40,7 @@ class TimeError:
     """
 
     def __init__(self, problem: Any, accuracy: float):
-        self._problem, self._error = problem, StepError(problem)
+        self._problem = problem
         self._once, self._adding_up = _ONCE * accuracy, _ADDING_UP * accuracy**1.5
 
     def of(self, states: list[State], x: np.ndarray, control: float) -> float:
@@ -51,5 +50,5 @@ class TimeError:
         end = State(x, control, x, 0.0, time=time)
         middle = (past[-1].time + time) / 2
         share = extrapolate.weights([*past, end], middle) if time > past[-1].time else np.array([])
-        once, lasting = self._error.of(past, share, x, control)
+        once, lasting = self._problem.step_error.of(past, share, x, control)
         return max(once / self._once, lasting / self._adding_up)
