@@ -305,3 +305,15 @@ def test_parison_of_programmed_wall():
 def test_varying_thickness_refuses(thickness, words):
     with pytest.raises(fx.InputError, match=words):
         fx.mesh.disc(radius=1.0, thickness=thickness, elements=(4, 1))
+
+
+def test_meshes_and_scenes_say_what_is_there():
+    mesh = fx.mesh.disc(radius=2.0, thickness={"a": 0.1, "b": 0.2}, elements=(6, 1))
+    assert str(mesh) == """24 six-node triangles, R from 0 to 2, Z from 0 to 0.3
+layers: a, b
+boundaries: axis (2 edges), rim (2 edges), bottom (6 edges), top (6 edges)"""
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
+    lines = str(scene).splitlines()
+    assert lines[0].startswith("mesh               24 six-node triangles, 2 by 0.3 (R, Z); layers: a, b; boundaries: axis")
+    assert {"material of b      NeoHookean(c10=1.0)", "load 1             Pressure('bottom') (driven)"} <= set(lines)

@@ -110,6 +110,26 @@ def test_restart_in_the_middle(stages, tmp_path):
         assert again[column] == pytest.approx(whole[column], rel=1e-9, abs=1e-14)
 
 
+def test_the_state_of_a_stage_and_a_time():
+    body = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1)), materials=P0,
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")])
+    path = fx.Process(body).run([fx.Stage("blow", drive="air", until=fx.pole_height(0.2), speed=1.0),
+                                  fx.Stage("wait", duration=2.0)], progress=False, accuracy=1e-2)
+    stages = list(dict.fromkeys(state.stage for state in path.states))
+    for stage in stages:
+        mine = [state for state in path.states if state.stage == stage]
+        assert path.state(stage) is mine[-1] and path.state(stage, mine[0].time) is mine[0]
+        if mine[-1].time > mine[0].time:
+            time = mine[0].time + 0.37 * (mine[-1].time - mine[0].time)
+            found = path.state(stage, time)
+            assert found.time == pytest.approx(time, rel=1e-9) and found.stage == stage
+        with pytest.raises(fx.InputError, match=f"time = 1e.09: stage '{stage}' goes from"):
+            path.state(stage, 1e9)
+    assert path.state() is path.last
+    with pytest.raises(fx.InputError, match="stage 'held' is not known; known: "):
+        path.state("held")
+
+
 def test_unit_of_time():
     """In hours as in seconds."""
     paths = [run(sheet(unit=unit), blow(T=0.5 / unit, held=1.0 / unit)) for unit in (1.0, 3600.0)]

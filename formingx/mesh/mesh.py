@@ -33,6 +33,17 @@ class Mesh:
     boundaries: dict[str, tuple[int, ...]]
     comm: MPI.Comm
 
+    def __str__(self) -> str:
+        """What is there; edges and sizes only of a mesh on one rank: it is not collective."""
+        cells, alone = self.domain.topology.index_map(2).size_global, self.comm.size == 1
+        edges = {name: f" ({len(self.facets_of(name))} edges)" if alone else "" for name in self.boundaries}
+        lines = [f"{cells} six-node triangles"]
+        if alone:
+            (r, z), (R, Z) = (f(self.domain.geometry.x[:, :2], axis=0) for f in (np.min, np.max))
+            lines[0] += f", R from {r:.6g} to {R:.6g}, Z from {z:.6g} to {Z:.6g}"
+        return "\n".join([*lines, f"layers: {', '.join(self.layers)}",
+                          f"boundaries: {', '.join(name + of for name, of in edges.items())}"])
+
     def check(self) -> None:
         """Look the elements over, as reading a mesh does: for meshes whose nodes were moved; collective.
 

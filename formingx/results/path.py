@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ConvergenceError, InputError
+from ..errors import ConvergenceError, InputError, finite, known
 from ..solve import extrapolate
 from ..solve.follow import Run
 from ..solve.newton import Failure
 from ..solve.state import Counts, Record, Segment, State
 from ..solve.stepping import StepControl
-from ..solve.targets import Bound, Target, is_met
+from ..solve.targets import Bound, Target, is_met, process_time
 from . import columns as standard_columns
 from .evaluate.profile import Profile, Profiles
 from .evaluate.stress import Stresses, StressField
@@ -111,6 +111,26 @@ class Path:
             measure = self._view(segment).columns[measure]
         with segment.problem.at(state) as problem:
             return measure.value(problem.x, state.control)
+
+    def state(self, stage: str | None = None, time: float | None = None) -> State:
+        """The last state (of a stage), or the one at a process time (in a stage): solved for where none lies there.
+
+        Raises:
+            InputError: there is no such stage, or it does not pass that time.
+            ConvergenceError: see `at`.
+        """
+        if stage is not None:
+            known("Path.state: stage", stage, list(dict.fromkeys(state.stage for state in self.states)))
+        there = [state for state in self.states if stage in (None, state.stage)]
+        if time is None:
+            return there[-1]
+        time = finite("Path.state: time", time)
+        first, last = there[0].time, there[-1].time
+        if not first <= time <= last:
+            raise InputError(f"Path.state: time = {time:g}: {f'stage {stage!r}' if stage else 'the run'} goes from"
+                             f" {first:g} to {last:g}")
+        exact = next((state for state in there if state.time == time), None)
+        return exact or self.at(process_time(time), after=there[0])
 
     def at(self, target: Target, after: State | None = None) -> State:
         """The first state of the path that meets the target: solved for, not interpolated; the path stays as it is.

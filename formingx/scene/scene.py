@@ -22,6 +22,7 @@ from ..physics.part import Part
 from ..physics.supports import Held, Support
 from . import tool_width
 from .sampling import sample
+from .summary import summary
 from .temperature import BodyTemperature
 
 _HIGHEST = 30
@@ -67,6 +68,7 @@ class Scene:
             raise InputError(f"Scene: materials = {materials!r}: must be a formingx material, or {{layer: material}}")
         mesh.check()                                           # its nodes may have been moved
         self.mesh = mesh
+        self._extent = _extent(mesh)
         self.materials = dict(materials)
         self.supports = _all_of(Support, "supports", supports, "supports, such as Clamped('rim')")
         self.loads = _all_of(Load, "loads", loads, "loads, such as Pressure('bottom')")
@@ -357,10 +359,19 @@ class Scene:
     @property
     def extent(self) -> np.ndarray:
         """Size of the mesh along R and Z, shape (2,), all ranks."""
-        X, comm = self.mesh.domain.geometry.x[:, :2], self.mesh.comm
-        high = np.array([comm.allreduce(X[:, i].max(initial=-np.inf), MPI.MAX) for i in (0, 1)])
-        low = np.array([comm.allreduce(X[:, i].min(initial=np.inf), MPI.MIN) for i in (0, 1)])
-        return high - low
+        return self._extent
+
+    def __str__(self) -> str:
+        lines = summary(self)
+        width = max(map(len, lines))
+        return "\n".join(f"{part:{width}}  {line}" for part, line in lines.items())
+
+
+def _extent(mesh: Mesh) -> np.ndarray:
+    X, comm = mesh.domain.geometry.x[:, :2], mesh.comm
+    high = np.array([comm.allreduce(X[:, i].max(initial=-np.inf), MPI.MAX) for i in (0, 1)])
+    low = np.array([comm.allreduce(X[:, i].min(initial=np.inf), MPI.MIN) for i in (0, 1)])
+    return high - low
 
 
 def _all_of(kind: type, name: str, things: Any, what: str) -> list[Any]:

@@ -28,12 +28,13 @@ from ... import _compat
 from ...discrete.problem import Problem
 from ...errors import InputError, instance, place
 from ...scene.scene import Scene
+from ...scene.summary import summary
 from ...solve.curve import Curve
 from ...solve.newton import Iteration, Tolerances
 from ...solve.state import Counts, Record, State
 from ...solve.targets import Target
 from .. import files
-from .description import describe, differences, summary
+from .description import describe, differences
 
 FORMAT = 3
 _FIELDS = ("x", "direction")

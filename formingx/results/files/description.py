@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -14,6 +13,7 @@ from ... import _compat
 from ...materials.constants import Varying
 from ...materials.material import Material
 from ...scene.sampling import sample
+from ...scene.summary import text
 
 _PARTS = ("materials", "supports", "loads", "contacts", "model", "kinematics", "quadrature_degree")
 
@@ -36,34 +36,6 @@ def describe(problem: Any) -> dict[str, Any]:
             found["materials"][layer] |= {"shear_modulus": scene.shear_modulus(layer),
                                           "sums": _sums_of_constants(scene, layer)}
     return found
-
-
-def summary(scene: Any) -> dict[str, str]:
-    """{part: one line for people} of a scene."""
-    mesh, comm = scene.mesh, scene.mesh.comm
-    topology, extent = mesh.domain.topology, scene.extent
-    cells = comm.allreduce(topology.index_map(2).size_local, MPI.SUM)
-    layers = ", ".join(mesh.layers)
-    lines = {"mesh": f"{cells} six-node triangles, {extent[0]:.6g} by {extent[1]:.6g} (R, Z); layers: {layers}"
-                     f"; boundaries: {', '.join(mesh.boundaries)}"}
-    for name, material in scene.materials.items():
-        lines[f"material of {name}"] = text(material)
-    for kind in ("supports", "loads", "contacts"):
-        for k, thing in enumerate(getattr(scene, kind), 1):
-            numbers = "".join(f", {name.replace('_', ' ')} {value!r}" for name, value in vars(thing).items()
-                              if isinstance(value, int | float) and repr(value) not in text(thing))
-            lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if thing.driven else "")
-    return lines | {"model": text(scene.model), "kinematics": text(scene.kinematics),
-                    "quadrature degree": str(scene.quadrature_degree),
-                    **({} if scene.temperature is None else {"temperature": text(scene.temperature)})}
-
-
-def text(thing: Any) -> str:
-    """repr without memory addresses; of an object that has none of its own, its kind and its public attributes."""
-    if type(thing).__repr__ is object.__repr__:
-        inside = ", ".join(f"{k}={v!r}" for k, v in vars(thing).items() if not k.startswith("_"))
-        return f"{type(thing).__name__}({inside})"
-    return re.sub(r" at 0x[0-9a-f]+", "", repr(thing))
 
 
 def plain(value: Any, depth: int = 8) -> Any:

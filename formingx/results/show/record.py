@@ -125,7 +125,7 @@ class Record:
 
 def of_path(path: Any) -> Record:
     """The record of a `Path`; collective."""
-    from ..files.description import summary
+    from ...scene.summary import summary
     try:
         profiles = [path.profile(state) for state in path.states]
     except InputError:
