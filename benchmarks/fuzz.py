@@ -216,7 +216,7 @@ def cases(folder: Path) -> dict[str, Callable[[random.Random], Any]]:
             found[f"runs {call.name}"] = lambda rng, c=call, g=good: c.make(**_required(c, g, rng))
         elif call.name != "mesh.read":
             found[f"{_kind(call.name)} {call.name}"] = lambda rng, c=call, g=good: _used(c, _required(c, g, rng))
-    found |= _of_files(folder) | _of_fits() | _of_tools() | _of_meshes() | _of_runs(folder, made)
+    found |= _of_files(folder) | _of_fits() | _of_answers() | _of_tools() | _of_meshes() | _of_runs(folder, made)
     return found
 
 
@@ -301,6 +301,38 @@ def _of_fits() -> dict[str, Callable]:
         return str(fx.fit(material, rng.choice([tests, tests, tests, anything(rng)]),
                           rng.choice([None, None, 1, 2, anything(rng)])))
     return {"fits fit": call}
+
+
+def _of_answers() -> dict[str, Callable]:
+    """Curves compared, and scenes looked over: every column, unit, stage and size that a user may mistake."""
+    import reliability
+
+    import formingx as fx
+
+    def side(rng):
+        n = rng.randint(0, 6)
+        far = [rng.choice([1e308, -1e308, 5e-324, 0.0, 1.0]) for _ in range(n)]
+        column = [[near(0.1 * k, rng) for k in range(n)], far]
+        return rng.choice([{"a": rng.choice(column), "b": rng.choice(column)}] * 5 + [anything(rng)])
+
+    def compare(rng):
+        columns = rng.choice([None, ["a", "b"], {"a": "b", "b": "a"}, anything(rng)])
+        str(fx.compare(side(rng), side(rng), columns=columns,
+                       units=rng.choice([None, {"a": near(2.0, rng)}, {"b": "mm"}, anything(rng)])))
+
+    def doctor(rng):
+        scene = rng.choice([reliability._scene, reliability._named])()
+        target = rng.choice([fx.pressure, fx.travel, fx.pole_height])
+        stage = fx.Stage("on", drive=rng.choice(scene.drivable), until=target(near(0.1, rng) * rng.choice([1, -1])))
+        mixed = rng.choice([[stage], [], anything(rng)])
+        str(fx.doctor(scene, targets=rng.choice([[], [fx.pole_stretch(2.0)], anything(rng)]), stages=mixed,
+                      units=rng.choice([fx.Units(length="mm", stress="MPa"), fx.Units(), anything(rng)])))
+
+    def made(rng):
+        kind = rng.choice([fx.NeoHookean, fx.MooneyRivlin, fx.Gent, fx.Yeoh, fx.Ogden, fx.Viscoelastic])
+        kind(*[rng.choice([1.0, [1.0], anything(rng)]) for _ in range(rng.randint(0, 3))],
+             **{name: near(1.0, rng) for name in rng.sample(["c10", "c01", "mu", "alpha", "Jm", "branches"], 2)})
+    return {"answers compare": compare, "answers doctor": doctor, "answers material": made}
 
 
 def _of_tools() -> dict[str, Callable]:

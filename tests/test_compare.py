@@ -176,6 +176,7 @@ def test_bad_tables(tmp_path, text, message):
     ({"units": {"z": 1}}, "units: column 'z' is not known"),
     ({"units": {"a": 0}}, "must be greater than 0"),
     ({"units": 3}, "compare: units = 3: must be"),
+    ({"columns": ["a", ["b"]]}, r"compare: columns: column = \['b'\]: must be a name"),
     ({"columns": 3}, "compare: columns = 3: must be a list of names"),
     ({"units": {"a": "cm"}}, "does not state the unit of column 'a'"),
 ])

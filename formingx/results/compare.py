@@ -199,7 +199,8 @@ def _columns(left: csv_files.Table, right: csv_files.Table, given: Any) -> dict[
                              f" {', '.join(right.columns)}: fewer than two have the same name; say which belong"
                              f" together, as columns={{our name: their name}}")
         return pairs
-    pairs = dict(given) if isinstance(given, Mapping) else {c: c for c in several("compare: columns", given, "names")}
+    pairs = dict(given) if isinstance(given, Mapping) else {
+        instance("compare: columns: column", c, str, "a name"): c for c in several("compare: columns", given, "names")}
     if len(pairs) < 2:
         raise InputError(f"compare: columns = {given!r}: a curve needs at least two columns")
     for our, their in pairs.items():
