@@ -222,6 +222,18 @@ def test_text_files(tmp_path, old, new, words):
         read(tmp_path, CURVED.replace(old, new, 1), "mesh.txt")
 
 
+def test_blocks_of_no_dimension(tmp_path):
+    """A block of nodes with coordinates on an entity of dimension -4 had rows of -1 number."""
+    text = """$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 1 1 1\n-4 1 1 1\n1\n0 0 0\n$EndNodes\n$Elements
+0 0 1 1\n$EndElements\n"""
+    with pytest.raises(fx.InputError, match="section .Nodes: a dimension is -4"):
+        read(tmp_path, text)
+    with pytest.raises(fx.InputError, match="4 more numbers follow"):
+        read(tmp_path, text.replace("-4 1 1 1", "2 1 1 0"))
+    with pytest.raises(fx.InputError, match="1 nodes, but its first line says 2"):
+        read(tmp_path, text.replace("-4 1 1", "2 1 0").replace("1 1 1 1", "1 2 1 1"))
+
+
 @pytest.mark.parametrize("what", BAD)
 def test_bad_files(tmp_path, what):
     text, words = BAD[what]

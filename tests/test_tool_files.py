@@ -224,7 +224,9 @@ def test_units_of_step(tmp_path):
     assert tools.read(file).pieces[0].radius == pytest.approx(30)
     assert tools.read(file, units="cm").pieces[0].radius == pytest.approx(3)
     text = file.read_text()
-    for wrong, words in ((text[:len(text) // 2], "cut off"), (re.sub(r"#\d+ = CIRCLE.*\n", "", text), "refers to #")):
+    for wrong, words in ((text[:len(text) // 2], "cut off"), (re.sub(r"#\d+ = CIRCLE.*\n", "", text), "refers to #"),
+                         (text.replace("LENGTH_UNIT()", "LENGTH_UNIT() LENGTH_UNIT()", 1), "is not whole"),
+                         (text.replace("LENGTH_UNIT()", "LENGTH_UNIT(", 1), "is not whole")):
         file.write_text(wrong)
         with pytest.raises(fx.InputError, match=words):
             tools.read(file)

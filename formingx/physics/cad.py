@@ -119,7 +119,7 @@ def _check_references(file: str) -> None:
     if "END-ISO-10303-21" not in text:
         raise InputError(f"tool file {file!r} cannot be read: it has no end: it was cut off")
     for record in text.split(";"):
-        if record.count("(") != record.count(")") or record.count("=") > 1:
+        if record.count("(") != record.count(")") or record.count("=") > 1 or _names_twice(record):
             raise InputError(f"tool file {file!r} cannot be read: the record {' '.join(record.split())[:60]!r} is not"
                              f" whole: it is damaged")
     defined = re.findall(r"#(\d+)\s*=", text)
@@ -127,3 +127,12 @@ def _check_references(file: str) -> None:
     if missing or len(set(defined)) < len(defined):
         what = f"refers to #{min(missing, key=int)}, which is not in it" if missing else "defines a number twice"
         raise InputError(f"tool file {file!r} cannot be read: it {what}: it is damaged")
+
+
+def _names_twice(record: str) -> bool:
+    """True if a record of several parts, #1 = ( A(...) B(...) ), has one of them twice."""
+    parts = re.search(r"=\s*\((.*)\)\s*$", record, re.DOTALL)
+    names, more = (parts[1] if parts else ""), 1
+    while more:
+        names, more = re.subn(r"\([^()]*\)", " ", names)
+    return len(set(names.split())) < len(names.split())

@@ -16,9 +16,10 @@ _NEEDED = {"LINE": (10, 20, 11, 21), "ARC": (10, 20, 40, 50, 51), "CIRCLE": (10,
 _COUNTED: dict[str, dict[int, tuple[int, ...]]] = {
     "LWPOLYLINE": {90: (10, 20)}, "SPLINE": {72: (40,), 73: (10, 20), 74: (11, 21)}}
 """{curve: {group code of a count: the codes that follow so many times}}."""
-_LETTERING = ("ACAD_PROXY_ENTITY", "ACAD_TABLE", "ARC_DIMENSION", "ATTDEF", "ATTRIB", "DIMENSION", "HATCH", "IMAGE",
-              "LEADER", "LIGHT", "MTEXT", "MULTILEADER", "OLE2FRAME", "OLEFRAME", "POINT", "SHAPE", "SOLID", "TEXT",
-              "TOLERANCE", "TRACE", "VIEWPORT", "WIPEOUT")
+_LETTERING = ("ACAD_PROXY_ENTITY", "ACAD_TABLE", "ARC_DIMENSION", "ATTDEF", "ATTRIB", "CAMERA", "DGNUNDERLAY",
+              "DIMENSION", "DWFUNDERLAY", "GEOPOSITIONMARKER", "HATCH", "IMAGE", "LARGE_RADIAL_DIMENSION", "LEADER",
+              "LIGHT", "MPOLYGON", "MTEXT", "MULTILEADER", "OLE2FRAME", "OLEFRAME", "PDFUNDERLAY", "POINT", "SHAPE",
+              "SOLID", "TEXT", "TOLERANCE", "TRACE", "VIEWPORT", "WIPEOUT")
 """What a drawing has beside its curves."""
 
 
