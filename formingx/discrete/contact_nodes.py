@@ -265,6 +265,16 @@ class ContactNodes:
         self._in_tangent = self._stiffness(fields, control, ahead)
         return self._between_unknowns((self._scale * self._length)[:, None, None] * self._in_tangent)
 
+    def stiffness_round(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """As `stiffness`, of forces round the axis by motions there, shape (n, m/2, m/2), see the law."""
+        radius = np.full(len(self.points), np.inf)
+        if self.solid.scene.kinematics.axisymmetric:
+            radius = self.points[:, 0] + self._length * self.displacement(fields)[:, 0]
+        found = self.law.stiffness_round(self.positions(fields, control), self.touch, radius)
+        both = np.zeros((len(found), 2, 2))
+        both[:, 0, 0] = self._scale * self._length * found
+        return self._between_unknowns(both)[:, ::2, ::2]
+
     def change_ahead(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Stiffness ahead of an accepted state, less that in the tangent last made, shape (n, 2, 2), stress/length.
 

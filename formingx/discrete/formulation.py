@@ -48,6 +48,7 @@ class Formulation(ABC):
         histories: what the forms depend on besides fields, control and time (`History`).
         potential: of a step, over stress times volume (UFL, rank 0); energy: the energy stored, likewise: the same
             without histories. dissipation: power, over stress times volume (UFL, rank 0), or None.
+        load_values: [(load, its value (UFL, the user's unit))], as the stage and the control have it.
         residual: dpotential/dw - external virtual work (UFL, rank 1); control_derivative, time_derivative: its
             derivative by the control, in the loads and by way of the time in materials, or None.
         load_works: of each load of the scene its virtual work at the value that it has (UFL, rank 1, user's units).
@@ -275,10 +276,12 @@ class Formulation(ABC):
         terms = []
         self._loads = []
         self.load_works = []
+        self.load_values = []
         for load, scale in zip(self.scene.loads, self.scales):
             base, rate = self.constant(0.0 if load.driven else load.value), self.constant(0.0)
             self._loads.append((load, base, rate))
             value = self.constant(scale) * (base + rate * control) if load.driven else base
+            self.load_values.append((load, value))
             work = body.work(load, value)
             self.load_works.append(work)
             residual -= self._scale * work

@@ -70,7 +70,7 @@ class ExtendedMatrix:
         for dofs, values in blocks:
             free = ~self._held[dofs]
             values = values * free[:, :, None] * free[:, None, :]
-            A.setValuesLocalRCV(dofs, dofs, values.reshape(len(dofs), -1), addv=add)
+            A.setValuesLocalRCV(dofs, dofs, values.reshape(len(dofs), dofs.shape[1] ** 2), addv=add)
         for k, (mine, weights, everyone, all_weights) in enumerate(self._entries):
             if len(mine):
                 A.setValues(mine.astype(PETSc.IntType), [self._first + k], weights, addv=add)

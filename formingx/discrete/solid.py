@@ -97,12 +97,16 @@ class Solid(Formulation):
         self.pressure_of = _colour(scene) if scene.model.pressure else {}
         return scene.mesh
 
-    def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
+    def mode_space(self) -> fem.FunctionSpace:
+        """The space of modes: displacement amplitudes, shape (3,), and pressures, on the elements of the fields."""
+        return fem.functionspace(self.domain, basix.ufl.mixed_element(self._elements(self.domain.basix_cell(), 3)[1]))
+
+    def _elements(self, cell: Any, components: int = 2) -> tuple[Any, list[Any]]:
         pressure = self.scene.model.pressure
         element = basix.ufl.element("Lagrange", cell, 2)
         if pressure and pressure.bubble:
             element = basix.ufl.enriched_element([element, basix.ufl.element("Bubble", cell, 3)])
-        fields = [basix.ufl.blocked_element(element, shape=(2,))]
+        fields = [basix.ufl.blocked_element(element, shape=(components,))]
         if pressure:
             field = basix.ufl.element(pressure.family, cell, pressure.degree)
             fields += [field] * (max(self.pressure_of.values()) + 1)
@@ -131,13 +135,17 @@ class Solid(Formulation):
         The energy of the material, then what keeps the volume: W(F) - rest_stress ln J, and p (J - 1) or a penalty.
         `of`: see `_energy`.
         """
-        F = self.elastic(F)
+        return self.elastic_densities(names, self.elastic(F), ufl.split(self.w)[1:], of)
+
+    def elastic_densities(self, names: list[str], F: Any, pressures: Any, of: Any = MaterialTerms.step_energy
+                          ) -> list[tuple[Any, dict]]:
+        """`energy_densities` of an elastic F and of pressure fields (UFL, dimensionless)."""
         model, terms, J = self.scene.model, self._terms[names[0]], kin.volume_ratio(F)
         W = of(terms, F)
         if model.stress_free:
             W -= terms.rest_stress * ufl.ln(J)
         modulus = self.constant(max(self.scene.shear_modulus(name) for name in names))
-        p = self.constant(self.stress) * ufl.split(self.w)[1 + self.pressure_of[names[0]]] if self.pressure_of else None
+        p = self.constant(self.stress) * pressures[self.pressure_of[names[0]]] if self.pressure_of else None
         return [(W, {}), *model.terms(J, p, modulus, self._eps)]
 
 

@@ -379,6 +379,19 @@ class Law:
         rising = (np.abs(d) < self.theta) * k / (2 * self.theta) * self.separates
         return np.where(sticks, k * slope, along * pressed), np.where(sticks, rising, along * k * slope)
 
+    def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
+        """Derivative of the traction round the axis by the motion there, shape (n,), stress/length.
+
+        That of the normal traction, N n_r/r (r: `radius`, infinite in plane strain), and what holds a point that
+        sticks; nothing holds one that slides.
+        """
+        near, found = self.nearest(x), self.tractions(x, old)
+        turned = np.divide(found.normal * near.normal[:, 0], radius, out=np.zeros(len(x)), where=radius > 0)
+        if not self.has_friction:
+            return turned
+        F, slope = self.ramp(near.distance, self._held(old))
+        return turned + np.where(found.sense == 0, self._resistance(near.distance, self.k * F, slope)[0], 0.0)
+
     def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
         """Distance and slip of points x, shape (n, 2), and their gradients."""
         near = self.nearest(x)

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 import ufl
+from ufl.constantvalue import Zero
+from ufl.tensors import ListTensor
 
 
 class Kinematics:
@@ -39,6 +41,19 @@ class Kinematics:
         """{name: displacements, shape (n, 2), of points, shape (n, 2)} of the motions that strain nothing."""
         raise NotImplementedError
 
+    def mode_gradient(self, mode: Any, X: Any, number: Any) -> Any:
+        """H, shape (3, 3), components (r, z, hoop or depth), by which a mode changes F.
+
+        Args:
+            mode: amplitudes (U, W, V) of u_r = U cos, u_z = W cos, u_hoop = V sin, shape (3,); X: shape (2,).
+            number: waves n round the axis, cos(n theta); in plane strain the wave number k along the depth, cos(k x3).
+        """
+        raise NotImplementedError
+
+    def rigid_modes(self, number: float) -> list[Callable[[np.ndarray], np.ndarray]]:
+        """Modes (U, W, V), shape (n, 3), of points where they are now, shape (n, 2), that strain nothing."""
+        raise NotImplementedError
+
 
 class Axisymmetric(Kinematics):
     """Rotational symmetry about R = 0 without twist.
@@ -62,6 +77,19 @@ class Axisymmetric(Kinematics):
     def rigid_motions(self):
         return {"translation along Z": _along_z}
 
+    def mode_gradient(self, mode, X, number):
+        U, W, V = mode[0], mode[1], mode[2]
+        return _rows(ufl.grad(mode), [-(number * U + V) / X[0], -number * W / X[0], (number * V + U) / X[0]])
+
+    def rigid_modes(self, number):
+        """Along the axis and about it (n = 0); across it and tilting it (n = 1)."""
+        def mode(*components):
+            return lambda x: np.stack([c(x[:, 0], x[:, 1]) for c in components], 1)
+        none, one = (lambda r, z: 0 * r), (lambda r, z: 1 + 0 * r)
+        return {0: [mode(none, one, none), mode(none, none, lambda r, z: r)],
+                1: [mode(one, none, lambda r, z: -1 + 0 * r),
+                    mode(lambda r, z: z, lambda r, z: -r, lambda r, z: -z)]}.get(number, [])
+
 
 class PlaneStrain(Kinematics):
     """A long body, unit depth: F33 = 1, forces and volumes per unit depth."""
@@ -82,14 +110,31 @@ class PlaneStrain(Kinematics):
                 "translation along Z": _along_z,
                 "rotation": lambda X: np.stack([-X[:, 1], X[:, 0]], 1)}
 
+    def mode_gradient(self, mode, X, number):
+        return _rows(ufl.grad(mode), [-number * mode[0], -number * mode[1], number * mode[2]])
+
+    def rigid_modes(self, number):
+        """Translations and the rotation in the plane, of a mode that is the same all along."""
+        plane = [lambda x, f=f: np.column_stack([f(x), 0 * x[:, 0]]) for f in self.rigid_motions().values()]
+        return [] if number else [*plane, lambda x: np.column_stack([0 * x, 1 + 0 * x[:, 0]])]
+
 
 def _along_z(X):
     return np.stack([0 * X[:, 0], 1 + 0 * X[:, 0]], 1)
 
 
 def volume_ratio(F):
-    """J = det F of an F with the block structure of this module."""
-    return F[2, 2] * (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0])
+    """J = det F; of an F with the block structure of this module the one product that is not zero."""
+    J = F[2, 2] * (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0])
+    if is_block(F):
+        return J
+    return J + F[0, 2] * (F[1, 0] * F[2, 1] - F[1, 1] * F[2, 0]) + F[1, 2] * (F[0, 1] * F[2, 0] - F[0, 0] * F[2, 1])
+
+
+def is_block(F):
+    """True if F has the block structure of this module; modes alone have none, and write their F entry by entry."""
+    across = ((0, 2), (1, 2), (2, 0), (2, 1))
+    return not isinstance(F, ListTensor) or all(isinstance(F[place], Zero) for place in across)
 
 
 def invariants(F):
@@ -106,7 +151,7 @@ def sum_of_powers(F, alpha):
     part is even in d. Near d = 0 its series in x = (d/m)^2 replaces it, so that value and derivatives have no 0/0;
     beyond, the small eigenvalue is det C / (m + d), which unlike m - d loses no digits in a thin sheet. At the switch,
     x = 1e-4, five terms and round-off both leave second derivatives exact to some 1e-14 of their norm (alpha from -5
-    to 10).
+    to 10). The F of a mode may have entries across the blocks: it is exact to their second order.
     """
     C = F.T * F
     a = alpha / 2
@@ -118,8 +163,51 @@ def sum_of_powers(F, alpha):
         term = term * (a - k + 2) * (a - k + 1) / (k * (k - 1)) * x
         series = series + term
     large = 1 + ufl.sqrt(ufl.conditional(near, 1e-4, x))        # the branch not taken must be finite too
-    small = ((F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) / m) ** 2 / large
-    return m**a * ufl.conditional(near, series, large**a + small**a) + C[2, 2] ** a
+    small = _in_plane_determinant(F) / m**2 / large
+    powers = m**a * ufl.conditional(near, series, large**a + small**a) + C[2, 2] ** a
+    return powers if is_block(F) else powers + _powers_across(F, ufl.as_vector([C[0, 2], C[1, 2]]), a)
+
+
+def _in_plane_determinant(F):
+    """Of C = F^T F."""
+    det = (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) ** 2
+    if is_block(F):
+        return det
+    return det + sum((F[2, 0] * F[i, 1] - F[2, 1] * F[i, 0]) ** 2 for i in range(2))
+
+
+def _powers_across(F, b, a):
+    """What entries b = (C13, C23) add to tr C^a, to second order: b . g(A) b with the in-plane part A of C, C33 = c.
+
+    An eigenvalue x of A becomes x + b^2/(x - c), and c less, so g(x) = a (x^s - c^s)/(x - c), s = a - 1, and that is
+    a (x c)^(s - 1)/2 sinh(s y)/sinh(y), y = ln(x/c)/2: nothing is lost where stretches coincide. Entries of F within
+    the blocks alone are in g, which derivatives by a mode across them leave alone.
+    """
+    F2, c, s = ufl.as_matrix([[F[0, 0], F[0, 1]], [F[1, 0], F[1, 1]]]), F[2, 2] ** 2, a - 1
+    A = F2.T * F2
+    m, J2 = ufl.tr(A) / 2, ufl.det(F2) ** 2
+    d = ufl.sqrt(((A[0, 0] - A[1, 1]) / 2) ** 2 + A[0, 1] ** 2)
+
+    def g(x):
+        y = ufl.ln(x / c) / 2
+        same = ufl.lt(abs(y), 1e-12)
+        away = ufl.conditional(same, 1, y)                      # the branch not taken must be finite too
+        return a * (x * c) ** ((s - 1) / 2) * ufl.conditional(same, s, ufl.sinh(s * away) / ufl.sinh(away))
+    high, low = g(m + d), g(J2 / (m + d))
+    apart = ufl.inner(b, (A - m * ufl.Identity(2)) * b) / ufl.max_value(d, 1e-150)
+    return (high + low) / 2 * ufl.inner(b, b) + (high - low) / 2 * apart
+
+
+def cofactor_change(F, H):
+    """By how much the cofactor of F, shape (3, 3), changes with F by H, to first order."""
+    def entry(i, j):
+        (a, b), (c, d) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)
+        return F[a, c] * H[b, d] + H[a, c] * F[b, d] - F[a, d] * H[b, c] - H[a, d] * F[b, c]
+    return ufl.as_tensor([[entry(i, j) for j in range(3)] for i in range(3)])
+
+
+def _rows(gradient, last):
+    return ufl.as_tensor([[gradient[i, 0], gradient[i, 1], last[i]] for i in range(3)])
 
 
 def _block(F2, F33):

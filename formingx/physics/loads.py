@@ -6,7 +6,8 @@ from typing import Any
 
 import ufl
 
-from ..errors import finite, instance
+from ..errors import InputError, finite, instance
+from .kinematics import cofactor_change
 from .part import Part
 
 
@@ -38,6 +39,17 @@ class Load(Part):
             body: a `formingx.discrete.formulation.LoadedBody`: u, du, X, F, kinematics, `integral`, `face`.
         """
         raise NotImplementedError
+
+    def mode_work(self, body: Any, value: Any) -> Any:
+        """Of its virtual work, the change by a mode that varies round the body: a UFL form, or None of a dead load.
+
+        Bilinear in `body.dmode` and `body.mode`: amplitudes (u_r, u_z, u_hoop), shape (3,), length.
+
+        Args:
+            body: as in `virtual_work`; `body.H`, shape (3, 3): by how much the mode changes F.
+        """
+        raise InputError(f"{self!r}: stability: how it changes with a mode is not known: give the load a method"
+                         f" mode_work(body, value) that returns a form, or None if it does not")
 
     def unit(self, body: Any) -> float:
         """The value at which a driven load counts as one: a run takes its steps in parts of it.
@@ -73,6 +85,11 @@ class Pressure(Load):
         face = body.face(self.on, self.quadrature_degree)
         area = body.kinematics.area_vector(body.u, body.X, face.normal)         # with its weight
         return -value * ufl.inner(area, body.du) * face.measure
+
+    def mode_work(self, body, value):
+        face = body.face(self.on, self.quadrature_degree)
+        N = ufl.as_vector([face.normal[0], face.normal[1], 0])
+        return -value * face.integral(ufl.inner(cofactor_change(body.F, body.H) * N, body.dmode))
 
     def unit(self, body):
         """Stress times thickness over length, thickness being the volume of the body over the loaded area."""

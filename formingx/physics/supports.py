@@ -50,11 +50,17 @@ class Support(Part):
 
 
 class Symmetry(Support):
-    """No displacement across a symmetry line that lies along Z (an axis, `normal="r"`) or R (`normal="z"`)."""
+    """No displacement across a symmetry line that lies along Z (an axis, `normal="r"`) or R (`normal="z"`).
 
-    def __init__(self, on: str, normal: str = "r"):
+    Args:
+        mirror: the body goes on behind it, as its own image: then modes that are no image of themselves count, too, see
+            `Path.stability`. False: it is an axis, or a guide along which the body slides.
+    """
+
+    def __init__(self, on: str, normal: str = "r", mirror: bool = False):
         super().__init__(on)
         self.component = _component(f"Symmetry({on!r}): normal", normal)
+        self.mirror = instance(f"Symmetry({on!r}): mirror", mirror, bool, "True or False")
 
     def constraints(self):
         return [Held(self.component, on=self.on)]

@@ -43,6 +43,7 @@ class Path:
         self.record, self._timed, self._own = record, timed, {} if columns is None else columns
         self._views: dict[int, _View] = {}
         self._walls: Any = None
+        self._watch: Any = None
         self._view(record.segments[-1])                      # so that nothing is compiled on the way
         record.on_state.append(self._measure)
 
@@ -412,6 +413,22 @@ class Path:
         axisymmetric = self.problem.scene.kinematics.axisymmetric
         (views.revolved if axisymmetric else views.extruded)(self.profile(state), file, self.problem.comm)
         return Picture(file)
+
+    def stability(self, modes: Any = range(9), states: Any = 20) -> Any:
+        """Which modes that vary round the body are unstable, and where the path loses them (`Stability`); print it.
+
+        It costs about two iterations a mode and state. What is lost is located between the path's own states.
+
+        Args:
+            modes: waves round the axis, cos(n theta); in plane strain wave numbers along the depth, over length.
+            states: how many, evenly along the path; "all"; a state, or several.
+
+        Raises:
+            InputError: a membrane; a load that does not say how it changes with a mode; an argument not allowed.
+        """
+        from .stability import Watch
+        self._watch = self._watch or Watch(self)
+        return self._watch.look(modes, states)
 
     def wall(self, state: State | None = None) -> Any:
         """The wall of the part at a state (default: the last), place by place (`Wall`): to_csv, to_excel."""

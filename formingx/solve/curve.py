@@ -238,6 +238,11 @@ class Curve:
                 high = middle
         return self.solve(*self.interpolate(a, b, low), bound.equation(target), "target", a)
 
+    def inside(self, a: State, b: State, fraction: float) -> State:
+        """The state at a fraction of the way between two, in the plane normal to the tangent of the first."""
+        x, control = self.interpolate(a, b, fraction)
+        return self.solve(x, control, self._plane(a, x, control), "step", a)
+
     def find(self, a: State, b: State, bound: Any, target: Any) -> State:
         """`between` for a target that lies between two states; raises `ConvergenceError`."""
         try:

@@ -22,8 +22,8 @@ def configure(ksp: PETSc.KSP, matrix: PETSc.Mat, symmetric: bool) -> None:
 class DirectSolver:
     """Factorise, then solve as often as needed."""
 
-    def __init__(self, matrix: PETSc.Mat, symmetric: bool, determinant: bool = False):
-        self._matrix, self._symmetric, self._determinant = matrix, symmetric, determinant
+    def __init__(self, matrix: PETSc.Mat, symmetric: bool, determinant: bool = False, inertia: bool = False):
+        self._matrix, self._symmetric, self._determinant, self._inertia = matrix, symmetric, determinant, inertia
         self._columns: list[PETSc.Mat] = []                 # dense, for `solve_all`
         self._scaled = False                                # there are factors, and a scaling with them
         self._keeps = matrix.comm.size == 1                 # MUMPS can keep it
@@ -75,11 +75,17 @@ class DirectSolver:
         """Sign of the determinant of the last factorisation (with `determinant`), 1 or -1, the same on all ranks."""
         return int(np.sign(self._ksp.getPC().getFactorMatrix().getMumpsRinfog(12)))
 
+    def negative_pivots(self) -> int:
+        """Of D in L D L^T, all ranks (with `inertia`, of a symmetric matrix)."""
+        return int(self._ksp.getPC().getFactorMatrix().getMumpsInfog(12))
+
     def _create(self) -> None:
         self._ksp = PETSc.KSP().create(self._matrix.comm)
         configure(self._ksp, self._matrix, self._symmetric)
         if self._determinant:
             self._ksp.getPC().getFactorMatrix().setMumpsIcntl(33, 1)
+        if self._inertia:                # the last block is not left to ScaLAPACK, which counts no pivots
+            self._ksp.getPC().getFactorMatrix().setMumpsIcntl(13, 1)
 
     def _dense(self, n: int, m: int) -> list[PETSc.Mat]:
         """Two matrices of n own rows and m columns, the same as before if that had as many."""

@@ -1,0 +1,225 @@
+"""The second variation against tangents, rigid motions and energies in space; losses against exact bifurcations."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from conftest import run_json, treloar
+
+import formingx as fx
+import formingx.reference_stability as exact
+from formingx.discrete.problem import Problem
+from formingx.discrete.second_variation import SecondVariation
+from formingx.errors import InputError
+
+
+def sparse(matrix):
+    pointers, columns, values = matrix.getValuesCSR()
+    return sp.csr_matrix((values, columns, pointers), shape=matrix.getSize())
+
+
+def ring(material, supports=None, **scene):
+    mesh = fx.mesh.disc(radius=2.0, thickness=0.8, elements=(4, 2), inner_radius=0.5)
+    return fx.Scene(mesh=mesh, materials=material, supports=supports or [fx.Clamped("rim")], **scene)
+
+
+def column(nu, material=None, elements=(6, 16), half=False):
+    """A solid cylinder between frictionless plates, or half of it."""
+    height = np.pi / nu
+    mesh = fx.mesh.disc(radius=1.0, thickness=height / 2 if half else height, elements=elements)
+    return fx.Scene(mesh=mesh, materials=material or fx.NeoHookean(c10=1.0), supports=[
+        fx.Symmetry("axis"), fx.Symmetry("bottom", "z", mirror=half), fx.Displaced("top", "z")])
+
+
+def contact_scene():
+    mesh = fx.mesh.disc(radius=1.0, thickness=0.2, elements=(8, 2))
+    return fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=1.0, c01=0.3), loads=[fx.Pressure("top")],
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                    contacts=[fx.Contact("bottom", fx.tools.plane(-0.3).reversed(), "none")])
+
+
+@pytest.mark.parametrize("make, until", [
+    (lambda: column(1.0, fx.Ogden(mu=(1.4, -0.3), alpha=(2.5, -2.0))), fx.travel(-0.3)),
+    (lambda: treloar(), fx.pole_height(1.0)), (contact_scene, fx.pressure(8.0))],
+    ids=["Ogden", "follower pressure", "contact"])
+def test_no_waves_are_the_tangent(make, until):
+    path = fx.trace(make(), until=until, progress=False)
+    problem, variation = path.problem, SecondVariation(path.problem)
+    with problem.at(path.last):
+        n, free = problem.n_owned, np.ones(problem.n_owned, dtype=bool)
+        free[problem.held] = False
+        K = sparse(problem.tangent(problem.x, problem.control))[:n][:, :n][free][:, free]
+        variation.fill(0)
+        to_mode = variation._to_mode[:n][free]
+        found = sparse(variation.matrix)[to_mode]
+        # what pins a rigid motion is torsion here, of which the path knows nothing
+        assert abs(found[:, to_mode] - (K + K.T) / 2).max() < 1e-12 * abs(K).max()
+        assert abs(found[:, variation._unknowns[:, 2]]).max() == 0 or not problem.scene.contacts
+
+
+@pytest.mark.parametrize("material", [
+    fx.NeoHookean(c10=1.0), fx.Ogden(mu=(1.4, -0.3), alpha=(2.5, -2.0)), fx.Gent(mu=2.0, Jm=8.0),
+    fx.Viscoelastic(fx.NeoHookean(c10=0.5), branches=[(1.0, 2.0)])], ids=lambda m: type(m).__name__)
+def test_rigid_motions_have_no_energy(material):
+    """Torsion and a shift across the axis, which frictionless plates leave free, of a body that is compressed."""
+    path = fx.trace(column(1.0, material, (3, 6)), until=fx.travel(-0.5), progress=False)
+    variation = SecondVariation(path.problem)
+    with path.problem.at(path.last):
+        for n, free in ((0, 1), (1, 1), (2, 0)):
+            variation.fill(n)
+            assert len(variation.rigid) == free
+            variation._pin = lambda: None
+            matrix = sparse(variation.fill(n))
+            for mode in variation.rigid:
+                assert np.abs(matrix @ mode).max() < 1e-10 * abs(matrix).max()
+            del variation._pin
+
+
+@pytest.mark.parametrize("ogden, same", [
+    (fx.Ogden(mu=2.0, alpha=2.0), fx.NeoHookean(c10=1.0)),
+    (fx.Ogden(mu=(2.0, -0.6), alpha=(2.0, -2.0)), fx.MooneyRivlin(c10=1.0, c01=0.3))], ids=["neo-Hooke", "Mooney"])
+def test_ogden_is_what_it_should_be(ogden, same):
+    """At rest, where all stretches coincide, and far from it, on the same state."""
+    one, two = (Problem(column(1.0, material, (3, 4))) for material in (ogden, same))
+    a, b = SecondVariation(one), SecondVariation(two)
+    for path in (fx.trace(two.scene, until=fx.travel(-1.2), progress=False),):
+        for state in (path.states[0], path.last):
+            for n in range(9):
+                with one.at(state), two.at(state):
+                    A, B = sparse(a.fill(n)), sparse(b.fill(n))
+                assert abs(A - B).max() < 1e-8 * abs(B).max()
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+@pytest.mark.parametrize("material", ["Mooney", "Ogden"])
+def test_energy_in_space(n, material):
+    """Second difference of the energy of a body in space, in Cartesian coordinates, along a mode."""
+    c10, c01, mu, alpha = 1.0, 0.3, 1.7, 3.2
+    law = fx.MooneyRivlin(c10=c10, c01=c01) if material == "Mooney" else fx.Ogden(mu=mu, alpha=alpha)
+    problem = Problem(ring(law, quadrature_degree=8))
+    variation = SecondVariation(problem)
+    L = problem.forms.length
+
+    def base(R, Z):
+        return 0.1 * R * Z + 0.05 * R, -0.2 * Z + 0.04 * R**2
+
+    def mode(R, Z):
+        return (2 - R) * (0.3 + Z), (2 - R) * (0.5 - 0.4 * Z + 0.2 * R), (2 - R) * (0.7 * Z - 0.1)
+    for i in range(2):
+        sub, dofs = problem.forms.space.sub(0).sub(i).collapse()
+        from dolfinx import fem
+        f = fem.Function(sub)
+        f.interpolate(lambda X, i=i: base(X[0], X[1])[i] / L)
+        problem.forms.w.x.array[np.asarray(dofs)] = f.x.array
+    p0 = 0.3
+    problem.forms.w.x.array[np.asarray(problem.forms.space.sub(1).collapse()[1])] = p0 / problem.forms.stress
+    problem.fill(problem.x, problem.forms.w.x.array)
+    x = np.zeros(variation.matrix.getLocalSize()[0])
+    X, Y, m = variation._X[:, 0], variation._X[:, 1], float(n == 1)
+    for i in range(3):
+        sub, dofs = variation.space.sub(0).sub(i).collapse()
+        f = fem.Function(sub)
+        f.interpolate(lambda P, i=i: mode(P[0], P[1])[i] / L + (i == 2) * m * mode(P[0], P[1])[0] / L)
+        x[np.asarray(dofs)] = f.x.array
+    assert len(X) == len(Y)
+    quadratic = x @ (sparse(variation.fill(n)) @ x) * problem.forms.stress * problem.forms.volume
+
+    g, w = np.polynomial.legendre.leggauss(10)
+    R, Z = np.meshgrid(1.25 + 0.75 * g, 0.4 + 0.4 * g, indexing="ij")
+    area = np.outer(0.75 * w, 0.4 * w) * R
+    t = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    place = np.stack(np.broadcast_arrays(R[..., None] * np.cos(t), R[..., None] * np.sin(t), Z[..., None]))
+
+    def position(P, eps):
+        R, t, Z = np.hypot(P[0], P[1]), np.arctan2(P[1], P[0]), P[2]
+        (u, v), (U, W, V) = base(R, Z), mode(R, Z)
+        r, h, z = R + u + eps * U * np.cos(n * t), eps * V * np.sin(n * t), Z + v + eps * W * np.cos(n * t)
+        return np.stack([r * np.cos(t) - h * np.sin(t), r * np.sin(t) + h * np.cos(t), z])
+
+    def energy(eps, d=1e-4):
+        step = [d * np.eye(3)[j][:, None, None, None] for j in range(3)]
+        F = np.stack([(8 * (position(place + s, eps) - position(place - s, eps))
+                       - position(place + 2 * s, eps) + position(place - 2 * s, eps)) / (12 * d) for s in step], -1)
+        F = np.moveaxis(F, 0, -2)
+        C = np.swapaxes(F, -1, -2) @ F
+        J, I1 = np.linalg.det(F), np.trace(C, axis1=-2, axis2=-1)
+        I2 = (I1**2 - np.trace(C @ C, axis1=-2, axis2=-1)) / 2
+        if material == "Mooney":
+            W = c10 * (I1 - 3) + c01 * (I2 - 3) - 2 * (c10 + 2 * c01) * np.log(J)
+        else:
+            W = mu / alpha * (np.linalg.eigvalsh(C) ** (alpha / 2)).sum(-1) - mu * np.log(J)
+        return float(((W + p0 * (J - 1)) * area[..., None]).sum() * 2 * np.pi / len(t))
+    h = 2e-3
+    second = (-energy(2 * h) + 16 * energy(h) - 30 * energy(0) + 16 * energy(-h) - energy(-2 * h)) / (12 * h**2)
+    assert quadratic / 2 == pytest.approx(second, rel=2e-6)         # the mean of cos^2 is half that of 1
+
+
+@pytest.mark.parametrize("nu, n", [(0.5, 1), (1.0, 1)])
+def test_cylinder(nu, n):
+    path = fx.trace(column(nu, elements=(6, 24)), until=fx.travel(-0.35 * np.pi / nu), progress=False)
+    loss = path.stability([n]).first
+    assert loss.number == n and loss.solved
+    assert 1 + loss.control / (np.pi / nu) == pytest.approx(exact.cylinder(nu, n), abs=1e-5)
+
+
+def test_flipped_half_is_the_whole():
+    """What a half cylinder loses, with its image and against it, is what the whole one loses."""
+    whole, half = (fx.trace(column(0.2, elements=e, half=h), until=fx.travel(-d), progress=False)
+                   for e, h, d in (((2, 32), False, 1.0), ((2, 16), True, 0.5)))
+    a = [1 + loss.control / (np.pi / 0.2) for loss in whole.stability([1, 2]).losses]
+    found = half.stability([1, 2])
+    b = [1 + 2 * loss.control / (np.pi / 0.2) for loss in found.losses]
+    assert a == pytest.approx(sorted(b, reverse=True), abs=1e-7) and len(a) == 2
+    assert {loss.flipped for loss in found.losses} == {None, "bottom"}
+
+
+def test_ring_under_outer_pressure():
+    A = 0.8
+    mesh = fx.mesh.disc(radius=1.0, inner_radius=A, thickness=0.025, elements=(8, 1))
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.5), loads=[fx.Pressure("rim")],
+                     supports=[fx.Symmetry("bottom", "z"), fx.Symmetry("top", "z")])
+    path = fx.trace(scene, until=fx.displacement(-0.02, at=(A, 0.0), component="r"), progress=False)
+    found = path.stability(range(4))
+    assert found.first.number == 2 and len(found.alarms) == 1
+    assert found.first.control == pytest.approx(0.0112425992232, rel=2e-5)      # `exact.tube(0.8, 2)`
+
+
+def test_what_is_formed_is_silent():
+    """A hinged sheet through its maximum of pressure: a limit point is none that alarms."""
+    path = fx.trace(treloar(elements=(10, 2)), until=fx.pole_stretch(4.0), progress=False)
+    found = path.stability(range(5))
+    assert found.alarms == [] and [loss.limit_point for loss in found.losses] == [True]
+    assert "limit point" in str(found)
+
+
+def test_membrane_and_loads_that_do_not_know():
+    path = fx.trace(treloar(model=fx.Membrane()), until=fx.pole_height(1.0), progress=False)
+    with pytest.raises(InputError, match="membrane"):
+        path.stability([2])
+
+    class Hanging(fx.Load):
+        def virtual_work(self, body, value):
+            return body.integral(value * body.du[1])
+    path = fx.trace(ring(fx.NeoHookean(c10=1.0), loads=[Hanging()]), until=fx.displacement(0.01, at=(0.5, 0.0)),
+                    progress=False)
+    with pytest.raises(InputError, match="mode_work"):
+        path.stability([2])
+    with pytest.raises(InputError, match="whole"):
+        path.stability([2.5])
+
+
+RANKS = """
+import json, numpy as np, formingx as fx
+from mpi4py import MPI
+mesh = fx.mesh.disc(radius=1.0, thickness=np.pi, elements=(4, 12))
+scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z"),
+                 fx.Displaced("top", "z")])
+path = fx.trace(scene, until=fx.travel(-1.2), progress=False)
+found = path.stability(range(3))
+if MPI.COMM_WORLD.rank == 0:
+    print(json.dumps([[loss.number, loss.control, *loss.at] for loss in found.losses]))
+"""
+
+
+def test_ranks():
+    one, two = run_json(RANKS, 1), run_json(RANKS, 2)
+    assert np.array(one)[:, :2] == pytest.approx(np.array(two)[:, :2], rel=1e-8) and len(one) == 1
