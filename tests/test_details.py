@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 import ufl
+from conftest import treloar
 from test_heat import body_of
 
 import formingx as fx
 from formingx import Stage, tools
 from formingx.discrete.problem import Problem
+from formingx.solve import follow
 
 
 def moved(mesh, by):
@@ -90,3 +92,31 @@ def test_rest_is_free_of_stress_under_the_penalty():
     forces = problem.forces(problem.x.duplicate(), 0.0)
     forces[problem.held] = 0
     assert np.abs(forces).max() < 1e-14
+
+
+@pytest.mark.parametrize("tool", [tools.sphere(radius=0.5, z=0.0), tools.cup(radius=2.0, depth=1.0, fillet=0.5)])
+def test_slip_on_a_curved_tool_has_the_slope_that_is_said(tool):
+    """Where the point has gone into the tool, or out of it, since it touched, the tangent turns as it moves."""
+    law = fx.Contact("top", tool, 0.3).law(1.0, 1.0, np.zeros((1, 2)))
+    law.shift = 0.0
+    start = tool.outline()[:: max(len(tool.outline()) // 12, 1)]
+    old = law.start(start)._replace(distance=np.zeros(len(start)))                # they touch
+    x, e = start + [0.03, 0.05], 1e-6
+    for along in np.eye(2):
+        slope = (law.motion(x + e * along, old).slip - law.motion(x - e * along, old).slip) / (2 * e)
+        smooth = np.abs(law.nearest(x - e * along).curvature - law.nearest(x + e * along).curvature) < 1e-3
+        assert smooth.sum() > 3
+        assert (law.motion(x, old).along @ along)[smooth] == pytest.approx(slope[smooth], abs=1e-7)
+
+
+def test_a_step_back_to_what_was_passed_is_made_shorter(monkeypatch):
+    true, asked = follow.was_passed, []
+
+    def at_first(*args):
+        asked.append(args)
+        return len(asked) == 3 or true(*args)
+    plain = fx.trace(treloar((6, 1)), until=fx.pole_stretch(2.0), progress=False)
+    monkeypatch.setattr(follow, "was_passed", at_first)
+    path = fx.trace(treloar((6, 1)), until=fx.pole_stretch(2.0), progress=False)
+    assert path.counts.failures == plain.counts.failures + 1
+    assert path["pressure"][-1] == pytest.approx(plain["pressure"][-1], rel=1e-9)
