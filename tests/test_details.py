@@ -9,6 +9,7 @@ from test_heat import body_of
 import formingx as fx
 from formingx import Stage, tools
 from formingx.discrete.problem import Problem
+from formingx.results.evaluate.part import _strips
 from formingx.solve import follow
 
 
@@ -23,7 +24,7 @@ def as_ufl(by, mesh):
 
 
 @pytest.mark.parametrize("by", [lambda X: (0.7 * X[1], 0 * X[1]), lambda X: (0.3 * X[1], 0.4 * X[0] + 0.2 * X[1])],
-                         ids=["sheared", "sheared and grown"])
+                         ids=["sheared", "grown"])
 def test_heat_flows_in_the_deformed_body(by):
     """A deformed body, pulled back, is the body that has that shape: conduction and what is absorbed in depth."""
     def sheet():
@@ -120,3 +121,33 @@ def test_a_step_back_to_what_was_passed_is_made_shorter(monkeypatch):
     path = fx.trace(treloar((6, 1)), until=fx.pole_stretch(2.0), progress=False)
     assert path.counts.failures == plain.counts.failures + 1
     assert path["pressure"][-1] == pytest.approx(plain["pressure"][-1], rel=1e-9)
+
+
+def test_a_tool_that_comes_in_remembers_nothing():
+    """What stuck to it before it left has moved since: it starts from where it is now."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(3, 1)), materials=fx.NeoHookean(c10=1.0),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("bottom")],
+                     contacts=[fx.Contact("top", tools.plane(0.1), 0.3, moves=(0, -1))])
+    problem = Problem(scene)
+    contact, = problem.contacts
+    x = np.random.default_rng(1).uniform(-0.01, 0.01, problem.n_owned)
+    assert contact.touch.position == pytest.approx(contact.points)
+    contact.come_in(x, -0.2)
+    assert contact.touch.position == pytest.approx(contact.positions(x, -0.2), rel=1e-12)
+    assert not contact.touch.slip.any()
+
+
+def test_a_grey_face_radiates_with_the_fourth_power():
+    law = fx.Radiation("top", emissivity=0.9, heater=400.0, view_factor=0.7)
+    assert law.flux(100.0, -273.15, **law.parameters) == pytest.approx(
+        0.7 * 0.9 * 5.670374419e-8 * (673.15**4 - 373.15**4), rel=1e-12)
+
+
+def test_volume_between_two_lines_is_that_of_cones():
+    """One piece from the axis: a frustum; from R = 1 to 2 a hollow one."""
+    bottom, top = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]), np.array([[0.0, 3.0], [1.5, 3.0], [2.5, 3.0]])
+
+    def frustum(a, b):
+        return np.pi * (a * a + a * b + b * b)
+    assert _strips(bottom, top, True) == pytest.approx([frustum(1, 1.5), frustum(2, 2.5) - frustum(1, 1.5)], rel=1e-12)
+    assert _strips(bottom, top, False) == pytest.approx([3.75, 3.0], rel=1e-12)
