@@ -198,10 +198,14 @@ class Ledger:
         return lost
 
     def _warmed(self, a: Any, b: Any) -> float:
-        """Stored energy that comes with the temperature, which changes when a state is accepted."""
-        problem = self._problem
-        with problem.at(replace(b, memory=[*b.memory[:-1], a.memory[-1]])):       # that of the temperature is last
-            return b.measures["strain_energy"] - self._energy * problem.assemble_scalar(self._stored)
+        """Stored energy that comes with the temperature, by the trapezium rule: the body as it was, and as it is."""
+        problem, cold, warm = self._problem, a.memory[-1], b.memory[-1]        # that of the temperature is last
+
+        def stored(state: Any, temperature: Any) -> float:
+            still = temperature._replace(before=None)                         # it does not go on from there
+            with problem.at(replace(state, memory=[*state.memory[:-1], still])):
+                return self._energy * problem.assemble_scalar(self._stored)
+        return sum(stored(state, warm) - stored(state, cold) for state in (a, b)) / 2
 
     def _sum(self, values: Any) -> float:
         return float(self._problem.comm.allreduce(float(np.sum(values)), MPI.SUM))
