@@ -37,7 +37,7 @@ log = logging.getLogger("formingx")
 def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: StepControl | None = None,
           tolerances: Tolerances | None = None, max_steps: int | None = None, progress: bool = True,
           start: Path | None = None, checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
-          at_fold: str | None = None, resume: bool = False) -> Path:
+          at_fold: str | None = None, resume: bool = False, beyond: bool = False) -> Path:
     """Follow the equilibrium path from the unloaded body until a target is reached, through limit points.
 
     Args:
@@ -61,6 +61,8 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
             (friction); but a pressure is followed, for what an air supply makes grow is the volume (in contact, or
             with a history: as long as the volume grows).
         resume: go on from what the checkpoint holds, which must be of this scene; if it holds nothing, begin.
+        beyond: go on, with a warning, where a state is none that a body can have: folded, inside a tool, elements
+            inside out. (`State.verdict` says so; by default the run ends there.)
 
     Raises:
         InputError: nothing is driven, a target needs something that the scene does not have or cannot be met (it is
@@ -88,7 +90,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     start = _from_checkpoint("trace", resume, checkpoint, scene, start)
     with _carried(checkpoint) as carried:
         problem = Problem(scene) if start is None else start.problem
-        path = carried(_path(Curve(problem, tolerances or Tolerances()), start, record))
+        path = carried(_path(Curve(problem, tolerances or Tolerances()), start, record, beyond))
         targets = [(target, target.bind(problem)) for target in (*through, until)]
         _keep(path, checkpoint)
         run = Run(path.record, targets, step, at_fold)
@@ -97,7 +99,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
 
 
 def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerances | None = None, max_steps: int = 1000,
-          record: Mapping[str, Measure] | None = None) -> Path:
+          record: Mapping[str, Measure] | None = None, beyond: bool = False) -> Path:
     """Load the body to a value of the control in increments, each by PETSc's SNES at fixed control.
 
     For scenes without limit point before `to`; `trace` passes limit points and picks its own steps. Options such as
@@ -108,7 +110,7 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
         increments: number of equal increments; one that fails is halved, and new contact shortens them.
         tolerances: when a state counts as converged; default `Tolerances()`.
         max_steps: accepted states before the run gives up.
-        record: see `trace`.
+        record, beyond: see `trace`.
 
     Raises:
         InputError: nothing is driven, or an argument is not allowed.
@@ -128,7 +130,7 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     with _carried() as carried:
         problem = Problem(scene)
         curve = FixedControlCurve(problem, tolerances or Tolerances())
-        path = carried(_path(curve, None, record))
+        path = carried(_path(curve, None, record, beyond))
         targets = [(Target(name, to * k / increments, None), Amplitude(problem, driven))
                    for k in range(1, increments + 1)]
         increment = abs(to / problem.forms.control_scale) / increments
@@ -153,7 +155,7 @@ class Process:
     def run(self, stages: Sequence[Stage], *, step: StepControl | None = None, tolerances: Tolerances | None = None,
             max_steps: int | None = None, progress: bool = True, start: Path | State | None = None,
             checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
-            accuracy: str | float = "standard", resume: bool = False) -> Path:
+            accuracy: str | float = "standard", resume: bool = False, beyond: bool = False) -> Path:
         """Run the stages; one path holds the states of all of them, every stage from a state of kind "start" on.
 
         Args:
@@ -169,6 +171,7 @@ class Process:
             accuracy: of the steps in time of a material that relaxes, "draft", "standard" or "fine" (1, 0.2, 0.03 % of
                 stress and thickness), or such an error as a number.
             resume: go on from what the checkpoint holds, which must be of this process; if it holds nothing, begin.
+            beyond: see `trace`.
 
         Raises:
             InputError: a stage drives or leaves out something that the scene does not have, leaves the body free to
@@ -194,7 +197,8 @@ class Process:
             problem = start.problem if isinstance(start, Path) else Problem(self.scene)
             for state in [start] if isinstance(start, State) else start.states[-1:] if start else []:
                 _check_start(state, stages, problem)
-            path = carried(_path(Curve(problem, tolerances), start, record, any(stage.timed for stage in stages)))
+            timed = any(stage.timed for stage in stages)
+            path = carried(_path(Curve(problem, tolerances), start, record, beyond, timed))
             _keep(path, checkpoint)
             execution = Execution(path.record, plans, unsure, step, tolerances.residual, allowed)
             execution.run(None if max_steps is None else count("Process: max_steps", max_steps), progress)
@@ -238,9 +242,11 @@ def _check_start(state: State, stages: list[Stage], problem: Problem) -> None:
                          f" process, those that are done too")
 
 
-def _path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measure] | None, timed: bool = False) -> Path:
+def _path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measure] | None, beyond: bool,
+          timed: bool = False) -> Path:
     """A path to be solved for by `curve`, that begins with the states of another, or with a state."""
     record = Record(curve.problem, curve)
+    record.beyond = instance("beyond", beyond, bool, "True or False")
     if isinstance(start, Path):
         record.go_on_from(start.record)
     elif start is not None:
@@ -291,7 +297,7 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
     path = paths[0]
     of_volume = volume.doubts(path.last.measures["volume_error"], "the last state",
                               path.problem.furthest_volume_ratio(path.last))
-    for bad, text in (of_volume + edges.doubts(edges.coarsest(path, path.last))
+    for bad, text in (of_volume + path.doubts() + edges.doubts(edges.coarsest(path, path.last))
                       + tension.doubts(tension.first_compression(path))):
         if bad == "serious" and path.problem.comm.rank == 0:
             log.warning("%s", text)

@@ -62,7 +62,8 @@ def pressed(**change):
 
 
 def test_element_about_to_turn_inside_out(tmp_path):
-    _, found = failure(lambda: fx.trace(pressed(), until=fx.travel(-0.95), max_steps=100, progress=False))
+    _, found = failure(lambda: fx.trace(pressed(), until=fx.travel(-0.95), max_steps=100, progress=False,
+                                        beyond=True))
     assert "an element is about to turn inside out" in found.causes[0]
     assert found.smallest_J < 0.1 and found.what == "travel"
     assert found.at_J.R > 0.6 and found.at_J.Z < 0.4 and found.at_J.layer == "sheet"      # the outer foot

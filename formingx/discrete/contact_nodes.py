@@ -430,6 +430,10 @@ class ContactNodes:
         total = (self.area[:, None] * self.tractions(fields, control).force).sum(0)
         return self._comm.allreduce(total, MPI.SUM)
 
+    def energy(self, fields: np.ndarray, control: float) -> float:
+        """What penetration holds, stress length^3 (per depth: length^2), all ranks."""
+        return self._comm.allreduce(float(self.area @ self.law.energy(self.positions(fields, control))), MPI.SUM)
+
     def pressing(self, fields: np.ndarray, control: float) -> float:
         """Sum of the normal forces at the points, in the units of `force`, all ranks."""
         return self._comm.allreduce(float(self.area @ self.tractions(fields, control).normal), MPI.SUM)

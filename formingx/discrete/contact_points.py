@@ -26,7 +26,7 @@ class ContactPoints(ContactNodes):
         vectors, numbers = solid.space.sub(0).collapse()
         numbers, X = np.asarray(numbers, dtype=np.int32).reshape(-1, 2), vectors.tabulate_dof_coordinates()[:, :2]
         self._unknowns = la.vector(solid.space.dofmap.index_map, 1)
-        facets = [_ends_first(fem.locate_dofs_topological(vectors, 1, np.array([f], dtype=np.int32), remote=False), X)
+        facets = [ends_first(fem.locate_dofs_topological(vectors, 1, np.array([f], dtype=np.int32), remote=False), X)
                   for f in _own_facets(mesh, self.contact.on)]
         nodes = np.array(facets, dtype=np.int32).reshape(-1, 3)
         at, weights = np.polynomial.legendre.leggauss(int(self.contact.points))
@@ -92,7 +92,7 @@ def _own_facets(mesh: Any, on: str) -> np.ndarray:
     return facets[cells < topology.index_map(2).size_local]
 
 
-def _ends_first(nodes: np.ndarray, X: np.ndarray) -> np.ndarray:
+def ends_first(nodes: np.ndarray, X: np.ndarray) -> np.ndarray:
     """The two ends and the middle of an edge: no two of its nodes are further apart than the ends."""
     away = np.linalg.norm(X[nodes][:, None] - X[nodes][None], axis=-1)
     i, j = np.unravel_index(np.argmax(away), (3, 3))

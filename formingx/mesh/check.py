@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..errors import InputError
@@ -113,7 +115,13 @@ def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: 
 
 
 def crossing(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
-    """A place where edges touch or cross each other other than at nodes that they share, shape (2,), or None.
+    """A place where edges touch or cross each other other than at nodes that they share, shape (2,), or None."""
+    pairs = next(crossings(points, edges), None)
+    return None if pairs is None else points[edges[pairs[0, 0]]].mean(0)
+
+
+def crossings(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray]:
+    """Numbers of edges that touch or cross each other other than at nodes that they share, shape (m, 2), m > 0.
 
     points: shape (n, 2), length; edges: indices of their ends, shape (k, 2).
     """
@@ -133,9 +141,7 @@ def crossing(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
             gap = ((point - p - t[:, None] * along) ** 2).sum(1)
             crosses |= (node[:, None] != other).all(1) & (gap <= 1e-18 * length)
         if crosses.any():
-            k = int(np.argmax(crosses))
-            return (a[k] + b[k]) / 2
-    return None
+            yield np.column_stack([first, second])[crosses]
 
 
 def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:

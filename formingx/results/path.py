@@ -20,6 +20,7 @@ from ..solve.targets import Bound, Target, is_met, process_time
 from . import columns as standard_columns
 from .evaluate.profile import Profile, Profiles
 from .evaluate.stress import Stresses, StressField
+from .evaluate.verdict import Verdict
 from .show.picture import Picture
 
 
@@ -29,7 +30,7 @@ class _View:
     def __init__(self, problem: Any, timed: bool, columns: Mapping[str, Any]):
         self.columns = standard_columns.standard(problem, timed)
         self.columns |= standard_columns.own(problem, columns, self.columns)
-        self.profiles, self.stresses = Profiles(problem), Stresses(problem)
+        self.profiles, self.stresses, self.verdict = Profiles(problem), Stresses(problem), Verdict(problem)
 
 
 class Path:
@@ -46,6 +47,7 @@ class Path:
         self._watch: Any = None
         self._view(record.segments[-1])                      # so that nothing is compiled on the way
         record.on_state.append(self._measure)
+        record.judge = lambda state: self._view(record.segments[-1]).verdict.of(state)
 
     @property
     def segments(self) -> list[Segment]:
@@ -249,6 +251,10 @@ class Path:
                                  for c, bound in zip(columns, bounds)])
                 rows.append([b.measures[c] for c in columns])
         return rows
+
+    def doubts(self) -> list[tuple[str, str]]:
+        """(how bad: "serious" or "minor"; what) of contact in the last state; collective."""
+        return self._view(self.segments[-1]).verdict.doubts(self.last)
 
     def profile(self, state: State | None = None) -> Profile:
         """Deformed outline and thickness of a sheet at a state (default: the last)."""

@@ -23,7 +23,7 @@ from .folds import snaps, usual, was_passed
 from .jump import AHEAD, MOST, NoEquilibrium, jump
 from .newton import Failure, tangents
 from .progress import Progress
-from .state import Record, State
+from .state import Record, State, Unusable
 from .stepping import StepControl
 from .targets import Amplitude, Bound, Target, is_met
 from .time_error import TimeError
@@ -447,7 +447,12 @@ class Run:
     def _accept(self, state: State) -> None:
         """Take up a state and close the targets that it meets."""
         record = self.record
-        record.accept(state)
+        try:
+            record.accept(state)
+        except Unusable as unusable:
+            if not self.states:
+                raise
+            self._give_up(f"at {record.describe(state)} {unusable}; beyond=True goes on all the same")
         if self.problem.has_kinks:
             self.curve.look_ahead(state)
         self._values.append(self.curve.value(self._aim, state.x, state.control))

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import itertools
+import logging
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from ..errors import ConvergenceError
 from .targets import Target
+
+log = logging.getLogger("formingx")
 
 
 @dataclass(eq=False, repr=False)
@@ -30,6 +34,7 @@ class State:
         stage: name of the stage of a process; setting: what the stage had set, as plain data (`Setting`).
         stepping: what a run goes on with: its next step, its counts and its target; empty inside a step.
         time: process time.
+        verdict: why it is no state that a body can have, in words; "" but in a run that went on beyond (`Record`).
     """
 
     x: np.ndarray
@@ -46,6 +51,7 @@ class State:
     stepping: dict = field(default_factory=dict)
     time: float = 0.0
     jump: dict = field(default_factory=dict)
+    verdict: str = ""
 
     def __repr__(self) -> str:
         numbers = ", ".join(f"{name}={value:.6g}" for name, value in self.measures.items())
@@ -76,6 +82,10 @@ class Segment:
     states: list[State] = field(default_factory=list)
 
 
+class Unusable(ConvergenceError):
+    """A state was found, but none that a body can have."""
+
+
 class Record:
     """The accepted states of a run, in order, and who is told of them.
 
@@ -86,6 +96,8 @@ class Record:
         ended: why the run ended before its targets, as a result and not as an error; "" if it did not.
         on_state: functions called with every accepted state, while the problem stands there (they fill `measures`).
         on_step: functions called whenever a step is complete.
+        judge: says of a state whose measures are known why it is none that a body can have, "" if it is one.
+        beyond: keep such states, too.
     """
 
     def __init__(self, problem: Any, curve: Any):
@@ -93,6 +105,8 @@ class Record:
         self.counts, self.stage, self.ended = Counts(), "", ""
         self.on_state: list[Callable[[State], None]] = []
         self.on_step: list[Callable[[], None]] = []
+        self.judge: Callable[[State], str] = lambda state: ""
+        self.beyond = False
 
     @property
     def problem(self) -> Any:
@@ -135,8 +149,12 @@ class Record:
         self.counts = replace(other.counts)
 
     def accept(self, state: State) -> None:
-        """Take up a state: what has a history goes on from it."""
-        problem = self.problem
+        """Take up a state: what has a history goes on from it.
+
+        Raises:
+            Unusable: it is none that a body can have; the record is as it was before.
+        """
+        problem, memory = self.problem, self.problem.memory
         problem.advance(state.x, state.control)
         state.memory, state.stage, state.setting = problem.memory, self.stage, asdict(problem.setting)
         state.time = problem.forms.time_at(state.control)
@@ -144,9 +162,15 @@ class Record:
         try:
             for told in self.on_state:
                 told(state)
+            state.verdict = self.judge(state)
+            if state.verdict and not self.beyond:
+                raise Unusable(state.verdict)
         except BaseException:
             self.segments[-1].states.pop()
+            problem.memory = memory
             raise
+        if state.verdict and not any(s.verdict for s in self.states[-2:-1]):
+            log.warning("beyond %s: %s", self.describe(state), state.verdict)
         self.counts.steps += state.kind != "start"
 
     def settle(self, step: Any, until: Target, **more: Any) -> None:

@@ -36,7 +36,7 @@ from ...solve.targets import Target
 from .. import files
 from .description import describe, differences
 
-FORMAT = 3
+FORMAT = 4
 _FIELDS = ("x", "direction")
 
 

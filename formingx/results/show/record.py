@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,6 @@ from ...errors import InputError
 from .. import files
 from ..evaluate import edges, tension, volume
 from ..evaluate.contact_face import ContactFace, ContactTable, tool_forces
-from ..evaluate.folding import first_fold
 from ..evaluate.profile import Profile
 
 PENETRATION = 0.05
@@ -42,6 +42,7 @@ class Record:
         layers: of the last state, as in `Wall`; script: the file that ran; or "".
         furthest: where J is furthest from 1 in the last state, or None: not known of a checkpoint or a membrane.
         edge: `edges.coarsest` in the last state, or None; compression: `tension.first_compression`, or None.
+        verdicts: of the n states, `State.verdict`.
     """
 
     summary: dict[str, str]
@@ -63,6 +64,7 @@ class Record:
     furthest: Least | None = None
     edge: edges.Edge | None = None
     compression: tuple[int, tension.Resultant] | None = None
+    verdicts: Sequence[str] = ()
 
     @property
     def control(self) -> str:
@@ -92,7 +94,7 @@ class Record:
         if worst > MASS:
             found.append(("serious" if worst > 10 * MASS else "minor",
                           f"The mass changes by up to {100 * worst:.2g} %: a smaller eps, or a finer mesh, keeps it."))
-        found += self._of_volume() + self._of_folding() + edges.doubts(self.edge)
+        found += self._of_volume() + self._of_verdict() + edges.doubts(self.edge)
         found += tension.doubts(self.compression)
         if self.counts.get("failures", 0) > len(self.kinds):
             found.append(("note", f"{self.counts['failures']} attempts at a step failed and were repeated with half its"
@@ -105,14 +107,11 @@ class Record:
         return volume.doubts(errors[k], f"state {k}, {words(self.control)} = {self.measures[self.control][k]:.5g}",
                              self.furthest)
 
-    def _of_folding(self) -> list[tuple[str, str]]:
-        first = first_fold(self.profiles, self.axisymmetric)
-        if first is None:
-            return []
-        k, what, place = first
-        return [("serious", f"The body folds: its faces {what}, first in state {k} ({words(self.control)} ="
-                            f" {self.measures[self.control][k]:.5g}), near (r, z) = ({place[0]:.5g}, {place[1]:.5g});"
-                            f" a body does not go through itself, what comes after that is not to be used.")]
+    def _of_verdict(self) -> list[tuple[str, str]]:
+        k = next((k for k, verdict in enumerate(self.verdicts) if verdict), None)
+        return [] if k is None else [
+            ("serious", f"From state {k} on ({words(self.control)} = {self.measures[self.control][k]:.5g}) the run is"
+                        f" not to be used: {self.verdicts[k]}.")]
 
     def warnings(self) -> list[str]:
         """What a reader should know before trusting the numbers, without how bad it is."""
@@ -140,7 +139,7 @@ def of_path(path: Any) -> Record:
                   [tooling.travels(s.setting, s.control) for s in path.states], tool_forces(path),
                   _fields(path, profiles), dict(wall.layers) if wall else {}, sys.argv[0],
                   problem.furthest_volume_ratio(path.last), edges.coarsest(path, path.last),
-                  tension.first_compression(path))
+                  tension.first_compression(path), [s.verdict for s in path.states])
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:
@@ -155,7 +154,7 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
                   stepping.get("until"), tooling,
                   [tooling.travels(s.get("setting", {}), s["control"]) for s in states],
                   {name: measures[column] for name, column in tooling.force_columns.items() if column in measures},
-                  [{} for _ in states], {})
+                  [{} for _ in states], {}, verdicts=[s["verdict"] for s in states])
 
 
 def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray:

@@ -1,0 +1,94 @@
+"""The boundary of a solid body where it is now: curved edges, all ranks'."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import dolfinx.mesh
+import numpy as np
+from dolfinx import fem
+
+from ..mesh.check import crossing, crossings
+from .contact_points import ends_first
+
+_PARTS = 8
+"""Straight pieces of an edge."""
+
+
+class Outline:
+    """The m edges of the boundary, each a parabola through its ends and its middle, the body to its left.
+
+    Args:
+        forms: the `Solid`; its `w` is what is looked at.
+
+    Attributes:
+        rest: end, other end and middle of each edge at rest, shape (m, 3, 2), length.
+    """
+
+    def __init__(self, forms: Any):
+        self._forms, domain = forms, forms.domain
+        topology = domain.topology
+        topology.create_connectivity(1, 2)
+        self._facets = dolfinx.mesh.exterior_facet_indices(topology)
+        vectors, numbers = forms.space.sub(0).collapse()
+        numbers, X = np.asarray(numbers, dtype=np.int64).reshape(-1, 2), vectors.tabulate_dof_coordinates()[:, :2]
+        nodes = np.zeros((len(self._facets), 3), dtype=np.int64)
+        for k, facet in enumerate(self._facets):
+            at = fem.locate_dofs_topological(vectors, 1, np.array([facet], dtype=np.int32), remote=False)
+            a, b, middle = ends_first(at, X)
+            cell = vectors.dofmap.cell_dofs(topology.connectivity(1, 2).links(facet)[0])
+            (along, inwards) = X[b] - X[a], X[cell].mean(0) - X[middle]
+            left = along[0] * inwards[1] > along[1] * inwards[0]
+            nodes[k] = (a, b, middle) if left else (b, a, middle)
+        self._dofs, self._own = numbers[nodes], X[nodes]
+        names = vectors.dofmap.index_map.local_to_global(nodes.ravel().astype(np.int32)).reshape(-1, 3)
+        ends = self._gathered(names)[:, :2]
+        self._ends = np.unique(ends, return_inverse=True)[1].reshape(-1, 2)
+        self.rest = self._gathered(self._own)
+
+    def edges(self) -> np.ndarray:
+        """Where the edges are now, as `rest`; collective."""
+        return self._gathered(self._own + self._forms.length * self._forms.w.x.array[self._dofs])
+
+    def of(self, boundary: str) -> np.ndarray:
+        """Which edges are of a boundary of the mesh, shape (m,); collective."""
+        return self._gathered(np.isin(self._facets, self._forms.scene.mesh.facets_of(boundary)))
+
+    def pieces(self, edges: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
+        """(points, shape (n, 2), length; straight pieces between them, shape (parts m, 2)) along `edges()`."""
+        m, corners = len(edges), int(self._ends.max()) + 1
+        points = np.empty((corners + m * (parts - 1), 2))
+        points[self._ends] = edges[:, :2]
+        points[corners:] = along(edges, parts)[:, 1:-1].reshape(-1, 2)
+        inner = corners + np.arange(m * (parts - 1)).reshape(m, parts - 1)
+        chain = np.column_stack([self._ends[:, 0], inner, self._ends[:, 1]])
+        return points, np.stack([chain[:, :-1], chain[:, 1:]], -1).reshape(-1, 2)
+
+    def fold(self, edges: np.ndarray) -> np.ndarray | None:
+        """A place where the boundary goes through itself, of `edges()`, shape (2,), length; None if it does nowhere.
+
+        Not in a crease: of edges that have a neighbour in common, where an element bends over a sharp edge.
+        """
+        if crossing(*self.pieces(edges, 2)) is None:        # chords may cross where the curves do not
+            return None
+        points, pieces = self.pieces(edges, _PARTS)
+        for i, j in itertools.chain.from_iterable(crossings(points, pieces)):
+            if not self._near(i // _PARTS, j // _PARTS):
+                return points[pieces[i]].mean(0)
+        return None
+
+    def _near(self, i: int, j: int) -> bool:
+        """True if two edges are the same, neighbours, or neighbours of one."""
+        around = np.isin(self._ends, self._ends[i]).any(1)
+        return bool(np.isin(self._ends[around], self._ends[j]).any())
+
+    def _gathered(self, values: np.ndarray) -> np.ndarray:
+        comm = self._forms.comm
+        return values if comm.size == 1 else np.concatenate(comm.allgather(values))
+
+
+def along(edges: np.ndarray, parts: int = _PARTS) -> np.ndarray:
+    """Points of edges, shape (m, 3, 2), from one end to the other, shape (m, parts + 1, 2)."""
+    s = np.linspace(0, 1, parts + 1)
+    return np.einsum("pk,mki->mpi", np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)]), edges)

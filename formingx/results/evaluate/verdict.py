@@ -1,0 +1,158 @@
+"""Whether a state is one that a body can have: looked at while the run goes, before it is accepted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...discrete.outline import Outline, along
+from ...solve.state import State
+
+_VOLUME = 0.25
+"""Root mean square of J - 1. (Creases at clamped rims, and at corners of coarse blocks, stay below 0.17.)"""
+
+_INSIDE_OUT, _FEWEST = 0.05, 4
+"""Part of the elements that may have a point with J <= 0, and number of them that always may: corners are singular."""
+
+_INSIDE = 0.25
+"""Depth of the body in a tool, over the thickness and over the length of an edge: beyond both it stands in the tool."""
+
+_SUNK = 0.05
+"""Penetration of contact points over the wall that is left there: above it the body did not follow the tool."""
+
+_HELD = 2e-3
+"""Energy that penetration holds, over that of the body, above which a run warns. (Of a block between plates the force
+is off by three times as much.)"""
+
+_THINNEST = 1e100
+"""Pole stretch: the square root of a wall that is not above 0 is taken of 1e-300."""
+
+_CUT = 0.1
+"""Depth of a face in a tool between contact points, over the thickness, above which a run warns."""
+
+_PULLS = 1e-3
+"""Force by which a tool without friction is pulled, over the forces that press on it."""
+
+
+class Depth(NamedTuple):
+    """How deep a body is in a tool: over what is allowed, depth (length), place (r, z), the contact, its name."""
+
+    share: float
+    depth: float
+    place: np.ndarray
+    contact: Any
+    name: str
+
+
+class Verdict:
+    """Looks at the states of one problem; what does not change is found once."""
+
+    def __init__(self, problem: Any):
+        self._problem, self._solid = problem, problem.scene.model.solid
+        if self._solid:
+            self._outline = Outline(problem.forms)
+            self._faces = [self._outline.of(contact.contact.on) for contact in problem.contacts]
+            self._rest = _lengths(self._outline.rest)
+
+    def of(self, state: State) -> str:
+        """Why a state, whose `measures` are known, is none that a body can have; "" if it is one; collective."""
+        return next(self._reasons(state), "")
+
+    def doubts(self, state: State) -> list[tuple[str, str]]:
+        """(how bad, what), as `volume.doubts`, of a state that a body can have; collective."""
+        if not self._solid:
+            return []
+        with self._problem.at(state):
+            edges, found = self._outline.edges(), []
+            for contact in self._problem.touching:
+                share = contact.energy(state.x, state.control) / (state.measures["strain_energy"] or np.inf)
+                if share > _HELD:
+                    found.append(("serious", f"Penetration of the tool of {_name(contact)!r} holds {100 * share:.2g} %"
+                                             f" of the energy of the body: forces are off by more; give Contact a"
+                                             f" penalty of {contact.contact.penalty * share / _HELD * 10:.1g}."))
+            for cut in self._deepest(edges, state, own=True):
+                found.append(("serious", f"Between contact points the face is {cut.depth:.3g} deep in the tool of"
+                                         f" {cut.name!r} at (r, z) = ({cut.place[0]:.5g}, {cut.place[1]:.5g}): smaller"
+                                         f" elements there, or a larger fillet."))
+        return found
+
+    def _reasons(self, state: State) -> Iterator[str]:
+        measures = state.measures
+        for name, value in measures.items():
+            if not np.isfinite(value):
+                yield f"the {name.replace('_', ' ')} is {value}"
+        if measures.get("pole_stretch", 1.0) > _THINNEST:
+            yield "the two faces cross at the pole"
+        if not self._solid:
+            return
+        if measures["volume_error"] > _VOLUME:
+            yield (f"the elements do not keep their volumes: the root mean square of J - 1 is"
+                   f" {measures['volume_error']:.2g}")
+        with self._problem.at(state) as problem:
+            bad, cells, (R, Z) = problem.inside_out()
+            if bad > max(_FEWEST, _INSIDE_OUT * cells):
+                yield f"{bad} of {cells} elements are inside out, the worst at (R, Z) = ({R:.5g}, {Z:.5g})"
+            edges = self._outline.edges()
+            for deep in self._deepest(edges, state, own=False):
+                yield (f"the body stands {deep.depth:.4g} deep in the tool of {deep.name!r} at (r, z) ="
+                       f" ({deep.place[0]:.5g}, {deep.place[1]:.5g}): a face without contact, or elements that are too"
+                       f" large for the tool")
+            for sunk in self._sunk(edges, state):
+                yield (f"the body did not follow the tool of {sunk.name!r}: contact points are {sunk.depth:.4g} deep in"
+                       f" it, {100 * sunk.share * _SUNK:.2g} % of the wall that is left there: give Contact a penalty"
+                       f" of {50 * sunk.share * sunk.contact.contact.penalty:.1g}")
+            for contact in problem.touching:
+                if _pulled(contact, state):
+                    yield (f"the body pulls at the tool of {_name(contact)!r}, which has no friction and lets go: it is"
+                           f" behind it")
+        place = self._outline.fold(edges)
+        if place is not None:
+            yield f"the body folds: its boundary goes through itself near (r, z) = ({place[0]:.5g}, {place[1]:.5g})"
+
+    def _deepest(self, edges: np.ndarray, state: State, own: bool) -> Iterator[Depth]:
+        """Where the body is too deep in tools: `own`: the face of the contact, for a warning; or any face."""
+        points, length = along(edges), _lengths(edges)
+        for contact, face in zip(self._problem.contacts, self._faces):
+            if not contact.present:
+                continue
+            at = (points - contact.travelled(state.control)).reshape(-1, 2)
+            depth = contact.contact.tool.signed_distance(at).reshape(points.shape[:2])
+            most = _CUT * contact.thickness if own else _INSIDE * np.maximum(contact.thickness, length)
+            share = np.where(face | (not own), depth.max(1) / most, 0.0)
+            k = int(np.argmax(share))
+            if share[k] > 1:
+                yield Depth(share[k], depth[k].max(), points[k, np.argmax(depth[k])], contact, _name(contact))
+
+    def _sunk(self, edges: np.ndarray, state: State) -> Iterator[Depth]:
+        """Contact points that the penalty lets too deep into tools: over the wall there now, whose volume is kept."""
+        weight, rest = self._problem.scene.kinematics.weight, self._outline.rest
+        grown = _lengths(edges) / self._rest * weight(edges[:, 2].T) / weight(rest[:, 2].T)
+        for contact, face in zip(self._problem.contacts, self._faces):
+            if not contact.present or contact.contact.points != "nodes" or not face.any():
+                continue
+            at = (edges - contact.travelled(state.control))[face].reshape(-1, 2)
+            depth = contact.contact.tool.signed_distance(at).reshape(-1, 3).max(1)
+            share = depth * grown[face] / (_SUNK * contact.thickness)
+            k = int(np.argmax(share))
+            if share[k] > 1:
+                yield Depth(share[k], depth[k], edges[face][k, 2], contact, _name(contact))
+
+
+def _pulled(contact: Any, state: State) -> bool:
+    """True if a tool without friction, from which the body separates, is pulled along its travel; collective."""
+    law = contact.contact
+    if not law.driven or not law.separates or law.friction_by_temperature or law.mu > 0:
+        return False
+    force = contact.force(state.x, state.control) @ np.array(law.moves) / np.hypot(*law.moves)
+    return bool(force > _PULLS * contact.pressing(state.x, state.control))
+
+
+def _lengths(edges: np.ndarray) -> np.ndarray:
+    """Of edges, shape (m, 3, 2): shape (m,)."""
+    return np.linalg.norm(np.diff(along(edges, 4), axis=1), axis=-1).sum(1)
+
+
+def _name(contact: Any) -> str:
+    return contact.contact.name or contact.contact.on

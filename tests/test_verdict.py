@@ -1,0 +1,97 @@
+"""A state that a body cannot have ends a run, in words, with the path up to the last good state."""
+
+import pytest
+
+import formingx as fx
+from formingx import tools
+from formingx.results.evaluate.verdict import Verdict
+
+
+def block(height=1.0, friction="none", elements=(6, 6), **contact):
+    """Half of a block between frictionless plates in plane strain."""
+    return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=height, elements=elements), kinematics=fx.PlaneStrain(),
+                    materials=fx.NeoHookean(c10=0.5),
+                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")],
+                    contacts=[fx.Contact("top", tools.plane(height), friction, moves=(0, -1), **contact)])
+
+
+def foot():
+    """A block glued to its base, pressed flat: its foot flows out and folds."""
+    return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(6, 6)), materials=fx.NeoHookean(c10=1.0),
+                    supports=[fx.Symmetry("axis"), fx.Clamped("bottom"), fx.Displaced("top")])
+
+
+def funnel():
+    """A sheet blown through a ring, with nothing above."""
+    ring = tools.Tool([(28.0, 31.2), (28.0, 1.2), (80.0, 1.2)], [0.0, 3.0, 0.0])
+    return fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(24, 1)), materials=fx.NeoHookean(c10=0.4),
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")],
+                    contacts=[fx.Contact("top", ring, "stick")])
+
+
+def inside_out(path, state):
+    """Part of the elements with a point where J <= 0."""
+    with path.problem.at(state) as problem:
+        bad, cells, _ = problem.inside_out()
+    return bad / cells
+
+
+def test_a_run_ends_before_its_first_bad_state(caplog):
+    with pytest.raises(fx.ConvergenceError, match="elements are inside out, the worst at .* beyond=True") as error:
+        fx.trace(foot(), until=fx.travel(-0.85), progress=False)
+    good = error.value.path
+    assert len(good) > 2 and max(inside_out(good, state) for state in good.states) <= 0.06
+    assert "The last good state is" in str(error.value)
+    path = fx.trace(foot(), until=fx.travel(-0.85), progress=False, beyond=True)
+    verdicts = [state.verdict for state in path.states]
+    assert next(k for k, verdict in enumerate(verdicts) if verdict) == len(good)
+    assert "beyond travel" in caplog.text
+
+
+def test_a_sheet_that_folds_ends_the_run():
+    with pytest.raises(fx.ConvergenceError, match="the body folds: its boundary goes through itself near"):
+        fx.trace(funnel(), until=fx.pressure(0.09), progress=False)
+
+
+def test_open_and_report_say_it_too(tmp_path):
+    from formingx.results.files import checkpoint
+    from formingx.results.show import record
+    fx.trace(foot(), until=fx.travel(-0.85), progress=False, beyond=True, checkpoint=tmp_path / "run")
+    for found in (record.of_checkpoint(*checkpoint.contents(tmp_path / "run")),
+                  record.of_path(fx.load(tmp_path / "run", foot()))):
+        assert any("the run is not to be used:" in text and "inside out" in text for text in found.warnings())
+
+
+@pytest.mark.parametrize("height, gap", [(1.0, 0.05), (2.0, 0.07)])
+def test_a_travel_that_the_body_did_not_follow_is_no_target_met(height, gap):
+    with pytest.raises(fx.ConvergenceError, match="did not follow the tool .* give Contact a penalty of") as error:
+        fx.trace(block(height), until=fx.travel(height - gap), progress=False)
+    penalty = float(str(error.value).split("a penalty of ")[1].split(";")[0])
+    left = gap / height
+    path = fx.trace(block(height, penalty=10 * penalty), until=fx.travel(height - gap), progress=False)
+    assert path["tool_force"][-1] == pytest.approx(left**-3 - left, rel=0.1)
+
+
+@pytest.mark.parametrize("gap, warns", [(0.5, False), (0.2, True), (0.1, True)])
+def test_a_run_warns_where_penetration_changes_the_force(gap, warns, caplog):
+    path = fx.trace(block(), until=fx.travel(1 - gap), progress=False)
+    off = abs(path["tool_force"][-1] / (gap**-3 - gap) - 1)
+    assert ("forces are off by more" in caplog.text) == warns and (off > 5e-3) == warns
+
+
+def test_a_pole_that_is_thinner_than_nothing_is_no_state():
+    """A ball on elements that are far too long for it."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(20, 1)), materials=fx.NeoHookean(c10=0.4),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", tools.sphere(radius=1.1, z=1.2), 0.3, moves=(0, -1))])
+    try:
+        path = fx.trace(scene, until=fx.travel(40.0), progress=False)
+    except fx.ConvergenceError as error:
+        path = error.path
+    assert path["pole_stretch"].max() < 100
+
+
+def test_a_good_state_has_no_verdict():
+    path = fx.trace(block(), until=fx.travel(0.3), progress=False)
+    verdict = Verdict(path.problem)
+    assert [verdict.of(state) for state in path.states] == [""] * len(path)
