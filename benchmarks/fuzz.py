@@ -2,7 +2,8 @@
 
     python3 benchmarks/fuzz.py [--calls 10000] [--seed 0] [--kinds KIND ...]
 
-A call ends well in a result, an InputError, a ConvergenceError or an OSError, within 10 s. Call k of a seed is always
+A call ends well in a result, an InputError, a ConvergenceError or an OSError, within 10 s (whole runs, of the kind
+`processes`, in states that hold, see `fuzz_runs.py`, within 90 s). Call k of a seed is always
 the same one, so that one that ended badly can be repeated: `--only K --seed SEED`. The calls run in a process of their
 own, which is started again where one ends it.
 """
@@ -32,8 +33,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-LIMIT = 10.0                                   # seconds of a processor's time for one call
-LONGEST = 6 * LIMIT                            # and of any, until the first call too: the machine may be busy
+LIMIT, OF_RUNS = 10.0, 90.0                    # seconds of a processor's time for one call; for a whole run
+LONGEST = 6 * OF_RUNS                          # and of any, until the first call too: the machine may be busy
 
 
 class Ending(NamedTuple):
@@ -67,9 +68,9 @@ def _watched(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> Iterat
         while True:
             spent, until = _processor_time(child.pid), time.monotonic() + LONGEST
             while not ready.select(1.0):
-                if time.monotonic() > until or began and _processor_time(child.pid) > spent + LIMIT:
+                if time.monotonic() > until or began and _processor_time(child.pid) > spent + _limit(began):
                     child.kill()
-                    yield Ending(number, began, f"no end within {LIMIT:g} s", True)
+                    yield Ending(number, began, f"no end within {_limit(began):g} s", True)
                     return
             part = os.read(child.stdout.fileno(), 65536)
             if not part:
@@ -84,6 +85,10 @@ def _watched(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> Iterat
                     number = found[0] + 1
         if number < last:
             yield Ending(number, began, f"the process died ({child.wait()})", True)
+
+
+def _limit(call: str) -> float:
+    return OF_RUNS if call.startswith("processes") else LIMIT
 
 
 def _processor_time(process: int) -> float:
@@ -203,6 +208,7 @@ def cases(folder: Path) -> dict[str, Callable[[random.Random], Any]]:
     """{kind and name: a call}; the first word is the kind."""
     import formingx as fx
     sys.path.insert(0, str(Path(__file__).parent))
+    import fuzz_runs
     import reliability
     mesh = fx.mesh.disc(radius=1.0, thickness={"a": 0.05, "b": 0.05}, elements=(4, 1))
     made = reliability._scene()
@@ -217,6 +223,7 @@ def cases(folder: Path) -> dict[str, Callable[[random.Random], Any]]:
         elif call.name != "mesh.read":
             found[f"{_kind(call.name)} {call.name}"] = lambda rng, c=call, g=good: _used(c, _required(c, g, rng))
     found |= _of_files(folder) | _of_fits() | _of_answers() | _of_tools() | _of_meshes() | _of_runs(folder, made)
+    found |= fuzz_runs.cases()
     return found
 
 

@@ -15,6 +15,12 @@ def test_random_calls_end_well():
     assert {"result", "InputError"} <= {e.how for e in endings}
 
 
+def test_whole_runs_of_random_scenes_hold():
+    """Six of them; `python3 benchmarks/fuzz.py --kinds processes` makes others."""
+    endings = fuzz.run(6, 9, ("processes",))
+    assert len(endings) == 6 and not [e for e in endings if e.bad]
+
+
 def test_a_call_that_dies_is_found():
     """What ends the process counts as one bad call, and the calls after it are made all the same."""
     endings = fuzz.run(4, 0, ("itself",))
