@@ -1,5 +1,7 @@
 """Lines that whole runs hardly feel, each by itself: found by `benchmarks/mutants.py`."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import ufl
@@ -10,7 +12,10 @@ import formingx as fx
 from formingx import Stage, tools
 from formingx.discrete.problem import Problem
 from formingx.results.evaluate.part import _strips
-from formingx.solve import follow
+from formingx.solve import extrapolate, follow
+from formingx.solve.curve import Curve
+from formingx.solve.state import State
+from formingx.solve.targets import Amplitude
 
 
 def moved(mesh, by):
@@ -151,3 +156,39 @@ def test_volume_between_two_lines_is_that_of_cones():
         return np.pi * (a * a + a * b + b * b)
     assert _strips(bottom, top, True) == pytest.approx([frustum(1, 1.5), frustum(2, 2.5) - frustum(1, 1.5)], rel=1e-12)
     assert _strips(bottom, top, False) == pytest.approx([3.75, 3.0], rel=1e-12)
+
+
+def test_a_target_met_on_a_far_part_of_the_path_is_a_failure(monkeypatch):
+    true, asked = Curve.progress, []
+
+    def behind_at_first(self, old, new):
+        asked.append(new)
+        return -1.0 if len(asked) == 1 else true(self, old, new)
+    monkeypatch.setattr(Curve, "progress", behind_at_first)
+    path = fx.trace(treloar((6, 1)), until=fx.pole_height(0.3), progress=False)
+    assert path.counts.failures == 1 and all(state is not asked[0] for state in path.states)
+
+
+def test_no_parabola_goes_through_a_jump():
+    def states(kind):
+        return [State(np.array([s]), 0.0, np.ones(1), 0.0, kind=k) for s, k in enumerate(["step", kind, "step"])]
+
+    def apart(a, b):
+        return float(abs(b.x - a.x)[0])
+    through, broken = states("step"), states("jump")
+    assert [extrapolate.behind(through, length, apart) for length in (3.0, 1.0)] == through[:2]
+    assert extrapolate.behind(broken, 3.0, apart) is None
+
+
+def test_a_jump_does_not_pass_its_target(monkeypatch):
+    """How far the control goes on in it ends where something that is driven has its target value."""
+    class Driven(Amplitude):
+        moves = True
+
+        def __init__(self):
+            pass
+    monkeypatch.setattr(follow.Run, "_sense", 1.0)
+    run = follow.Run.__new__(follow.Run)
+    run.curve, run.open = SimpleNamespace(value=lambda bound, x, control: control), [(fx.travel(0.5), Driven())]
+    near = State(np.zeros(1), 0.49, np.ones(1), 1.0)
+    assert run._change(near, 0.1) == pytest.approx(0.01) and run._change(near, 1e-3) == pytest.approx(1e-3)

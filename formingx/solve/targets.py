@@ -100,22 +100,17 @@ class _Linear(Bound):
 
 
 class _Form(Bound):
-    """scale times the value of a scalar form (minus its value at rest)."""
+    """scale times the value of a scalar form."""
 
     def __init__(self, problem, form, scale):
         self._problem, self._scale = problem, scale
         self._value = problem.forms.compile(form)
         self._derivative = problem.forms.compile(
             ufl.derivative(form, problem.forms.w, problem.forms.test_function()))
-        at_rest = problem.x.duplicate()
-        at_rest.set(0)
-        self._rest = 0.0
-        self._rest = self.value(at_rest, 0.0)
-        at_rest.destroy()
 
     def value(self, x, control):
         self._problem.set_state(x, control)
-        return self._scale * self._problem.assemble_scalar(self._value) - self._rest
+        return self._scale * self._problem.assemble_scalar(self._value)
 
     def equation(self, target):
         def c(x, control, gradient):
