@@ -27,8 +27,8 @@ from typing import Any
 import numpy as np
 
 import formingx as fx
-from formingx import csv_files
-from formingx.materials.measured import read_tests
+from formingx.calibration.measured import read_tests
+from formingx.io import csv_files
 from formingx.scene.fields import values_at
 
 LIMIT = 300                                                      # seconds for one file; CAD has a limit of its own

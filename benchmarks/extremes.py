@@ -17,7 +17,7 @@ from scipy.sparse import csr_matrix  # noqa: E402
 
 import formingx as fx  # noqa: E402
 from formingx.discrete.problem import Problem  # noqa: E402
-from formingx.reference import membrane_inflation, membrane_limit_point  # noqa: E402
+from formingx.exact.inflation import membrane_inflation, membrane_limit_point  # noqa: E402
 from formingx.results import files  # noqa: E402
 from formingx.solve.curve import Curve  # noqa: E402
 from formingx.solve.newton import Failure  # noqa: E402

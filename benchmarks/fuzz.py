@@ -254,7 +254,7 @@ def _required(call: Any, good: dict[str, Any], rng: random.Random) -> dict[str, 
 
 def _of_files(folder: Path) -> dict[str, Callable]:
     import formingx as fx
-    from formingx.physics import tools
+    from formingx.tools import shapes as tools
     (folder / "tool.geo").write_text("""r = 3; Point(1) = {0, 5, 0}; Point(2) = {r^2, 5, 0}; Point(3) = {9, 4, 0};
 Point(4) = {10, 4, 0}; Point(5) = {10, 0, 0};\nLine(1) = {1, 2};\nCircle(2) = {2, 3, 4};\nLine(3) = {4, 5};
 Physical Curve("mould") = {1, 2, 3};\n""")
@@ -343,7 +343,7 @@ def _of_answers() -> dict[str, Callable]:
 
 
 def _of_tools() -> dict[str, Callable]:
-    from formingx.physics.tools import Arc, Line, Tool
+    from formingx.tools.shapes import Arc, Line, Tool
 
     def number(rng):
         return rng.choice([rng.uniform(-2, 2), rng.randint(-2, 2), rng.randint(-2, 2), anything(rng)])

@@ -1,7 +1,7 @@
 """A flat sheet of 1 mm at 150 C laid on a cold tool that conducts: aluminium, syntactic foam, steel.
 
 The tool is 20 mm thick, its back held at 30 C, the contact's conductance 1000 W/(m2 K); air at 25 C above. Each
-temperature is held against a Laplace transform of both bodies (formingx/heat/reference.py). SI units, C.
+temperature is held against a Laplace transform of both bodies (formingx/exact/heat.py). SI units, C.
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ from common import parser, summarise
 from slab import SHEET, at_times, draw, print_errors, same_slab, slab
 
 import formingx as fx
-from formingx.heat import reference
+from formingx.exact import heat as reference
 from formingx.results import files
 
 THICKNESS, START, CONDUCTANCE = 1e-3, 150.0, 1000.0

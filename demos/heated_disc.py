@@ -2,7 +2,7 @@
 
 Cool rim: C/C0 = 1 + 3 R^2; step: 1 + 2 (1 + tanh((R - 0.7)/0.1)); hot rim: 1 - 0.5 R^2, R over r0. At given pole
 stretches the pressure p r0/(C0 h0), the pole height w/r0 and thickness ratios, held against membrane theory
-(formingx.reference.membrane_inflation: an ordinary differential equation).
+(formingx.exact.inflation.membrane_inflation: an ordinary differential equation).
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ from common import parser, save, say, summarise
 from scipy.interpolate import CubicSpline
 
 import formingx as fx
-from formingx.reference import membrane_inflation
+from formingx.exact.inflation import membrane_inflation
 from formingx.results import files
 from formingx.results.show import plots
 

@@ -1,6 +1,6 @@
 """A flat sheet of 3 mm heated through: by hot air, between radiant heaters, and by radiation absorbed in the depth.
 
-Each temperature is held against a solution without finite elements (formingx/heat/reference.py): series, or for the
+Each temperature is held against a solution without finite elements (formingx/exact/heat.py): series, or for the
 faces that radiate finite volumes. SI units, temperatures in C. From 25 C; x counts from the bottom face.
 """
 
@@ -9,7 +9,7 @@ from common import parser, summarise
 from slab import SHEET, at_times, draw, print_errors, same_slab, slab
 
 import formingx as fx
-from formingx.heat import reference
+from formingx.exact import heat as reference
 from formingx.heat.boundaries import STEFAN_BOLTZMANN
 from formingx.results import files
 

@@ -12,7 +12,7 @@ elements carries 26 psi (26.3 at most; 25.8 on finer meshes).
 from common import COMM, parser, save, say, summarise
 
 import formingx as fx
-from formingx.reference import membrane_limit_point
+from formingx.exact.inflation import membrane_limit_point
 from formingx.results import files
 from formingx.results.show import plots
 

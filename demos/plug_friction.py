@@ -20,7 +20,7 @@ from scipy.interpolate import PchipInterpolator
 from williams_plug import C10, PLUG, RADIUS, THICKNESS, TRAVELS
 
 import formingx as fx
-from formingx.reference_plug import membrane_sliding_over_plug
+from formingx.exact.plug import membrane_sliding_over_plug
 from formingx.results import files
 from formingx.results.show import plots
 

@@ -4,8 +4,8 @@ import numpy as np
 from common import save, say
 
 import formingx as fx
+from formingx.exact.heat import Slab
 from formingx.figures import figure
-from formingx.heat.reference import Slab
 
 SHEET = fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=1800.0)      # W/(m K), kg/m3, J/(kg K)
 

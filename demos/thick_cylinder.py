@@ -11,7 +11,7 @@ import numpy as np
 from common import COMM, parser, save, say, summarise
 
 import formingx as fx
-from formingx.reference import thick_sphere_limit_point, thick_wall
+from formingx.exact.inflation import thick_sphere_limit_point, thick_wall
 from formingx.results import files
 from formingx.results.show import plots
 

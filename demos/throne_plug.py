@@ -4,7 +4,7 @@ Mooney rubber, C10 the I1 constant; r0 = 7.62 cm. Thin: h0 = 0.0254 cm (r0/h0 = 
 constants (0.1213, 0.03327 MPa) and with Treloar's (0.143, 0.03327 MPa); thick: h0 = 0.076 cm (100), plug radius 2.30 cm
 (0.1731, 0.004006 MPa). "held": what touches the plug never lets go (no slip), to 10 cm; "frictionless", to a pole
 stretch of 3; each with a clamped and with a hinged rim, beside the membrane under a plug with a sharp edge
-(`formingx.reference_plug`; it ends where it would touch the plug's side); and with mu = 0.3, to 10 cm. The plug's edge
+(`formingx.exact.plug`; it ends where it would touch the plug's side); and with mu = 0.3, to 10 cm. The plug's edge
 is rounded here (--fillet); with smaller fillets the force comes to that of the membrane. Lengths in cm, forces in N.
 
 The thesis' text has no forces, only this: for the thick sheet its curve seems better than Throne's own; for the thin
@@ -19,7 +19,7 @@ import plugs
 from common import parser, save, say, summarise
 
 import formingx as fx
-from formingx.reference_plug import membrane_under_plug
+from formingx.exact.plug import membrane_under_plug
 from formingx.results import files
 from formingx.results.show import plots
 

@@ -7,7 +7,7 @@ import numpy as np
 from common import COMM, parser, save, say, summarise
 
 import formingx as fx
-from formingx.reference import membrane_inflation, membrane_limit_point
+from formingx.exact.inflation import membrane_inflation, membrane_limit_point
 from formingx.results import files
 from formingx.results.show import plots
 

@@ -1,7 +1,10 @@
 """formingx: how polymers are formed, simulated with finite elements on FEniCSx."""
 
-from . import _interrupts, mesh
-from .doctor import doctor
+from . import _interrupts, mesh, tools
+from .calibration.data import treloar1944
+from .calibration.fit import Fit, fit
+from .calibration.fit_in_time import TimedTest
+from .doctor.doctor import doctor
 from .errors import ConvergenceError, InputError, Interrupted
 from .heat.boundaries import Absorption, Convection, FixedTemperature, HeatFlux, Radiation, ThermalProperties
 from .heat.contact import ConductingTool, ContactWithTool
@@ -9,22 +12,19 @@ from .heat.cooling import Cooling
 from .heat.result import HeatRun
 from .heat.run import heat
 from .materials.constants import entropic, of_temperature
-from .materials.data import treloar1944
 from .materials.expansion import ThermalExpansion
-from .materials.fit import Fit, fit
-from .materials.fit_in_time import TimedTest
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from .materials.kbkz import KBKZ, PSM, Wagner
 from .materials.material import Material
 from .materials.published import Published, published
 from .materials.viscoelastic import TransientNetwork, Viscoelastic
-from .physics import tools
+from .measures.forces import force
+from .measures.targets import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel
 from .physics.contact import Contact
 from .physics.kinematics import Axisymmetric, PlaneStrain
 from .physics.loads import Load, Pressure
 from .physics.models import DisplacementPenalty, Membrane, MixedPressure
 from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Support, Symmetry
-from .physics.tools import Tool
 from .results.compare import Comparison, compare
 from .results.compare_nodes import NodalComparison, compare_nodes, write_nodes
 from .results.evaluate.profile import Profile
@@ -33,16 +33,15 @@ from .results.path import Path
 from .results.show.report import report
 from .runs import Process, load, solve, trace
 from .scene.scene import Scene
-from .solve.forces import force
 from .solve.newton import Tolerances
 from .solve.stage import Stage
 from .solve.state import State
 from .solve.stepping import StepControl
-from .solve.targets import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel
 from .study import Study, StudyRun, study
-from .tables import table
-from .time_temperature import WLF, Arrhenius
+from .tools import Tool
 from .units import Units
+from .values.table import table
+from .values.temperature import WLF, Arrhenius
 
 __version__ = "0.1.0"
 

@@ -119,7 +119,7 @@ def _demo(words: list[str]) -> None:
 
 
 def _doctor(options: argparse.Namespace) -> None:
-    from .scripts import look_over
+    from .doctor.scripts import look_over
     _say(str(look_over(options.script, options.arguments)))
 
 

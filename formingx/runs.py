@@ -12,8 +12,9 @@ from typing import Any
 
 from .discrete.problem import Problem
 from .errors import ConvergenceError, InputError, Interrupted, count, finite, instance, known, several
+from .measures.columns import Measure
+from .measures.targets import Amplitude, Target
 from .physics.contact import Contact
-from .results.columns import Measure
 from .results.evaluate import edges, tension, volume
 from .results.files.checkpoint import Checkpoint, holds_states, read
 from .results.path import Path
@@ -28,7 +29,6 @@ from .solve.stage import AT_FOLD, Stage, plan
 from .solve.start import begin
 from .solve.state import Record, State
 from .solve.stepping import StepControl
-from .solve.targets import Amplitude, Target
 from .solve.time_error import allowed as allowed_error
 
 log = logging.getLogger("formingx")

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 import formingx as fx
-from formingx import reference_time
+from formingx.exact import time as reference_time
 
 C10, P0, P1 = 0.05, [(0.5, 1.0)], [(0.3, 0.5), (0.4, 5.0)]
 

@@ -7,9 +7,9 @@ from test_admissible import displaced
 from test_contact import cup
 
 import formingx as fx
-from formingx import csv_files
 from formingx.discrete.probes import probe
 from formingx.discrete.problem import Problem
+from formingx.io import csv_files
 
 
 @pytest.fixture(scope="module")

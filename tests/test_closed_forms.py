@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import formingx as fx
-from formingx.reference import membrane_inflation, membrane_limit_point
+from formingx.exact.inflation import membrane_inflation, membrane_limit_point
 
 
 def cylinder(material, model=None):

@@ -8,7 +8,7 @@ from reference import element
 from test_reference_element import follow, pair
 
 import formingx as fx
-from formingx import csv_files
+from formingx.io import csv_files
 from formingx.results import files
 
 

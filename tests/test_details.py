@@ -11,11 +11,11 @@ from test_heat import body_of
 import formingx as fx
 from formingx import Stage, tools
 from formingx.discrete.problem import Problem
+from formingx.measures.targets import Amplitude
 from formingx.results.evaluate.part import _strips
 from formingx.solve import extrapolate, follow
 from formingx.solve.curve import Curve
 from formingx.solve.state import State
-from formingx.solve.targets import Amplitude
 
 
 def moved(mesh, by):

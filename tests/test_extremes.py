@@ -9,7 +9,7 @@ sys.path.insert(0, str(ROOT / "benchmarks"))
 import extremes  # noqa: E402
 
 import formingx as fx  # noqa: E402
-from formingx.reference import membrane_limit_point  # noqa: E402
+from formingx.exact.inflation import membrane_limit_point  # noqa: E402
 
 # What the reference leaves out (bending, a clamped rim, one element) sets how near a row can come.
 NEAR = {"eps": 2e-4, "stretch": 2e-4, "I1 to I2": 2e-4, "Ogden exponent": 5e-4, "Gent's limit": 5e-2, "layers": 2e-2,

@@ -9,7 +9,7 @@ from conftest import run_json
 from dolfinx import fem
 
 import formingx as fx
-from formingx.heat import reference
+from formingx.exact import heat as reference
 from formingx.heat import run as running
 from formingx.heat.layers import layered
 from formingx.mesh.grid import gathered

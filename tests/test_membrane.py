@@ -8,7 +8,7 @@ from test_derivatives import assert_derivatives, difference, random_state
 
 import formingx as fx
 from formingx.discrete.problem import Problem
-from formingx.reference import membrane_inflation, membrane_limit_point
+from formingx.exact.inflation import membrane_inflation, membrane_limit_point
 from formingx.results.evaluate.tension import Tension
 
 MATERIALS = [

@@ -9,7 +9,7 @@ from conftest import ROOT, treloar
 
 import formingx as fx
 from formingx.errors import InputError
-from formingx.reference_plug import membrane_sliding_over_plug, membrane_under_plug
+from formingx.exact.plug import membrane_sliding_over_plug, membrane_under_plug
 from formingx.solve.folds import snaps, was_passed
 
 sys.path.insert(0, str(ROOT / "benchmarks"))

@@ -8,8 +8,8 @@ import pytest
 from expected_in_time import C10, P1, balloon, relaxation, viscoelastic_tube
 
 import formingx as fx
-from formingx import reference_time
-from formingx.reference import thick_wall
+from formingx.exact import time as reference_time
+from formingx.exact.inflation import thick_wall
 
 MATERIAL = fx.Viscoelastic(fx.NeoHookean(c10=C10), P1)
 

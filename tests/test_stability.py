@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from conftest import run_json, treloar
 
 import formingx as fx
-import formingx.reference_stability as exact
+import formingx.exact.stability as exact
 from formingx.discrete.problem import Problem
 from formingx.discrete.second_variation import SecondVariation
 from formingx.errors import InputError

@@ -9,7 +9,7 @@ from test_closed_forms import cylinder, tube
 
 import formingx as fx
 from formingx.discrete.problem import Problem
-from formingx.reference import thick_sphere_limit_point, thick_wall
+from formingx.exact.inflation import thick_sphere_limit_point, thick_wall
 
 STRETCH = 1.7
 MATERIALS = [

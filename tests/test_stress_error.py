@@ -10,7 +10,7 @@ from test_stress import sphere
 
 import formingx as fx
 from formingx import _compat
-from formingx.reference import thick_wall
+from formingx.exact.inflation import thick_wall
 from formingx.results.evaluate.patches import Patches
 
 MODELS = [fx.MixedPressure(), fx.MixedPressure(eps=1e-4, space="P1"), fx.MixedPressure(space="P0"),

@@ -7,8 +7,8 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 import formingx as fx
-from formingx.tables import table
-from formingx.time_temperature import WLF, Arrhenius
+from formingx.values.table import table
+from formingx.values.temperature import WLF, Arrhenius
 
 MODULUS = {130: 2.0, 150: 0.6, 160: 0.6, 170: 0.2}
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import formingx as fx
-from formingx.physics import cad
-from formingx.physics.arcs import arcs_along
+from formingx.tools import cad
+from formingx.tools.arcs import arcs_along
 
 tools = fx.tools
 POINTS = np.random.default_rng(1).uniform([0, 1.5], [12, 7], (100, 2))

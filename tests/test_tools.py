@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import formingx as fx
-from formingx.physics.tools import Arc, Line
+from formingx.tools.shapes import Arc, Line
 
 tools = fx.tools
 SHAPES = {

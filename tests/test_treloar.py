@@ -8,7 +8,7 @@ from conftest import treloar
 
 import formingx as fx
 from formingx.discrete.probes import Probe
-from formingx.reference import membrane_limit_point
+from formingx.exact.inflation import membrane_limit_point
 from formingx.solve.curve import Curve
 from formingx.solve.jump import fixed
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..physics.contact import Contact
-from ..physics.tools import Arc, Line, Tool
+from ..tools.shapes import Arc, Line, Tool
 from .schedule import Setting
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..errors import InputError, finite, non_negative, positive
-from ..tables import Table
+from ..values.table import Table
 
 STEFAN_BOLTZMANN = 5.670374419e-8
 """W/(m2 K4)."""

@@ -26,7 +26,7 @@ from ..mesh import Mesh
 from ..physics import kinematics as kin
 from ..results.evaluate.profile import distance_to_line
 from ..solve.direct import DirectSolver
-from ..tables import Table
+from ..values.table import Table
 from .boundaries import Absorption, FixedTemperature, ThermalProperties
 from .contact import ContactWithTool, Touch
 

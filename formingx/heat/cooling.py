@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import ConvergenceError, InputError, instance, known, positive, several
-from ..tables import Table
-from ..time_temperature import ABSOLUTE_ZERO
+from ..values.table import Table
+from ..values.temperature import ABSOLUTE_ZERO
 from . import stepping
 from .boundaries import ThermalProperties
 from .conduction import Conduction

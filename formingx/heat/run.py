@@ -16,7 +16,7 @@ from ..errors import ConvergenceError, InputError, finite, instance, known, posi
 from ..mesh import Mesh
 from ..physics.kinematics import Axisymmetric
 from ..scene import fields
-from ..time_temperature import ABSOLUTE_ZERO
+from ..values.temperature import ABSOLUTE_ZERO
 from . import stepping
 from .boundaries import Absorption, FixedTemperature, ThermalProperties
 from .conduction import Conduction

@@ -16,8 +16,8 @@ import ufl
 from dolfinx import fem
 
 from ..errors import InputError, finite, known, values
-from ..tables import Table
-from ..time_temperature import ABSOLUTE_ZERO, FunctionOfTemperature
+from ..values.table import Table
+from ..values.temperature import ABSOLUTE_ZERO, FunctionOfTemperature
 
 
 class Sample(NamedTuple):

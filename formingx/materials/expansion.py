@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, finite
-from ..time_temperature import FunctionOfTemperature
+from ..values.temperature import FunctionOfTemperature
 from .constants import varying
 
 

@@ -26,8 +26,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..numerals import number, whole
-from ..output import replace
+from ..io.numerals import number, whole
+from ..io.output import replace
 from .grid import Grid, counter_clockwise
 
 _FORMAT = "six-node triangles 1"

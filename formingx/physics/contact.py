@@ -32,10 +32,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError, count, instance, non_negative, pair, positive
-from ..tables import Table
-from ..time_temperature import FunctionOfTemperature
+from ..tools.shapes import Nearest, Tool
+from ..values.table import Table
+from ..values.temperature import FunctionOfTemperature
 from .part import Part
-from .tools import Nearest, Tool
 
 _STICKS = 100.0
 """Coefficients of friction from which on a point counts as one that sticks: nothing slides there."""

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from .. import csv_files
 from ..errors import InputError, instance, known, several
+from ..io import csv_files
 from . import files
 from .show import plots
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import csv_files
 from .. import mesh as meshes
 from ..discrete.probes import probe
 from ..errors import InputError, known
+from ..io import csv_files
 from ..mesh import text as grid
 from . import files
 from .show import plots

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import ConvergenceError, InputError, finite, known
+from ..measures import columns as standard_columns
+from ..measures.targets import Bound, Target, is_met, process_time
 from ..solve import extrapolate
 from ..solve.follow import Run
 from ..solve.newton import Failure
 from ..solve.state import Counts, Record, Segment, State
 from ..solve.stepping import StepControl
-from ..solve.targets import Bound, Target, is_met, process_time
-from . import columns as standard_columns
 from .evaluate.profile import Profile, Profiles
 from .evaluate.stress import Stresses, StressField
 from .evaluate.verdict import Verdict

@@ -9,11 +9,11 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from .. import csv_files
 from ..errors import InputError, finite, values
+from ..io import csv_files
 from ..mesh import Mesh
 from ..mesh.locate import locate
-from ..tables import Table
+from ..values.table import Table
 
 _WHAT = "a number, a table over R, a function of (R, Z), a CSV file, what fx.heat returned, or a DOLFINx Function"
 

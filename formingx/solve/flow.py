@@ -11,12 +11,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..measures.targets import Bound, Target, is_met, process_time
 from . import extrapolate
 from .follow import Inaccurate, Run
 from .newton import Failure, tangents
 from .state import Record, State
 from .stepping import StepControl
-from .targets import Bound, Target, is_met, process_time
 
 _SAME = 1e-12          # relative: times that are the same
 _STILL = 1e-7          # relative: a change that is none

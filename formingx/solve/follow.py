@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ConvergenceError
+from ..measures.targets import Amplitude, Bound, Target, is_met
 from ..scene.aims import beyond_all
 from . import extrapolate
 from .diagnose import diagnose
@@ -25,7 +26,6 @@ from .newton import Failure, tangents
 from .progress import Progress
 from .state import Record, State, Unusable
 from .stepping import StepControl
-from .targets import Amplitude, Bound, Target, is_met
 from .time_error import TimeError
 
 log = logging.getLogger("formingx")

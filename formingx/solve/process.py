@@ -16,6 +16,7 @@ import numpy as np
 
 from ..discrete.schedule import Setting
 from ..errors import ConvergenceError, InputError
+from ..measures.targets import Amplitude, Bound, Target, changed, process_time
 from ..scene import clearance
 from .flow import Flow
 from .follow import Run
@@ -24,7 +25,6 @@ from .stage import Plan
 from .start import begin
 from .state import Record, State
 from .stepping import StepControl
-from .targets import Amplitude, Bound, Target, changed, process_time
 
 _IN_TIME = StepControl(length=1e-3, smallest=1e-13)
 """Step control of a material that relaxes: the error in time soon takes over."""

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError, finite, instance, known, positive, several
+from ..measures.targets import Target
 from ..scene import aims
 from ..scene.scene import Scene
 from .stepping import StepControl
-from .targets import Target
 
 _OF_CONTROL = ("pressure", "travel")
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import ConvergenceError
+from ..measures.targets import Amplitude, Target
 from .curve import Curve
 from .follow import Run
 from .newton import Failure
 from .state import Record, State
-from .targets import Amplitude, Target
 
 
 def begin(curve: Curve) -> State:

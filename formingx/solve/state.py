@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ConvergenceError
-from .targets import Target
+from ..measures.targets import Target
 
 log = logging.getLogger("formingx")
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...discrete.probes import probe
 from ...errors import InputError, non_negative
-from ...physics.tools import Arc, Tool
+from ...tools.shapes import Arc, Tool
 from ..files.sheet import Sheet
 from .profile import distance_to_line, fine
 

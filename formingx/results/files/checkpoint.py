@@ -27,12 +27,12 @@ from dolfinx import fem
 from ... import _compat
 from ...discrete.problem import Problem
 from ...errors import InputError, instance, place
+from ...measures.targets import Target
 from ...scene.scene import Scene
 from ...scene.summary import summary
 from ...solve.curve import Curve
 from ...solve.newton import Iteration, Tolerances
 from ...solve.state import Counts, Record, State
-from ...solve.targets import Target
 from .. import files
 from .description import describe, differences
 

@@ -34,9 +34,9 @@ from dolfinx import mesh as dolfinx_mesh
 from mpi4py import MPI
 
 from ...errors import InputError
+from ...measures.relaxed import ElasticStretches
 from .. import files
 from ..evaluate.contact_face import ContactFace
-from ..evaluate.relaxed import ElasticStretches
 
 _NODES = {1: np.array([[0.0], [1.0], [0.5]]), 2: np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])}
 """Places of the nodes in the reference cell, in DOLFINx order, by dimension."""

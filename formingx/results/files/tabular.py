@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, place
-from ...output import replace
+from ...io.output import replace
 
 
 def write_path(path: Any, file: Any) -> None:

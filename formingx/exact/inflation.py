@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from .errors import InputError, known, non_negative, positive
+from ..errors import InputError, known, non_negative, positive
 
 
 @dataclass(frozen=True)

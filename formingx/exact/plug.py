@@ -24,8 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from .errors import InputError, known, non_negative, positive
-from .reference import meridional_stretch
+from ..errors import InputError, known, non_negative, positive
+from .inflation import meridional_stretch
 
 
 @dataclass(frozen=True)

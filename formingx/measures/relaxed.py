@@ -10,7 +10,7 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from ... import _compat
+from .. import _compat
 
 _STRAIN, _NONE = 1e-6, 1e-10
 """Equibiaxial strain that is added where no stress is left (over the shear modulus): rest has the ratio of moduli."""

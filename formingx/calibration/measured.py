@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..csv_files import name_and_unit, records
 from ..errors import InputError, known
-from ..numerals import is_number
+from ..io.csv_files import name_and_unit, records
+from ..io.numerals import is_number
+from ..materials.homogeneous import MODES
 from ..units import STRESSES
-from .homogeneous import MODES
 
 _NAMES = {"test": "test", "mode": "test", "stretch": "stretch", "stress": "stress", "nominal stress": "stress",
           "engineering stress": "stress", "time": "time"}

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError, finite, known, place
-from . import homogeneous
+from ..materials import homogeneous
+from ..materials.material import Material
+from ..materials.viscoelastic import RelaxingMaterial
 from .fit_in_time import TimedTest, fitted_in_time
 from .fit_plot import plotted
-from .material import Material
 from .measured import read_tests
 from .uncertainty import uncertainty
-from .viscoelastic import RelaxingMaterial
 
 _FIRST, _LAST = 20, 400
 """Evaluations for every first guess, and then for the best three."""

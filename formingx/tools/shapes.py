@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError, finite, non_negative, positive
+from .files import read
 from .profile import TURN, Arc, Line, Nearest, Tool
-from .tool_files import read
 
 __all__ = ["Arc", "Line", "Nearest", "Pot", "Tool", "bottle", "clamp_ring", "cone", "cup", "cylinder", "male", "plane",
            "pot", "read", "sphere"]

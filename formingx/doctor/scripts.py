@@ -12,10 +12,10 @@ from typing import Any
 
 import formingx
 
+from ..errors import InputError, place
+from ..runs import Process
+from ..study import design
 from .doctor import Report, doctor
-from .errors import InputError, place
-from .runs import Process
-from .study import design
 
 
 class _Looked(BaseException):

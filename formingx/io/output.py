@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from .errors import place
+from ..errors import place
 
 
 def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:

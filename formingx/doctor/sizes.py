@@ -8,15 +8,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .errors import InputError
-from .materials.inflation import Inflated, Peak, first_peak
-from .mesh.triangles import Triangles
-from .physics.contact import Contact
-from .physics.tools import Tool
-from .scene.scene import Scene
-from .solve.stage import Stage
-from .solve.targets import Target
-from .units import Units
+from ..errors import InputError
+from ..materials.inflation import Inflated, Peak, first_peak
+from ..measures.targets import Target
+from ..mesh.triangles import Triangles
+from ..physics.contact import Contact
+from ..scene.scene import Scene
+from ..solve.stage import Stage
+from ..tools.shapes import Tool
+from ..units import Units
 
 Found = Iterator[tuple[str, str]]
 

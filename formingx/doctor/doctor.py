@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from . import doctor_sizes
-from .doctor_sizes import Body
-from .errors import instance, several
+from ..errors import instance, several
+from ..measures.targets import Target
+from ..physics.models import DisplacementPenalty
+from ..physics.supports import Displaced, Symmetry
+from ..scene.aims import unreachable
+from ..scene.scene import Scene
+from ..solve.stage import Stage
+from ..tools.shapes import Arc
+from ..units import NONE, Units
+from . import sizes as doctor_sizes
 from .findings import Finding, Report
-from .physics.models import DisplacementPenalty
-from .physics.supports import Displaced, Symmetry
-from .physics.tools import Arc
-from .scene.aims import unreachable
-from .scene.scene import Scene
-from .solve.stage import Stage
-from .solve.targets import Target
-from .units import NONE, Units
+from .sizes import Body
 
 _FLATTEST = 110.0          # longest edge over height: discs of aspect 100 end right in benchmarks/extremes.py
 _LONGEST = 2.0             # of elements of a soft layer over its thickness: measured, hard layers around it 150 to 1000

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .errors import InputError, known, place, positive
+from ..errors import InputError, known, place, positive
+from ..units import LENGTHS, STRESSES
 from .numerals import is_number
-from .units import LENGTHS, STRESSES
 
 _VOLUMES = {f"{name}3": size**3 for name, size in LENGTHS.items()} | {"l": 1e-3, "ml": 1e-6}
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import ufl
 
-from .errors import InputError, finite, known, positive, values
-from .tables import Table
+from ..errors import InputError, finite, known, positive, values
+from .table import Table
 
 ABSOLUTE_ZERO = {"C": -273.15, "K": 0.0}
 """By unit of temperature."""

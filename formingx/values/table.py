@@ -10,7 +10,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from .errors import InputError, finite
+from ..errors import InputError, finite
 
 
 class Table:

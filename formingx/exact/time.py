@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from .errors import InputError, known, non_negative, positive
-from .materials.homogeneous import MODES
-from .materials.viscoelastic import Viscoelastic
+from ..errors import InputError, known, non_negative, positive
+from ..materials.homogeneous import MODES
+from ..materials.viscoelastic import Viscoelastic
 
 _TOLERANCES = {"rtol": 1e-12, "atol": 1e-13}
 

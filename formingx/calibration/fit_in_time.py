@@ -13,11 +13,11 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from ..errors import InputError, count, positive, several
-from . import branches, homogeneous
-from .hyperelastic import NeoHookean
-from .material import Material
+from ..materials import branches, homogeneous
+from ..materials.hyperelastic import NeoHookean
+from ..materials.material import Material
+from ..materials.viscoelastic import RelaxingMaterial
 from .uncertainty import uncertainty
-from .viscoelastic import RelaxingMaterial
 
 _PER_DECADE = 16
 """Relaxation times a decade at which a branch's stress is computed; between them a cubic spline."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from ..numerals import number, whole
+from ..io.numerals import number, whole
 
 _NEEDED = {"LINE": (10, 20, 11, 21), "ARC": (10, 20, 40, 50, 51), "CIRCLE": (10, 20, 40), "VERTEX": (10, 20),
            "ELLIPSE": (10, 20, 11, 21, 40, 41, 42), "LWPOLYLINE": (), "POLYLINE": (), "SPLINE": (), "SEQEND": ()}

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..numerals import is_number
+from ..io.numerals import is_number
 from .profile import Arc, Line
 
 _OPERATORS: dict[type, Any] = {

@@ -7,9 +7,9 @@ from typing import Any
 
 from ..discrete.tooling import Tooling
 from ..errors import InputError
-from ..solve.forces import resisting
-from ..solve.targets import Amplitude, Bound, Target, bind_pole_height, bind_pole_stretch, bind_volume
-from .evaluate.relaxed import PoleStressRatio
+from .forces import resisting
+from .relaxed import PoleStressRatio
+from .targets import Amplitude, Bound, Target, bind_pole_height, bind_pole_stretch, bind_volume
 
 Measure = Target | Callable[[Any], float]
 """What a user's own column records, see `formingx.trace`."""

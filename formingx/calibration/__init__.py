@@ -1,0 +1,1 @@
+"""Constants of materials from tests: fits, in time too, their uncertainty, plots."""

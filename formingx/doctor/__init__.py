@@ -1,0 +1,1 @@
+"""A scene, or a script's, looked over before a run."""

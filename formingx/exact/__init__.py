@@ -1,0 +1,1 @@
+"""Exact solutions and membrane theory, to compare runs with."""

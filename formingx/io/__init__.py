@@ -1,0 +1,1 @@
+"""Numbers, tables and files of other programs, read and written."""

@@ -1,0 +1,1 @@
+"""Values that depend on others: tables, functions of the temperature."""
