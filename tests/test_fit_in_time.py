@@ -117,3 +117,16 @@ def test_bad_input(material, data, words):
 def test_rate_must_be_positive():
     with pytest.raises(fx.InputError, match="rate = 0"):
         fx.TimedTest.constant_rate("uniaxial", 0, L, L)
+
+
+@pytest.mark.parametrize("first", [0.05, 3.0])
+def test_a_stretch_that_is_held_was_put_on_at_time_0(first):
+    """Rows of a relaxation test that begin later: fitted as if the step were there, G(0) was 12 % too low."""
+    exact = fx.Viscoelastic(fx.NeoHookean(c10=0.2), branches=[(0.4, 1.0)])
+    times = first * np.geomspace(1, 100, 12)
+    stress = exact.relaxation("uniaxial", 1.5, times)
+    found = fx.fit(fx.Viscoelastic, [fx.TimedTest("uniaxial", times, np.full(12, 1.5), stress)], terms=1).material
+    assert found.relaxation_modulus(0.0) == pytest.approx(exact.relaxation_modulus(0.0), rel=1e-3)
+    rising = np.linspace(1.5, 2.0, 12)
+    with pytest.raises(fx.InputError, match="begins at time .* with a stretch of 1.5: since when"):
+        fx.fit(fx.Viscoelastic, [fx.TimedTest("uniaxial", times, rising, stress)])

@@ -132,3 +132,20 @@ def test_between_states_of_a_flow_there_is_none_to_find():
     path = run(block(), Stage("flow", drive="pull", follow={fx.travel: [(0, 0), (1, 1)]}), accuracy=1e-2)
     with pytest.raises(fx.InputError, match="within a flow"):
         path.at(fx.travel(0.987654))
+
+
+def test_doctor_sees_a_modulus_that_pulls_a_cooling_body_back():
+    """On what is left when all has relaxed; not on a branch that sets, nor on a rubber's."""
+    table, rubber = fx.table({20: 6.0, 150: 1.0}), fx.entropic(0.5, 150.0, unit="C")
+    sets = fx.Viscoelastic(fx.NeoHookean(c10=rubber), [(20.0, 1e-3)], shift=fx.Arrhenius(200e3, 150.0, unit="C"))
+
+    def found(material, air=20.0):
+        scene = fx.Scene(mesh=fx.mesh.disc(radius=1, thickness=0.05), materials=material, temperature=150.0,
+                         heat=fx.Cooling(fx.ThermalProperties(conductivity=0.01, density=1.0, heat_capacity=1.0),
+                                         [fx.Convection("top", h=0.05, air=air)], unit="C"),
+                         supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")])
+        return [f.text for f in fx.doctor(scene).findings if "pulls back" in f.text]
+    for material in (fx.NeoHookean(c10=table), fx.Viscoelastic(fx.NeoHookean(c10=table), [(table, 0.3)])):
+        assert len(found(material)) == 1 and "6 times as large at 20 degrees" in found(material)[0]
+        assert not found(material, air=145.0)
+    assert not found(sets) and not found(fx.NeoHookean(c10=rubber))

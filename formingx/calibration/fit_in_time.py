@@ -29,7 +29,7 @@ class TimedTest(NamedTuple):
     Args:
         mode: "uniaxial", "pure_shear" or "equibiaxial".
         times: shape (n,), not falling; a stretch that changes while the time does not is put on at once, and so is the
-            first one.
+            first one, at the first of the times; if that is not 0 and the stretch is held all along, at time 0.
         stretches: shape (n,).
         stress: nominal, shape (n,); not a number where it was not measured.
         between: what grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
@@ -202,4 +202,9 @@ def _checked(name: str, test: TimedTest) -> dict[str, Any]:
         raise InputError(f"{name}: stress = {test.stress!r}: must be numbers") from None
     if stress.shape != t.shape:
         raise InputError(f"{name}: stress has the shape {stress.shape}, times {t.shape}: must be the same")
+    if t[0] != 0 and l[0] != 1:                                 # when was it put on?
+        if np.ptp(l) > 0 or t[0] < 0:
+            raise InputError(f"{name}: begins at time {t[0]:.6g} with a stretch of {l[0]:.6g}: since when? Begin with"
+                             f" the time at which it was put on, the stress left empty (not a number)")
+        t, l, stress = np.append(0.0, t), np.append(l[0], l), np.append(np.nan, stress)
     return {"times": t, "stretches": l, "stress": stress}

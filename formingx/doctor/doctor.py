@@ -17,6 +17,7 @@ from ..scene.scene import Scene
 from ..solve.stage import Stage
 from ..tools.shapes import Arc
 from ..units import NONE, Units
+from . import cooling as doctor_cooling
 from . import sizes as doctor_sizes
 from .findings import Finding, Report
 from .sizes import Body
@@ -33,9 +34,9 @@ def doctor(scene: Scene, *, targets: Sequence[Target] = (), stages: Sequence[Sta
 
     Elements (shape, number through a thick layer), the mesh against the edges of the tools, penalties against the
     precision that they leave, sizes that look like mixed units, pressures and blow ratios that the material does not
-    bear, tools that move away or leave a way past them. What makes every run impossible or wrong, such as a body that
-    is free to move, elements that lie over each other or lock, is an `InputError` of `Scene` already; an "error" here
-    is a target that `trace` refuses.
+    bear, tools that move away or leave a way past them, a modulus that rises as the body cools. What makes every run
+    impossible or wrong, such as a body that is free to move, elements that lie over each other or lock, is an
+    `InputError` of `Scene` already; an "error" here is a target that `trace` refuses.
 
     Args:
         targets: what the run will aim at, to be looked over too.
@@ -58,6 +59,7 @@ def doctor(scene: Scene, *, targets: Sequence[Target] = (), stages: Sequence[Sta
     checks = (_driven, _elements, _locking, _layers, _fillets, _contact_penalties, _volume_penalty, _units)
     findings = [finding for check in checks for finding in check(scene, body, targets)]
     findings += [Finding("warning", about, text) for check in doctor_sizes.CHECKS for about, text in check(body)]
+    findings += [Finding("warning", about, text) for about, text in doctor_cooling.springs_back(scene)]
     return Report([*findings, *_targets(scene, body, targets)])
 
 

@@ -87,6 +87,12 @@ class Cooling:
         """What a problem remembers of the temperature (`formingx.discrete.history.History`)."""
         return CoolingHistory(self, problem)
 
+    def extremes(self, scene: Any) -> tuple[float, float]:
+        """Between which temperatures the body stays if work does not heat it; collective."""
+        first = scene.temperature.first
+        ends = scene.mesh.comm.allgather((first.min(initial=np.inf), first.max(initial=-np.inf)))
+        return _extremes([*np.ravel(ends)], [*self.boundaries, *self._touches(scene)])
+
     def conducts(self, contact: Any) -> bool:
         """True if heat flows through a contact of the scene."""
         return contact.name in self.tools
@@ -131,8 +137,7 @@ class CoolingHistory:
         self._n = len(self._body.points)
         self._first = scene.temperature.first[: self._n].copy()
         self._seen: Any = None                              # by the constants of this problem
-        ends = problem.comm.allgather((self._first.min(initial=np.inf), self._first.max(initial=-np.inf)))
-        low, high = _extremes([*np.ravel(ends)], [*cooling.boundaries, *touches])
+        low, high = cooling.extremes(scene)
         scene.temperature.limits = low, np.inf if cooling.work_to_heat else high
         self._dissipated = self._body.source(forms.dissipated) if cooling.work_to_heat else None
         self.start()
