@@ -32,8 +32,8 @@ def springs_back(scene: Scene) -> Iterator[tuple[str, str]]:
             except InputError:                              # it says so itself, if it comes to that
                 continue
             if cold > _RISES * hot > 0:
-                yield (f"layer {layer!r}", f"{name}, of what is left when all has relaxed, is {cold / hot:.3g} times as"
-                                           f" large at {low:.4g} degrees as at {high:.4g}: as it cools, a stretched"
-                                           f" body pulls back with so much more, as if it had not set. What sets"
-                                           f" keeps its shape: give Viscoelastic a stiff branch with a relaxation time that"
-                                           f" is short when hot and endless when cold (shift=...), see docs/heat.md")
+                yield f"layer {layer!r}", (
+                    f"{name}, of what is left when all has relaxed, is {cold / hot:.3g} times as large at {low:.4g}"
+                    f" degrees as at {high:.4g}: as it cools, a stretched body pulls back with so much more, as if it"
+                    f" had not set. What sets keeps its shape: give Viscoelastic a stiff branch with a relaxation time"
+                    f" that is short when hot and endless when cold (shift=...), see docs/heat.md")
