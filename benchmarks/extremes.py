@@ -19,7 +19,7 @@ import formingx as fx  # noqa: E402
 from formingx.discrete.problem import Problem  # noqa: E402
 from formingx.exact.inflation import membrane_inflation, membrane_limit_point  # noqa: E402
 from formingx.results import files  # noqa: E402
-from formingx.solve.curve import Curve  # noqa: E402
+from formingx.solve.arc_length import Curve  # noqa: E402
 from formingx.solve.newton import Failure  # noqa: E402
 
 RATIO = 15.24

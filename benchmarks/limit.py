@@ -21,8 +21,8 @@ from common import COMM, say  # noqa: E402
 import formingx as fx  # noqa: E402
 from formingx.discrete.problem import Problem  # noqa: E402
 from formingx.results import files  # noqa: E402
-from formingx.solve.curve import Curve  # noqa: E402
-from formingx.solve.direct import DirectSolver  # noqa: E402
+from formingx.solve.arc_length import Curve  # noqa: E402
+from formingx.solve.linear import DirectSolver  # noqa: E402
 
 SIZES = {"inflation": [(20, 1), (40, 2), (80, 4)], "cup": [(30, 1), (60, 2)]}
 LARGE = {"inflation": [(160, 8), (320, 16), (1000, 55)], "cup": []}

@@ -17,7 +17,7 @@ from limit import clocked  # noqa: E402
 import formingx as fx  # noqa: E402
 from formingx.discrete.problem import Problem  # noqa: E402
 from formingx.results import files  # noqa: E402
-from formingx.solve.direct import DirectSolver  # noqa: E402
+from formingx.solve.linear import DirectSolver  # noqa: E402
 
 PARTS = {"tangent": (Problem, "tangent"), "residual": (Problem, "residual"), "factors": (DirectSolver, "factorise"),
          "two solves": (DirectSolver, "solve_all")}

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import formingx as fx
-from formingx.solve import curve
+from formingx.solve.arc_length import Curve
 
 _NUMBER = {"a word": "x", "nan": math.nan, "inf": math.inf, "a bool": True, "a list": [], "an array": [1.0, 2.0],
            "huge": 10**400, "a dict": {}}
@@ -77,11 +77,11 @@ def unsolved() -> Iterator[None]:
     """Runs end with `ReachedTheSolve` where they would begin to solve."""
     def stop(*_: Any) -> None:
         raise ReachedTheSolve
-    start, curve.Curve.start = curve.Curve.start, stop
+    start, Curve.start = Curve.start, stop
     try:
         yield
     finally:
-        curve.Curve.start = start
+        Curve.start = start
 
 
 def _mesh() -> fx.mesh.Mesh:

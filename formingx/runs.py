@@ -20,10 +20,10 @@ from .results.files.checkpoint import Checkpoint, holds_states, read
 from .results.path import Path
 from .scene import aims, clearance
 from .scene.scene import Scene
-from .solve.curve import Curve
-from .solve.fixed import FixedControlCurve
-from .solve.follow import Run
+from .solve.arc_length import Curve
+from .solve.load_control import FixedControlCurve
 from .solve.newton import Tolerances
+from .solve.path_following import Run
 from .solve.process import Execution
 from .solve.stage import AT_FOLD, Stage, plan
 from .solve.start import begin

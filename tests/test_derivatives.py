@@ -6,7 +6,7 @@ import pytest
 import formingx as fx
 from formingx.discrete.problem import Problem
 from formingx.discrete.viscosity import Viscosity
-from formingx.solve.jump import _Viscous
+from formingx.solve.snap_through import _Viscous
 
 pytestmark = pytest.mark.quick
 

@@ -13,8 +13,8 @@ from formingx import Stage, tools
 from formingx.discrete.problem import Problem
 from formingx.measures.targets import Amplitude
 from formingx.results.evaluate.part import _strips
-from formingx.solve import extrapolate, follow
-from formingx.solve.curve import Curve
+from formingx.solve import path_following, predictor
+from formingx.solve.arc_length import Curve
 from formingx.solve.state import State
 
 
@@ -116,13 +116,13 @@ def test_slip_on_a_curved_tool_has_the_slope_that_is_said(tool):
 
 
 def test_a_step_back_to_what_was_passed_is_made_shorter(monkeypatch):
-    true, asked = follow.was_passed, []
+    true, asked = path_following.was_passed, []
 
     def at_first(*args):
         asked.append(args)
         return len(asked) == 3 or true(*args)
     plain = fx.trace(treloar((6, 1)), until=fx.pole_stretch(2.0), progress=False)
-    monkeypatch.setattr(follow, "was_passed", at_first)
+    monkeypatch.setattr(path_following, "was_passed", at_first)
     path = fx.trace(treloar((6, 1)), until=fx.pole_stretch(2.0), progress=False)
     assert path.counts.failures == plain.counts.failures + 1
     assert path["pressure"][-1] == pytest.approx(plain["pressure"][-1], rel=1e-9)
@@ -176,8 +176,8 @@ def test_no_parabola_goes_through_a_jump():
     def apart(a, b):
         return float(abs(b.x - a.x)[0])
     through, broken = states("step"), states("jump")
-    assert [extrapolate.behind(through, length, apart) for length in (3.0, 1.0)] == through[:2]
-    assert extrapolate.behind(broken, 3.0, apart) is None
+    assert [predictor.behind(through, length, apart) for length in (3.0, 1.0)] == through[:2]
+    assert predictor.behind(broken, 3.0, apart) is None
 
 
 def test_a_jump_does_not_pass_its_target(monkeypatch):
@@ -187,8 +187,8 @@ def test_a_jump_does_not_pass_its_target(monkeypatch):
 
         def __init__(self):
             pass
-    monkeypatch.setattr(follow.Run, "_sense", 1.0)
-    run = follow.Run.__new__(follow.Run)
+    monkeypatch.setattr(path_following.Run, "_sense", 1.0)
+    run = path_following.Run.__new__(path_following.Run)
     run.curve, run.open = SimpleNamespace(value=lambda bound, x, control: control), [(fx.travel(0.5), Driven())]
     near = State(np.zeros(1), 0.49, np.ones(1), 1.0)
     assert run._change(near, 0.1) == pytest.approx(0.01) and run._change(near, 1e-3) == pytest.approx(1e-3)

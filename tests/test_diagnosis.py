@@ -118,7 +118,7 @@ def test_condition_number():
     from scipy.sparse import csr_matrix
 
     from formingx.discrete.problem import Problem
-    from formingx.solve.direct import DirectSolver, condition
+    from formingx.solve.linear import DirectSolver, condition
     problem = Problem(treloar(elements=(4, 1)))
     x = problem.x.duplicate()
     x.set(0)
@@ -134,15 +134,15 @@ def test_condition_number():
 def test_solutions_with_a_scaling_that_is_kept(able, monkeypatch):
     """Of another tangent, to round-off; a MUMPS that cannot keep one makes another."""
     from formingx.discrete.problem import Problem
-    from formingx.solve import direct
+    from formingx.solve import linear
     problem = Problem(treloar(elements=(4, 1)))
     x, found = problem.x.duplicate(), problem.x.duplicate()
     x.set(0)
     problem.tangent(x, 0.0)
-    solver = direct.DirectSolver(problem.matrix, problem.symmetric)
+    solver = linear.DirectSolver(problem.matrix, problem.symmetric)
     assert solver.factorise()
     if not able:
-        monkeypatch.setattr(direct.DirectSolver, "scaling", 0)
+        monkeypatch.setattr(linear.DirectSolver, "scaling", 0)
     x.array_w[:] = 0.01 * np.random.default_rng(1).standard_normal(len(x.array_r))
     rhs = problem.tangent(x, 0.0) * x
     assert solver.factorise(rescale=False)

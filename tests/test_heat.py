@@ -6,7 +6,8 @@ import ufl
 from dolfinx import fem
 
 import formingx as fx
-from formingx.heat import reference, stepping
+from formingx.exact import heat as reference
+from formingx.heat import stepping
 from formingx.heat.conduction import Conduction
 
 D = 3e-3

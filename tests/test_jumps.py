@@ -11,7 +11,7 @@ import formingx as fx
 from formingx import tools
 from formingx.discrete.contact_nodes import ContactNodes
 from formingx.results.show import plots
-from formingx.solve import jump
+from formingx.solve import snap_through
 
 sys.path.insert(0, str(ROOT / "demos"))
 import plugs  # noqa: E402
@@ -166,7 +166,7 @@ def test_work_is_energy_and_friction_and_what_jumps_lose():
     {"_FIRST": 3.0, "_FALLS": 0.5}, pytest.param({"_GROWS": (2.0, 2.0)}, marks=pytest.mark.slow)], ids=str)
 def test_where_jumps_end_does_not_depend_on_how_eta_changes(rough, schedule, monkeypatch):
     for name, value in schedule.items():
-        monkeypatch.setattr(jump, name, value)
+        monkeypatch.setattr(snap_through, name, value)
     other = pushed()
     assert other.jumps and other["tool_force"][-1] == pytest.approx(rough["tool_force"][-1], rel=1e-3)
 
@@ -175,8 +175,8 @@ def test_where_jumps_end_does_not_depend_on_how_eta_changes(rough, schedule, mon
 def test_nor_in_shorter_steps(monkeypatch):
     """At 7.2, past the third jump; at 6.9, at its brink, which of two states a run ends in is left to round-off."""
     before = pushed(7.2, largest=0.02)["tool_force"][-1]
-    monkeypatch.setattr(jump, "_FIRST", 3.0)
-    monkeypatch.setattr(jump, "_FALLS", 0.5)
+    monkeypatch.setattr(snap_through, "_FIRST", 3.0)
+    monkeypatch.setattr(snap_through, "_FALLS", 0.5)
     assert pushed(7.2, largest=0.02)["tool_force"][-1] == pytest.approx(before, rel=1e-3)
 
 

@@ -9,8 +9,8 @@ from conftest import treloar
 import formingx as fx
 from formingx.discrete.probes import Probe
 from formingx.exact.inflation import membrane_limit_point
-from formingx.solve.curve import Curve
-from formingx.solve.jump import fixed
+from formingx.solve.arc_length import Curve
+from formingx.solve.snap_through import fixed
 
 STRETCHES = (1.2, 1.5, 2.0, 3.0, 4.0, 6.0)
 

@@ -25,7 +25,7 @@ from ..errors import ConvergenceError
 from ..mesh import Mesh
 from ..physics import kinematics as kin
 from ..results.evaluate.profile import distance_to_line
-from ..solve.direct import DirectSolver
+from ..solve.linear import DirectSolver
 from ..values.table import Table
 from .boundaries import Absorption, FixedTemperature, ThermalProperties
 from .contact import ContactWithTool, Touch

@@ -13,9 +13,9 @@ import numpy as np
 from ..errors import ConvergenceError, InputError, finite, known
 from ..measures import columns as standard_columns
 from ..measures.targets import Bound, Target, is_met, process_time
-from ..solve import extrapolate
-from ..solve.follow import Run
+from ..solve import predictor
 from ..solve.newton import Failure
+from ..solve.path_following import Run
 from ..solve.state import Counts, Record, Segment, State
 from ..solve.stepping import StepControl
 from .evaluate.profile import Profile, Profiles
@@ -300,8 +300,8 @@ class Path:
         if state.setting["rate"][-1]:
             x, control = segment.curve.interpolate(before, state, 0.5)
         else:                                                # a flow, whose tangents are at a fixed time
-            past = [*extrapolate.before(states[:-1], time, extrapolate.CUBIC - 1), state]
-            weights = extrapolate.weights(past, time)
+            past = [*predictor.before(states[:-1], time, predictor.CUBIC - 1), state]
+            weights = predictor.weights(past, time)
             x, control = weights @ [s.x for s in past], float(weights @ [s.control for s in past])
         with segment.problem.at(before) as problem:
             if not state.setting["rate"][-1]:

@@ -12,7 +12,7 @@ from ..discrete.elements import Body, body
 from ..discrete.tooling import Tooling
 from ..mesh.triangles import Place, place
 from .diagnosis import Diagnosis
-from .direct import DirectSolver, condition
+from .linear import DirectSolver, condition
 
 _BEFORE, _SINGULAR = 10, 100.0
 """States before the last one at which the condition number of the tangent is looked at, too, and the growth from

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from .curve import Curve
+from .arc_length import Curve
 from .state import State
 
 

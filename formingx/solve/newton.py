@@ -12,8 +12,8 @@ from petsc4py import PETSc
 
 from ..errors import count, positive
 from .chords import Chords
-from .direct import DirectSolver
-from .settle import Settling, woodbury
+from .linear import DirectSolver
+from .local_contact import Settling, woodbury
 
 UNLOADED = 1e-5
 """Floor of the support forces (over stress times volume over length) in the relative residual."""

@@ -18,9 +18,9 @@ from ..discrete.schedule import Setting
 from ..errors import ConvergenceError, InputError
 from ..measures.targets import Amplitude, Bound, Target, changed, process_time
 from ..scene import clearance
-from .flow import Flow
-from .follow import Run
+from .measure_control import Flow
 from .newton import UNLOADED, Failure
+from .path_following import Run
 from .stage import Plan
 from .start import begin
 from .state import Record, State

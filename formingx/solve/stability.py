@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..discrete.second_variation import SecondVariation
-from .direct import DirectSolver
+from .linear import DirectSolver
 from .newton import Failure
 from .state import State
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from ..errors import ConvergenceError
 from ..measures.targets import Amplitude, Target
-from .curve import Curve
-from .follow import Run
+from .arc_length import Curve
 from .newton import Failure
+from .path_following import Run
 from .state import Record, State
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, finite
-from . import extrapolate
+from . import predictor
 from .state import State
 
 ACCURACY = {"draft": 1e-2, "standard": 2e-3, "fine": 3e-4}
@@ -46,9 +46,9 @@ class TimeError:
     def of(self, states: list[State], x: np.ndarray, control: float) -> float:
         """Error of the step from the last of some states to (x, control) over what is allowed; 0: no time goes by."""
         time = self._problem.forms.time_at(control)
-        past = extrapolate.before(states, time, extrapolate.QUADRATIC - 1)
+        past = predictor.before(states, time, predictor.QUADRATIC - 1)
         end = State(x, control, x, 0.0, time=time)
         middle = (past[-1].time + time) / 2
-        share = extrapolate.weights([*past, end], middle) if time > past[-1].time else np.array([])
+        share = predictor.weights([*past, end], middle) if time > past[-1].time else np.array([])
         once, lasting = self._problem.step_error.of(past, share, x, control)
         return max(once / self._once, lasting / self._adding_up)

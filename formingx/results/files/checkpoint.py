@@ -30,7 +30,7 @@ from ...errors import InputError, instance, place
 from ...measures.targets import Target
 from ...scene.scene import Scene
 from ...scene.summary import summary
-from ...solve.curve import Curve
+from ...solve.arc_length import Curve
 from ...solve.newton import Iteration, Tolerances
 from ...solve.state import Counts, Record, State
 from .. import files

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from .direct import DirectSolver
+from .linear import DirectSolver
 
 MOST = 40
 """Points that are settled together; with more, the iteration is left to itself."""

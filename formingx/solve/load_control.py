@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from .curve import Curve
+from .arc_length import Curve
 from .diagnose import Attempt
-from .direct import configure
+from .linear import configure
 from .newton import UNLOADED, Failure, Iteration, Tolerances
 from .state import State
 

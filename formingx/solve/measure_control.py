@@ -12,9 +12,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..measures.targets import Bound, Target, is_met, process_time
-from . import extrapolate
-from .follow import Inaccurate, Run
+from . import predictor
 from .newton import Failure, tangents
+from .path_following import Inaccurate, Run
 from .state import Record, State
 from .stepping import StepControl
 
@@ -99,8 +99,8 @@ class Flow(Run):
         if len(self.states) < 2 or old.time in self._times or old.kind == "limit point":
             return new
         before, after = (
-            _rate([*extrapolate.before(self.states[:-1], old.time, 2), old]),
-            _rate([*extrapolate.before(self.states, new.time, 2), new])) if self.problem.relaxes else (
+            _rate([*predictor.before(self.states[:-1], old.time, 2), old]),
+            _rate([*predictor.before(self.states, new.time, 2), new])) if self.problem.relaxes else (
             old.slope, new.slope)                            # else a path, whose tangents say it
         still = _STILL * max(abs(old.control), abs(new.control)) / (new.time - old.time)
         if before * after >= 0 or min(abs(before), abs(after)) < still or self.curve.distance(old, new) < _STILL:
@@ -119,10 +119,10 @@ class Flow(Run):
 
     def _foretold(self, old: State, time: float, value: float) -> tuple[np.ndarray, float]:
         """(x, control) at a time: on the polynomial through the last states, or along the tangent of the first."""
-        past = extrapolate.before(self.states, time, extrapolate.CUBIC - self.problem.has_kinks)
+        past = predictor.before(self.states, time, predictor.CUBIC - self.problem.has_kinks)
         if len(past) == 1:
             return self._along(old, value)
-        w = extrapolate.weights(past, time)
+        w = predictor.weights(past, time)
         return w @ [s.x for s in past], float(w @ [s.control for s in past])
 
     def _along(self, old: State, value: float) -> tuple[np.ndarray, float]:

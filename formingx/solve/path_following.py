@@ -18,12 +18,12 @@ import numpy as np
 from ..errors import ConvergenceError
 from ..measures.targets import Amplitude, Bound, Target, is_met
 from ..scene.aims import beyond_all
-from . import extrapolate
+from . import predictor
 from .diagnose import diagnose
 from .folds import snaps, usual, was_passed
-from .jump import AHEAD, MOST, NoEquilibrium, jump
 from .newton import Failure, tangents
 from .progress import Progress
+from .snap_through import AHEAD, MOST, NoEquilibrium, jump
 from .state import Record, State, Unusable
 from .stepping import StepControl
 from .time_error import TimeError
@@ -263,7 +263,7 @@ class Run:
     def _take(self, old: State, length: float, target: Target | None, bound: Any, reach: float) -> list[State]:
         """One step of a length, or to a target that is within reach; raises `Failure`, `Inaccurate` or `_Late`."""
         self.problem.prepare(old.x, old.control, old.direction, old.slope, reach, ends=True)
-        behind = None if self.problem.has_kinks else extrapolate.behind(self.states, reach, self.curve.distance)
+        behind = None if self.problem.has_kinks else predictor.behind(self.states, reach, self.curve.distance)
         with self.curve.newton.in_a_hurry(length > _JUMPS[0]):
             if target is None:
                 new = self.curve.step(old, length, self._foretold, behind)
@@ -296,8 +296,8 @@ class Run:
 
         def x(control: float) -> np.ndarray | None:
             time = self.problem.forms.time_at(control)
-            past = extrapolate.before(self.states, time, extrapolate.CUBIC)
-            return extrapolate.weights(past, time) @ [s.x for s in past] if len(past) > 2 else None
+            past = predictor.before(self.states, time, predictor.CUBIC)
+            return predictor.weights(past, time) @ [s.x for s in past] if len(past) > 2 else None
         return x
 
     def _error_in_time(self, new: State) -> float:

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..errors import ConvergenceError
 from .diagnose import Attempt, diagnose
-from .jump import fixed
 from .newton import UNLOADED, BorderedNewton, Failure, Tolerances
+from .snap_through import fixed
 from .state import State
 
 CONTROL_WEIGHT = 0.1
