@@ -15,7 +15,7 @@ from .errors import ConvergenceError, InputError, Interrupted, count, finite, in
 from .measures.columns import Measure
 from .measures.targets import Amplitude, Target
 from .physics.contact import Contact
-from .results.evaluate import edges, tension, volume
+from .results.evaluate import edges, snaps, tension, volume
 from .results.files.checkpoint import Checkpoint, holds_states, read
 from .results.path import Path
 from .scene import aims, clearance
@@ -298,6 +298,6 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
     of_volume = volume.doubts(path.last.measures["volume_error"], "the last state",
                               path.problem.furthest_volume_ratio(path.last))
     for bad, text in (of_volume + path.doubts() + edges.doubts(edges.coarsest(path, path.last))
-                      + tension.doubts(tension.first_compression(path))):
+                      + tension.doubts(tension.first_compression(path)) + snaps.doubts(snaps.largest(path))):
         if bad == "serious" and path.problem.comm.rank == 0:
             log.warning("%s", text)

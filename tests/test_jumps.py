@@ -10,6 +10,7 @@ from scipy import integrate, optimize
 import formingx as fx
 from formingx import tools
 from formingx.discrete.contact_nodes import ContactNodes
+from formingx.results.evaluate import snaps
 from formingx.results.show import plots
 from formingx.solve import snap_through
 
@@ -138,6 +139,16 @@ def test_a_rough_plug_goes_on_where_points_leave_its_edge(rough):
     assert rough["travel"][-1] == pytest.approx(6.5, rel=1e-12)
     assert np.all(np.diff(rough["travel"]) > 0)
     assert all(state.jump["dissipated"] > 0 and state.jump["moved"] > 0 for state in rough.jumps)
+
+
+def test_walls_that_a_jump_with_friction_changes_much_are_doubted(rough):
+    snap, k = snaps.largest(rough), next(k for k, state in enumerate(rough.states) if state.kind == "jump")
+    ratios = [rough.profile(rough.states[n]).wall_ratio for n in (k - 1, k)]
+    assert (snap.jumps, snap.state) == (len(rough.jumps), k)
+    assert snap.change == pytest.approx(np.abs(ratios[1] / ratios[0] - 1).max(), rel=1e-12)
+    assert 0.005 < snap.change < 0.05 and snaps.doubts(snap) == []
+    ((bad, text),) = snaps.doubts(snap._replace(after=1.1 * snap.before))
+    assert bad == "serious" and f"state {k}" in text and "StepControl" in text
 
 
 def share_of_friction(path):

@@ -13,7 +13,7 @@ from ...discrete.admissible import Least
 from ...discrete.tooling import Tooling
 from ...errors import InputError
 from .. import files
-from ..evaluate import edges, tension, volume
+from ..evaluate import edges, snaps, tension, volume
 from ..evaluate.contact_face import ContactFace, ContactTable, tool_forces
 from ..evaluate.profile import Profile
 
@@ -41,7 +41,8 @@ class Record:
             the profiles say; empty of a checkpoint.
         layers: of the last state, as in `Wall`; script: the file that ran; or "".
         furthest: where J is furthest from 1 in the last state, or None: not known of a checkpoint or a membrane.
-        edge: `edges.coarsest` in the last state, or None; compression: `tension.first_compression`, or None.
+        edge: `edges.coarsest` in the last state, or None; compression: `tension.first_compression`, or None; snap:
+            `snaps.largest`, or None.
         verdicts: of the n states, `State.verdict`.
     """
 
@@ -65,6 +66,7 @@ class Record:
     edge: edges.Edge | None = None
     compression: tuple[int, tension.Resultant] | None = None
     verdicts: Sequence[str] = ()
+    snap: snaps.Snap | None = None
 
     @property
     def control(self) -> str:
@@ -95,7 +97,7 @@ class Record:
             found.append(("serious" if worst > 10 * MASS else "minor",
                           f"The mass changes by up to {100 * worst:.2g} %: a smaller eps, or a finer mesh, keeps it."))
         found += self._of_volume() + self._of_verdict() + edges.doubts(self.edge)
-        found += tension.doubts(self.compression)
+        found += tension.doubts(self.compression) + snaps.doubts(self.snap)
         if self.counts.get("failures", 0) > len(self.kinds):
             found.append(("note", f"{self.counts['failures']} attempts at a step failed and were repeated with half its"
                                   f" length; the results do not suffer."))
@@ -139,7 +141,7 @@ def of_path(path: Any) -> Record:
                   [tooling.travels(s.setting, s.control) for s in path.states], tool_forces(path),
                   _fields(path, profiles), dict(wall.layers) if wall else {}, sys.argv[0],
                   problem.furthest_volume_ratio(path.last), edges.coarsest(path, path.last),
-                  tension.first_compression(path), [s.verdict for s in path.states])
+                  tension.first_compression(path), [s.verdict for s in path.states], snaps.largest(path))
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:

@@ -1,0 +1,60 @@
+"""Snap-through with a history: where a body comes to rest, of several places, then depends on the way there."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...errors import InputError
+
+_WALL = 0.05
+"""Change of the wall in one jump, over the wall, above which walls behind it are doubted."""
+
+
+class Snap(NamedTuple):
+    """The jump of a run in which the wall changed most.
+
+    Attributes:
+        jumps: how many there were. state: its number in the path.
+        before, after: the wall over the original thickness at `point`, reference radius (length).
+    """
+
+    jumps: int
+    state: int
+    before: float
+    after: float
+    point: float
+
+    @property
+    def change(self) -> float:
+        """Of the wall, over the wall before."""
+        return abs(self.after / self.before - 1)
+
+
+def largest(path: Any) -> Snap | None:
+    """Of the jumps of a path with friction or relaxing material; None: there is none, or no wall; collective."""
+    jumps = [k for k, state in enumerate(path.states) if state.kind == "jump" and k]
+    if not jumps or not path.problem.has_history:
+        return None
+    found = []
+    for k in jumps:
+        try:
+            profile = path.profile(path.states[k])
+            before, after = path.profile(path.states[k - 1]).wall_ratio, profile.wall_ratio
+        except InputError:                                  # no sheet
+            return None
+        i = int(np.argmax(np.abs(after / before - 1)))
+        found.append(Snap(len(jumps), k, float(before[i]), float(after[i]), float(profile.reference_radius[i])))
+    return max(found, key=lambda snap: snap.change)
+
+
+def doubts(snap: Snap | None) -> list[tuple[str, str]]:
+    """(how bad, what), as `volume.doubts`."""
+    if snap is None or snap.change < _WALL:
+        return []
+    times = f"{snap.jumps} times, most" if snap.jumps > 1 else "once,"
+    return [("serious", f"The body snapped {times} in state {snap.state}: there the wall went from {snap.before:.4g} to"
+                        f" {snap.after:.4g} of the original at R = {snap.point:.5g}. With friction or relaxing material"
+                        f" the state of rest that it comes to depends on the way there, so what follows is known no"
+                        f" better than it changes with the steps: compare runs with StepControl(target=4) and 8.")]
