@@ -31,7 +31,7 @@ def test_adiabatic_work_becomes_heat():
     path = pull(scene, accuracy="fine")
     volume = np.pi * 0.4
     with path.problem.at(path.last):
-        T = scene.temperature.T.x.array.copy()
+        T = path.problem.temperature.T.x.array.copy()
     assert np.ptp(T) < 1e-8
     lost = path.last.measures["dissipated_energy"]
     heat, power = 6.0 * volume * (T.mean() - 20.0), path["dissipated_power"]
@@ -48,7 +48,7 @@ def test_half_of_the_work_heats_half_as_much_and_none_not_at_all():
         scene = pulled(work_to_heat=share)
         path = pull(scene, accuracy="draft")
         with path.problem.at(path.last):
-            rises[share] = scene.temperature.T.x.array.mean() - 20.0
+            rises[share] = path.problem.temperature.T.x.array.mean() - 20.0
     assert rises[0.5] == pytest.approx(rises[1.0] / 2, rel=1e-9) and abs(rises[None]) < 1e-9
 
 
@@ -102,10 +102,9 @@ def press(scene, **options):
     return fx.Process(scene).run([push, fx.Stage("hold", duration=0.5)], progress=False, accuracy="draft", **options)
 
 
-def told(scene, path):
+def told(path):
     """Numbers of the last state: forces, temperatures of the sheet, wall."""
-    with path.problem.at(path.last):
-        T = scene.temperature.at(np.array([[R, Z] for R in (0.0, 0.3, 0.7) for Z in (0.0, 0.05)]))
+    T = path.temperature(np.array([[R, Z] for R in (0.0, 0.3, 0.7) for Z in (0.0, 0.05)]))
     m = path.last.measures
     return [*T.tolist(), m["tool_force"], m["pole_height"], m["dissipated_energy"], *path.profile().thickness_ratio[:3],
             float(len(path))]
@@ -114,12 +113,12 @@ def told(scene, path):
 def test_a_restart_goes_on_as_if_it_had_never_stopped(tmp_path):
     scene = pressed()
     whole = press(scene, checkpoint=tmp_path / "run")
-    assert told(scene, whole)[1] < 120 and whole.last.measures["tool_force"] != 0
+    assert told(whole)[1] < 120 and whole.last.measures["tool_force"] != 0
     for number in (len(whole) // 2, len(whole) - 2):
         start = fx.load(tmp_path / "run", scene, state=number)
         again = press(scene, start=start)
         same(again, whole, rel=1e-9)
-        assert told(scene, again) == pytest.approx(told(scene, whole), rel=1e-9)
+        assert told(again) == pytest.approx(told(whole), rel=1e-9)
 
 
 RANKS = """
@@ -127,7 +126,7 @@ import json, sys
 sys.path.insert(0, "tests")
 from test_cooling import press, pressed, told
 scene = pressed()
-found = told(scene, press(scene))
+found = told(press(scene))
 if scene.mesh.comm.rank == 0:
     print(json.dumps(found))
 """

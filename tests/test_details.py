@@ -60,7 +60,7 @@ def test_a_tool_that_is_away_takes_no_heat():
     for stage in ("touch", "away"):
         state = [s for s in path.states if s.stage == stage][-1]
         with path.problem.at(state) as problem:
-            T, X = problem.scene.temperature.T, ufl.SpatialCoordinate(scene.mesh.domain)
+            T, X = problem.temperature.T, ufl.SpatialCoordinate(scene.mesh.domain)
             dx = ufl.dx(scene.mesh.domain, metadata={"quadrature_degree": 4})
             means.append(problem.forms.integral(T * X[0] * dx))
     cold = 150.0 * 0.5 * 0.05

@@ -82,10 +82,10 @@ def test_constants_follow_a_temperature_that_changes():
     problem = Problem(here)
     c10 = problem.forms.coefficients["sheet", "c10"]
     assert np.allclose(c10.x.array, 0.6)
-    here.temperature.T.x.array[:] = 130.0
+    problem.temperature.T.x.array[:] = 130.0
     problem.forms.take_temperature()
     assert np.allclose(c10.x.array, 2.0)
-    here.temperature.T.x.array[:] = 120.0
+    problem.temperature.T.x.array[:] = 120.0
     with pytest.raises(fx.InputError, match=r"temperature = 120: must be from 130 to 170"):
         problem.forms.take_temperature()
 
@@ -153,10 +153,10 @@ def test_a_sheet_cools_while_it_waits():
     points = np.array([[0.0, 0.0], [0.01, 1e-3]])
     c10 = path.problem.forms.coefficients["sheet", "c10"].ufl_operands[0]        # times how it goes on in a step
     with path.problem.at(path.last):
-        assert scene.temperature.at(points) == pytest.approx(alone.at(points)[-1], abs=0.05)
+        assert path.problem.temperature.at(points) == pytest.approx(alone.at(points)[-1], abs=0.05)
         stiffer = c10.x.array.max()
     with path.problem.at(path.states[0]):
-        assert np.all(scene.temperature.T.x.array == 150.0)
+        assert np.all(path.problem.temperature.T.x.array == 150.0)
         assert c10.x.array == pytest.approx(0.6e6)
     assert stiffer > 0.7e6
 
@@ -176,7 +176,6 @@ def test_a_tool_takes_heat_only_where_and_while_it_touches():
     push = fx.Stage("push", drive="plug", until=fx.travel(4e-3), through=[fx.travel(0.4e-3)], duration=0.5)
     path = fx.Process(scene).run([push], progress=False, accuracy="draft")
     with path.problem.at(path.met(fx.travel(0.4e-3))):
-        assert np.all(np.abs(scene.temperature.T.x.array - 150.0) < 1e-9)        # it has not come to the sheet yet
-    with path.problem.at(path.last):
-        *under, beside = scene.temperature.at(np.array([[R, 1e-3] for R in (0.0, 0.002, 0.004, 0.006, 0.019)]))
+        assert np.all(np.abs(path.problem.temperature.T.x.array - 150.0) < 1e-9)      # it has not come to the sheet yet
+    *under, beside = path.temperature(np.array([[R, 1e-3] for R in (0.0, 0.002, 0.004, 0.006, 0.019)]))
     assert min(under) < 110 and beside > 149.9, under

@@ -69,10 +69,9 @@ def test_it_follows_a_face_that_cools():
     """mu is that of the last accepted state's face, comes back with a state, and goes on in a restart."""
     polymer = fx.ThermalProperties(conductivity=0.17, density=1.0, heat_capacity=1.0)
     cooling = fx.Cooling(polymer, unit="C", tools={"plug": (1.0, 30.0)}, tolerance=0.5)
-    scene, path = pushed(RISING, 150.0, cooling)
+    path = pushed(RISING, 150.0, cooling)[1]
     R, N, tangential, mu = tractions(path)
-    with path.problem.at(path.last):
-        T = scene.temperature.at(np.column_stack([R, np.full(len(R), 0.05)]))
+    T = path.temperature(np.column_stack([R, np.full(len(R), 0.05)]))
     assert T.max() < 120 and mu == pytest.approx(RISING(T), rel=1e-9)
     assert np.all(np.abs(tangential) <= mu * N * (1 + 1e-12))
     assert np.all(tractions(path, path.states[1])[3] > mu.max())

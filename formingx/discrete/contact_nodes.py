@@ -56,7 +56,7 @@ class ContactNodes:
         self._place(assemble)
         self._temperature_nodes: Any = None                 # of the temperature that friction depends on
         if contact.friction_by_temperature:
-            self._temperature_nodes = solid.scene.temperature.nodes(self._nodes())
+            self._temperature_nodes = solid.temperature.nodes(self._nodes())
         self.thickness = solid.thickness(contact.on)
         self.law = contact.law(contact.penalty * solid.stress / self.thickness, self.thickness, self.points,
                                self._temperatures())
@@ -111,10 +111,10 @@ class ContactNodes:
     def _temperatures(self) -> np.ndarray | None:
         """Of the body at the points now, shape (n,); None where friction does not depend on them."""
         nodes = self._temperature_nodes
-        return None if nodes is None else self.solid.scene.temperature.at_nodes(nodes)
+        return None if nodes is None else self.solid.temperature.at_nodes(nodes)
 
     def take_temperature(self) -> None:
-        """The scene's temperature has changed: friction follows it.
+        """The temperature has changed: friction follows it.
 
         Raises:
             InputError: friction has no value at a temperature.

@@ -18,11 +18,11 @@ class Followed:
 
     Args:
         forms: the `Formulation`; values: a `Function` of a quadrature element, which holds f(T).
-        parts: [(cells, by local numbers; f; the temperature there by the `values` of `BodyTemperature.in_cells`)].
+        parts: [(cells, by local numbers; f; the temperature there by the `values` of `Temperature.in_cells`)].
     """
 
     def __init__(self, forms: Any, values: fem.Function, parts: Sequence[tuple[Any, Callable, Callable]]):
-        self._temperature, self._values, self._parts = forms.scene.temperature, values, parts
+        self._temperature, self._values, self._parts = forms.temperature, values, parts
         self._rate = None
         if forms.scene.heat is not None:
             self._rate, self._since = fem.Function(values.function_space), forms.constant(0.0)

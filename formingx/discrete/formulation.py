@@ -26,6 +26,7 @@ from .history import History, MaterialHistory
 from .loaded_body import LoadedBody
 from .material_terms import MaterialTerms
 from .probes import Probe
+from .temperature import Temperature
 
 
 class Formulation(ABC):
@@ -52,6 +53,7 @@ class Formulation(ABC):
         residual: dpotential/dw - external virtual work (UFL, rank 1); control_derivative, time_derivative: its
             derivative by the control, in the loads and by way of the time in materials, or None.
         load_works: of each load of the scene its virtual work at the value that it has (UFL, rank 1, user's units).
+        temperature: the `Temperature` of the body, or None.
         slack_at_rest: True if the body at rest has no stiffness in some direction.
     """
 
@@ -63,6 +65,7 @@ class Formulation(ABC):
         self.stress = max(scene.shear_modulus(name) for name in scene.mesh.layers)
         self.mesh = self._make_mesh()
         self.domain = self.mesh.domain
+        self.temperature: Any = None if scene.temperature is None else Temperature(scene.temperature)
         self.comm = scene.mesh.comm
         self.displacement_element, elements = self._elements(self.domain.basix_cell())
         self.space = fem.functionspace(self.domain, basix.ufl.mixed_element(elements))
@@ -157,11 +160,11 @@ class Formulation(ABC):
         return F if self._free is None else self._free.elastic(F)
 
     def temperatures(self, terms: MaterialTerms, values: Any = None) -> np.ndarray:
-        """The scene's temperature (or other values of it) at the quadrature points of a material, (cells, points)."""
-        return self.scene.temperature.in_cells(terms.cells, terms.places, values)
+        """The temperature (or other values of it) at the quadrature points of a material, (cells, points)."""
+        return self.temperature.in_cells(terms.cells, terms.places, values)
 
     def take_temperature(self) -> None:
-        """The scene's temperature has changed: constants follow it; scales stay as they are; collective.
+        """The temperature has changed: constants follow it; scales stay as they are; collective.
 
         Raises:
             InputError: a constant has no value at a temperature.

@@ -24,7 +24,7 @@ class FreeStretch:
 
     def __init__(self, forms: Any, expansion: dict[str, Any]):
         cell, degree = forms.domain.basix_cell(), forms.scene.quadrature_degree
-        places, temperature = basix.make_quadrature(cell, degree)[0], forms.scene.temperature
+        places, temperature = basix.make_quadrature(cell, degree)[0], forms.temperature
         element = basix.ufl.quadrature_element(cell, scheme="default", degree=degree)
         stretch = fem.Function(fem.functionspace(forms.domain, element), name="free stretch")
         stretch.x.array[:] = 1.0

@@ -92,7 +92,7 @@ class MidSurface(Formulation):
         shapes: Any = geometry.tabulate(0, terms.places)
         R, Z = np.einsum("qk,nkd->dnq", shapes[0], nodes)
         points = np.column_stack([R.ravel(), self.mid(terms.names[0], R.ravel(), Z.ravel())])
-        return self.scene.temperature.at(points).reshape(R.shape)
+        return self.temperature.at(points).reshape(R.shape)
 
     def probe(self, problem, points):
         return MidSurfaceProbe(problem, points)

@@ -28,6 +28,7 @@ from .history import MaterialHistory
 from .matrix import ExtendedMatrix
 from .schedule import Setting
 from .step_error import StepError
+from .temperature import Temperature
 from .viscosity import Viscosity
 
 
@@ -158,6 +159,11 @@ class Problem:
     def time(self) -> float:
         """Process time at the control that the forms see now."""
         return self.forms.time_at(self.control)
+
+    @property
+    def temperature(self) -> Temperature | None:
+        """Of the body at the last accepted state, inside `at` that of the state; None: the scene has none."""
+        return self.forms.temperature
 
     @property
     def memory(self) -> list[Any]:
@@ -352,7 +358,7 @@ class Problem:
         self._foretold = None, []
 
     def take_temperature(self) -> None:
-        """The scene's temperature has changed: constants and friction follow it; collective.
+        """The temperature has changed: constants and friction follow it; collective.
 
         Raises:
             InputError: a constant or friction has no value at a temperature.

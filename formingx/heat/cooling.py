@@ -89,7 +89,7 @@ class Cooling:
 
     def extremes(self, scene: Any) -> tuple[float, float]:
         """Between which temperatures the body stays if work does not heat it; collective."""
-        first = scene.temperature.first
+        first = scene.temperature.T.x.array
         ends = scene.mesh.comm.allgather((first.min(initial=np.inf), first.max(initial=-np.inf)))
         return _extremes([*np.ravel(ends)], [*self.boundaries, *self._touches(scene)])
 
@@ -126,7 +126,7 @@ class CoolingHistory:
         forms, scene = problem.forms, problem.scene
         self._cooling, self._problem, self._forms = cooling, problem, forms
         zero = ABSOLUTE_ZERO[cooling.unit]
-        self._field = scene.temperature
+        self._field = problem.temperature
         touches = cooling._touches(scene)
         self._body = Conduction(scene.mesh, checked_materials(scene.mesh, cooling.materials),
                                 checked_boundaries(scene.mesh, [*cooling.boundaries, *touches], zero),
@@ -135,10 +135,10 @@ class CoolingHistory:
         self._touches = [(touch, contact, touch.conductance.copy())
                          for touch, contact in zip(self._body.touches, touching, strict=True)]
         self._n = len(self._body.points)
-        self._first = scene.temperature.first[: self._n].copy()
-        self._seen: Any = None                              # by the constants of this problem
+        self._first = scene.temperature.T.x.array[: self._n]
+        self._seen: Any = None                              # by the field, and by what depends on it
         low, high = cooling.extremes(scene)
-        scene.temperature.limits = low, np.inf if cooling.work_to_heat else high
+        self._field.limits = low, np.inf if cooling.work_to_heat else high
         self._dissipated = self._body.source(forms.dissipated) if cooling.work_to_heat else None
         self.start()
 
@@ -225,12 +225,10 @@ class CoolingHistory:
         return np.concatenate(self._problem.comm.allgather(own))
 
     def _take(self) -> None:
-        """The temperature of the scene, which other problems may have changed, and the constants of this one."""
+        """The temperature of the problem, and what depends on it."""
         field, T, before = self._field, self._state[0], self._before
         seen = self._time, T, before
-        same = self._seen is not None and self._time == field.time and _equal(seen, self._seen) and np.array_equal(
-            T, field.T.x.array[: self._n])
-        if self._problem.comm.allreduce(int(not same)):
+        if self._problem.comm.allreduce(int(self._seen is None or not _equal(seen, self._seen))):
             self._seen = seen
             field.T.x.array[: self._n] = T
             field.T.x.scatter_forward()

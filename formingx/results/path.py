@@ -481,6 +481,13 @@ class Path:
         from .evaluate.contact_face import ContactFace, contact_of
         return ContactFace(self, contact_of(self, tool, "contact")[0]).of(state or self.last)
 
+    def temperature(self, points: Any, state: State | None = None) -> np.ndarray:
+        """Of the body in a state (default: the last) at reference points (R, Z), shape (n, 2), length: shape (n,)."""
+        if self.problem.temperature is None:
+            raise InputError("temperature: the scene has none: give Scene a temperature=...")
+        with self.problem.at(state or self.last) as problem:
+            return problem.temperature.at(points)
+
     def tool_forces(self) -> dict[str, np.ndarray]:
         """{tool: its force at all states}: positive when it resists its travel; of a tool that stays, along Z."""
         from .evaluate.contact_face import tool_forces
@@ -491,9 +498,8 @@ class Path:
 
         Work done on the body by each load (its column; of a fixed one "pressure_on_bottom"), each driven support (its
         name, or "support") and each tool that moves; by forces that a stage leaves without balance, as they fade
-        ("change"). Energy that comes with a change of temperature ("heat"). Where it went: "strain_energy", above that
-        of the first state; "dissipated_energy" in materials that relax; "friction"; "jumps" of the body. "unbalanced"
-        is what is left of the sum: the error of the integrals over the steps, and of the run.
+        ("change"). Energy of changes of temperature ("heat"). Where it went: "strain_energy", above that at first;
+        "dissipated_energy" in materials; "friction"; "jumps". "unbalanced": the error of the integrals, and of the run.
         """
         from .evaluate.work import work
         return work(self)

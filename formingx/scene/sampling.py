@@ -11,10 +11,10 @@ import numpy as np
 from .. import _compat
 from ..materials.constants import Sample
 from ..mesh.mesh import Mesh
-from .temperature import BodyTemperature
+from .temperature import GivenTemperature
 
 
-def sample(mesh: Mesh, layer: str, degree: int, temperature: BodyTemperature | None = None) -> Sample:
+def sample(mesh: Mesh, layer: str, degree: int, temperature: GivenTemperature | None = None) -> Sample:
     """The quadrature points of the energy, of a degree, in this rank's own cells of a layer, by their numbers."""
     domain = mesh.domain
     cells = mesh.cells.find(mesh.layers[layer])
@@ -23,5 +23,5 @@ def sample(mesh: Mesh, layer: str, degree: int, temperature: BodyTemperature | N
     geometry = basix.ufl.element("Lagrange", "triangle", _compat.coordinate_map(domain).degree)
     shapes: Any = geometry.tabulate(0, places)
     nodes = domain.geometry.x[_compat.cell_nodes(domain)[cells], :2]
-    T = None if temperature is None else temperature.in_cells(cells, places, temperature.first).ravel()
+    T = None if temperature is None else temperature.in_cells(cells, places).ravel()
     return Sample(np.einsum("qk,nkd->nqd", shapes[0], nodes).reshape(-1, 2), cells, places, domain, T)

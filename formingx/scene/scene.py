@@ -23,7 +23,7 @@ from ..physics.supports import Held, Support
 from . import tool_width
 from .sampling import sample
 from .summary import summary
-from .temperature import BodyTemperature
+from .temperature import GivenTemperature
 
 _HIGHEST = 30
 """Degree of a quadrature: more are asked for by mistake, and their points fill the memory."""
@@ -83,7 +83,7 @@ class Scene:
         if self.quadrature_degree > _HIGHEST:
             raise InputError(f"Scene: quadrature_degree = {quadrature_degree!r}: must be at most {_HIGHEST}")
         if temperature is not None:
-            self.temperature = BodyTemperature(temperature, mesh)
+            self.temperature = GivenTemperature(temperature, mesh)
         if expansion is not None:
             self.expansion = self._checked_expansion(expansion)
         self._check_names()
@@ -101,7 +101,7 @@ class Scene:
             heat.check(self)
             self.heat = heat
 
-    temperature: BodyTemperature | None = None
+    temperature: GivenTemperature | None = None
     heat: Any = None
     expansion: Mapping[str, ThermalExpansion] = MappingProxyType({})
 

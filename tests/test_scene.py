@@ -1,0 +1,50 @@
+"""A scene is a description: no run changes it."""
+
+import types
+
+import numpy as np
+from dolfinx import fem
+from test_cooling import pressed
+
+import formingx as fx
+
+
+def contents(thing, seen=None):
+    """All that a thing of the package holds, as plain data that can be compared; what others made, as it is."""
+    seen = {} if seen is None else seen
+    if id(thing) in seen:
+        return f"seen {seen[id(thing)]}"
+    if isinstance(thing, np.ndarray):
+        return thing.dtype.str, thing.shape, thing.tobytes()
+    if isinstance(thing, fem.Function):
+        return thing.x.array.tobytes()
+    if isinstance(thing, dict | types.MappingProxyType):
+        return [(str(key), contents(value, seen)) for key, value in thing.items()]
+    if isinstance(thing, list | tuple):
+        return [contents(value, seen) for value in thing]
+    if type(thing).__module__.startswith("formingx"):
+        seen[id(thing)] = len(seen)
+        return type(thing).__name__, contents(vars(thing), seen)
+    return thing
+
+
+def test_a_run_leaves_its_scene_as_it_was():
+    """Friction by temperature, heat, relaxation, expansion, a process of two stages and a mesh: all as before."""
+    scene = pressed()
+    before, X = contents(scene), scene.mesh.domain.geometry.x.copy()
+    path = fx.Process(scene).run([fx.Stage("push", drive="plug", until=fx.travel(0.1), duration=0.2),
+                                  fx.Stage("wait", duration=0.2)], progress=False, accuracy="draft")
+    assert path.temperature([(0.0, 0.05)])[0] < 140 and path.last.measures["tool_force"] != 0
+    assert contents(scene) == before and np.array_equal(scene.mesh.domain.geometry.x, X)
+    assert np.all(scene.temperature.T.x.array == 150.0)
+
+
+def test_two_runs_of_a_scene_at_once_do_not_meet():
+    """The temperature is the problem's: a second run of the same scene begins with that of the scene."""
+    scene = pressed()
+    push = [fx.Stage("push", drive="plug", until=fx.travel(0.06), duration=0.1)]
+    first = fx.Process(scene).run(push, progress=False, accuracy="draft")
+    T = first.problem.temperature.T.x.array.copy()
+    second = fx.Process(scene).run(push, progress=False, accuracy="draft")
+    assert np.array_equal(first.problem.temperature.T.x.array, T)
+    assert [s.measures for s in second.states] == [s.measures for s in first.states]
