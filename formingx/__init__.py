@@ -17,6 +17,7 @@ from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivli
 from .materials.kbkz import KBKZ, PSM, Wagner
 from .materials.material import Material
 from .materials.published import Published, published
+from .materials.sets import Sets
 from .materials.viscoelastic import TransientNetwork, Viscoelastic
 from .measures.forces import force
 from .measures.targets import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel

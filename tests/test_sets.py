@@ -1,0 +1,117 @@
+"""A material that sets: what is born in the drawn shape keeps it, what melts lets it go."""
+
+import json
+
+import numpy as np
+import pytest
+from conftest import drawn, run
+from scipy.optimize import brentq
+
+import formingx as fx
+
+HEAT = fx.ThermalProperties(conductivity=0.2, density=1000.0, heat_capacity=2000.0)
+BASE = fx.NeoHookean(c10=1.0)
+
+
+def block(material, boundaries, temperature=150.0, heat=True, **more):
+    """A block that is drawn equally in its plane."""
+    return fx.Scene(mesh=fx.mesh.disc(radius=1e-3, thickness=1e-3, elements=(2, 1)), materials=material,
+                    temperature=temperature, heat=fx.Cooling(HEAT, boundaries, unit="C", tolerance=1.0) if heat
+                    else None, supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
+                                         fx.Displaced("rim", "r", name="grip")], **more)
+
+
+def air(temperature):
+    return [fx.Convection(face, h=500.0, air=temperature) for face in ("top", "bottom")]
+
+
+def draw(by):
+    return fx.Stage("draw", drive="grip", until=fx.travel(by * 1e-3))
+
+
+def stretch(path):
+    return float(np.mean(path.stress().at_quadrature_points().deformation_gradient[:, 0, 0]))
+
+
+def balance(G, drawn_to, mu=2.0, phi=1.0):
+    return brentq(lambda l: mu * (l**2 - l**-4) + phi * G * ((l / drawn_to)**2 - (l / drawn_to)**-4), 1, drawn_to)
+
+
+def test_set_block(tmp_path):
+    """Within 1e-8 of the balance of rubber and glass; few steps."""
+    run("demos/set_block.py", "--out", tmp_path, "--quick")
+    found = json.loads((tmp_path / "summary.json").read_text())
+    for mode, close in (("uniaxial", (1.492217, 1.499210)), ("equibiaxial", (1.494939, 1.499488))):
+        for modulus, value in zip((200, 2000), close):
+            numbers = found[mode][f"G_{modulus}"]
+            assert numbers["stretch"] == pytest.approx(numbers["exact"], rel=1e-8)
+            assert numbers["exact"] == pytest.approx(value, abs=1e-6) and numbers["steps"] < 25
+    assert drawn(tmp_path / "set_block.png")
+
+
+def test_a_base_that_relaxes_sets_too():
+    """The branch holds its stress as it is frozen: it pulls with the elastic strain that it had when it was let go."""
+    tau, mu, G = 4.0, 1.5, 300.0
+    material = fx.Sets(fx.TransientNetwork(BASE, [(mu, tau)]), G, fraction=fx.table({70: 1, 75: 0.5, 85: 0}))
+    path = fx.Process(block(material, air(20.0))).run(
+        [draw(0.4), fx.Stage("chill", duration=20.0), fx.Stage("let go", without=["grip"])], progress=False,
+        accuracy="fine")
+    L, time = 1.4, 20.0
+    decay = np.exp(-time / tau)
+    A = np.array([decay + (1 - decay) / L**2, decay + (1 - decay) * L**4])      # in the plane, across
+
+    def pull(l):
+        return (2 * (l**2 - l**-4) + mu * (A[0] * l**2 - A[1] * l**-4) + G * ((l / L)**2 - (l / L)**-4))
+    assert stretch(path) == pytest.approx(brentq(pull, 1, L), rel=1e-6)
+
+
+@pytest.mark.parametrize("hot, left", [(82.5, 0.25), (120.0, 0.0)])
+def test_what_melts_again_bears_no_more(hot, left):
+    """Set at rest, drawn cold, warmed in its grip: the stress is that of the base and of the glass that is left."""
+    G, l = 50.0, 1.1
+    scene = block(fx.Sets(BASE, G, between=(75, 85)), air(hot), temperature=20.0)
+    path = fx.Process(scene).run([draw(l - 1), fx.Stage("warm", duration=60.0)], progress=False, accuracy="draft")
+    for state, share in ((path.state("draw"), 1.0), (path.last, left)):
+        stress = path.stress(state).at_quadrature_points().cauchy[:, 0, 0]
+        assert stress == pytest.approx((2 + share * G) * (l**2 - l**-4) * np.ones(len(stress)), rel=2e-4)
+
+
+def test_steps_in_time_keep_the_accuracy():
+    """The base stiffens as it cools and pulls a loaded block back, which the glass that is born stops on the way."""
+    stiffens = fx.NeoHookean(c10=fx.table({20: 4.0, 80: 1.5, 150: 1.0}))
+    found = {}
+    for accuracy in (5e-2, 1e-2, 1e-3):
+        scene = fx.Scene(mesh=fx.mesh.disc(radius=1e-3, thickness=1e-3, elements=(2, 1)), temperature=150.0,
+                         materials=fx.Sets(stiffens, 20.0, between=(60, 90)), loads=[fx.Pressure("rim", name="pull")],
+                         heat=fx.Cooling(HEAT, air(20.0), unit="C", tolerance=0.2),
+                         supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")])
+        path = fx.Process(scene).run([fx.Stage("pull", drive="pull", until=fx.pressure(-1.5)),
+                                      fx.Stage("chill", duration=10.0)], progress=False, accuracy=accuracy)
+        found[accuracy] = stretch(path)
+    assert found[5e-2] == pytest.approx(found[1e-3], rel=5e-3)
+    assert found[1e-2] == pytest.approx(found[1e-3], rel=5e-4)
+
+
+def test_without_cold_it_is_its_base():
+    """At a temperature above: to round-off; below, at rest: the glass is there, free of stress in the first shape."""
+    hot, plain = (fx.Process(block(material, [], heat=False)).run([draw(0.5)], progress=False)
+                  for material in (fx.Sets(BASE, 300.0, between=(75, 85)), BASE))
+    assert hot.last.x == pytest.approx(plain.last.x, abs=1e-12)
+    material = fx.Sets(BASE, 300.0, between=(75, 85))
+    assert material.at_temperature(20.0).shear_modulus == pytest.approx(302.0)
+    assert material.fraction([20.0, 80.0, 90.0]).tolist() == [1.0, 0.5, 0.0]
+    assert material.base.parameters == BASE.parameters
+
+
+@pytest.mark.parametrize("make, words", [
+    (lambda: fx.Sets(1.0, 800.0, between=(75, 85)), "base = 1.0: must be a material"),
+    (lambda: fx.Sets(BASE, -1.0, between=(75, 85)), "modulus = -1.0: must be greater than 0"),
+    (lambda: fx.Sets(BASE, 1.0, between=(85, 75)), "the lower first"),
+    (lambda: fx.Sets(BASE, 1.0), "give one of them"),
+    (lambda: fx.Sets(BASE, 1.0, fraction=fx.table({20: 0, 80: 1})), "must fall from 1 to 0"),
+    (lambda: fx.Sets(fx.Sets(BASE, 1.0, between=(1, 2)), 1.0, between=(1, 2)), "sets already"),
+    (lambda: block(fx.Sets(BASE, 1.0, between=(1, 2)), [], temperature=None, heat=False), "temperature"),
+])
+def test_what_is_refused(make, words):
+    with pytest.raises(fx.InputError, match=words):
+        make()
