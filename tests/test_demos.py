@@ -281,3 +281,18 @@ def test_relaxing_pot_quick(tmp_path):
     assert "base" in found["straight"] and set(found["plug"]) == {"speed_6"}
     assert found["plug"]["speed_6"]["hold_1"]["base"] > found["straight"]["base"]
     assert drawn(tmp_path / "relaxing_pot.png")
+
+
+def test_stability_quick(tmp_path):
+    found = summary("stability", tmp_path, "--quick")
+    assert found["cylinder"]["nu_1"]["n_1"] == pytest.approx(0.75169553, abs=1e-4)
+    assert found["tube"]["0.8"]["n_3"]["pressure_over_mu"] == pytest.approx(0.03163656, rel=1e-4)
+    assert found["block"]["nu_1"]["flexure"] == pytest.approx(0.69622127, abs=1e-3)
+    assert found["sheet"]["alarms"] == 0 and found["switched"]["mirror_error"] < 1e-6
+    assert drawn(tmp_path / "accuracy.png")
+
+
+def test_top_load_quick(tmp_path):
+    found = summary("top_load", tmp_path, "--quick")
+    assert found["first_n"] == 4 and found["n_4"]["force_N"] == pytest.approx(1326, rel=2e-2)
+    assert drawn(tmp_path / "top_load.png")

@@ -223,3 +223,32 @@ if MPI.COMM_WORLD.rank == 0:
 def test_ranks():
     one, two = run_json(RANKS, 1), run_json(RANKS, 2)
     assert np.array(one)[:, :2] == pytest.approx(np.array(two)[:, :2], rel=1e-8) and len(one) == 1
+
+
+def test_formed_is_the_deformed_body():
+    """Its volume is that of the body, its boundaries are where the deformed ones were."""
+    path = fx.trace(treloar(elements=(8, 1)), until=fx.pole_height(1.0), progress=False)
+    mesh, old = path.formed(), path.problem.scene.mesh
+    assert mesh.layers.keys() == old.layers.keys() and mesh.boundaries.keys() == old.boundaries.keys()
+    profile = path.profile()
+    assert mesh.nodes_of("top")[-1] == pytest.approx(profile.top[-1], abs=1e-12)
+    assert mesh.nodes_of("axis")[[0, -1], 1] == pytest.approx([profile.bottom[0, 1], profile.top[0, 1]], abs=1e-12)
+    again = Problem(fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=2.0), supports=[
+        fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")]))
+    assert again.forms.volume == pytest.approx(path.problem.forms.volume, rel=1e-5)
+
+
+def test_branches_of_a_tube_are_images_of_each_other():
+    """The two bulges of an inflated tube, one at each end, are as large at the same volume, and need less pressure."""
+    ratio, length, critical = 0.8, np.pi, 1.98640828
+    mesh = fx.mesh.disc(radius=1.0, inner_radius=ratio, thickness=length, elements=(2, 10))
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.5), loads=[fx.Pressure("inner")],
+                     supports=[fx.Symmetry("bottom", "z"), fx.Symmetry("top", "z")])
+    path = fx.trace(scene, until=fx.displacement(1.02 * ratio, at=(ratio, 0.0), component="r"), progress=False)
+    loss = path.stability([0]).first
+    assert loss.state.measures["enclosed_volume"] == pytest.approx(
+        np.pi * length * ratio**2 * (critical**2 - 1), rel=1e-4)
+    ends = [fx.trace(scene, start=loss.branch(sense), until=fx.enclosed_volume(
+        1.05 * loss.state.measures["enclosed_volume"]), progress=False).last for sense in (1, -1)]
+    pressures = [end.measures["pressure"] for end in ends]
+    assert pressures[0] == pytest.approx(pressures[1], rel=1e-9) and pressures[0] < loss.control

@@ -436,6 +436,19 @@ class Path:
         self._watch = self._watch or Watch(self)
         return self._watch.look(modes, states)
 
+    def formed(self, state: State | None = None) -> Any:
+        """The body of a state (default: the last) as a new `Mesh`, free of stress, with its layers and boundaries.
+
+        To be crushed (top load), formed once more, or written (`formingx.mesh.write`). What has formed and frozen has
+        no stress in it here: stresses that it really has are left out.
+
+        Raises:
+            InputError: a membrane, or deformed elements that are no mesh.
+        """
+        from .formed import formed
+        state = state or self.last
+        return formed(self._segment(state).problem, state)
+
     def wall(self, state: State | None = None) -> Any:
         """The wall of the part at a state (default: the last), place by place (`Wall`): to_csv, to_excel."""
         from .evaluate.wall import Walls

@@ -1,0 +1,62 @@
+"""The formed body as a new mesh, free of stress: to be crushed, formed once more, or written for another program."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from ..errors import InputError
+from ..mesh.grid import Grid, counter_clockwise, to_mesh
+from ..mesh.mesh import Mesh
+
+_NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
+_TO_GRID = [0, 1, 2, 5, 3, 4]                               # middles of the edges 01, 12, 20
+
+
+def formed(problem: Any, state: Any) -> Mesh:
+    """The deformed elements of a state, with the names of layers and boundaries; second-order geometry; collective.
+
+    Raises:
+        InputError: a membrane, or deformed elements that are no mesh (inside out, or one over another).
+    """
+    forms, mesh = problem.forms, problem.scene.mesh
+    domain, comm = mesh.domain, mesh.comm
+    if forms.domain is not domain:
+        raise InputError("Path.formed: a membrane has no elements across its thickness: form a solid, MixedPressure()")
+    numbers = fem.functionspace(domain, ("Lagrange", 2)).dofmap
+    cells = np.arange(domain.topology.index_map(2).size_local, dtype=np.int32)
+    triangles = numbers.index_map.local_to_global(np.asarray(numbers.list)[cells].ravel().astype(np.int32))
+    triangles = triangles.reshape(-1, 6)
+    points = np.zeros((len(cells), 6, 2))
+    if len(cells):
+        with problem.at(state):
+            moved = fem.Expression(ufl.as_vector([forms.X[0], forms.X[1]]) + forms.u, _NODES)
+            points = moved.eval(domain, cells).reshape(len(cells), 6, 2)
+    layers = {name: triangles[(found := mesh.cells.find(tag))[found < len(cells)]] for name, tag in mesh.layers.items()}
+    domain.topology.create_connectivity(1, 2)
+    domain.topology.create_connectivity(2, 1)
+    to_cell, to_facet = domain.topology.connectivity(1, 2), domain.topology.connectivity(2, 1)
+    edges: dict[str, list] = {name: [] for name in mesh.boundaries}
+    for name, rows in edges.items():
+        for facet in mesh.facets_of(name):
+            cell = to_cell.links(facet)[0]
+            if cell < len(cells):
+                k = int(np.flatnonzero(to_facet.links(cell) == facet)[0])
+                rows.append(triangles[cell, [(k + 1) % 3, (k + 2) % 3, 3 + k]])
+    parts = comm.allgather((triangles, points, layers, edges))
+
+    def grid() -> Grid:
+        place = np.zeros((1 + max(int(t.max(initial=0)) for t, *_ in parts), 2))
+        for t, x, *_ in parts:
+            place[t] = x
+        if problem.scene.kinematics.axisymmetric:            # what is on the axis is there to the last bit
+            place[np.abs(place[:, 0]) < 1e-12 * np.ptp(place), 0] = 0.0
+        return Grid(place, np.arange(1, len(place) + 1),
+                    {name: counter_clockwise(place, np.concatenate([p[2][name] for p in parts])[:, _TO_GRID])
+                     for name in mesh.layers},
+                    {name: np.array([row for p in parts for row in p[3][name]], dtype=np.int64).reshape(-1, 3)
+                     for name in mesh.boundaries})
+    return to_mesh(grid, comm, "Path.formed: the deformed mesh")
