@@ -4,11 +4,11 @@ c10 = 1/2, so mu = 1. Modes are told apart by their half waves along the body: U
 cos(m pi z/L).
 """
 
-import formingx.reference_stability as exact
 import numpy as np
 from common import parser, save, say, summarise
 
 import formingx as fx
+from formingx.exact import stability as exact
 from formingx.figures import figure
 
 CYLINDERS = {0.2: [1], 0.5: [1], 1: [1], 2: [0, 1], 3: [0, 1, 2]}

@@ -423,31 +423,17 @@ class Path:
     def stability(self, modes: Any = range(9), states: Any = 20) -> Any:
         """Which modes that vary round the body are unstable, and where the path loses them (`Stability`); print it.
 
-        It costs about two iterations a mode and state. What is lost is located between the path's own states.
-
-        Args:
-            modes: waves round the axis, cos(n theta); in plane strain wave numbers along the depth, over length.
-            states: how many, evenly along the path; "all"; a state, or several.
-
-        Raises:
-            InputError: a membrane; a load that does not say how it changes with a mode; an argument not allowed.
+        modes: waves round the axis; in plane strain wave numbers along the depth. states: how many, "all", or those.
+        An InputError for a membrane, and for a load that does not say how it changes with a mode.
         """
         from .stability import Watch
         self._watch = self._watch or Watch(self)
         return self._watch.look(modes, states)
 
     def formed(self, state: State | None = None) -> Any:
-        """The body of a state (default: the last) as a new `Mesh`, free of stress, with its layers and boundaries.
-
-        To be crushed (top load), formed once more, or written (`formingx.mesh.write`). What has formed and frozen has
-        no stress in it here: stresses that it really has are left out.
-
-        Raises:
-            InputError: a membrane, or deformed elements that are no mesh.
-        """
+        """The body of a state (default: the last) as a new `Mesh`, free of stress; an InputError if it is none."""
         from .formed import formed
-        state = state or self.last
-        return formed(self._segment(state).problem, state)
+        return formed(self._segment(state or self.last).problem, state or self.last)
 
     def wall(self, state: State | None = None) -> Any:
         """The wall of the part at a state (default: the last), place by place (`Wall`): to_csv, to_excel."""
