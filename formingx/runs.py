@@ -160,7 +160,8 @@ class Process:
 
         Args:
             stages: in order.
-            step: step control of the stages that have none of their own, at their start; default `StepControl()`.
+            step: step control of the stages that have none of their own, at their start; default `StepControl()`. (Of a
+                flow its lengths are parts of the duration.)
             tolerances: when a state counts as converged; default `Tolerances()`.
             max_steps: accepted states of a stage (of a straight piece of its tables) before the run gives up; None: it
                 gives up when it comes no nearer to its target.

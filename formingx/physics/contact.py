@@ -404,7 +404,8 @@ class Law:
         At the foot of the ramp they have none, and the tangent of the path would let them slip where they will stick.
         """
         near, now = self.nearest(x), self.tractions(x, old)
-        touching = (arrived | (np.abs(near.distance / self.theta + 1.025) < 0.025)) & (now.sense == 0)
+        about = np.abs(near.distance / self.theta + 1.025) < 0.025 + 2 * _AT_FOOT       # a body may rest at the foot
+        touching = (arrived | about) & (now.sense == 0)
         press = np.where(touching, np.maximum(-0.5 * self.theta - near.distance, 0.0), 0.0)
         if old is not None:
             distance = np.where(self._held(old), old.distance, near.distance + press)

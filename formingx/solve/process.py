@@ -207,7 +207,7 @@ class Execution:
         control = None if begun else self._enter_driving(numbers, clocked=False)
         target, course, times = self._course(self.problem.setting.base[-1])
         run = Flow(self.record, target.bind(self.problem), course, times, self._targets[self._k],
-                   self._stage.step or (None if begun else _IN_TIME), self._accuracy, self._label)
+                   self._stage.step or self._step or (None if begun else _IN_TIME), self._accuracy, self._label)
         run.follow(self._max_steps, self._progress, None if control is None else self._resumed(control))
 
     def _course(self, now: float) -> tuple[Target, Callable[[float], float], list[float]]:

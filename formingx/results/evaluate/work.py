@@ -4,10 +4,14 @@ Between two states of one control the body moves on the cubic through both and t
 along it (Gauss's rule). Reactions of supports and tools are no smooth functions of a guessed body, so their force is a
 cubic in arc length, too: through both values, with the slopes that the body's forces have along the tangents. Where a
 point is about to touch, a parabola does without the slope there; in a flow, and in a jump, straight lines serve.
+
+A step over which this does not balance is halved: a state in its middle is solved for, from where the step began, until
+another half changes nothing that counts.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -15,10 +19,15 @@ import numpy as np
 from mpi4py import MPI
 
 from ...discrete.tooling import Tooling
+from ...solve.newton import Failure
 
+_LOSSES = "friction", "jumps"
 _GAUSS = tuple((1 + s) / 2 for s in (-(0.6**0.5), 0.0, 0.6**0.5)), (5 / 18, 8 / 18, 5 / 18)
 _FOOT = 0.06           # of half the width of the ramp: points nearer to its foot are at it
 _SMALL = 1e-5          # of the arc length of a state: half of a difference quotient
+_CLOSED = 2e-4         # of the largest energy: what a step may leave unbalanced
+_HALVINGS = 6          # of a step, at most
+_PARTS = 0.5, 0.35, 0.65   # of a step at which it is halved
 
 
 class _Line(NamedTuple):
@@ -79,14 +88,57 @@ class Ledger:
         self._driven = [(i, thing) for i, thing in enumerate(scene.things)
                         if any(thing is d for d in scene.drivable) and thing not in scene.loads]
         self._stored = forms.compile(forms.energy) if scene.heat is not None else None
-        self._ends: dict[int, dict[str, _Reaction]] = {}
+        self._ends: dict[int, tuple[Any, dict[str, _Reaction]]] = {}
 
     def rows(self) -> dict[str, np.ndarray]:
         """{what: what is added in each state to what was there before, shape (states,)}."""
+        pairs = list(zip(self._states, self._states[1:]))
+        found = [self._between(a, b) for a, b in pairs]
+        scale = max((abs(s.measures["strain_energy"]) for s in self._states), default=0.0)
         rows: list[dict[str, float]] = [{}]
-        rows += [self._between(a, b) for a, b in zip(self._states, self._states[1:])]
+        rows += [row if abs(_left(row, a, b)) <= _CLOSED * scale else self._halved(a, b, row, _CLOSED * scale)
+                 for (a, b), row in zip(pairs, found)]
         names = dict.fromkeys(name for row in rows for name in row)
         return {name: np.array([row.get(name, 0.0) for row in rows]) for name in names}
+
+    def _halved(self, a: Any, b: Any, whole: dict[str, float], small: float,
+                times: int = _HALVINGS) -> dict[str, float]:
+        """What is added from a state to the next, `whole` at a first look, by way of states between."""
+        middle = self._middle(a, b) if times and a.setting == b.setting and b.kind != "jump" else None
+        if middle is None:
+            return whole
+        halves = [(one, other, self._between(one, other)) for one, other in ((a, middle), (middle, b))]
+        if abs(sum(sum(_gains(row)) for *_, row in halves) - sum(_gains(whole))) > small:
+            halves = [(one, other, self._halved(one, other, row, small, times - 1)) for one, other, row in halves]
+        (*_, found), (*_, rest) = halves
+        return {name: found.get(name, 0.0) + rest.get(name, 0.0) for name in {**found, **rest}}
+
+    def _middle(self, a: Any, b: Any) -> Any:
+        """A state about half-way between two, in time, too, come to from the first; None if none is found."""
+        problem, curve, h = self._problem, self._curve, self._curve.distance(a, b)
+        if not h:
+            return None
+        line = [replace(s, direction=(b.x - a.x) / h, slope=(b.control - a.control) / h) for s in (a, b)]
+        for part, (start, end) in itertools.product(_PARTS, [line] if self._flows(a, b) else [(a, b), line]):
+            with problem.at(a):
+                if self._flows(a, b):
+                    problem.forms.clock = a.time + part * (b.time - a.time)
+                problem.prepare(a.x, a.control, start.direction, start.slope, part * h)
+                try:
+                    found = curve.inside(start, end, part)
+                except Failure:                             # where contact does not settle, it may elsewhere
+                    continue
+                finally:
+                    curve.spent()
+                problem.advance(found.x, found.control)
+                found.memory, found.setting = problem.memory, b.setting
+                return found
+        return None
+
+    @staticmethod
+    def _flows(a: Any, b: Any) -> bool:
+        """True of a step whose time does not follow the control."""
+        return bool(b.time != a.time and not b.setting["rate"][-1])
 
     def _between(self, a: Any, b: Any) -> dict[str, float]:
         """What is added from a state to the next."""
@@ -99,7 +151,7 @@ class Ledger:
             found["heat"] = self._warmed(a, b)
         if a.setting != b.setting:                          # the same body, seen under another setting
             return found
-        straight = b.kind == "jump" or b.time != a.time and not b.setting["rate"][-1]      # no tangents of the way
+        straight = b.kind == "jump" or self._flows(a, b)    # no tangents of the way
         h = self._curve.distance(a, b)
         start = None if straight or a.kind == "start" and self._kinked(a) else h           # a body at rest on a tool
         end = None if straight else h
@@ -134,8 +186,8 @@ class Ledger:
     def _reactions(self, state: Any) -> dict[str, _Reaction]:
         """Of driven supports and tools at a state; computed once."""
         if id(state) not in self._ends:
-            self._ends[id(state)] = self._found(state) if self._driven else {}
-        return self._ends[id(state)]
+            self._ends[id(state)] = state, self._found(state) if self._driven else {}
+        return self._ends[id(state)][1]
 
     def _found(self, state: Any) -> dict[str, _Reaction]:
         problem, found = self._problem, {}
@@ -211,6 +263,17 @@ class Ledger:
         return float(self._problem.comm.allreduce(float(np.sum(values)), MPI.SUM))
 
 
+def _gains(row: dict[str, float]) -> list[float]:
+    """What is put in, less what is lost, of a row."""
+    return [-value if name in _LOSSES else value for name, value in row.items()]
+
+
+def _left(row: dict[str, float], a: Any, b: Any) -> float:
+    """What a row leaves unbalanced between two states."""
+    by = [b.measures.get(name, 0.0) - a.measures.get(name, 0.0) for name in ("strain_energy", "dissipated_energy")]
+    return sum(_gains(row)) - sum(by)
+
+
 def _friction_of(contact: Any, state: Any, problem: Any) -> np.ndarray:
     return contact.tractions(state.x[: problem.n_owned], state.control).tangential
 
@@ -246,7 +309,7 @@ def work(path: Any) -> dict[str, np.ndarray]:
     empty = [np.zeros(len(segment.states)) for segment in path.segments]
     found = {name: np.cumsum(np.concatenate([rows.get(name, zero) for rows, zero in zip(ledgers, empty)]))
              for name in names}
-    lost: dict[str, np.ndarray] = {name: found.pop(name) for name in ("friction", "jumps") if name in found}
+    lost: dict[str, np.ndarray] = {name: found.pop(name) for name in _LOSSES if name in found}
     if "dissipated_energy" in path.columns:
         lost["dissipated_energy"] = path["dissipated_energy"]
     stored = path["strain_energy"] - path["strain_energy"][0]
