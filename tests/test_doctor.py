@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import test_process
 from conftest import ROOT, treloar
-from formingx.doctor.doctor.scripts import look_over
 from scipy.optimize import brentq
 
 import formingx as fx
+from formingx.doctor.scripts import look_over
 from formingx.materials.inflation import Inflated, first_peak
 
 CUP = {"radius": 1.25, "depth": 0.4, "mouth": 0.082}

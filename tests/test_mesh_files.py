@@ -222,6 +222,21 @@ def test_text_files(tmp_path, old, new, words):
         read(tmp_path, CURVED.replace(old, new, 1), "mesh.txt")
 
 
+def test_text_files_that_lost_their_end(tmp_path):
+    """Whole blocks, or digits of the last number; version 1, which has no last line, is read as before."""
+    file = tmp_path / "mesh.txt"
+    fx.mesh.write(fx.mesh.disc(radius=1.0, thickness={"a": 0.1, "b": 0.05}, elements=(2, 1)), file)
+    text = file.read_text()
+    whole = fx.mesh.read(file)
+    for k in range(0, len(text) - 1, 7):
+        with pytest.raises(fx.InputError, match="first line|must be|ends after|is not among"):
+            read(tmp_path, text[:k], "cut.txt")
+    with pytest.raises(fx.InputError, match="stands after 'end'"):
+        read(tmp_path, text + "boundary 1 more\n", "more.txt")
+    old = read(tmp_path, text.replace("triangles 2", "triangles 1").replace("end\n", ""), "old.txt")
+    assert old.boundaries.keys() == whole.boundaries.keys() and old.layers.keys() == whole.layers.keys()
+
+
 def test_blocks_of_no_dimension(tmp_path):
     """A block of nodes with coordinates on an entity of dimension -4 had rows of -1 number."""
     text = """$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 1 1 1\n-4 1 1 1\n1\n0 0 0\n$EndNodes\n$Elements

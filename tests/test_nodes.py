@@ -79,7 +79,7 @@ def test_textbook_element(tmp_path):
 
 
 @pytest.mark.parametrize("old, new, message", [
-    ("triangles 1", "triangles 2", "line 1 .*the first line must be 'six-node triangles 1'"),
+    ("triangles 1", "triangles 3", "line 1 .*the first line must be 'six-node triangles 2'"),
     ("numbering corners", "numbering spiral", "line 2 .*must be one of 'corners', 'around'"),
     ("numbering corners", "", "must come before the elements"),
     (ONE, "", "line 0 .*the first line must be"), (ONE, "# all comment", "the first line must be"),

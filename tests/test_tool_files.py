@@ -9,6 +9,7 @@ import pytest
 import formingx as fx
 from formingx.tools import cad
 from formingx.tools.arcs import arcs_along
+from formingx.tools.profile import Arc
 
 tools = fx.tools
 POINTS = np.random.default_rng(1).uniform([0, 1.5], [12, 7], (100, 2))
@@ -60,7 +61,7 @@ def test_splines_of_cad(tmp_path, kind):
         gmsh.finalize()
     tool = tools.read(tmp_path / f"wave.{kind}", [1], tolerance=1e-4)
     assert 1e-7 < np.abs(tool.signed_distance(exact)).max() < 1e-4
-    assert all(isinstance(p, tools.Arc) for p in tool.pieces)
+    assert all(isinstance(p, Arc) for p in tool.pieces)
     with pytest.raises(fx.InputError, match="give tolerance="):
         tools.read(tmp_path / f"wave.{kind}", [1])
     with pytest.raises(fx.InputError, match="tolerance = 0: must be greater"):
@@ -230,6 +231,29 @@ def test_units_of_step(tmp_path):
         file.write_text(wrong)
         with pytest.raises(fx.InputError, match=words):
             tools.read(file)
+
+
+def test_a_step_file_that_lost_what_moves_a_part(tmp_path):
+    def two_parts(occ):
+        points = [occ.addPoint(*p, 0) for p in ((0, 5), (9, 5), (9, 4), (10, 4))]
+        occ.addLine(*points[:2]), occ.addCircleArc(*points[1:])
+    file = solid(tmp_path, "step", two_parts)
+    assert len(tools.read(file).pieces) == 2
+    text, lost = re.subn(r"REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION\(#\d+\)", "", file.read_text(), count=1)
+    assert lost
+    file.write_text(text)
+    with pytest.raises(fx.InputError, match="nothing refers to #.*, a transformation"):
+        tools.read(file)
+
+
+def test_time_to_read_grows_with_a_file(tmp_path, monkeypatch):
+    """A large one is not a damaged one."""
+    (tmp_path / "reader.py").write_text("import sys; print('{\"error\": \"' + sys.argv[3] + '\"}')")
+    monkeypatch.setattr(cad.cad_process, "__file__", str(tmp_path / "reader.py"))
+    for size, seconds in ((100, 10), (5_000_000, 110)):
+        (tmp_path / "tool.brep").write_bytes(b"DBRep_DrawableShape" + b" " * size)
+        with pytest.raises(fx.InputError, match=f"cannot be read: {seconds}$"):
+            tools.read(tmp_path / "tool.brep")
 
 
 @pytest.mark.parametrize("body, words", [

@@ -2,7 +2,7 @@
 
 The file, line by line (blank lines count for nothing, nor does what follows a #; node numbers are any whole numbers):
 
-    six-node triangles 1                    the format and its version
+    six-node triangles 2                    the format and its version
     numbering corners                       of the six nodes, see below
     nodes 63                                then as many lines: number R Z
     1 0.0 0.082
@@ -10,6 +10,7 @@ The file, line by line (blank lines count for nothing, nor does what follows a #
     1 3 7 1 12 5 4
     boundary 10 bottom                      then as many lines: first, middle and last node of an edge
     3 12 7
+    end                                     whatever is cut off before it is missed (version 1 has none)
 
 `numbering corners`: the three corners counter-clockwise, then the middles of the edges 1-2, 2-3, 3-1 (the usual order
 of textbooks and of gmsh). `numbering around`: corner, middle, corner, ... counter-clockwise, so that every edge reads
@@ -30,7 +31,7 @@ from ..io.numerals import number, whole
 from ..io.output import replace
 from .grid import Grid, counter_clockwise
 
-_FORMAT = "six-node triangles 1"
+_FORMAT, _VERSIONS = "six-node triangles", ("1", "2")
 # position of our node (corners first) in a line of the file
 _NUMBERINGS = {"corners": [0, 1, 2, 3, 4, 5], "around": [0, 2, 4, 1, 3, 5]}
 
@@ -44,7 +45,7 @@ def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> No
     order = np.argsort(_NUMBERINGS[_known(numbering)])
     if any(t.shape[1] != 6 for t in grid.layers.values()):
         raise InputError("mesh.write: the text format holds six-node triangles; this mesh has three-node ones")
-    lines = [_FORMAT, f"numbering {numbering}", f"nodes {len(grid.points)}"]
+    lines = [f"{_FORMAT} 2", f"numbering {numbering}", f"nodes {len(grid.points)}"]
     lines += [f"{n} {float(r)!r} {float(z)!r}" for n, (r, z) in zip(grid.numbers, grid.points, strict=True)]
     number = 0
     for name, triangles in grid.layers.items():
@@ -55,7 +56,7 @@ def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> No
     for name, edges in grid.boundaries.items():
         lines.append(f"boundary {len(edges)} {name}")
         lines += [" ".join(map(str, row)) for row in grid.numbers[edges[:, [0, 2, 1]]]]
-    replace(file, lambda stream: stream.write("\n".join(lines) + "\n"))
+    replace(file, lambda stream: stream.write("\n".join([*lines, "end"]) + "\n"))
 
 
 def read(file: str | os.PathLike) -> Grid:
@@ -65,13 +66,15 @@ def read(file: str | os.PathLike) -> Grid:
         InputError: the file is not there or not in this format; the message names the line.
     """
     lines = _Lines(os.fspath(file))
-    if " ".join(next(lines, [])) != _FORMAT:
-        raise lines.error(f"the first line must be {_FORMAT!r}")
+    *first, version = next(lines, None) or [""]
+    if " ".join(first) != _FORMAT or version not in _VERSIONS:
+        raise lines.error(f"the first line must be '{_FORMAT} 2'")
     order, points, numbers = None, np.zeros((0, 2)), np.zeros(0, dtype=np.int64)
     layers: dict[str, np.ndarray] = {}
     boundaries: dict[str, np.ndarray] = {}
     index: dict[int, int] = {}
     elements: set[int] = set()
+    ended = version == "1"
     for words in lines:
         if words[0] == "numbering" and len(words) == 2 and order is None:
             order = _NUMBERINGS[_known(words[1], lines)]
@@ -95,9 +98,15 @@ def read(file: str | os.PathLike) -> Grid:
         elif words[0] == "boundary" and len(words) > 2:
             rows = lines.block(words[1], (whole,) * 3, "first, middle and last node", index, all_nodes=True)
             boundaries[_new(lines, words, boundaries)] = np.array(rows)[:, [0, 2, 1]]
+        elif words == ["end"] and not ended:
+            ended = True
+            if next(lines, None):
+                raise lines.error("stands after 'end'")
         else:
-            raise lines.error("must be 'numbering corners|around' or 'nodes COUNT', each once, 'elements COUNT LAYER'"
-                              " or 'boundary COUNT NAME'")
+            raise lines.error("must be 'numbering corners|around' or 'nodes COUNT', each once, 'elements COUNT LAYER',"
+                              " 'boundary COUNT NAME' or, last, 'end'")
+    if not ended:
+        raise lines.error("must be followed by 'end', as the last line of version 2: was the file cut off?")
     if not layers:
         raise InputError(f"mesh file {lines.file!r} has no block 'elements COUNT LAYER'")
     _check_edges(lines.file, layers, boundaries, numbers)

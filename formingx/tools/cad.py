@@ -21,8 +21,8 @@ from . import cad_process
 from .arcs import arcs_along, in_plane, piece_through
 from .profile import Arc, Line
 
-_SECONDS = 10             # of a processor's time to read a file and to follow its curves
-_LONGEST = 20 * _SECONDS  # of any: the machine may be busy
+_SECONDS, _BYTES = 10, 50_000   # of a processor's time to read a file and to follow its curves, and for so much of it
+_BUSY = 20                      # times as long by the clock: the machine may be busy
 
 
 def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[[], list[Line | Arc]]]:
@@ -42,13 +42,13 @@ class _Reader:
     """The process that reads a file."""
 
     def __init__(self, file: str, kind: str):
-        self._file = file
+        self._file, self._seconds = file, _SECONDS + os.path.getsize(file) // _BYTES
         # not a rank of a run under mpirun
         apart = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_COMM", "PMIX_", "PMI_", "PRTE_"))}
         self._process = subprocess.Popen(
-            [sys.executable, "-P", cad_process.__file__, file, kind, str(_SECONDS)], env=apart, text=True,
+            [sys.executable, "-P", cad_process.__file__, file, kind, str(self._seconds)], env=apart, text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
-        self._timer = Timer(_LONGEST, self._process.kill)
+        self._timer = Timer(_BUSY * self._seconds, self._process.kill)
         self._timer.start()
 
     def __enter__(self) -> _Reader:
@@ -81,7 +81,7 @@ class _Reader:
             pass
         if not line.endswith("\n"):
             ended = process.wait()
-            why = (f"it took more than {_SECONDS} s" if ended in (-signal.SIGXCPU, -signal.SIGKILL) else
+            why = (f"it took more than {self._seconds} s" if ended in (-signal.SIGXCPU, -signal.SIGKILL) else
                    f"Open CASCADE ended at it ({signal.Signals(-ended).name if ended < 0 else ended})")
             raise InputError(f"tool file {self._file!r} cannot be read: {why}: is it damaged?")
         found = json.loads(line)
@@ -123,7 +123,12 @@ def _check_references(file: str) -> None:
             raise InputError(f"tool file {file!r} cannot be read: the record {' '.join(record.split())[:60]!r} is not"
                              f" whole: it is damaged")
     defined = re.findall(r"#(\d+)\s*=", text)
-    missing = set(re.findall(r"#(\d+)", text)) - set(defined)
+    used = set(re.findall(r"#(\d+)(?!\d|\s*=)", text))
+    missing = used - set(defined)
+    unused = set(re.findall(r"#(\d+)\s*=\s*ITEM_DEFINED_TRANSFORMATION\b", text)) - used
+    if unused:
+        raise InputError(f"tool file {file!r} cannot be read: nothing refers to #{min(unused, key=int)}, a"
+                         f" transformation: what it moves has lost it, or is lost")
     if missing or len(set(defined)) < len(defined):
         what = f"refers to #{min(missing, key=int)}, which is not in it" if missing else "defines a number twice"
         raise InputError(f"tool file {file!r} cannot be read: it {what}: it is damaged")
