@@ -25,7 +25,7 @@ from .solve.load_control import FixedControlCurve
 from .solve.newton import Tolerances
 from .solve.path_following import Run
 from .solve.process import Execution
-from .solve.stage import AT_FOLD, Stage, plan
+from .solve.stage import AT_FOLD, Plan, Stage, plan
 from .solve.start import begin
 from .solve.state import Record, State
 from .solve.stepping import StepControl
@@ -201,9 +201,14 @@ class Process:
             timed = any(stage.timed for stage in stages)
             path = carried(_path(Curve(problem, tolerances), start, record, beyond, timed))
             _keep(path, checkpoint)
-            execution = Execution(path.record, plans, unsure, step, tolerances.residual, allowed)
+            execution = Execution(path.record, plans, unsure, self._look_again, step, tolerances.residual, allowed)
             execution.run(None if max_steps is None else count("Process: max_steps", max_steps), progress)
         return path
+
+    def _look_again(self, plan: Plan, stands: Callable[[int], float]) -> None:
+        """An InputError if the tools of a stage cannot move as it says, now that their travels are known."""
+        contacts = {i: stands(i) for i, thing in enumerate(self.scene.things) if thing in self.scene.contacts}
+        clearance.check(self.scene, [plan], contacts)
 
     def _checked(self, stages: Any) -> list[Stage]:
         stages = several("Process: stages", stages, "stages, such as Stage('vacuum', drive=vacuum, until=pressure(1))")

@@ -11,6 +11,7 @@ from test_heat import body_of
 import formingx as fx
 from formingx import Stage, tools
 from formingx.discrete.problem import Problem
+from formingx.discrete.step_limit import Way
 from formingx.measures.targets import Amplitude
 from formingx.results.evaluate.part import _strips
 from formingx.solve import path_following, predictor
@@ -87,7 +88,8 @@ def test_a_step_may_not_bring_a_whole_region_into_touch():
     problem = Problem(scene)
     x = np.zeros(problem.n_owned)
     near, far = (d / problem.forms.length for d in (0.05, 0.11))
-    assert not problem.too_far(x, 0.0, x, near) and problem.too_far(x, near, x, far)
+    rest, close, deep = (Way(x, control, x, 0.0, 1.0) for control in (0.0, near, far))
+    assert problem.limit.check(rest, close, 1.0) is None and "too much" in problem.limit.check(close, deep, 1.0).why
 
 
 def test_rest_is_free_of_stress_under_the_penalty():

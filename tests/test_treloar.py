@@ -10,7 +10,7 @@ import formingx as fx
 from formingx.discrete.probes import Probe
 from formingx.exact.inflation import membrane_limit_point
 from formingx.solve.arc_length import Curve
-from formingx.solve.snap_through import fixed
+from formingx.solve.newton import fixed
 
 STRETCHES = (1.2, 1.5, 2.0, 3.0, 4.0, 6.0)
 

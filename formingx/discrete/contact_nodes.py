@@ -217,6 +217,11 @@ class ContactNodes:
         return self.law.touching(self._last[0], self.touch) & ~self._touched
 
     @property
+    def ramp(self) -> float:
+        """Half-width of the ramp in which contact begins, length."""
+        return self.law.theta
+
+    @property
     def scale(self) -> np.ndarray:
         """Of the forces in F by tractions, shape (n,)."""
         return self._scale

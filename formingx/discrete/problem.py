@@ -7,7 +7,7 @@ for each `MeanHeld` support.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -17,18 +17,21 @@ from dolfinx import fem, la
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..errors import together
+from ..errors import InputError, together
 from ..scene.scene import Scene
 from .admissible import Admissible, Least
 from .constraints import Active, Constraints
 from .contact_nodes import ContactNodes
 from .contact_points import ContactPoints
+from .examine import Examination
 from .formulations import formulate
 from .history import MaterialHistory
 from .matrix import ExtendedMatrix
 from .schedule import Setting
 from .step_error import StepError
+from .step_limit import StepLimit
 from .temperature import Temperature
+from .units import Units
 from .viscosity import Viscosity
 
 
@@ -48,7 +51,7 @@ class _Stage(NamedTuple):
     left: np.ndarray | None = None
 
 
-class Problem:
+class Problem(Units):
     """Residual, tangent and derivative by the control of a scene.
 
     Attributes:
@@ -57,8 +60,8 @@ class Problem:
         comm: communicator.
         x: a vector of unknowns; inside `at` those of the state.
         matrix: the tangent, refilled by `tangent`.
-        contacts: the nodal forces of the scene's contacts (`ContactNodes`); touching: of those that take part now.
-        histories: what F depends on besides x and control (`History`).
+        contacts: the nodal forces of the scene's contacts (`ContactNodes`); present: of those that take part now.
+        histories: what F depends on besides x and control (`History`); limit: what a step may bring (`StepLimit`).
         setting: the `Setting` that x and control are seen under; see `enter`.
         force_scale: norm of all support forces at the state whose residual was last computed.
     """
@@ -79,6 +82,7 @@ class Problem:
         if scene.heat is not None:                              # after the materials, which heat it
             forms.histories.append(scene.heat.history(self))
         self.histories: list[Any] = [*(contact for contact in self.contacts if contact.law.remembers), *forms.histories]
+        self.limit = StepLimit(self)
         self._admissible = Admissible(forms)
         self._constraints = Constraints(forms, self.assemble)
         self._by_motion = self._lift = None
@@ -133,12 +137,12 @@ class Problem:
     @property
     def has_kinks(self) -> bool:
         """True if F has kinks, where the tangent ahead of a state differs from that behind it (`tangent`)."""
-        return bool(self.touching)
+        return bool(self.present)
 
     @property
     def active_set(self) -> Any:
         """Which points touch and slide, of the residual last computed, the same on all ranks; hashable; None: none."""
-        return tuple(self.comm.allgather(tuple(c.active.tobytes() for c in self.touching))) if self.touching else None
+        return tuple(self.comm.allgather(tuple(c.active.tobytes() for c in self.present))) if self.present else None
 
     @property
     def has_history(self) -> bool:
@@ -166,6 +170,19 @@ class Problem:
         return self.forms.temperature
 
     @property
+    def clock(self) -> float:
+        """Process time at control 0: of the setting, or what a run that chooses its times has set since."""
+        return self.forms.clock
+
+    @clock.setter
+    def clock(self, time: float) -> None:
+        self.forms.clock = time
+
+    def time_at(self, control: float) -> float:
+        """Process time at a control, under the setting that holds now."""
+        return self.forms.time_at(control)
+
+    @property
     def memory(self) -> list[Any]:
         """What each history remembers of the last accepted state."""
         return [history.get() for history in self.histories]
@@ -176,20 +193,23 @@ class Problem:
         for history, remembered in zip(self.histories, memory, strict=True):
             history.put(remembered)
 
-    @property
-    def why_not_finite(self) -> str:
-        """What makes a residual infinite or not a number in this scene."""
-        limits = {f"{m} came to its limit, I1 < {m.largest_I1:.6g}": None
-                  for m in self.scene.materials.values() if m.largest_I1 < np.inf}
-        return ", or ".join(["an element turned inside out", *(limits or ["the material left its domain"])])
+    def examine(self, last: Any, attempt: Any) -> Examination:
+        """What the last good state (or None) and a failed attempt (or None) tell; collective."""
+        return Examination(self, last, attempt)
 
-    def shown(self, control: float) -> tuple[str, float]:
-        """What the control stands for, in words, and its value in the user's units."""
-        number, things = self.setting.leading, self.scene.things
-        if number is None:
-            return "control", control
-        name = "process time" if number == len(things) else self.scene.column(things[number]).replace("_", " ")
-        return name, self.forms.scales[number] * self.setting.amplitude(number, control)
+    def bring_in(self, number: int, x: np.ndarray, control: float) -> None:
+        """A thing of the scene is going to take part, and remembers nothing. x: own part.
+
+        Raises:
+            InputError: a tool comes in where the body is.
+        """
+        for contact in self.contacts:
+            if contact.contact is self.scene.things[number]:
+                contact.come_in(x, control)
+                depth = contact.largest_penetration(x, control)
+                if depth > 1e-6 * self.forms.length:
+                    raise InputError(f"{contact.contact!r} comes in where the body is, which reaches {depth:.6g} into"
+                                     f" the tool")
 
     @contextlib.contextmanager
     def at(self, state: Any) -> Iterator[Problem]:
@@ -272,7 +292,7 @@ class Problem:
     def _forces(self, fields: np.ndarray, control: float) -> np.ndarray:
         """`forces` at the state last set."""
         values = self.assemble(self._residual)
-        for contact in self.touching:
+        for contact in self.present:
             contact.add_residual(values, fields, control)
         return values
 
@@ -292,14 +312,14 @@ class Problem:
 
     def begin(self, old: Any = None) -> None:
         """Newton's method begins at a guess ahead of a state (None: of none)."""
-        for contact in self.touching:
+        for contact in self.present:
             contact.begin(None if old is None else contact.positions(old.x[: self._n], old.control))
 
     def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
         """Ready the tangent at (x, control) for an iteration, and F, the residual there, for the solve with it."""
         if self.contacts:
             values = F.array_r[: self._n].copy()
-            for contact in self.touching:
+            for contact in self.present:
                 contact.linearise(values, x.array_r[: self._n], control)
             values[self.held] = F.array_r[: self._n][self.held]
             F.array_w[: self._n] = values
@@ -311,16 +331,19 @@ class Problem:
         """
         self.set_state(x, control)
         fields = x.array_r[: self._n]
-        return self._matrix.fill([(c.dofs, c.stiffness(fields, control, ahead)) for c in self.touching])
+        return self._matrix.fill([(c.dofs, c.stiffness(fields, control, ahead)) for c in self.present])
 
     def viscosity(self) -> Viscosity:
         """That of the body as it is held now; to be destroyed."""
         return Viscosity(self._viscosity, self._stage.active.bcs)
 
     @cached_property
-    def step_error(self) -> StepError:
-        """Of steps in time."""
+    def _step_error(self) -> StepError:
         return StepError(self)
+
+    def step_error(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
+        """See `StepError.of`."""
+        return self._step_error.of(past, share, x, control)
 
     @cached_property
     def _viscosity(self) -> Any:
@@ -328,7 +351,7 @@ class Problem:
 
     def changes_ahead(self, x: PETSc.Vec, control: float) -> list[np.ndarray]:
         """Of each contact that takes part: by how much the tangent `ahead` differs from the one last made."""
-        return [contact.change_ahead(x.array_r[: self._n], control) for contact in self.touching]
+        return [contact.change_ahead(x.array_r[: self._n], control) for contact in self.present]
 
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, ahead: bool = False) -> None:
         """out = dF/dcontrol at (x, control); `ahead`: as in `tangent`."""
@@ -338,7 +361,7 @@ class Problem:
             values += self.assemble(self._by_time)
         if self._by_motion and np.any(self._stage.rate):
             values += self.assemble(self._by_motion)
-        for contact in self.touching:
+        for contact in self.present:
             contact.add_control_derivative(values, x.array_r[: self._n], control, ahead)
         values[self.held] = -self._stage.rate
         self.fill(out, values)
@@ -379,39 +402,6 @@ class Problem:
             history.put(memory)
         self._foretold = x, after
         return after
-
-    def reach(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
-        """How long a step of at most `length` from x along (direction, slope) may be. Arrays: own part."""
-        n = self._n
-        return min([c.reach(x[:n], control, direction[:n], slope, length) for c in self.touching], default=length)
-
-    def prepare(self, x: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float,
-                ends: bool = False) -> None:
-        """A step of this length from x along (direction, slope) is about to be taken. Arrays: own part.
-
-        ends: it is to end where something comes into contact, see `touches_by`.
-        """
-        n = self._n
-        for contact in self.touching:
-            contact.prepare(x[:n], control, direction[:n], slope, length, ends)
-
-    def too_far(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
-        """True if more happened between two states than one step may bring. Arrays: own part."""
-        n = self._n
-        return any([c.grew_too_much(old[:n], old_control, new[:n], control) for c in self.touching])
-
-    def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
-        """True if a contact point goes through its tool on the straight way from one state to another."""
-        n = self._n
-        return any([c.passes_through(old[:n], old_control, new[:n], control) for c in self.touching])
-
-    def touches_by(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
-        """Part of a step, which came to `new` along (direction, slope), that will do; 1: it was short enough.
-
-        What comes into contact sticks or slides from where it touches: longer steps get that wrong. Arrays: own part.
-        """
-        n = self._n
-        return min([c.touches_by(new[:n], control, direction[:n], slope, length) for c in self.touching], default=1.0)
 
     def motion(self, control: float) -> np.ndarray:
         """The held unknowns at their values for a control, all else 0, shape (owned part of x,)."""
@@ -505,7 +495,7 @@ class Problem:
         for contact in self.contacts:
             i = number[id(contact.contact)]
             contact.base, contact.rate, contact.present = setting.base[i], setting.rate[i], i not in setting.off
-        self.touching = [contact for contact in self.contacts if contact.present]
+        self.present = [contact for contact in self.contacts if contact.present]
         if before is None or before.active is not stage.active:
             self._matrix.hold(stage.active.bcs, stage.active.rows)
         if self._lift is not None:

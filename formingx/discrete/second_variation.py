@@ -90,7 +90,7 @@ class SecondVariation:
         self._rows = rows
         self.negative = self._pressures + sum(bool(self.comm.allreduce(int(np.any(row)))) for row in rows)
         fields = problem.x.array_r[: problem.n_owned]
-        blocks = [self._of_contact(contact, fields, m) for contact in problem.touching]
+        blocks = [self._of_contact(contact, fields, m) for contact in problem.present]
         guided = [self._of_guided(fields, m)] if self._axisymmetric else []
         self._matrix.fill([*blocks, *guided])
         self.rigid = self._find_rigid()

@@ -40,7 +40,7 @@ class _Nodal(_Recorded):
         self._contacts = problem.contacts if contacts is None else contacts
 
     def value(self, x, control):
-        there = [c for c in self._contacts if c in self._problem.touching]
+        there = [c for c in self._contacts if c in self._problem.present]
         return float(self._over([0.0, *(self._of(contact, x.array_r, control) for contact in there)]))
 
 

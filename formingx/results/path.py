@@ -305,7 +305,7 @@ class Path:
             x, control = weights @ [s.x for s in past], float(weights @ [s.control for s in past])
         with segment.problem.at(before) as problem:
             if not state.setting["rate"][-1]:
-                problem.forms.clock = time
+                problem.clock = time
             time = problem.forms.time_at(control)
             problem.x.array_w[:] = x
             problem.look_at(x, control)

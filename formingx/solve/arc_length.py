@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import ConvergenceError
-from .diagnose import Attempt, diagnose
-from .newton import UNLOADED, BorderedNewton, Failure, Tolerances
-from .snap_through import fixed
+from .equations import Attempt, Equations
+from .newton import UNLOADED, BorderedNewton, Failure, Tolerances, fixed
 from .state import State
 
 CONTROL_WEIGHT = 0.1
@@ -26,7 +25,7 @@ class Curve:
 
     fixed_control = False
 
-    def __init__(self, problem: Any, tolerances: Tolerances):
+    def __init__(self, problem: Equations, tolerances: Tolerances):
         self.problem = problem
         self.newton = BorderedNewton(problem, tolerances, self.norm)
         self._iterations = 0
@@ -62,15 +61,6 @@ class Curve:
                                        " no stiffness")
             self._x.set(0)
         return self._state(0.0, history, "start", None)
-
-    def no_start(self, failure: Failure) -> ConvergenceError:
-        """The error of a body for which no first state was found."""
-        found = diagnose(self, [], failure.reason, failure.attempt)
-        fixed = [repr(load) for load in self.problem.scene.loads if not load.driven]
-        words, advice = (f", under {', '.join(fixed)}", "drive the largest of them instead") if fixed else (
-            "", "a tool touches the body at rest: give its Contact a smaller ramp")
-        return ConvergenceError(f"no equilibrium was found before anything is driven{words}: {failure.reason};"
-                                f" {advice}", diagnosis=found)
 
     def spend(self, iterations: int) -> None:
         """Count iterations that another has spent for it."""
@@ -130,7 +120,7 @@ class Curve:
 
         Where rest has no stiffness (a flat membrane) it is the state in the first direction on which F does no work.
         """
-        if not self.problem.forms.slack_at_rest or control == 0:
+        if not self.problem.slack_at_rest or control == 0:
             return self.problem.motion(control)
         sign, low, high = np.sign(control), 0.0, 1e-6
 
@@ -282,7 +272,7 @@ class Curve:
         b = self.newton.b
         size = self._length_of(b)
         state = State(self._x.array_r.copy(), control, b.array_r / size, 1 / size, history=history, kind=kind,
-                      time=self.problem.forms.time_at(control))
+                      time=self.problem.time_at(control))
         if before is not None and self._inner(state.direction, state.slope, state.x - before.x,
                                               control - before.control) < 0:
             state.direction, state.slope = -state.direction, -state.slope

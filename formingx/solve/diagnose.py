@@ -1,172 +1,135 @@
-"""Finds out why a run could not go on: once, when it has failed."""
+"""Why a run could not go on, in numbers, words and a picture: found out once, when it has failed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
-from ..discrete.elements import Body, body
-from ..discrete.tooling import Tooling
-from ..mesh.triangles import Place, place
-from .diagnosis import Diagnosis
+from ..errors import InputError
+from ..mesh.triangles import Place
+from .arc_length import Curve
+from .equations import Attempt, Findings
 from .linear import DirectSolver, condition
+from .state import State
 
 _BEFORE, _SINGULAR = 10, 100.0
 """States before the last one at which the condition number of the tangent is looked at, too, and the growth from
 there that tells of a singular tangent."""
 
 
-class Attempt(NamedTuple):
-    """Where a failed Newton iteration ended: x (own part) and control, and the last correction of both."""
+@dataclass(frozen=True)
+class Diagnosis:
+    """What was found when a run could not go on. Numbers are None where they could not be had; a membrane has no J.
 
-    x: np.ndarray
+    Attributes:
+        reason: how the last attempt ended.
+        step: number of the state that could not be reached (1: the first after the start).
+        control, aimed: the driven pressure (stress) or travel (length) of the last good state, and where the failed
+            attempt had got to.
+        residual: {"displacement", "pressure", "multipliers": norm of the forces left over, over that of the support
+            forces} in the failed attempt; inf where they were not finite.
+        worst: where the largest force was left over.
+        smallest_J, at_J: det F at the quadrature points of the last good state, its smallest, and where.
+        failed_J, at_failed_J: the same in the failed attempt.
+        shape: the worst shape of a deformed element of the last good state, over its shape at rest.
+        I1, limit: (I1 - 3) / (limit - 3) of the point nearest to its material's limit, and where; None: no limit.
+        turned: [(control before, after)] between which the determinant of the tangent changed its sign.
+        limit_points: controls of the limit points on the path.
+        limit_ahead: the control at which a limit point lies ahead, as the last slopes tell; or None.
+        flipped: nodes that came into contact, left it or changed between stick and slip in the last iteration.
+        touching: nodes in contact in the last good state.
+        condition, condition_before: 1-norm condition numbers (estimates) of the tangent of the last good state, and
+            some states before it.
+        causes: what the numbers prove or make likely, in plain words, the strongest first.
+        advice: what to try.
+    """
+
+    reason: str
+    step: int
     control: float
-    dx: np.ndarray
-    dcontrol: float
+    aimed: float | None = None
+    residual: dict[str, float] = field(default_factory=dict)
+    worst: Place | None = None
+    smallest_J: float | None = None
+    at_J: Place | None = None
+    failed_J: float | None = None
+    at_failed_J: Place | None = None
+    shape: float | None = None
+    I1: float | None = None
+    limit: Place | None = None
+    turned: tuple = ()
+    limit_points: tuple = ()
+    limit_ahead: float | None = None
+    flipped: int | None = None
+    touching: int = 0
+    condition: float | None = None
+    condition_before: float | None = None
+    causes: tuple = ()
+    advice: tuple = ()
+    what: str = "control"
+    examined: Findings | None = field(default=None, repr=False)
+
+    def __str__(self) -> str:
+        at = f", at {self.what} {self.aimed:.8g}" if self.aimed is not None else ""
+        lines = [f"Step {self.step} failed after {self.what} {self.control:.8g}{at}: {self.reason}." if self.step else
+                 f"There is no first state: {self.reason}."]
+        lines += [f"Cause: {cause}." for cause in self.causes] or ["Cause: the numbers below single out none."]
+        if self.residual:
+            parts = ", ".join(f"{k} {v:.3g}" if np.isfinite(v) else f"{k} not finite" for k, v in self.residual.items())
+            at = f"; the largest at {self.worst}" if self.worst else ""
+            lines.append(f"Forces left over, over the support forces: {parts}{at}.")
+        if self.smallest_J is not None:
+            new = self.failed_J is not None and abs(self.failed_J - self.smallest_J) > 0.01 * abs(self.smallest_J)
+            failed = f"; in the failed attempt {self.failed_J:.4g} at {self.at_failed_J}" if new else ""
+            lines.append(f"Smallest J: {self.smallest_J:.4g} at {self.at_J}{failed}.")
+        if self.condition is not None:
+            lines.append(f"Condition number of the tangent: {self.condition:.2g}.")
+        if self.touching or self.flipped:
+            flips = f"; {self.flipped} changed state in the last iteration" if self.flipped is not None else ""
+            lines.append(f"Nodes in contact: {self.touching}{flips}.")
+        lines += [f"Try {'; '.join(self.advice)}."] if self.advice else []
+        return "\n".join(lines)
+
+    def picture(self, file: Any) -> None:
+        """Draw the last good state, deformed, its elements coloured by J, the worst places marked, and the tools.
+
+        Rank 0 draws.
+
+        Raises:
+            InputError: a membrane has no elements to draw, nor has a run without a good state.
+        """
+        if self.examined is None:
+            raise InputError("Diagnosis.picture: there is no body to draw")
+        self.examined.draw(file, f"last good state: {self.what} {self.control:.5g}")
 
 
-class Found(NamedTuple):
-    """The worst of a failed attempt: residuals by field, the place and the node of the largest."""
-
-    residual: dict[str, float]
-    worst: Place
-    point: np.ndarray
-
-
-def diagnose(curve: Any, states: list, reason: str, attempt: Attempt | None = None, pace: str = "",
+def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attempt | None = None, pace: str = "",
              target: float | None = None) -> Diagnosis:
     """Everything that the last good state and the failed attempt tell; collective.
 
     Args:
-        curve: a `Curve`. states: the accepted ones, may be empty. attempt: None: no iteration failed.
-        pace: what more is known if the run was ended in good health. target: of the control (the user's units), if that
-            is what the run aims at.
+        states: the accepted ones, may be empty. attempt: None: no iteration failed. pace: what more is known if the
+            run was ended in good health. target: of the control (the user's units), if that is what it aims at.
     """
-    problem = curve.problem
-    x = problem.x.duplicate()
-    last = states[-1] if states else None
-    facts: dict[str, Any] = {"reason": reason, "step": len(states) if states else 0,
-                             "control": problem.shown(last.control)[1] if last else 0.0,
-                             "what": problem.shown(0.0)[0]}
-    marks: list = []
-    shape = None
-    if last:
-        x.array_w[:] = last.x
-        shape = body(problem, x, last.control)
-        if shape:
-            facts |= _worst_of(problem, shape, marks)
+    equations, last = curve.problem, states[-1] if states else None
+    facts: dict[str, Any] = {"reason": reason, "step": len(states),
+                             "control": equations.shown(last.control)[1] if last else 0.0,
+                             "what": equations.shown(0.0)[0]}
+    examined = equations.examine(last, attempt)
+    if examined is not None:
+        facts |= examined.facts
     if attempt is not None:
-        facts["aimed"] = problem.shown(attempt.control)[1]
-        x.array_w[:] = attempt.x
-        failed = body(problem, x, attempt.control)
-        finite = failed is None or bool(np.isfinite(failed.J).all())
-        if failed and finite:
-            facts["failed_J"], facts["at_failed_J"], _ = _smallest_J(problem, failed)
-        found = _residuals(problem, x, attempt.control)
-        facts |= {"residual": found.residual, "worst": found.worst}
-        if last:
-            marks.append(("largest force left over", _moved(problem, last, found.point)))
-        facts["flipped"] = _flips(problem, attempt)
+        facts["aimed"] = equations.shown(attempt.control)[1]
     if last:
-        facts["touching"] = problem.comm.allreduce(
-            sum(int(np.sum(touch)) for touch in _touching(problem, last.x, last.control)), MPI.SUM)
         facts |= _tangents(curve, states)
     causes, advice = _verdict(facts, curve.fixed_control, pace, target)
-    x.destroy()
-    tooling = Tooling.of_problem(problem)
-    tools = tooling.placed(tooling.travels(last.setting, last.control)) if last else []
-    data = (problem.comm.rank, shape, marks, tools) if shape else None
-    return Diagnosis(**facts, causes=tuple(causes), advice=tuple(advice), picture_data=data)
+    return Diagnosis(**facts, causes=tuple(causes), advice=tuple(advice), examined=examined)
 
 
-def _layer(problem: Any, tag: int) -> str:
-    return next((name for name, t in problem.scene.mesh.layers.items() if t == tag), "")
-
-
-def _smallest_J(problem: Any, shape: Body) -> tuple[float, Place, tuple]:
-    at = np.unravel_index(int(np.argmin(shape.J)), shape.J.shape)
-    return float(shape.J[at]), place(problem.scene.mesh, shape.points[at], _layer(problem, shape.layers[at[0]])), at
-
-
-def _worst_of(problem: Any, shape: Body, marks: list) -> dict[str, Any]:
-    """Smallest J, worst shape and nearness to a material's limit in the last good state."""
-    J, where, at = _smallest_J(problem, shape)
-    facts: dict[str, Any] = {"smallest_J": J, "at_J": where,
-                             "shape": float((shape.quality / shape.at_rest).min())}
-    marks.append((f"smallest J {J:.3g}", shape.moved[at]))
-    limits = np.array([problem.scene.materials[_layer(problem, tag)].largest_I1 for tag in shape.layers])
-    near = (shape.I1 - 3) / (limits[:, None] - 3)
-    if np.isfinite(limits).any():
-        at = np.unravel_index(int(np.argmax(near)), near.shape)
-        facts["I1"] = float(near[at])
-        facts["limit"] = place(problem.scene.mesh, shape.points[at], _layer(problem, shape.layers[at[0]]))
-        marks.append(("nearest to the material's limit", shape.moved[at]))
-    return facts
-
-
-def _residuals(problem: Any, x: Any, control: float) -> Found:
-    """The residual by field, over the support forces of the state, and where its largest displacement entry is."""
-    out, comm, space = x.duplicate(), problem.comm, problem.forms.space
-    problem.residual(x, control, out)
-    values, n = out.array_r.copy(), space.dofmap.index_map.size_local
-    out.destroy()
-    vectors, numbers = space.sub(0).collapse()
-    dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, problem.forms.domain.geometry.dim)
-    points = vectors.tabulate_dof_coordinates()[: len(dofs), :2]
-    own = dofs[:, 0] < n
-    dofs, points = dofs[own], points[own]
-    is_u = np.zeros(n, dtype=bool)
-    is_u[dofs.ravel()] = True
-    parts = {"displacement": values[:n][is_u], "pressure": values[:n][~is_u], "multipliers": values[n:]}
-    scale = problem.force_scale if np.isfinite(problem.force_scale) and problem.force_scale > 0 else 1.0
-    residual = {}
-    for name, part in parts.items():
-        if comm.allreduce(len(part), MPI.SUM):
-            total = comm.allreduce(float(np.sum(part**2)), MPI.SUM)
-            residual[name] = float(np.sqrt(total)) / scale if np.isfinite(total) else np.inf
-    sizes = np.nan_to_num(np.hypot(*values[dofs].T), nan=np.inf)
-    mine = (float(sizes.max(initial=-1.0)), points[np.argmax(sizes)].tolist() if len(sizes) else [0.0, 0.0])
-    point = np.array(max(comm.allgather(mine))[1])
-    return Found(residual, place(problem.scene.mesh, point), point)
-
-
-def _moved(problem: Any, state: Any, point: np.ndarray) -> np.ndarray:
-    """Where a node at a reference point is in a state, shape (2,)."""
-    vectors, numbers = problem.forms.space.sub(0).collapse()
-    dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, problem.forms.domain.geometry.dim)
-    points = vectors.tabulate_dof_coordinates()[: len(dofs), :2]
-    own = dofs[:, 0] < problem.forms.space.dofmap.index_map.size_local
-    away = np.hypot(*(points[own] - point).T)
-    at = int(np.argmin(away)) if len(away) else 0
-    mine = (np.inf, [0.0, 0.0])
-    if len(away):
-        mine = (float(away[at]), (problem.forms.length * state.x[dofs[own][at]]).tolist())
-    return point + np.array(min(problem.comm.allgather(mine))[1])
-
-
-def _touching(problem: Any, x: np.ndarray, control: float) -> list[np.ndarray]:
-    """For every contact: True for each own node in touch, shape (n,)."""
-    return [c.touching(x[: problem.forms.space.dofmap.index_map.size_local], control) for c in problem.touching]
-
-
-def _flips(problem: Any, attempt: Attempt) -> int | None:
-    """Nodes whose contact changed in the last iteration; None without contact."""
-    if not problem.touching:
-        return None
-    n, count = problem.forms.space.dofmap.index_map.size_local, 0
-    before = attempt.x - attempt.dx, attempt.control - attempt.dcontrol
-    for contact, a, b in zip(problem.touching, _touching(problem, *before),
-                             _touching(problem, attempt.x, attempt.control), strict=True):
-        slides = [contact.law.tractions(contact.positions(x[:n], c), contact.touch).sense
-                  for x, c in (before, (attempt.x, attempt.control))]
-        count += int(np.sum((a != b) | (a & b & (slides[0] != slides[1]))))
-    return problem.comm.allreduce(count, MPI.SUM)
-
-
-def _tangents(curve: Any, states: list) -> dict[str, Any]:
+def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     """Condition and signs of the determinant along the path, and the limit point that the last slopes point to.
 
     A limit point is where the determinant of dF/dx changes its sign and the control is stationary; where it changes
@@ -184,7 +147,7 @@ def _tangents(curve: Any, states: list) -> dict[str, Any]:
     limits = tuple(problem.shown(s.control)[1] for s in states if s.kind == "limit point")
     facts: dict[str, Any] = {"limit_points": limits}
     turned = []
-    usable = [s for s in states[1 if problem.forms.slack_at_rest else 0:] if s.kind != "limit point"]
+    usable = [s for s in states[1 if problem.slack_at_rest else 0:] if s.kind != "limit point"]
     if sign(states[-1]):
         facts["condition"] = condition(problem.matrix, solver)
     if len(usable) > _BEFORE and sign(usable[-1 - _BEFORE]):
@@ -204,7 +167,7 @@ def _tangents(curve: Any, states: list) -> dict[str, Any]:
     return facts
 
 
-def _changes(states: list, usable: list, sign: Any) -> list[tuple]:
+def _changes(states: Sequence[State], usable: Sequence[State], sign: Callable[[State], int]) -> list[tuple]:
     """Neighbours between which the sign of the determinant changed though the control has no limit point there."""
     pieces: list[list] = [[]]
     for state in states:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 from .arc_length import Curve
+from .equations import Equations
 from .state import State
 
 
-def usual(problem: Any, falls: bool) -> str:
+def usual(problem: Equations, falls: bool) -> str:
     """What is done at folds: "follow", "jump", or "blow", which is to follow while the volume of the air grows.
 
     Time goes one way. With a history so does whatever is driven, for to follow a fold would be to let it go back; but
@@ -18,18 +18,12 @@ def usual(problem: Any, falls: bool) -> str:
     maximum there, too. The same holds for a pressure on a body in contact, with a history or without: where contact
     changes a path may end. `falls`: what is driven is let off.
     """
-    if problem.setting.leading == len(problem.scene.things):
+    if problem.drives == "time":
         return "jump"
-    by_pressure = _by_pressure(problem)
+    by_pressure = problem.drives == "pressure"
     if not (problem.has_history or problem.has_kinks and by_pressure):
         return "follow"
     return "blow" if by_pressure and not falls else "jump"
-
-
-def _by_pressure(problem: Any) -> bool:
-    """True if a pressure is what is driven."""
-    leading, things = problem.setting.leading, problem.scene.things
-    return leading is not None and leading < len(things) and things[leading].quantity == "pressure"
 
 
 def snaps(curve: Curve, old: State, at_fold: str, sense: float) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from .arc_length import Curve
-from .diagnose import Attempt
+from .equations import Attempt, Equations
 from .linear import configure
 from .newton import UNLOADED, Failure, Iteration, Tolerances
 from .state import State
@@ -24,7 +24,7 @@ class FixedControl:
     Full Newton steps: on a thin sheet a backtracking line search stalls.
     """
 
-    def __init__(self, problem: Any, tolerances: Tolerances):
+    def __init__(self, problem: Equations, tolerances: Tolerances):
         self._problem, self._tolerances = problem, tolerances
         self._control, self._work = 0.0, 0.0
         self.history: list[Iteration] = []
@@ -83,7 +83,7 @@ class FixedControlCurve(Curve):
 
     fixed_control = True
 
-    def __init__(self, problem: Any, tolerances: Tolerances):
+    def __init__(self, problem: Equations, tolerances: Tolerances):
         super().__init__(problem, tolerances)
         self._fixed = FixedControl(problem, tolerances)
 

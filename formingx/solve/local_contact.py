@@ -13,11 +13,13 @@ by itself. With f linear it is Woodbury's formula, by which a tangent follows a 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
+from .equations import ContactFace, Equations
 from .linear import DirectSolver
 
 MOST = 40
@@ -38,8 +40,8 @@ class Settling:
         failed: how often no consistent state of them was found.
     """
 
-    def __init__(self, problem: Any):
-        self._problem, self._contacts = problem, problem.touching
+    def __init__(self, problem: Equations):
+        self._problem, self._contacts = problem, problem.present
         self._marked: list[np.ndarray] = []
         self._active: list[np.ndarray] = []
         self.failed = 0
@@ -86,7 +88,7 @@ class Settling:
         return self._problem.comm.allreduce(found, MPI.LOR)
 
 
-def woodbury(problem: Any, changes: list[np.ndarray], solver: DirectSolver, b: Any) -> bool:
+def woodbury(problem: Equations, changes: list[np.ndarray], solver: DirectSolver, b: Any) -> bool:
     """Make b = dx/dcontrol by a factorised tangent that of one which differs at a few points (Woodbury's formula).
 
     changes: of the stiffness per area of each contact's points, shape (n, 2, 2). False, and b as it was, where so many
@@ -98,7 +100,7 @@ def woodbury(problem: Any, changes: list[np.ndarray], solver: DirectSolver, b: A
         return True
     if points > FEW:
         return False
-    small = _Points(problem, problem.touching, chosen, solver, lambda V: np.zeros(V.shape[1]))
+    small = _Points(problem, problem.present, chosen, solver, lambda V: np.zeros(V.shape[1]))
     by = small.updated(b, [change[i] for change, i in zip(changes, chosen)])
     if by is None:
         return False
@@ -109,7 +111,8 @@ def woodbury(problem: Any, changes: list[np.ndarray], solver: DirectSolver, b: A
 class _Points:
     """A few points and the body as they see it. Arrays: all of all ranks, but for what is said to be own."""
 
-    def __init__(self, problem: Any, contacts: list, chosen: list[np.ndarray], solver: DirectSolver, border: Any):
+    def __init__(self, problem: Equations, contacts: Sequence[ContactFace], chosen: list[np.ndarray],
+                 solver: DirectSolver, border: Any):
         self._comm, self._contacts, self._chosen = problem.comm, contacts, chosen
         unit, held = np.zeros(problem.x.getLocalSize()), problem.held
         counts = self._comm.allgather(2 * sum(map(len, chosen)))
@@ -141,7 +144,7 @@ class _Points:
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._taken()
         y, by, least, halved = y0, np.zeros_like(y0), np.inf, 0
-        accuracy = 1e-4 * min(c.law.theta for c in self._contacts)
+        accuracy = 1e-4 * min(c.ramp for c in self._contacts)
         for k in range(_ITERATIONS):
             f, S = self._law(y - by)
             more = f - f0 + np.einsum("nij,nj->ni", S - S0, (y - by).reshape(-1, 2)).ravel()

@@ -11,10 +11,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..discrete.step_limit import Way
 from ..measures.targets import Bound, Target, is_met, process_time
 from . import predictor
 from .newton import Failure, tangents
-from .path_following import Inaccurate, Run
+from .path_following import Cutback, Run
 from .state import Record, State
 from .stepping import StepControl
 
@@ -45,7 +46,7 @@ class Flow(Run):
         return start
 
     def _accept(self, state: State) -> None:
-        self.problem.forms.clock = state.time
+        self.problem.clock = state.time
         super()._accept(state)
 
     def _next(self, old: State) -> list[State]:
@@ -61,9 +62,9 @@ class Flow(Run):
                 if dt < 1.5 * self.step.length * self._duration:
                     self.step.accepted(tangents(new.history), error)
                 return [self._met_before(old, self._limit_before(old, new))]
-            except Inaccurate as found:
-                self.step.length = found.share * dt / self._duration
-                self._failed("the error in time", self.step.length)
+            except Cutback as cut:
+                self.step.length = cut.part * dt / self._duration
+                self._failed(str(cut), self.step.length)
             except Failure as failure:
                 self.step.length = dt / self._duration
                 good = self.step.failed()
@@ -79,16 +80,19 @@ class Flow(Run):
 
     def _at(self, old: State, time: float) -> State:
         """The state at a time, one step from `old`; raises `Failure`."""
-        problem, problem.forms.clock = self.problem, time
+        problem, problem.clock = self.problem, time
         value = float(self._course(time))
         x, control = self._foretold(old, time, value)
         by, slope = x - old.x, control - old.control
-        if problem.reach(old.x, old.control, by, slope, 1.0) < 0.5:
+        way, limit = Way(old.x, old.control, by, slope, 1.0), problem.limit
+        if limit and limit.length(way) < 0.5:
             raise Failure("too much would come into contact in one step", [])
-        problem.prepare(old.x, old.control, by, slope, 1.0)
+        if limit:
+            limit.prepare(way)
         new = self.curve.solve(x, control, self._measure.equation(value), "step", old, chords=True)
-        if problem.too_far(old.x, old.control, new.x, new.control):
-            raise Failure("too much came into contact in one step", [])
+        cut = limit and limit.check(old, new, 1.0)
+        if cut:
+            raise Failure(cut.why, [])
         return new
 
     def _limit_before(self, old: State, new: State) -> State:
@@ -148,7 +152,7 @@ class Flow(Run):
                 continue
             values = []
             for state in (old, new):
-                problem.forms.clock = state.time
+                problem.clock = state.time
                 values.append(self.curve.value(bound, state.x, state.control) - target.value)
             if values[0] * values[1] < 0:
                 found = self._meeting(old, target, bound, old.time, new.time)

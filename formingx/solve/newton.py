@@ -12,6 +12,7 @@ from petsc4py import PETSc
 
 from ..errors import count, positive
 from .chords import Chords
+from .equations import Attempt, Equations
 from .linear import DirectSolver
 from .local_contact import Settling, woodbury
 
@@ -67,7 +68,7 @@ class Failure(Exception):
     def __init__(self, reason: str, history: list[Iteration]):
         super().__init__(reason)
         self.reason, self.history = reason, history
-        self.attempt: Any = None                            # where it ended (`diagnosis.Attempt`), if that is known
+        self.attempt: Attempt | None = None                 # where it ended, if that is known
 
 
 class _ActiveSet:
@@ -79,7 +80,7 @@ class _ActiveSet:
         found: how often a small correction led to an active set for the first time; returns: how often one came back.
     """
 
-    def __init__(self, problem: Any):
+    def __init__(self, problem: Equations):
         self._problem, self._iteration = problem, -1
         self._seen: dict[Any, int] = {}
         self._last: Any = None
@@ -160,7 +161,7 @@ class BorderedNewton:
     (c, dc/dcontrol), having put dc/dx into `gradient`.
     """
 
-    def __init__(self, problem: Any, tolerances: Tolerances, norm: Callable[[PETSc.Vec, float], float]):
+    def __init__(self, problem: Equations, tolerances: Tolerances, norm: Callable[[PETSc.Vec, float], float]):
         self.problem, self.tolerances, self._norm = problem, tolerances, norm
         self.solver = DirectSolver(problem.matrix, problem.symmetric)
         new = problem.x.duplicate
@@ -310,3 +311,11 @@ class BorderedNewton:
         self.solver.destroy()
         for vector in (self.F, self.F_control, self.gradient, self.a, self.b):
             vector.destroy()
+
+
+def fixed(target: float) -> Any:
+    """The constraint control = target."""
+    def c(x: Any, control: float, gradient: Any) -> tuple[float, float]:
+        gradient.set(0)
+        return control - target, 1.0
+    return c

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from ..discrete.step_limit import Way
 from ..errors import ConvergenceError
 from ..measures.targets import Amplitude, Bound, Target, is_met
-from ..scene.aims import beyond_all
 from . import predictor
 from .diagnose import diagnose
 from .folds import snaps, usual, was_passed
@@ -40,9 +40,6 @@ _FURTHEST = 1e-3
 
 _PATIENCE = 500
 """States that gain less than a thousandth of the way to the target, after which a run gives up."""
-
-_SHORT = 1e-4
-"""Lengths of steps that are never too long for what comes into contact."""
 
 _TOO_MUCH = 2.0
 """Errors in time, over what is allowed, at which a step is taken again."""
@@ -222,22 +219,21 @@ class Run:
         shortest fails, if a jump from near there came to rest nowhere; or from the first state, with a history: what
         touches on the way slips by what the tangent foretells, which at rest knows nothing of what is about to touch).
         """
-        first, jumps, failed, most = self.step.length, [*_JUMPS, 0.0], 0, np.inf
+        first, jumps, failed, most, limit = self.step.length, [*_JUMPS, 0.0], 0, np.inf, self.problem.limit
         if snaps(self.curve, old, self._at_fold, self._sense):
             return self._snap(old)
         while True:
-            length = self.problem.reach(old.x, old.control, old.direction, old.slope, min(self.step.length, most))
+            length = min(self.step.length, most)
+            length = limit.length(Way(old.x, old.control, old.direction, old.slope, length)) if limit else length
             target, bound, reach = self._within_reach(old, length)
             if length < self.step.length:
                 self._progress.limited("contact arriving", length)
             try:
                 return self._take(old, length, target, bound, reach)
-            except _Late as late:
-                most = late.part * reach
-                self._failed("contact arriving", most)
-            except Inaccurate as found:
-                self.step.length = found.share * reach
-                self._failed("the error in time", self.step.length)
+            except Cutback as cut:
+                most = cut.part * reach
+                self.step.length = most if cut.lasts else self.step.length
+                self._failed(str(cut), most)
             except Failure as failure:
                 self.step.length = length
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
@@ -261,8 +257,10 @@ class Run:
         self._progress.limited(why, length)
 
     def _take(self, old: State, length: float, target: Target | None, bound: Any, reach: float) -> list[State]:
-        """One step of a length, or to a target that is within reach; raises `Failure`, `Inaccurate` or `_Late`."""
-        self.problem.prepare(old.x, old.control, old.direction, old.slope, reach, ends=True)
+        """One step of a length, or to a target that is within reach; raises `Failure` or `Cutback`."""
+        limit = self.problem.limit
+        if limit:
+            limit.prepare(Way(old.x, old.control, old.direction, old.slope, reach), ends=True)
         behind = None if self.problem.has_kinks else predictor.behind(self.states, reach, self.curve.distance)
         with self.curve.newton.in_a_hurry(length > _JUMPS[0]):
             if target is None:
@@ -273,13 +271,9 @@ class Run:
             if not 0 < self.curve.progress(old, new) < 2 * length:
                 raise _Astray("the target was met on a far part of the path", [])
             new.met = target
-        if self.problem.too_far(old.x, old.control, new.x, new.control):
-            raise _Astray("too much came into contact in one step", [])
-        if self.problem.passes_through(old.x, old.control, new.x, new.control):
-            raise _Astray("a tool would pass through the face that it touches", [])
-        part = self.problem.touches_by(new.x, new.control, new.direction, new.slope, reach)
-        if part < 1 and reach > _SHORT:
-            raise _Late(part)
+        cut = limit and limit.check(old, new, reach, ends=True)
+        if cut:
+            raise Cutback(cut.why, max(cut.part, 0.1)) if cut.part else _Astray(cut.why, [])
         if was_passed(self.curve, self.states[:-1], old, new):
             raise _Astray("the iteration fell back to a part of the path that was passed", [])
         error = self._error_in_time(new)
@@ -295,18 +289,18 @@ class Run:
             return None
 
         def x(control: float) -> np.ndarray | None:
-            time = self.problem.forms.time_at(control)
+            time = self.problem.time_at(control)
             past = predictor.before(self.states, time, predictor.CUBIC)
             return predictor.weights(past, time) @ [s.x for s in past] if len(past) > 2 else None
         return x
 
     def _error_in_time(self, new: State) -> float:
-        """Of the step to a state, over what is allowed; raises `Inaccurate` if it is much more."""
+        """Of the step to a state, over what is allowed; raises `Cutback` if it is much more."""
         if self._time_error is None:
             return 0.0
         error = self._time_error.of(self.states, new.x, new.control)
         if error > _TOO_MUCH:
-            raise Inaccurate(error)
+            raise Cutback("the error in time", max(0.8 * error ** (-1 / 3), 0.1), lasts=True)
         return error
 
     def _snap(self, old: State) -> list[State]:
@@ -392,12 +386,11 @@ class Run:
 
     def _check_progress(self) -> None:
         """Stop if many states have come no nearer to the target, or what is driven has gone beyond all bounds."""
-        scene, leading = self.problem.scene, self.problem.setting.leading
-        if leading is not None and leading < len(scene.things):
-            value = self.problem.shown(self.record.last.control)[1]
-            absurd = beyond_all(scene, scene.things[leading].quantity, value)
-            if absurd is not None:
-                self._give_up(f"the {self._driven} has come to {value:.4g}, and nothing holds it: {absurd}")
+        control = self.record.last.control
+        absurd = self.problem.absurd(control)
+        if absurd is not None:
+            value = self.problem.shown(control)[1]
+            self._give_up(f"the {self._driven} has come to {value:.4g}, and nothing holds it: {absurd}")
         if len(self._values) > _PATIENCE:
             now, then = (self._gained(self._values[k]) for k in (-1, -1 - _PATIENCE))
             if abs(now - then) < 1e-3:
@@ -495,20 +488,12 @@ class Run:
             + ("" if diagnosis.advice else _TRY), diagnosis=diagnosis)
 
 
-class Inaccurate(Exception):
-    """A step is too long for the accuracy in time; share: of its length, that will do."""
+class Cutback(Exception):
+    """A step is too long; part: of its length, that will do. lasts: of the steps after it, too."""
 
-    def __init__(self, error: float):
-        super().__init__(error)
-        self.share = max(0.8 * error ** (-1 / 3), 0.1)
-
-
-class _Late(Exception):
-    """Something came into contact too long before the end of a step; part: of its length, that will do."""
-
-    def __init__(self, part: float):
-        super().__init__(part)
-        self.part = max(part, 0.1)
+    def __init__(self, why: str, part: float, lasts: bool = False):
+        super().__init__(why)
+        self.part, self.lasts = part, lasts
 
 
 class _Astray(Failure):

@@ -10,14 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from ..discrete.schedule import Setting
 from ..errors import ConvergenceError, InputError
 from ..measures.targets import Amplitude, Bound, Target, changed, process_time
-from ..scene import clearance
 from .measure_control import Flow
 from .newton import UNLOADED, Failure
 from .path_following import Run
@@ -39,20 +37,23 @@ class Execution:
 
     Args:
         record: where the states go. plans: of the stages. unsure: those whose tools are to be looked at again when
-            their turn comes (`clearance.check`). step: step control of stages that have none of their own.
+            their turn comes; look: looks at one, given what tells the value of a thing (its number) then, the user's
+            units. step: step control of stages that have none of their own.
         balanced: forces left over, relative to the support forces, that count as none.
         accuracy: the error in time that is allowed, relative.
     """
 
-    def __init__(self, record: Record, plans: list[Plan], unsure: list[Plan], step: StepControl | None,
-                 balanced: float, accuracy: float = 2e-3):
+    def __init__(self, record: Record, plans: list[Plan], unsure: list[Plan],
+                 look: Callable[[Plan, Callable[[int], float]], None], step: StepControl | None, balanced: float,
+                 accuracy: float = 2e-3):
         problem = record.problem
-        self.record, self.curve, self.problem, self.scene = record, record.curve, problem, problem.scene
-        self.plans, self._unsure, self._step, self._balanced = plans, unsure, step, balanced
+        self.record, self.curve, self.problem = record, record.curve, problem
+        self.plans, self._unsure, self._look, self._step, self._balanced = plans, unsure, look, step, balanced
         self._accuracy = accuracy
-        self._rest = np.zeros(problem.x.getLocalSize())
+        self._rest, nothing = np.zeros(problem.x.getLocalSize()), [0.0] * len(problem.scales)
+        self._still = Setting(nothing, nothing, [])
         self._targets = [self._bind(plan) for plan in plans]    # so that nothing is compiled between stages
-        problem.enter(Setting.first(self.scene), self._rest, 0.0)
+        problem.enter(self._still, self._rest, 0.0)
 
     def run(self, max_steps: int | None, progress: bool) -> None:
         """All stages that are left."""
@@ -66,7 +67,7 @@ class Execution:
             if piece < 1:
                 self._change(piece == 0)
                 if any(plan is p for p in self._unsure):     # now its travels are known
-                    clearance.check(self.scene, [plan], self._travels())
+                    self._look(plan, self._stands)
             stage = plan.stage
             if stage.flow or stage.hold:
                 self._flow(plan.numbers, piece > 0)
@@ -81,10 +82,9 @@ class Execution:
 
     def _bind(self, plan: Plan) -> list[tuple[Target, Bound]]:
         """The targets of a stage and their measures; where it drives one thing the last is `until`."""
-        stage, n = plan.stage, len(self.scene.things)
-        moving = {*plan.numbers, *(i for i, _ in plan.tables)}
-        rate = [float(i in moving) for i in range(n)] + [float(stage.timed)]
-        self.problem.enter(Setting([0.0] * (n + 1), rate, plan.off), self._rest, 0.0)
+        stage, moving = plan.stage, {*plan.numbers, *(i for i, _ in plan.tables)}
+        rate = [float(i in moving) for i in range(len(self._still.rate) - 1)] + [float(stage.timed)]
+        self.problem.enter(replace(self._still, rate=rate, off=plan.off), self._rest, 0.0)
         found = []
         for target in (*stage.through, *([stage.until] if plan.numbers and stage.until else [])):
             try:
@@ -101,14 +101,10 @@ class Execution:
         last = self.record.last if self.record.states else None
         return self.problem.setting, last.x if last else self._rest, last.control if last else 0.0
 
-    def _travels(self) -> dict[int, float]:
-        """How far each tool of the scene has come, {number: length}."""
-        return {i: self._stands(i) for i, thing in enumerate(self.scene.things) if thing in self.scene.contacts}
-
     def _stands(self, number: int) -> float:
         """Value of a thing now, in the user's units."""
         setting, _, control = self._standing()
-        return setting.amplitude(number, control) * self.problem.forms.scales[number]
+        return setting.amplitude(number, control) * self.problem.scales[number]
 
     def _enter(self, base: list[float], rate: list[float], piece: int, control: float, fading: bool = False) -> None:
         changed = sorted(set(self.problem.setting.off) ^ set(self._off)) if fading else []
@@ -145,23 +141,16 @@ class Execution:
         start: float | None = None
         if not begun:
             for i in set(before.off) - set(self._off):
-                self._bring_in(self.scene.things[i], x, control)
+                try:
+                    self.problem.bring_in(i, x, control)
+                except InputError as error:
+                    raise InputError(f"{self._stage.who}: {error}") from None
             still, fading = [0.0] * len(before.base), bool(self.record.states) and before.off != self._off
             start = 0.0 if fading else control
             self._enter(self._amplitudes(), still, 0, start, fading)
         if self.problem.setting.fading and (begun or self._out_of_balance(x)):
             target = changed()
             self._trace([(target, target.bind(self.problem))], start)
-
-    def _bring_in(self, thing: Any, x: np.ndarray, control: float) -> None:
-        """A tool that was away remembers nothing, and must not stand in the body."""
-        for contact in self.problem.contacts:
-            if contact.contact is thing:
-                contact.come_in(x, control)
-                depth = contact.largest_penetration(x, control)
-                if depth > 1e-6 * self.problem.forms.length:
-                    raise InputError(f"{self._stage.who}: {thing!r} comes in where the body is, which reaches"
-                                     f" {depth:.6g} into the tool")
 
     def _out_of_balance(self, x: np.ndarray) -> bool:
         self.problem.x.array_w[:] = x
@@ -178,7 +167,7 @@ class Execution:
     def _enter_driving(self, numbers: list[int], clocked: bool = True) -> float:
         """Make the amplitude of one thing the control; `clocked`: time goes by as it moves. The control now."""
         base = self._amplitudes()
-        rate, control, scale = [0.0] * len(base), base[numbers[0]], self.problem.forms.scales[numbers[0]]
+        rate, control, scale = [0.0] * len(base), base[numbers[0]], self.problem.scales[numbers[0]]
         for number in numbers:
             base[number], rate[number] = 0.0, 1.0
         stage, until = self._stage, self._stage.until
@@ -200,7 +189,7 @@ class Execution:
     def _amplitudes(self) -> list[float]:
         """Of all things, and the time, as they stand now."""
         setting, _, control = self._standing()
-        return [*setting.standing(control)[:-1], self.problem.forms.time_at(control)]
+        return [*setting.standing(control)[:-1], self.problem.time_at(control)]
 
     def _flow(self, numbers: list[int], begun: bool) -> None:
         """Piece 1: one thing is what makes a measure follow a course in time."""
@@ -233,7 +222,7 @@ class Execution:
         """Pieces 1, 2, ...: from knot to knot of the tables, the time being the control."""
         before, _, control = self._standing()
         stage, through = self._stage, self._targets[self._k]
-        now = before.base[-1] if piece else self.problem.forms.time_at(control)
+        now = before.base[-1] if piece else self.problem.time_at(control)
         end = now + stage.duration if stage.duration else stage.until.value if stage.until else max(
             table[-1, 0] for _, table in tables)
         if not piece:
@@ -250,7 +239,7 @@ class Execution:
     def _enter_line(self, tables: list, now: float, then: float, piece: int) -> None:
         """All tables are straight between these times; the control is the time, scaled: no amplitude is faster."""
         before, _, control = self._standing()
-        base, scales = self._amplitudes(), self.problem.forms.scales
+        base, scales = self._amplitudes(), self.problem.scales
         change = [0.0] * len(base)
         for i, table in tables:
             first, value = table[0]
@@ -281,12 +270,12 @@ class Execution:
             raise InputError(f"{who}: ends at time {end:g}, but the process time is {now:g} already: time cannot go"
                              f" back")
         for i, table in tables:
-            name, first = repr(self.scene.things[i]), table[0]
+            name, first = self.plans[self._k].names[i], table[0]
             if first[0] < now - _SAME * abs(now):
                 raise InputError(f"{who}: the table of {name} begins at time {first[0]:g}, but the process time is"
                                  f" {now:g} already: it goes back in time")
             stands = self._stands(i)
-            size = max(np.abs(table[:, 1]).max(), self.problem.forms.scales[i])
+            size = max(np.abs(table[:, 1]).max(), self.problem.scales[i])
             if first[0] <= now + _SAME * abs(now) and abs(stands - first[1]) > 1e-9 * size:
                 raise InputError(f"{who}: the table of {name} begins with {first[1]:g} at time {first[0]:g}, but it"
                                  f" stands at {stands:g} then")

@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from .newton import UNLOADED, BorderedNewton, Failure, Iteration, Tolerances
+from ..discrete.step_limit import Way
+from .newton import UNLOADED, BorderedNewton, Failure, Iteration, Tolerances, fixed
 from .state import State
 
 AHEAD = 1e-6
@@ -115,11 +116,11 @@ class _Way:
             self.curve.spend(len(failure.history))
             return self._hold_back()
         self.curve.spend(len(history) - 1)
-        if self.problem.folded(self._x, self.control) or self.problem.passes_through(
-                self.at.x, self.at.control, self._x.array_r, self.control):
-            return self._hold_back()
-        x, drag = self._x.array_r.copy(), viscous.drag(self._x.array_r)
+        x, limit = self._x.array_r.copy(), self.problem.limit
         last, new = self.at, replace(self.at, x=x, control=self.control)
+        if self.problem.folded(self._x, self.control) or limit and limit.passes_through(last, new):
+            return self._hold_back()
+        drag = viscous.drag(x)
         most = np.clip(_SHARE * self.curve.moved(self._old, last), *_FAR)
         far = self.curve.moved(replace(last, x=origin), new) / most
         if not self.solved and far > _AGAIN:
@@ -129,7 +130,8 @@ class _Way:
         self._lose(origin, x, drag)                         # from where the body was, or was foretold to be
         self._drag, self.at, by = drag, new, x - last.x
         self.problem.advance(x, self.control)
-        self.problem.prepare(x, self.control, by, 0.0, 1.0)
+        if limit:
+            limit.prepare(Way(x, self.control, by, 0.0, 1.0))
         self.solved += 1
         if self._wait or len(history) - 1 > _FEW:
             self._wait = max(self._wait - 1, 0)
@@ -157,9 +159,8 @@ class _Way:
             state = self.curve.resume(self.at.x, self.control)
             state.kind, state.history = "jump", [Iteration(self.rest, 0.0, 0.0)]
         self._lose(self.at.x, state.x, np.zeros(len(state.x)))
-        forms = self.problem.forms
-        state.jump = {"dissipated": self.lost * forms.stress * forms.volume,
-                      "moved": self.curve.moved(self._old, state) * forms.length}
+        energy, length = self.problem.units
+        state.jump = {"dissipated": self.lost * energy, "moved": self.curve.moved(self._old, state) * length}
         return state
 
     def _lose(self, a: np.ndarray, x: np.ndarray, drag: np.ndarray) -> None:
@@ -214,11 +215,3 @@ def jump(curve: Any, old: State, by: float, ahead: bool, solutions: int = MOST,
         raise
     finally:
         way.destroy()
-
-
-def fixed(target: float) -> Any:
-    """The constraint control = target."""
-    def c(x: Any, control: float, gradient: Any) -> tuple[float, float]:
-        gradient.set(0)
-        return control - target, 1.0
-    return c

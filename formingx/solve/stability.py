@@ -116,7 +116,7 @@ class Modes:
         if abs(nearest[0] - fraction) >= _LOCATED:
             x, control = self.curve.interpolate(a, b, fraction)
             state = State(x, control, a.direction, a.slope, memory=a.memory, stage=a.stage, setting=a.setting,
-                          time=self.problem.forms.time_at(control))
+                          time=self.problem.time_at(control))
         with self.problem.at(nearest[2]):
             self.variation.fill(*kind)
             mode, plane = self.variation.amplitudes(nearest[3]), self.variation.plane(nearest[3])

@@ -140,12 +140,14 @@ class Stage:
 
 
 class Plan(NamedTuple):
-    """A stage with the things of the scene by their numbers: what it drives, [(number, table)], what is left out."""
+    """A stage with the things of the scene by their numbers: what it drives, [(number, table)], what is left out; and
+    all of them in words."""
 
     stage: Stage
     numbers: list[int]
     tables: list[tuple[int, np.ndarray]]
     off: list[int]
+    names: list[str]
 
 
 def plan(scene: Scene, stage: Stage) -> Plan:
@@ -181,4 +183,5 @@ def plan(scene: Scene, stage: Stage) -> Plan:
         if (why := aims.beyond_all(scene, thing.quantity, most)) is not None:
             raise InputError(f"{who}: the table of {thing!r} goes to {most:g}: {why}")
     tables = [(i, table) for number, (_, table) in zip(numbers, stage.tables) for i in scene.together(number)]
-    return Plan(stage, scene.together(numbers[0]) if stage.drive is not None else [], tables, off)
+    return Plan(stage, scene.together(numbers[0]) if stage.drive is not None else [], tables, off,
+                list(map(repr, scene.things)))

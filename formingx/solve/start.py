@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import ConvergenceError
 from ..measures.targets import Amplitude, Target
 from .arc_length import Curve
+from .diagnose import diagnose
 from .newton import Failure
 from .path_following import Run
 from .state import Record, State
@@ -27,8 +28,8 @@ def begin(curve: Curve) -> State:
         return curve.start()
     except Failure as failure:
         first, rest = problem.setting, np.zeros(problem.x.getLocalSize())
-        if not any(not load.driven for load in problem.scene.loads):
-            raise curve.no_start(failure) from None
+        if not problem.fixed_loads:
+            raise _no_start(curve, failure) from None
         record = Record(problem, curve)
         target = Target("change", 1.0, None)
         try:
@@ -36,6 +37,15 @@ def begin(curve: Curve) -> State:
             run = Run(record, [(target, Amplitude(problem, None))])
             run.follow(1000, False, curve.resume(rest, 0.0))
         except (ConvergenceError, Failure):
-            raise curve.no_start(failure) from None
+            raise _no_start(curve, failure) from None
         problem.enter(first, record.last.x, 0.0)
         return curve.resume(record.last.x, 0.0)
+
+
+def _no_start(curve: Curve, failure: Failure) -> ConvergenceError:
+    """The error of a body for which no first state was found."""
+    loads = curve.problem.fixed_loads
+    words, advice = (f", under {', '.join(loads)}", "drive the largest of them instead") if loads else (
+        "", "a tool touches the body at rest: give its Contact a smaller ramp")
+    return ConvergenceError(f"no equilibrium was found before anything is driven{words}: {failure.reason}; {advice}",
+                            diagnosis=diagnose(curve, [], failure.reason, failure.attempt))

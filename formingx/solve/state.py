@@ -157,7 +157,7 @@ class Record:
         problem, memory = self.problem, self.problem.memory
         problem.advance(state.x, state.control)
         state.memory, state.stage, state.setting = problem.memory, self.stage, asdict(problem.setting)
-        state.time = problem.forms.time_at(state.control)
+        state.time = problem.time_at(state.control)
         self.segments[-1].states.append(state)
         try:
             for told in self.on_state:
@@ -182,7 +182,5 @@ class Record:
 
     def describe(self, state: State) -> str:
         """A state's main numbers in one line."""
-        scene = self.problem.scene
-        columns = ("process_time", *map(scene.column, scene.drivable), "pole_height", "pole_stretch")
         return f"stage {state.stage!r}, " * bool(state.stage) + ", ".join(
-            f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in columns if k in state.measures)
+            f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in self.problem.main_columns if k in state.measures)

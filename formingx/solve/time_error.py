@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ..errors import InputError, finite
 from . import predictor
+from .equations import Equations
 from .state import State
 
 ACCURACY = {"draft": 1e-2, "standard": 2e-3, "fine": 3e-4}
@@ -39,16 +38,16 @@ class TimeError:
         problem: the `Problem`. accuracy: the error promised.
     """
 
-    def __init__(self, problem: Any, accuracy: float):
+    def __init__(self, problem: Equations, accuracy: float):
         self._problem = problem
         self._once, self._adding_up = _ONCE * accuracy, _ADDING_UP * accuracy**1.5
 
     def of(self, states: list[State], x: np.ndarray, control: float) -> float:
         """Error of the step from the last of some states to (x, control) over what is allowed; 0: no time goes by."""
-        time = self._problem.forms.time_at(control)
+        time = self._problem.time_at(control)
         past = predictor.before(states, time, predictor.QUADRATIC - 1)
         end = State(x, control, x, 0.0, time=time)
         middle = (past[-1].time + time) / 2
         share = predictor.weights([*past, end], middle) if time > past[-1].time else np.array([])
-        once, lasting = self._problem.step_error.of(past, share, x, control)
+        once, lasting = self._problem.step_error(past, share, x, control)
         return max(once / self._once, lasting / self._adding_up)

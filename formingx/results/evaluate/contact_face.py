@@ -68,7 +68,7 @@ class ContactFace:
             moved = contact.points + path.problem.forms.length * contact.displacement(fields)
             gap = -contact.contact.tool.signed_distance(contact.positions(fields, state.control))
             traction = np.zeros((len(self.rest), 2))
-            if contact in path.problem.touching:
+            if contact in path.problem.present:
                 _, traction = contact.traction(fields, state.control)
         _, values = self._gathered(moved, gap)
         points = values[:, :2]

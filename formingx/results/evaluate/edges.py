@@ -31,7 +31,7 @@ def coarsest(path: Any, state: Any) -> Edge | None:
         fields = problem.x.array_r.copy()
         free = np.ones(len(fields))
         free[problem.held] = 0
-        for contact in problem.touching:
+        for contact in problem.present:
             if contact.contact.sticks or not contact.contact.separates:
                 continue
             x, law = contact.positions(fields, state.control), contact.tractions(fields, state.control)

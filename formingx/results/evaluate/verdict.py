@@ -66,7 +66,7 @@ class Verdict:
             return []
         with self._problem.at(state):
             edges, found = self._outline.edges(), []
-            for contact in self._problem.touching:
+            for contact in self._problem.present:
                 share = contact.energy(state.x, state.control) / (state.measures["strain_energy"] or np.inf)
                 if share > _HELD:
                     found.append(("serious", f"Penetration of the tool of {_name(contact)!r} holds {100 * share:.2g} %"
@@ -103,7 +103,7 @@ class Verdict:
                 yield (f"the body did not follow the tool of {sunk.name!r}: contact points are {sunk.depth:.4g} deep in"
                        f" it, {100 * sunk.share * _SUNK:.2g} % of the wall that is left there: give Contact a penalty"
                        f" of {50 * sunk.share * sunk.contact.contact.penalty:.1g}")
-            for contact in problem.touching:
+            for contact in problem.present:
                 if _pulled(contact, state):
                     yield (f"the body pulls at the tool of {_name(contact)!r}, which has no friction and lets go: it is"
                            f" behind it")

@@ -209,7 +209,7 @@ class Ledger:
                     force = slope = 0.0
                 elif thing in scene.contacts:
                     together = [scene.things[k] for k in scene.together(i)]
-                    tools = [c for c in at.touching if c.contact in together]
+                    tools = [c for c in at.present if c.contact in together]
                     force = -sum(float(c.force(fields, state.control) @ np.array(c.contact.moves)) for c in tools)
                     slope = sum(self._sum(free[self._nodes(c, fields, state.control)] @ np.array(c.contact.moves))
                                 for c in tools)
@@ -232,7 +232,7 @@ class Ledger:
         with self._problem.at(state) as at:
             x, control = state.x[: at.n_owned], state.control
             return self._sum([np.any(np.abs(c.law.distance(c.positions(x, control)) / c.law.theta + 1) < _FOOT)
-                              for c in at.touching]) > 0
+                              for c in at.present]) > 0
 
     def _friction(self, a: Any, b: Any) -> float:
         """What friction has dissipated: mean traction times what has slid, not elastically, while the point touched."""
@@ -241,7 +241,7 @@ class Ledger:
         if a.setting != b.setting or not contacts:
             return lost
         with problem.at(a):
-            for c in (c for c in contacts if c in problem.touching):
+            for c in (c for c in contacts if c in problem.present):
                 before[c] = c.positions(a.x[: problem.n_owned], a.control), c.touch, _friction_of(c, a, problem)
         with problem.at(b):
             for c, (x, touch, T) in before.items():

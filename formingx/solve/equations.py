@@ -1,0 +1,327 @@
+"""What the solver sees of a problem, F(x, control) = 0: typed interfaces, beyond which it reaches for nothing.
+
+x is dimensionless, its rows spread over the ranks ("own part"); so is the control. For each step, in this order:
+
+    limit.length, limit.prepare         how long it may be; it is about to be taken
+    begin                               Newton's method begins at the predicted state
+    residual, linearise, tangent,       each iteration: F; F and its active set as the iteration wants them; dF/dx
+      control_derivative                and dF/dcontrol, at the (x, control) of that residual
+    folded, limit.check, step_error     whether the state that it came to will do
+    advance                             it is accepted: the histories take it up
+    tangent(ahead=True)                 that of the next step, where F has a kink at the state
+
+`at` and `stand` go to another state; `enter` changes the setting between the stages of a process.
+What is written out here is what equations without contact, history, time or units have: a class that is derived from
+`Equations` need only give F.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from contextlib import AbstractContextManager
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ..discrete.schedule import Setting
+from ..discrete.step_limit import StepLimit
+
+
+class Standing(Protocol):
+    """A state to stand at. x: own part, shape (n,); setting: plain data of a `Setting`, or empty."""
+
+    x: np.ndarray
+    control: float
+    time: float
+    memory: list[Any]
+    setting: dict[str, Any]
+
+
+class Tractions(Protocol):
+    """What the law of contact gives at n points: force, shape (n, 2), stress; sense of sliding, shape (n,);
+    stiffness, dforce/dposition, shape (n, 2, 2), stress/length; active: the status of each, shape (n,)."""
+
+    force: np.ndarray
+    sense: np.ndarray
+
+    @property
+    def stiffness(self) -> np.ndarray: ...
+
+    @property
+    def active(self) -> np.ndarray: ...
+
+
+class ContactFace(Protocol):
+    """A face in contact: n own points, as the iteration that was linearised last sees them."""
+
+    points: np.ndarray
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Of the forces in F by tractions, shape (n,)."""
+
+    @property
+    def ramp(self) -> float:
+        """Distance over which contact begins, length."""
+
+    @property
+    def active(self) -> np.ndarray:
+        """Status of the points: hashable as bytes, shape (n,)."""
+
+    @property
+    def arrivals(self) -> np.ndarray:
+        """Which points touch that did not where Newton's method began, shape (n,)."""
+
+    def add(self, values: np.ndarray, forces: np.ndarray) -> None:
+        """Add forces at the points, shape (n, 2), to own rows of F."""
+
+    def moved(self, dx: np.ndarray, step: float) -> np.ndarray:
+        """How the points move, seen from the tool, by a correction of x (own part) and the control; (n, 2), length."""
+
+    def taken(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forces and stiffnesses that `linearise` has taken, of some points, shapes (m, 2), (m, 2, 2)."""
+
+    def foretold(self, by: np.ndarray, nodes: np.ndarray | slice = slice(None)) -> Tractions:
+        """The law at some points that move on by so much, shape (m, 2), length."""
+
+    def expect(self, nodes: np.ndarray, sense: np.ndarray) -> None:
+        """The next iteration takes this sense of sliding for the points in `nodes`, a mask, shape (n,)."""
+
+
+class Viscosity(Protocol):
+    """Forces eta V dx of a body that moves through a viscous stress."""
+
+    def forces(self, change: np.ndarray, eta: float) -> np.ndarray:
+        """eta V dx, own part, shape (n,)."""
+
+    def add_to(self, tangent: PETSc.Mat, eta: float) -> None:
+        """Add eta V to a tangent."""
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+
+
+class Attempt(NamedTuple):
+    """Where a failed Newton iteration ended: x (own part) and control, and the last correction of both."""
+
+    x: np.ndarray
+    control: float
+    dx: np.ndarray
+    dcontrol: float
+
+
+class Findings(Protocol):
+    """What a body tells about a failed attempt: `facts` are fields of a `Diagnosis`."""
+
+    facts: dict[str, Any]
+
+    def draw(self, file: Any, title: str) -> None:
+        """A picture of the last good state (rank 0 draws).
+
+        Raises:
+            InputError: there is nothing to draw.
+        """
+
+
+class Residual(Protocol):
+    """F and its derivatives.
+
+    Attributes:
+        comm: communicator; x: a vector of unknowns, inside `at` those of the state; matrix: refilled by `tangent`;
+        force_scale: size of the forces that balance in the residual last computed.
+    """
+
+    comm: MPI.Intracomm
+    x: PETSc.Vec
+    matrix: PETSc.Mat
+    force_scale: float
+
+    @property
+    def symmetric(self) -> bool:
+        """True if dF/dx is."""
+        return False
+
+    def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
+        """out = F(x, control); sets `force_scale`."""
+
+    def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> PETSc.Mat:
+        """dF/dx in `matrix`; `ahead`: as it is beyond an accepted state, where F has a kink there."""
+
+    def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, ahead: bool = False) -> None:
+        """out = dF/dcontrol."""
+
+    def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
+        """Product of two changes of x in a metric that knows neither mesh nor units: it measures arc length."""
+
+    def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:
+        """out with inner(a, b) = out . b."""
+
+    def folded(self, x: PETSc.Vec, control: float) -> bool:
+        """True if (x, control) is no state though F may vanish there: an element is inside out."""
+        return False
+
+    def viscosity(self) -> Viscosity:
+        """That of a snap-through; to be destroyed."""
+
+    @property
+    def slack_at_rest(self) -> bool:
+        """True if dF/dx is singular at rest, x = 0."""
+        return False
+
+    def stiff_state(self, out: PETSc.Vec) -> None:
+        """out = a state near rest where dF/dx is regular, for the first direction of a path."""
+
+    def motion(self, control: float) -> np.ndarray:
+        """Rest with what is held where it is at a control: the first guess from there; own part."""
+        return np.zeros(self.x.getLocalSize())
+
+
+class ActiveSet(Protocol):
+    """Kinks of F, by contact, and how Newton's method deals with them."""
+
+    @property
+    def has_kinks(self) -> bool:
+        """True if the tangent ahead of a state may differ from that behind it."""
+        return False
+
+    @property
+    def present(self) -> Sequence[ContactFace]:
+        """The faces in contact that take part now."""
+        return []
+
+    @property
+    def active_set(self) -> Hashable:
+        """Status of all points at the residual last computed, the same on all ranks; None: there are none."""
+        return None
+
+    @property
+    def held(self) -> np.ndarray:
+        """Local numbers of the own unknowns that are held: no force moves them."""
+        return np.zeros(0, dtype=np.int32)
+
+    @property
+    def limit(self) -> StepLimit | None:
+        """What a step may bring; None: any."""
+        return None
+
+    def begin(self, old: Standing | None = None) -> None:
+        """Newton's method begins at a guess ahead of a state (None: of none)."""
+
+    def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
+        """Ready the tangent at (x, control) for an iteration, and F, the residual there, for the solve with it."""
+
+    def changes_ahead(self, x: PETSc.Vec, control: float) -> list[np.ndarray]:
+        """Of each face: stiffness `ahead` less that in the tangent last made, shape (n, 2, 2), stress/length."""
+        return []
+
+
+class Histories(Protocol):
+    """What F depends on besides x and control, and time.
+
+    Attributes:
+        memory: what each history remembers of the last accepted state.
+        clock: process time at control 0.
+    """
+
+    memory: list[Any]
+    clock: float
+
+    @property
+    def has_history(self) -> bool:
+        """True if F depends on the states before."""
+        return False
+
+    @property
+    def relaxes(self) -> bool:
+        """True if F depends on time."""
+        return False
+
+    def advance(self, x: np.ndarray, control: float) -> None:
+        """A state is accepted: the histories take it up. x: own part."""
+
+    def time_at(self, control: float) -> float:
+        """Process time at a control."""
+        return self.clock
+
+    def step_error(self, past: Sequence[Standing], share: np.ndarray, x: np.ndarray,
+                   control: float) -> tuple[float, float]:
+        """Error of the step in time from the last of `past` to (x, control), relative: at its end; what lasts of it.
+
+        share: of each state, and of the new one, in x half-way in time.
+        """
+        return 0.0, 0.0
+
+
+class Stages(Protocol):
+    """What holds from one change of the problem to the next."""
+
+    @property
+    def setting(self) -> Setting:
+        """How what can be driven follows the control, and what takes no part."""
+
+    def enter(self, setting: Setting, x: np.ndarray, control: float) -> None:
+        """Take a setting, in which (x, control), own part, is a state."""
+
+    def stand(self, state: Standing) -> None:
+        """Go on from an accepted state: its setting and its histories are what they were then."""
+
+    def at(self, state: Standing) -> AbstractContextManager[Any]:
+        """Stand at a state, its x and control too, and come back on leaving."""
+
+    def bring_in(self, number: int, x: np.ndarray, control: float) -> None:
+        """A thing (its number in the setting) is going to take part, and remembers nothing.
+
+        Raises:
+            InputError: a tool comes in where the body is.
+        """
+
+
+class Units(Protocol):
+    """What the dimensionless numbers stand for."""
+
+    @property
+    def scales(self) -> Sequence[float]:
+        """The user's value over the amplitude of each thing that a `Setting` counts; last, 1.0 for the time."""
+
+    @property
+    def units(self) -> tuple[float, float]:
+        """One of the dimensionless energy and length in the user's units."""
+        return 1.0, 1.0
+
+    @property
+    def drives(self) -> str | None:
+        """What the control stands for: "pressure", "travel", "time" or, if it is none of them, None."""
+        return None
+
+    @property
+    def fixed_loads(self) -> list[str]:
+        """What acts already where nothing is driven yet, in words."""
+        return []
+
+    @property
+    def main_columns(self) -> Sequence[str]:
+        """The measures that tell one state from another in a line."""
+        return []
+
+    def shown(self, control: float) -> tuple[str, float]:
+        """What the control stands for, in words, and its value in the user's units."""
+        return "control", control
+
+    def absurd(self, control: float) -> str | None:
+        """Why no process comes to a control, in words, or None."""
+        return None
+
+    @property
+    def why_not_finite(self) -> str:
+        """What makes a residual infinite or not a number."""
+        return "F is not defined there"
+
+    def examine(self, last: Standing | None, attempt: Attempt | None) -> Findings | None:
+        """What the last good state and a failed attempt tell, for a `Diagnosis`; collective."""
+        return None
+
+
+class Equations(Residual, ActiveSet, Histories, Stages, Units, Protocol):
+    """All that the solver sees."""
