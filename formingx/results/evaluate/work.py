@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
+from ...discrete.step_limit import Way
 from ...discrete.tooling import Tooling
 from ...solve.newton import Failure
 
@@ -122,8 +123,8 @@ class Ledger:
         for part, (start, end) in itertools.product(_PARTS, [line] if self._flows(a, b) else [(a, b), line]):
             with problem.at(a):
                 if self._flows(a, b):
-                    problem.forms.clock = a.time + part * (b.time - a.time)
-                problem.prepare(a.x, a.control, start.direction, start.slope, part * h)
+                    problem.clock = a.time + part * (b.time - a.time)
+                problem.limit.prepare(Way(a.x, a.control, start.direction, start.slope, part * h))
                 try:
                     found = curve.inside(start, end, part)
                 except Failure:                             # where contact does not settle, it may elsewhere
