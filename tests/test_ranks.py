@@ -1,5 +1,6 @@
 """The same numbers on 1, 2 and 3 ranks, and the same errors."""
 
+import numpy as np
 import pytest
 from conftest import run, run_json
 
@@ -65,3 +66,24 @@ def test_ranks_agree_on_contact():
     serial, *others = [run_json(CONTACT, ranks) for ranks in (1, 2, 3)]
     for other in others:
         assert other == pytest.approx(serial, rel=1e-8)
+
+
+DRIVEN = """
+import json
+import formingx as fx
+mesh = fx.mesh.disc(radius=1.0, thickness=3.0, elements=(4, 12))
+scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[
+    fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.Displaced("top", "z")])
+path = fx.trace(scene, until=fx.travel(-0.5), progress=False)
+found = [float(path[c][-1]) for c in ("travel", "support_force")]
+if mesh.comm.rank == 0:
+    print(json.dumps(found))
+"""
+
+
+def test_a_driven_support_of_which_a_rank_has_nothing():
+    """The rank without a driven node waited for ever."""
+    serial, parallel = (run_json(DRIVEN, ranks) for ranks in (1, 2))
+    stretch = 1 - 0.5 / 3
+    assert parallel == pytest.approx(serial, rel=1e-8)
+    assert serial[1] == pytest.approx(np.pi * 2 * (stretch**-2 - stretch), rel=1e-6)

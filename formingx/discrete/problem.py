@@ -86,6 +86,7 @@ class Problem(Units):
         self._admissible = Admissible(forms)
         self._constraints = Constraints(forms, self.assemble)
         self._by_motion = self._lift = None
+        self._movable = [k for k, thing in enumerate(scene.things) if thing in scene.supports and thing.driven]
         if self._constraints.can_move:
             self._lift = fem.Function(forms.space)              # held unknowns move the others through the tangent
             self._by_motion = forms.compile(ufl.action(tangent, self._lift))
@@ -359,7 +360,7 @@ class Problem(Units):
         values = self.assemble(self._by_control) if self._by_control else np.zeros(self._n)
         if self._by_time and self.setting.rate[-1]:
             values += self.assemble(self._by_time)
-        if self._by_motion and np.any(self._stage.rate):
+        if self._by_motion and any(self.setting.rate[k] for k in self._movable):    # the same on all ranks
             values += self.assemble(self._by_motion)
         for contact in self.present:
             contact.add_control_derivative(values, x.array_r[: self._n], control, ahead)
