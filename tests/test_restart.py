@@ -179,7 +179,7 @@ def copied(whole, tmp_path):
     return tmp_path / "run", whole["hinged"][1]
 
 
-@pytest.mark.parametrize("file", ["0003/x.bp/data.0", "0003/direction.bp/md.0", "0003/state.json", "scene.json"])
+@pytest.mark.parametrize("file", ["0003/arrays.bin", "0003/state.json", "scene.json"])
 @pytest.mark.parametrize("how", ["cut", "changed", "gone", "empty"])
 def test_damaged(file, how, copied):
     folder, scene = copied
@@ -193,6 +193,44 @@ def test_damaged(file, how, copied):
         victim.write_bytes({"cut": content[:-7], "empty": b"", "changed": bytes(changed)}[how])
     with pytest.raises(fx.InputError, match="damaged|not there"):
         fx.load(folder, scene)
+
+
+def as_format_4(folder, path):
+    """Rewrite a checkpoint as versions did that wrote format 4: fields by adios4dolfinx, all else as text."""
+    import adios4dolfinx
+    from dolfinx import fem
+    w = fem.Function(path.problem.forms.space)
+    about = json.loads((folder / "scene.json").read_text())
+    (folder / "scene.json").write_text(json.dumps(about | {"formingx": 4}))
+    for k, state in enumerate(path.states):
+        one = folder / f"{k:04d}"
+        data = checkpoint._read_data(folder, k)
+        (one / "arrays.bin").unlink()
+        for name in ("x", "direction"):
+            del data[name]
+            w.x.array[:] = getattr(state, name)[:len(w.x.array)]
+            adios4dolfinx.write_function_on_input_mesh(one / f"{name}.bp", w, name=name)
+        data = json.loads(json.dumps(data, default=np.ndarray.tolist))
+        content = {str(file.relative_to(one)): file.read_bytes() for file in sorted(one.glob("*.bp/*"))}
+        data["checksums"] = checkpoint._checksums(data, content)
+        (one / "state.json").write_text(json.dumps(data))
+
+
+@pytest.mark.parametrize("name", ["hinged", "coulomb"])
+def test_a_checkpoint_of_format_4_is_read_and_goes_on(name, whole, tmp_path):
+    folder, scene, path = whole[name]
+    shutil.copytree(folder, old := tmp_path / "run")
+    as_format_4(old, path)
+    read = fx.load(old, scene)
+    same(read, path, rel=0)
+    assert np.array_equal(read.last.x, path.last.x)
+    assert np.allclose(checkpoint.contents(old)[1][-1]["profile"]["top"], path.profile().top)
+    further = type(SCENES[name][1])(SCENES[name][1].name, 1.02 * SCENES[name][1].value, *SCENES[name][1][2:])
+    longer = fx.trace(scene, until=further, start=read, progress=False, checkpoint=old)
+    same(fx.load(old, scene), longer, rel=0)
+    (old / "0001" / "x.bp" / "data.0").write_bytes(b"")
+    with pytest.raises(fx.InputError, match="0001' is damaged"):
+        fx.load(old, scene)
 
 
 def test_a_digit_that_changed(copied):
@@ -321,7 +359,7 @@ def test_full_disk(copied):
     path, limit = fx.load(folder, scene), resource.getrlimit(resource.RLIMIT_FSIZE)
     before = sorted(map(str, folder.rglob("*")))
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limit[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, limit[1]))
     try:
         with pytest.raises(OSError, match=r"state \d+ could not be written; the states before it are kept"):
             fx.trace(scene, until=fx.pole_stretch(3.5), start=path, progress=False, checkpoint=folder)

@@ -170,13 +170,13 @@ class ContactNodes:
         touch = self.law.tractions(self.positions(fields, control), self._memory.touch).touch
         self.put(Memory(touch, (before <= -theta) & (touch.distance > -theta)))
 
-    def save(self, memory: Memory) -> dict[str, list]:
+    def save(self, memory: Memory) -> dict[str, np.ndarray]:
         """A memory as plain data, node by node with its reference position, all ranks; collective."""
         parts = self._comm.allgather((self.points, *memory.touch, memory.arrived))
         names = ("points", *memory.touch._fields, "arrived")
-        return {name: np.concatenate(column).tolist() for name, column in zip(names, zip(*parts, strict=True))}
+        return {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True))}
 
-    def load(self, data: dict[str, list]) -> Memory:
+    def load(self, data: dict[str, Any]) -> Memory:
         """The own part of what `save` gave.
 
         Raises:

@@ -34,7 +34,7 @@ class History(Protocol):
         """Go back, or on, to a memory."""
 
     def save(self, memory: Any) -> dict[str, Any]:
-        """A memory as JSON can hold it, independent of ranks and the same on all of them; collective."""
+        """A memory as JSON can hold it but for arrays, independent of ranks and the same on all of them; collective."""
 
     def load(self, data: dict[str, Any]) -> Any:
         """The memory, own part, of what `save` gave; an InputError if it does not fit this scene."""
@@ -110,8 +110,8 @@ class MaterialHistory:
         gather = self._forms.comm.allgather
         numbers = np.concatenate(gather(self._numbers))
         order = np.argsort(numbers)
-        return {"time": memory.time, "cells": numbers[order].tolist(),
-                "values": {name: np.concatenate(gather(v))[order].tolist() for name, v in memory.values.items()}}
+        return {"time": memory.time, "cells": numbers[order],
+                "values": {name: np.concatenate(gather(v))[order] for name, v in memory.values.items()}}
 
     def load(self, data: dict[str, Any]) -> Memory:
         """See `History`."""

@@ -200,8 +200,7 @@ class CoolingHistory:
 
     def save(self, memory: Memory) -> dict[str, Any]:
         """See `History`."""
-        def plain(own):
-            return self._gathered(own).tolist()
+        plain = self._gathered
         return {"time": memory.time, "step": memory.step, "points": plain(self._body.points),
                 "temperature": plain(memory.temperature),
                 **({} if memory.before is None else {"before": [memory.before[0], plain(memory.before[1])]}),

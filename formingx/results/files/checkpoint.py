@@ -1,18 +1,20 @@
 """Checkpoints: a folder that holds every accepted state of a run, from which the run goes on, on any number of ranks.
 
-    run/scene.json               what the scene is, and versions
-    run/0000/state.json          the state's numbers, what its histories remember, and checksums of the two fields:
-    run/0000/x.bp, direction.bp  unknowns and tangent of the path, written by adios4dolfinx
+    run/scene.json        what the scene is, and versions
+    run/0000/state.json   the state's numbers, and checksums
+    run/0000/arrays.bin   its arrays (`arrays.pack`): unknowns and tangent of the path, what its histories remember
 
 A state is written beside its place and then renamed: what has its name is complete, whenever a run is killed. Fields
 are kept by the order of the cells in the script's mesh, which does not depend on the number of ranks; what histories
-remember, by node or by cell, likewise.
+remember, by node or by cell, likewise. Of format 4, which is read, too, fields are x.bp and direction.bp, written by
+adios4dolfinx, and all else is in state.json.
 """
 
 from __future__ import annotations
 
 import errno
 import json
+import logging
 import os
 import shutil
 import zlib
@@ -34,10 +36,14 @@ from ...solve.arc_length import Curve
 from ...solve.newton import Iteration, Tolerances
 from ...solve.state import Counts, Record, State
 from .. import files
+from .arrays import pack, unpack
 from .description import describe, differences
 
-FORMAT = 4
+FORMAT = 5
+_READ = (4, 5)
 _FIELDS = ("x", "direction")
+_ARRAYS = "arrays.bin"
+log = logging.getLogger("formingx")
 
 
 class Checkpoint:
@@ -54,7 +60,6 @@ class Checkpoint:
 
     def __init__(self, folder: Any, path: Any):
         self.folder, self._path, self._problem = place("checkpoint", folder), path, path.problem
-        self._w = fem.Function(path.problem.forms.space)
         self._there = self._begin()                         # states in the folder
 
     def write(self) -> None:
@@ -81,7 +86,8 @@ class Checkpoint:
                 folder.mkdir(parents=True, exist_ok=True)
                 files.replace(folder / "scene.json", lambda stream: json.dump(about, stream, indent=1))
                 return 0
-            _check_scene(folder, _read_json(folder / "scene.json"), scene)
+            kept = _read_json(folder / "scene.json")
+            _check_scene(folder, kept, scene)
             there = _states(folder)
             held = [_read_data(folder, k, checksums=False) for k in range(len(there))]
             settled = max((k + 1 for k, data in enumerate(held) if data["stepping"]), default=len(held))
@@ -92,20 +98,20 @@ class Checkpoint:
                                  f" with start=fx.load({str(folder)!r}, scene), give another folder, or remove it")
             for left in there[len(whole):]:
                 shutil.rmtree(left)
+            if kept["formingx"] != FORMAT:                  # what is written from now on is of this one
+                files.replace(folder / "scene.json", lambda stream: json.dump(about, stream, indent=1))
             return len(whole)
         return files.on_root(problem.comm, lambda: _plainly(begin, folder, "cannot be begun"))
 
     def _write_state(self, number: int, state: State, profile: Any) -> None:
-        problem, comm = self._problem, self._problem.comm
+        problem = self._problem
         final = self.folder / _name(number)
         part = final.with_name(final.name + ".part")
-        n = problem.forms.space.dofmap.index_map.size_local
         memory = [history.save(kept) for history, kept in zip(problem.histories, state.memory, strict=True)]
+        space = problem.forms.space
         data = _plain_state(state) | {"number": number, "memory": memory, "profile": profile}
         for name in _FIELDS:
-            tails = comm.allgather(getattr(state, name)[n:].tolist())
-            data[f"{name}_tail"] = tails[-1]
-        library, what = _compat.adios4dolfinx(), f"state {number} could not be written; the states before it are kept"
+            data |= {name: _by_cell(space, getattr(state, name)), f"{name}_tail": _tail(space, getattr(state, name))}
 
         def look():
             if not self.folder.is_dir():
@@ -113,32 +119,25 @@ class Checkpoint:
             if final.exists():
                 raise FileExistsError(errno.EEXIST, "it is there already: does another run write to this folder?")
 
-        def prepare():
+        def put():
+            plain, content = pack(data)
             shutil.rmtree(part, ignore_errors=True)
             part.mkdir()
-            files.reserve(part / "reserved", self._size(len(json.dumps(data))))
-        files.on_root(comm, lambda: _plainly(look, self.folder, f"state {number} could not be written"))
-        files.on_root(comm, lambda: _plainly(prepare, self.folder, what))
-        for name in _FIELDS:
-            self._w.x.array[:n] = getattr(state, name)[:n]
-            library.write_function_on_input_mesh(part / f"{name}.bp", self._w, name=name)
-
-        def finish():
-            data["checksums"] = _checksums(part, data)
-            files.replace(part / "state.json", lambda stream: json.dump(data, stream))
+            (part / _ARRAYS).write_bytes(content)
+            text = json.dumps(plain | {"checksums": _checksums(plain, {_ARRAYS: content})})
+            (part / "state.json").write_text(text, encoding="utf-8")
             try:
                 os.rename(part, final)
             except OSError as error:
                 if not final.exists():
                     raise
                 raise FileExistsError(errno.EEXIST, "another run wrote it: each needs a folder of its own") from error
-        files.on_root(comm, lambda: _plainly(finish, self.folder, what))
 
-    def _size(self, more: int) -> int:
-        """About as many bytes as a state takes."""
-        dofmap, topology = self._problem.forms.space.dofmap, self._problem.forms.domain.topology
-        cells = topology.index_map(topology.dim).size_global
-        return 16 * (cells * (dofmap.list.shape[1] + 3) + dofmap.index_map.size_global) + more + 2**16
+        def act():
+            what = f"state {number} could not be written"
+            _plainly(look, self.folder, what)
+            _plainly(put, self.folder, f"{what}; the states before it are kept")
+        files.on_root(problem.comm, act)
 
 
 def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
@@ -189,9 +188,9 @@ def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 
 def _check_format(folder: FilePath, about: dict) -> None:
-    if about.get("formingx") != FORMAT:
+    if about.get("formingx") not in _READ:
         raise InputError(f"checkpoint {str(folder)!r} has the format {about.get('formingx')!r}; this version of"
-                         f" formingx reads {FORMAT}")
+                         f" formingx reads {' and '.join(map(str, _READ))}")
 
 
 def _check_scene(folder: FilePath, about: dict, scene: dict) -> None:
@@ -206,18 +205,48 @@ def _check_scene(folder: FilePath, about: dict, scene: dict) -> None:
 
 
 def _read_state(folder: FilePath, data: dict, problem: Any) -> State:
-    data = dict(data)
-    n, last = problem.forms.space.dofmap.index_map.size_local, problem.comm.rank == problem.comm.size - 1
-    w = fem.Function(problem.forms.space)
+    data, space = dict(data), problem.forms.space
+    last = problem.comm.rank == problem.comm.size - 1
     arrays = {}
     for name in _FIELDS:
-        _compat.adios4dolfinx().read_function(folder / f"{name}.bp", w, name=name)
-        arrays[name] = np.concatenate([w.x.array[:n], data.pop(f"{name}_tail") if last else []])
+        own = _of_cells(space, data[name]) if name in data else _of_file(space, folder / f"{name}.bp", name)
+        arrays[name] = np.concatenate([own, data[f"{name}_tail"] if last else []])
     met = data.pop("met")
     return State(**arrays, met=Target(met[0], met[1], None, met[2]) if met else None,
                  history=[Iteration(*row) for row in data.pop("history")],
                  memory=_read_memory(problem, data.pop("memory")),
-                 **{f.name: data[f.name] for f in fields(State) if f.name in data})
+                 **{f.name: data[f.name] for f in fields(State) if f.name in data and f.name not in _FIELDS})
+
+
+def _by_cell(space: Any, own: np.ndarray) -> np.ndarray:
+    """Values of the cells in the order of the script's mesh, shape (cells, unknowns of one), on rank 0; collective."""
+    topology, w = space.mesh.topology, fem.Function(space)
+    cells, n = topology.index_map(topology.dim).size_local, space.dofmap.index_map.size_local
+    w.x.array[:n] = own[:n]
+    w.x.scatter_forward()
+    parts = space.mesh.comm.gather((topology.original_cell_index[:cells], w.x.array[space.dofmap.list[:cells]]))
+    numbers, values = (np.concatenate(column) for column in zip(*parts or [(np.zeros(0, int), np.zeros((0, 0)))]))
+    return values[np.argsort(numbers)]
+
+
+def _of_cells(space: Any, values: np.ndarray) -> np.ndarray:
+    """Own unknowns, without those that belong to no cell, of what `_by_cell` gave."""
+    numbers = space.mesh.topology.original_cell_index
+    found = np.zeros(len(space.dofmap.list) and space.dofmap.list.max() + 1)
+    found[space.dofmap.list] = values[numbers[:len(space.dofmap.list)]]
+    return found[:space.dofmap.index_map.size_local]
+
+
+def _of_file(space: Any, file: FilePath, name: str) -> np.ndarray:
+    """Own unknowns in a file of format 4."""
+    w = fem.Function(space)
+    _compat.adios4dolfinx().read_function(file, w, name=name)
+    return w.x.array[:space.dofmap.index_map.size_local].copy()
+
+
+def _tail(space: Any, own: np.ndarray) -> list[float]:
+    """Unknowns that belong to no cell: the last rank has them; collective."""
+    return space.mesh.comm.allgather(own[space.dofmap.index_map.size_local:].tolist())[-1]
 
 
 def _plain_state(state: State) -> dict[str, Any]:
@@ -234,13 +263,13 @@ def _read_memory(problem: Any, memory: list[dict[str, Any]]) -> list[Any]:
     return [history.load(data) for history, data in zip(problem.histories, memory, strict=True)]
 
 
-def _profile(path: Any, state: State) -> dict[str, list] | None:
+def _profile(path: Any, state: State) -> dict[str, np.ndarray] | None:
     """The outline and the thickness of a sheet, so that a report needs no scene; None where there is no sheet."""
     try:
         profile = path.profile(state)
     except InputError:
         return None
-    return {f.name: getattr(profile, f.name).tolist() for f in fields(profile)}
+    return {f.name: getattr(profile, f.name) for f in fields(profile)}
 
 
 def _name(number: int) -> str:
@@ -261,11 +290,23 @@ def _read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
     """What a state's state.json says; an InputError unless it is that of the state, whole and as it was written."""
     one = folder / _name(number)
     data = _read_json(one / "state.json")
-    missing = [f.name for f in fields(State) if f.name not in (*_FIELDS, "memory") and f.name not in data]
-    if missing or data.get("number") != number or checksums and _checksums(one, data) != data.get("checksums"):
+    content: dict[str, bytes] = {}
+    try:
+        if "x" in data:
+            content[_ARRAYS] = (one / _ARRAYS).read_bytes()
+        elif checksums:
+            content = {f"{name}.bp/{file.name}": file.read_bytes() for name in _FIELDS
+                       for file in sorted((one / f"{name}.bp").glob("*"))}
+        missing = [f.name for f in fields(State) if f.name not in (*_FIELDS, "memory") and f.name not in data]
+        whole = not missing and data.get("number") == number and (
+            not checksums or _checksums(data, content) == data.get("checksums"))
+        found = unpack(data, content[_ARRAYS]) if whole and "x" in data else data
+    except (OSError, ValueError, TypeError):
+        whole, found = False, data
+    if not whole:
         raise InputError(f"checkpoint {str(one)!r} is damaged: its files are not those that were written"
                          f" (load's state= picks an earlier one)")
-    return data
+    return found
 
 
 def _read_json(file: FilePath) -> Any:
@@ -283,14 +324,11 @@ def _read_json(file: FilePath) -> Any:
         raise InputError(f"checkpoint: {str(file)!r} is damaged or cannot be read: {error}") from None
 
 
-def _checksums(state: FilePath, data: dict) -> dict[str, int]:
-    """{file: CRC-32} of the fields of a state and of its other data."""
+def _checksums(data: dict, content: dict[str, bytes]) -> dict[str, int]:
+    """{file: CRC-32} of what state.json says and of the other files of a state."""
     rest = {key: value for key, value in data.items() if key != "checksums"}
     found = {"state.json": zlib.crc32(json.dumps(rest, sort_keys=True).encode())}
-    for name in _FIELDS:
-        found |= {f"{name}.bp/{file.name}": zlib.crc32(file.read_bytes())
-                  for file in sorted((state / f"{name}.bp").glob("*"))}
-    return found
+    return found | {name: zlib.crc32(bytes_) for name, bytes_ in content.items()}
 
 
 def _plainly(action: Callable[[], Any], folder: FilePath, what: str) -> Any:

@@ -1,0 +1,50 @@
+"""Plain data with arrays in it, as JSON beside one file of bytes, which is read at once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+_KEY, _TYPES = "array", ("<f8", "<i8", "|b1")
+
+
+def pack(data: Any) -> tuple[Any, bytes]:
+    """Data as JSON can hold it, and all arrays in it one after the other, little-endian.
+
+    An array stands there as {"array": [its first byte, its type, its shape]}.
+    """
+    found: list[bytes] = []
+    at = 0
+
+    def plain(one):
+        nonlocal at
+        if isinstance(one, dict):
+            return {key: plain(value) for key, value in one.items()}
+        if isinstance(one, list | tuple):
+            return [plain(value) for value in one]
+        if not isinstance(one, np.ndarray):
+            return one
+        kind = {"f": "<f8", "i": "<i8", "u": "<i8", "b": "|b1"}[one.dtype.kind]
+        found.append(one.astype(kind).tobytes())
+        here, at = at, at + len(found[-1])
+        return {_KEY: [here, kind, list(one.shape)]}
+    return plain(data), b"".join(found)
+
+
+def unpack(data: Any, content: bytes) -> Any:
+    """What `pack` was given; its arrays cannot be written to.
+
+    Raises:
+        ValueError: the two do not belong together.
+    """
+    if isinstance(data, list):
+        return [unpack(value, content) for value in data]
+    if not isinstance(data, dict):
+        return data
+    if data.keys() != {_KEY}:
+        return {key: unpack(value, content) for key, value in data.items()}
+    at, kind, shape = data[_KEY]
+    if kind not in _TYPES:
+        raise ValueError(f"no array is of the type {kind!r}")
+    return np.frombuffer(content, kind, int(np.prod(shape, dtype=int)), at).reshape(shape)
