@@ -16,6 +16,7 @@ from formingx.discrete.problem import Problem
 from formingx.discrete.schedule import Setting
 from formingx.materials.material import Material
 from formingx.physics.supports import MeanHeld
+from formingx.results.files.arrays import pack, unpack
 
 SYMMETRY = fx.Symmetry("axis")
 
@@ -303,7 +304,8 @@ def test_a_memory_is_kept():
     problem.set_state(x, 0.3)
     history.advance(x.array_r, 0.3)
     memory, force = history.get(), residual(problem, 0.5)(x)
-    data = json.loads(json.dumps(history.save(memory)))
+    plain, content = pack(history.save(memory))
+    data = unpack(json.loads(json.dumps(plain)), content)
     history.start()
     assert history.get().time == 0 and np.array_equal(history.get().values["C"], rest.values["C"])
     assert np.abs(residual(problem, 0.5)(x) - force).max() > 1e-6 * np.abs(force).max()
@@ -336,7 +338,7 @@ for model in (fx.MixedPressure(), fx.Membrane()):
     energy = problem.assemble_scalar(forms.compile(forms.potential))
     found.append([saved, energy, describe(problem)["materials"]["sheet"]["sums"]])
 if problem.comm.rank == 0:
-    print(json.dumps(found))
+    print(json.dumps(found, default=np.ndarray.tolist))
 """
 
 
