@@ -167,6 +167,41 @@ def test_sum_of_powers_in_high_precision(alpha):
                 assert np.linalg.norm(part - exact) < (5e-14 if ratio < 0.999 else 1e-10) * np.linalg.norm(exact)
 
 
+@pytest.mark.parametrize("alpha", [-2.0, 1.3, 2.0, 5.0])
+def test_powers_for_every_perturbation(alpha):
+    """Of all nine entries of F, those across the blocks too, where two, all or no stretches are equal."""
+    mp = pytest.importorskip("mpmath")
+    mp.mp.dps = 60
+    mesh = ufl.Mesh(basix.ufl.element("Lagrange", "triangle", 1, shape=(2,)))
+    inputs = [ufl.Constant(mesh) for _ in range(10)]
+    f = [ufl.variable(x) for x in inputs[:9]]
+    F = ufl.as_tensor([f[:3], f[3:6], f[6:]])
+    e, h = np.eye(9, dtype=int), mp.mpf(10) ** -15
+    upper = [(i, j) for i in range(9) for j in range(i, 9)]
+    for of, exact in ((kinematics.sum_of_powers(F, inputs[9]),
+                       lambda A: sum(x ** (alpha / 2) for x in mp.eigsy(A.T * A, eigvals_only=True))),
+                      (kinematics.volume_ratio(F), mp.det)):
+        W = expand_indices(expand_derivatives(of))
+        first = [expand_derivatives(ufl.diff(W, x)) for x in f]
+        program = _Program(inputs, [W, *first, *(expand_derivatives(ufl.diff(first[i], f[j])) for i, j in upper)])
+        for turned in (0.0, 0.7):
+            for stretches in ((1.0, 1.0, 1.0), (2.0, 2.0, 0.25), (2.0, 0.25, 2.0), (3.0, 0.2, 1.4), (1 + 1e-9, 1.0, 1.0)):
+                c, s = np.cos(turned), np.sin(turned)
+                at = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.diag(stretches)
+                at[:2, :2] = at[:2, :2] @ np.array([[c, s], [-s, c]])
+                x = [mp.mpf(float(v)) for v in at.ravel()]
+
+                def value(shift, x=x, exact=exact):
+                    return exact(mp.matrix(3, 3) + mp.matrix([[x[3 * i + j] + h * int(shift[3 * i + j])
+                                                               for j in range(3)] for i in range(3)]))
+                found = program(at.ravel()[:8, None], [at[2, 2], alpha])[:, 0]
+                wanted = [value(0 * e[0]), *((value(a) - value(-a)) / (2 * h) for a in e),
+                          *((value(e[i] + e[j]) - value(e[i] - e[j]) - value(e[j] - e[i]) + value(-e[i] - e[j]))
+                            / (4 * h * h) for i, j in upper)]
+                wanted = np.array(wanted, float)
+                assert np.linalg.norm(found - wanted) < 1e-7 * np.linalg.norm(wanted), (stretches, turned)
+
+
 @pytest.mark.parametrize("alpha", [-5.0, 1.3, 10.0])
 def test_second_derivatives_of_powers_do_not_jump(alpha):
     program, h = _powers(), 1e-9

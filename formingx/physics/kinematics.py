@@ -180,13 +180,14 @@ def _powers_across(F, b, a):
     """What entries b = (C13, C23) add to tr C^a, to second order: b . g(A) b with the in-plane part A of C, C33 = c.
 
     An eigenvalue x of A becomes x + b^2/(x - c), and c less, so g(x) = a (x^s - c^s)/(x - c), s = a - 1, and that is
-    a (x c)^(s - 1)/2 sinh(s y)/sinh(y), y = ln(x/c)/2: nothing is lost where stretches coincide. Entries of F within
-    the blocks alone are in g, which derivatives by a mode across them leave alone.
+    a (x c)^(s - 1)/2 sinh(s y)/sinh(y), y = ln(x/c)/2: nothing is lost where stretches coincide. The term is exact where
+    b = 0, in value and first and second derivatives by all entries of F; where d < 1e-8 m it is taken at 1e-8 m.
     """
     F2, c, s = ufl.as_matrix([[F[0, 0], F[0, 1]], [F[1, 0], F[1, 1]]]), F[2, 2] ** 2, a - 1
     A = F2.T * F2
     m, J2 = ufl.tr(A) / 2, ufl.det(F2) ** 2
-    d = ufl.sqrt(((A[0, 0] - A[1, 1]) / 2) ** 2 + A[0, 1] ** 2)
+    apart_squared = ((A[0, 0] - A[1, 1]) / 2) ** 2 + A[0, 1] ** 2
+    d = ufl.sqrt(ufl.conditional(ufl.lt(apart_squared, 1e-16 * m**2), 1e-16 * m**2, apart_squared))
 
     def g(x):
         y = ufl.ln(x / c) / 2
@@ -194,7 +195,7 @@ def _powers_across(F, b, a):
         away = ufl.conditional(same, 1, y)                      # the branch not taken must be finite too
         return a * (x * c) ** ((s - 1) / 2) * ufl.conditional(same, s, ufl.sinh(s * away) / ufl.sinh(away))
     high, low = g(m + d), g(J2 / (m + d))
-    apart = ufl.inner(b, (A - m * ufl.Identity(2)) * b) / ufl.max_value(d, 1e-150)
+    apart = ufl.inner(b, (A - m * ufl.Identity(2)) * b) / d
     return (high + low) / 2 * ufl.inner(b, b) + (high - low) / 2 * apart
 
 
