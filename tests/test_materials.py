@@ -185,7 +185,7 @@ def test_powers_for_every_perturbation(alpha):
         first = [expand_derivatives(ufl.diff(W, x)) for x in f]
         program = _Program(inputs, [W, *first, *(expand_derivatives(ufl.diff(first[i], f[j])) for i, j in upper)])
         for turned in (0.0, 0.7):
-            for stretches in ((1.0, 1.0, 1.0), (2.0, 2.0, 0.25), (2.0, 0.25, 2.0), (3.0, 0.2, 1.4), (1 + 1e-9, 1.0, 1.0)):
+            for stretches in ((1, 1, 1), (2, 2, 0.25), (2, 0.25, 2), (3, 0.2, 1.4), (1 + 1e-9, 1, 1)):
                 c, s = np.cos(turned), np.sin(turned)
                 at = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.diag(stretches)
                 at[:2, :2] = at[:2, :2] @ np.array([[c, s], [-s, c]])

@@ -180,8 +180,8 @@ def _powers_across(F, b, a):
     """What entries b = (C13, C23) add to tr C^a, to second order: b . g(A) b with the in-plane part A of C, C33 = c.
 
     An eigenvalue x of A becomes x + b^2/(x - c), and c less, so g(x) = a (x^s - c^s)/(x - c), s = a - 1, and that is
-    a (x c)^(s - 1)/2 sinh(s y)/sinh(y), y = ln(x/c)/2: nothing is lost where stretches coincide. The term is exact where
-    b = 0, in value and first and second derivatives by all entries of F; where d < 1e-8 m it is taken at 1e-8 m.
+    a (x c)^(s - 1)/2 sinh(s y)/sinh(y), y = ln(x/c)/2: nothing is lost where stretches coincide. The term is exact
+    where b = 0, in value and first and second derivatives by all entries of F; where d < 1e-8 m, d is taken as 1e-8 m.
     """
     F2, c, s = ufl.as_matrix([[F[0, 0], F[0, 1]], [F[1, 0], F[1, 1]]]), F[2, 2] ** 2, a - 1
     A = F2.T * F2
