@@ -39,7 +39,7 @@ def contact_scene():
 
 @pytest.mark.parametrize("make, until", [
     (lambda: column(1.0, fx.Ogden(mu=(1.4, -0.3), alpha=(2.5, -2.0))), fx.travel(-0.3)),
-    (lambda: treloar(), fx.pole_height(1.0)), (contact_scene, fx.pressure(8.0))],
+    (lambda: treloar(), fx.pole_height(1.0)), (contact_scene, fx.pressure(4.0))],
     ids=["Ogden", "follower pressure", "contact"])
 def test_no_waves_are_the_tangent(make, until):
     path = fx.trace(make(), until=until, progress=False)
