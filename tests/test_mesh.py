@@ -21,6 +21,47 @@ def test_disc_is_named_and_whole():
     assert np.allclose(mesh.nodes_of("rim")[:, 0], 2.0) and np.allclose(mesh.nodes_of("axis")[:, 0], 0.0)
 
 
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("backwards", [False, True])
+def test_from_lines(swapped, backwards):
+    """A cone's frustum on a disc: volume, names and nodes, whichever line comes first and however they run."""
+    lines = [np.array([(0, 0), (20, 0), (30, 40)]), np.array([(0, -2), (21, -2), (32, 40)])]
+    given = [line[::-1] if backwards else line for line in (lines[::-1] if swapped else lines)]
+    counts = [16, 8] if backwards else [8, 16]
+    mesh = fx.mesh.from_lines(*given, elements=(counts, [1, 2]), layers={"a": 3, "b": 1})
+    inner, outer, free = ("outer", "inner", "start" if backwards else "end")[: 3] if swapped else (
+        "inner", "outer", "start" if backwards else "end")
+    assert set(mesh.boundaries) == {"axis", free, "inner", "outer"}
+    assert np.allclose(mesh.nodes_of("axis")[:, 0], 0) and np.allclose(mesh.nodes_of(free)[:, 1], 40)
+    assert len(mesh.nodes_of("inner")) == 2 * 24 + 1 and given[0][1].tolist() in mesh.nodes_of("inner").tolist()
+    assert [len(mesh.cells.find(mesh.layers[n])) for n in "ab"] == [48, 96]
+    R, Z = np.concatenate([lines[0], lines[1][::-1]]).T
+    r, z = np.roll(R, -1), np.roll(Z, -1)
+    exact = abs(np.pi / 3 * np.sum((R + r) * (R * z - r * Z)))              # Pappus, side by side
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped(free)],
+                     loads=[fx.Pressure("inner")])
+    assert Solid(scene).volume == pytest.approx(exact, rel=1e-12)
+
+
+def test_wall_of_a_tube_that_is_thinner_at_its_top():
+    """The two faces run the same way, though their ends of smaller R are at different heights."""
+    Z = np.linspace(0, 100, 6)
+    tube = fx.mesh.from_lines([(20, z) for z in Z], [(22 - 0.01 * z, z) for z in Z], elements=(1, 1))
+    scene = fx.Scene(mesh=tube, materials=fx.NeoHookean(c10=0.4), supports=[fx.Clamped("start"), fx.Clamped("end")],
+                     loads=[fx.Pressure("inner")])
+    wall = fx.solve(scene, to=1e-6).wall()
+    assert wall.wall == pytest.approx(2 - 0.01 * wall.z, rel=1e-3)
+
+
+@pytest.mark.parametrize("lines, says", [
+    ([[(0, 0)], [(0, 1)]], "at least two points"), ([[(0, 0), (1, 0)], [(0, 1), (1, 1), (2, 1)]], "as many"),
+    ([[(0, 0), (1, 0)], [(0, 1), (1, -1)]], "from_lines"), ([[(0, 0), (1, 0)], [(0, 0), (1, 1)]], "from_lines"),
+    ([[(0, 0), (1, math.nan)], [(0, 1), (1, 1)]], "finite")])
+def test_lines_that_make_no_body(lines, says):
+    with pytest.raises(fx.InputError, match=says):
+        fx.mesh.from_lines(*lines)
+
+
 def test_grading():
     R = fx.mesh.disc(radius=1.0, thickness=0.1, elements=(6, 1), grading=0.2).nodes_of("bottom")[::2, 0]
     sizes = np.diff(R)

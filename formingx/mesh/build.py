@@ -1,4 +1,4 @@
-"""Discs, spheres and parisons."""
+"""Discs, spheres, parisons, and bodies between two lines."""
 
 from __future__ import annotations
 
@@ -187,6 +187,66 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
     radius = inner_radius + _levels(layers, through, z - inner_radius * np.sin(angle))
     points = np.stack([radius * np.sin(np.pi / 2 - angle), z - radius * np.sin(angle)], axis=-1)
     return _mesh("parison", points, list(layers), through, ("neck", "axis", "inner", "outer"), comm)
+
+
+def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapping[str, float] | None = None,
+               comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
+    """A body from its outline: what lies between two lines through points, point k of one opposite point k of the other.
+
+    Between points k and k + 1 the faces are straight: a curve takes as many points as it needs.
+
+    Boundaries: `inner`, `outer`, `start` and `end` (from the first or last point of one to that of the other; called
+    `axis` where both points have R = 0).
+
+    Args:
+        inner, outer: (R, Z) of their points, shape (n, 2), length; n is at least 2, and the same.
+        elements: (between each two points and the next, through each layer): counts, or rows of n - 1 counts and of
+            what `disc` takes for its layers.
+        layers: {layer name: its part of the way from `inner` to `outer`, in any unit}; default one, called `wall`.
+
+    Raises:
+        InputError: points that are not finite, too few or not as many as on the other line, lines that cross or meet,
+            a count that is not a whole number of at least 1.
+
+    >>> import formingx as fx
+    >>> cone = fx.mesh.from_lines([(0, 0), (20, 0), (30, 40)], [(0, -2), (21, -2), (32, 40)], elements=([8, 16], 2))
+    >>> print(cone)
+    96 six-node triangles, R from 0 to 32, Z from -2 to 40
+    layers: wall
+    boundaries: axis (2 edges), end (2 edges), inner (24 edges), outer (24 edges)
+    """
+    lines = [_points(f"from_lines: {name}", points) for name, points in (("inner", inner), ("outer", outer))]
+    if len(lines[0]) != len(lines[1]):
+        raise InputError(f"from_lines: inner has {len(lines[0])} points, outer {len(lines[1])}: they must be as many")
+    parts = _layers("from_lines", {"wall": 1.0} if layers is None else layers, "wall", "")
+    pieces, given = len(lines[0]) - 1, elements[0] if _is_row(elements) and len(elements) else elements
+    along = [count("from_lines: elements between two points", n) for n in (given if _is_row(given) else [given] * pieces)]
+    if len(along) != pieces:
+        raise InputError(f"from_lines: elements between points = {given!r}: {pieces} pieces need as many counts")
+    _, through = _counts("from_lines", "lines", (sum(along), *elements[1:]), len(parts))
+    ends = np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(along))])
+    at = _with_middles(ends)
+    first, second = (np.stack([np.interp(at, np.arange(pieces + 1), line[:, i]) for i in (0, 1)], axis=-1)
+                     for line in lines)
+    level = _levels(parts, through, np.zeros(1))
+    points = first + (level / level[-1])[:, :, None] * (second - first)
+    around = np.concatenate([lines[0], lines[1][::-1]])
+    names = ["axis" if all(line[k, 0] == 0 for line in lines) else name for k, name in ((0, "start"), (-1, "end"))]
+    if names[0] == names[1]:
+        names = ["start", "end"]
+    if np.sum(around[:, 0] * np.roll(around[:, 1], -1) - np.roll(around[:, 0], -1) * around[:, 1]) < 0:
+        points, names = points[:, ::-1], names[::-1]         # the body lies to the left of `inner`
+    return _mesh("from_lines", points, list(parts), through, (*names, "inner", "outer"), comm)
+
+
+def _points(name: str, points: Any) -> np.ndarray:
+    try:
+        found = np.array(points, dtype=float)
+    except (TypeError, ValueError):
+        found = np.zeros(0)
+    if found.ndim != 2 or found.shape[1] != 2 or len(found) < 2 or not np.all(np.isfinite(found)):
+        raise InputError(f"{name} = {points!r}: must be at least two points (R, Z) of finite numbers")
+    return found
 
 
 def _layers(kind: str, thickness: Any, alone: str, coordinate: str) -> dict[str, Callable]:

@@ -110,6 +110,8 @@ class Profiles:
             raise InputError(f"a profile needs boundaries {' or '.join(f'{a!r} and {b!r}' for a, b in FACES)};"
                              f" the mesh has {list(mesh.boundaries)}")
         bottom, top = (mesh.line_of(name) for name in faces)
+        if np.hypot(*(top - bottom[0]).T).argmin() > np.hypot(*(top - bottom[-1]).T).argmin():
+            top = top[::-1]                                 # an open tube whose wall changes: see `Mesh.line_of`
         return probe(self._problem, np.vstack([bottom, _opposite(bottom, top)]))
 
 

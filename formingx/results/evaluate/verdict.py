@@ -128,13 +128,13 @@ class Verdict:
     def _sunk(self, edges: np.ndarray, state: State) -> Iterator[Depth]:
         """Contact points that the penalty lets too deep into tools: over the wall there now, whose volume is kept."""
         weight, rest = self._problem.scene.kinematics.weight, self._outline.rest
-        grown = _lengths(edges) / self._rest * weight(edges[:, 2].T) / weight(rest[:, 2].T)
         for contact, face in zip(self._problem.contacts, self._faces):
             if not contact.present or contact.contact.points != "nodes" or not face.any():
                 continue
             at = (edges - contact.travelled(state.control))[face].reshape(-1, 2)
             depth = contact.contact.tool.signed_distance(at).reshape(-1, 3).max(1)
-            share = depth * grown[face] / (_SUNK * contact.thickness)
+            grown = _lengths(edges[face]) / self._rest[face] * weight(edges[face, 2].T) / weight(rest[face, 2].T)
+            share = depth * grown / (_SUNK * contact.thickness)
             k = int(np.argmax(share))
             if share[k] > 1:
                 yield Depth(share[k], depth[k], edges[face][k, 2], contact, _name(contact))
