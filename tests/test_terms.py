@@ -9,6 +9,7 @@ from conftest import run_json
 from dolfinx import fem
 from petsc4py import PETSc
 from scipy.integrate import quad
+from scipy.optimize import brentq
 from test_derivatives import difference, random_state, residual
 
 import formingx as fx
@@ -48,6 +49,19 @@ class Hung(fx.Support):
 
     def constraints(self):
         return [MeanHeld(1, self.on)]
+
+
+class Foundation(fx.Support):
+    """Springs under a face along Z: a stiffness per area, stress over length."""
+
+    resists = ("z",)
+
+    def __init__(self, on, stiffness, name=None):
+        super().__init__(on)
+        self.stiffness, self.name = stiffness, name
+
+    def stored_energy(self, body):
+        return body.face(self.on).integral(body.constant(self.stiffness) / 2 * body.u[1] ** 2)
 
 
 class Relaxing(Material):
@@ -390,3 +404,48 @@ def test_gradient_by_a_constant():
     exact = problem.forms.probe(problem, point).displacement(dx)[0, 1]
     plus, minus = (displacement(inflated(1.0 + s), point)[0, 1] for s in (h, -h))
     assert exact == pytest.approx((plus - minus) / (2 * h), rel=1e-6) and exact < 0
+
+
+def test_block_on_springs():
+    """A cylinder in homogeneous compression on an elastic foundation: P(l) = -k s, and a ledger that closes."""
+    height, radius, c10, k, down = 2.0, 1.5, 0.7, 0.9, 0.8
+    mesh = fx.mesh.disc(radius=radius, thickness=height, elements=(3, 3))
+    springs = Foundation("bottom", k, "springs")
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=c10),
+                     supports=[SYMMETRY, springs, fx.Displaced("top", name="plate")])
+    path = fx.Process(scene).run([fx.Stage("down", drive="plate", until=fx.travel(-down)),
+                                  fx.Stage("back", drive="plate", until=fx.travel(-0.3))], progress=False)
+    for travel in (down, 0.3):
+        s = brentq(lambda s, d=travel: 2 * c10 * ((l := 1 - (d - s) / height) - l**-2) + k * s, 0, travel)
+        state = path.state(stage="down" if travel == down else "back")
+        force = path.value(fx.force(0.0).bind(path.problem), state)
+        assert abs(force) == pytest.approx(k * s * np.pi * radius**2, rel=1e-5)
+    work = path.work()
+    assert np.abs(work["unbalanced"]).max() < 2e-4 * work["strain_energy"].max()
+
+
+def test_energy_of_a_support_that_leaves():
+    """What springs stored goes with them; what they bore fades, and the body comes to rest without them."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(10, 1)), materials=fx.NeoHookean(c10=0.4),
+                     supports=[SYMMETRY, fx.Clamped("rim"), springs := Foundation("top", 0.02)],
+                     loads=[fx.Pressure("bottom")])
+    path = fx.Process(scene).run([fx.Stage("up", drive=scene.loads[0], until=fx.pressure(0.03)),
+                                  fx.Stage("free", without=[springs])], progress=False)
+    free = fx.trace(fx.Scene(mesh=scene.mesh, materials=fx.NeoHookean(c10=0.4), loads=[fx.Pressure("bottom")],
+                             supports=[SYMMETRY, fx.Clamped("rim")]), until=fx.pressure(0.03), progress=False)
+    assert path["pole_height"][-1] == pytest.approx(free["pole_height"][-1], rel=1e-8)
+    held = path.value(fx.pole_height(0.0).bind(path.problem), path.state(stage="up"))
+    assert held < 0.95 * path["pole_height"][-1]
+    work = path.work()
+    assert work["change"][-1] != 0 and np.abs(work["unbalanced"]).max() < 1e-3 * work["strain_energy"].max()
+    with pytest.raises(fx.InputError, match="has an energy"):
+        fx.trace(scene, until=fx.pressure(0.01), progress=False).stability()
+
+
+def test_energy_of_a_support_must_be_a_form_without_test_function():
+    class Work(Foundation):
+        def stored_energy(self, body):
+            return body.face(self.on).integral(body.du[1])
+    with pytest.raises(fx.InputError, match="without body.du"):
+        Problem(fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1)), loads=[fx.Pressure("bottom")],
+                         materials=fx.NeoHookean(c10=1.0), supports=[SYMMETRY, Work("bottom", 1.0)]))

@@ -52,6 +52,7 @@ class Formulation(ABC):
         load_values: [(load, its value (UFL, the user's unit))], as the stage and the control have it.
         residual: dpotential/dw - external virtual work (UFL, rank 1); control_derivative, time_derivative: its
             derivative by the control, in the loads and by way of the time in materials, or None.
+        elastic_supports: [(support with an energy, 1 where it is there, else 0 (`Constant`))].
         load_works: of each load of the scene its virtual work at the value that it has (UFL, rank 1, user's units).
         temperature: the `Temperature` of the body, or None.
         slack_at_rest: True if the body at rest has no stiffness in some direction.
@@ -91,6 +92,7 @@ class Formulation(ABC):
         self.scales += [self.length] * (len(scene.things) - len(self.scales)) + [1.0]
         self.control_scale = next((s for s, t in zip(self.scales, scene.things) if t is scene.driven), self.length)
         self._take_materials()
+        self._take_supports(body)
         self.residual, self.control_derivative, self.time_derivative = self._residual(body)
 
     @abstractmethod
@@ -149,6 +151,16 @@ class Formulation(ABC):
         self.potential = self._energy(MaterialTerms.step_energy)
         self.energy = self._energy(MaterialTerms.stored_energy) if changing else self.potential
         self.dissipation = self.dissipated(self._scale) if changing else None
+
+    def _take_supports(self, body: LoadedBody) -> None:
+        """The energies of elastic supports."""
+        self.elastic_supports: list[tuple[Any, fem.Constant]] = []
+        for support in self.scene.supports:
+            energy = body.stored(support)
+            if energy is not None:
+                there = self.constant(1.0)
+                self.elastic_supports.append((support, there))
+                self.potential, self.energy = (e + self._scale * there * energy for e in (self.potential, self.energy))
 
     def dissipated(self, factor: Any) -> Any:
         """The integral (UFL) of a factor times the power that is dissipated per reference volume."""
@@ -262,7 +274,9 @@ class Formulation(ABC):
         return float(base.value + rate.value * control)
 
     def set_loads(self, setting: Any) -> None:
-        """Loads and process time as a `Setting` wants them."""
+        """Loads, elastic supports and process time as a `Setting` wants them."""
+        for support, present in self.elastic_supports:
+            present.value = float(not any(self.scene.things[i] is support for i in setting.off))
         for i, (load, base, rate) in enumerate(self._loads):
             there = i not in setting.off
             base.value = there * (setting.base[i] if load.driven else load.value)

@@ -1,4 +1,4 @@
-"""What a load sees of the body: the fields of its virtual work, and the integrals that it may take."""
+"""What a load or an elastic support sees of the body: the fields, and the integrals that it may take."""
 
 from __future__ import annotations
 
@@ -58,6 +58,14 @@ class LoadedBody:
     def thickness(self, boundary: str) -> float:
         """Volume of the body over the area of a boundary, length."""
         return self._forms.thickness(boundary)
+
+    def stored(self, support: Any) -> Any:
+        """The energy of a support or None, or an InputError unless it is a form without virtual displacement."""
+        form = support.stored_energy(self)
+        if form is not None and (not isinstance(form, ufl.Form) or form.arguments()):
+            raise InputError(f"{support!r}: stored_energy must return a UFL form without body.du, such as"
+                             f" body.face(on).integral(k / 2 * body.u[1]**2); this is {str(form)[:60]}")
+        return form
 
     def work(self, load: Any, value: Any) -> Any:
         """The virtual work of a load, or an InputError unless it is a form that is linear in `du`."""

@@ -56,7 +56,7 @@ class SecondVariation:
         mirrors: names of the boundaries that are mirrors.
 
     Raises:
-        InputError: a membrane, or a load that does not know how it changes with a mode.
+        InputError: a membrane, an elastic support, or a load that does not know how it changes with a mode.
     """
 
     def __init__(self, problem: Any):
@@ -64,6 +64,8 @@ class SecondVariation:
         if forms.domain.topology.dim != 2:
             raise InputError("stability: a membrane has no bending stiffness: where its hoop is compressed it wrinkles"
                              " in more and more waves; look at its stresses, or take a solid, MixedPressure()")
+        for support, _ in forms.elastic_supports:
+            raise InputError(f"stability: {support!r} has an energy: how that changes with a mode is not known")
         self.problem, self.comm, self._forms = problem, problem.comm, forms
         self.space = forms.mode_space()
         self._axisymmetric = problem.scene.kinematics.axisymmetric

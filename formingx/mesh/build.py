@@ -191,7 +191,7 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
 
 def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapping[str, float] | None = None,
                comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """A body from its outline: what lies between two lines through points, point k of one opposite point k of the other.
+    """A body from its outline: what lies between two lines through points, each point opposite that of the other line.
 
     Between points k and k + 1 the faces are straight: a curve takes as many points as it needs.
 
@@ -219,11 +219,14 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
     if len(lines[0]) != len(lines[1]):
         raise InputError(f"from_lines: inner has {len(lines[0])} points, outer {len(lines[1])}: they must be as many")
     parts = _layers("from_lines", {"wall": 1.0} if layers is None else layers, "wall", "")
-    pieces, given = len(lines[0]) - 1, elements[0] if _is_row(elements) and len(elements) else elements
-    along = [count("from_lines: elements between two points", n) for n in (given if _is_row(given) else [given] * pieces)]
+    if not _is_row(elements) or len(elements) != 2:
+        raise InputError(f"from_lines: elements = {elements!r}: must be (between two points, through each layer)")
+    pieces, given = len(lines[0]) - 1, elements[0]
+    along = [count("from_lines: elements between two points", n)
+             for n in (given if _is_row(given) else [given] * pieces)]
     if len(along) != pieces:
         raise InputError(f"from_lines: elements between points = {given!r}: {pieces} pieces need as many counts")
-    _, through = _counts("from_lines", "lines", (sum(along), *elements[1:]), len(parts))
+    _, through = _counts("from_lines", "lines", (sum(along), elements[1]), len(parts))
     ends = np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(along))])
     at = _with_middles(ends)
     first, second = (np.stack([np.interp(at, np.arange(pieces + 1), line[:, i]) for i in (0, 1)], axis=-1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..errors import InputError, finite, instance
 from .part import Part
@@ -36,14 +36,33 @@ class MeanHeld(NamedTuple):
 
 
 class Support(Part):
-    """The base of all supports, also of a user's own: `constraints` is all that it must give.
+    """The base of all supports, also of a user's own: it gives `constraints`, or `stored_energy`, or both.
 
     Args:
         on: name of the boundary that it holds.
+
+    Attributes:
+        resists: components, "r" or "z", along which its energy resists a motion of the whole boundary.
     """
+
+    resists: tuple[str, ...] = ()
 
     def __init__(self, on: str):
         self.on = instance(f"{type(self).__name__}: on", on, str, "the name of a boundary")
+
+    def stored_energy(self, body: Any) -> Any:
+        """Energy of an elastic support (stress length^3, per depth length^2): a UFL form of rank 0; None: it has none.
+
+        Its derivative by the displacement are the forces on the body. In a stage without the support it is not there.
+
+        Args:
+            body: a `formingx.discrete.loaded_body.LoadedBody`: u, X, F, `face`, `integral`.
+        """
+        return None
+
+    def held(self) -> list[Held | MeanHeld]:
+        """`constraints`, and what its energy resists."""
+        return [*self.constraints(), *(Held(_component(f"{self!r}: resists", c), on=self.on) for c in self.resists)]
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.on!r})"

@@ -309,7 +309,7 @@ class Scene:
         gram = np.zeros((len(modes), len(modes)))
         size = max(self.extent)
         for support in supports:
-            for held in support.constraints():
+            for held in support.held():
                 X = (np.array([held.point]) if held.point is not None else self.mesh.nodes_of(held.on)) / size
                 rows = np.stack([mode(X)[:, held.component] for mode in modes], 1)
                 if not isinstance(held, Held):

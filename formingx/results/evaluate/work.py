@@ -88,7 +88,7 @@ class Ledger:
                        for load, work in zip(scene.loads, forms.load_works, strict=True)]
         self._driven = [(i, thing) for i, thing in enumerate(scene.things)
                         if any(thing is d for d in scene.drivable) and thing not in scene.loads]
-        self._stored = forms.compile(forms.energy) if scene.heat is not None else None
+        self._stored = forms.compile(forms.energy) if scene.heat is not None or forms.elastic_supports else None
         self._ends: dict[int, tuple[Any, dict[str, _Reaction]]] = {}
 
     def rows(self) -> dict[str, np.ndarray]:
@@ -151,6 +151,8 @@ class Ledger:
         if self._problem.scene.heat is not None:
             found["heat"] = self._warmed(a, b)
         if a.setting != b.setting:                          # the same body, seen under another setting
+            if self._problem.forms.elastic_supports:
+                found["change"] = self._energy_at(b) - self._energy_at(a)
             return found
         straight = b.kind == "jump" or self._flows(a, b)    # no tangents of the way
         h = self._curve.distance(a, b)
@@ -252,13 +254,17 @@ class Ledger:
 
     def _warmed(self, a: Any, b: Any) -> float:
         """Stored energy that comes with the temperature, by the trapezium rule: the body as it was, and as it is."""
-        problem, cold, warm = self._problem, a.memory[-1], b.memory[-1]        # that of the temperature is last
+        cold, warm = a.memory[-1], b.memory[-1]        # that of the temperature is last
 
         def stored(state: Any, temperature: Any) -> float:
             still = temperature._replace(before=None)                         # it does not go on from there
-            with problem.at(replace(state, memory=[*state.memory[:-1], still])):
-                return self._energy * problem.assemble_scalar(self._stored)
+            return self._energy_at(replace(state, memory=[*state.memory[:-1], still]))
         return sum(stored(state, warm) - stored(state, cold) for state in (a, b)) / 2
+
+    def _energy_at(self, state: Any) -> float:
+        """Stored energy at a state."""
+        with self._problem.at(state) as problem:
+            return self._energy * problem.assemble_scalar(self._stored)
 
     def _sum(self, values: Any) -> float:
         return float(self._problem.comm.allreduce(float(np.sum(values)), MPI.SUM))
