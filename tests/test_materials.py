@@ -297,7 +297,9 @@ NAN, INF = math.nan, math.inf
     (lambda: fx.ArrudaBoyce(mu=0.0, N=9.0), "mu = 0.0: must be greater than 0"),
     (lambda: fx.Hyperelastic(lambda F, a: a * F, of="F", a=1.0), r"shape \(3, 3\): must be a UFL scalar"),
     (lambda: fx.Hyperelastic(lambda I1, I2, a: a * ufl.bessel_I(0, I1), a=1.0), "contains BesselI"),
-    (lambda: fx.Hyperelastic(lambda F, a: a * F[0, 0] ** 2, of="F", a=1.0).stress("uniaxial", 2), "not isotropic"),
+    (lambda: fx.Hyperelastic(lambda F, a: a * F[0, 0] ** 2, of="F", a=1.0), "no stiffness"),
+    (lambda: fx.Hyperelastic(lambda F, a: a * (ufl.inner(F, F) - 3 + (F[0, 0] ** 2 - 1) ** 2), of="F", a=1.0).stress(
+        "uniaxial", 2), "not isotropic"),
     (lambda: fx.NeoHookean(c10=1.0).stress("shear", 2.0), "mode 'shear' is not known; known: 'uniaxial'"),
     (lambda: fx.NeoHookean(c10=1.0).stress("uniaxial", [2.0, -1.0]), "stretch of -1: .*greater than 0"),
     (lambda: fx.NeoHookean(c10=1.0).stress("uniaxial", NAN), "stretch of nan: .*finite"),

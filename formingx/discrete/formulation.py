@@ -48,7 +48,8 @@ class Formulation(ABC):
         coefficients: {(layer, name): `Constant` or UFL coefficient} of the materials' constants.
         histories: what the forms depend on besides fields, control and time (`History`).
         potential: of a step, over stress times volume (UFL, rank 0); energy: the energy stored, likewise: the same
-            without histories. dissipation: power, over stress times volume (UFL, rank 0), or None.
+            without histories. dissipation: power, over stress times volume (UFL, rank 0), damage_energy: energy,
+            likewise; or None.
         load_values: [(load, its value (UFL, the user's unit))], as the stage and the control have it.
         residual: dpotential/dw - external virtual work (UFL, rank 1); control_derivative, time_derivative: its
             derivative by the control, in the loads and by way of the time in materials, or None.
@@ -150,7 +151,11 @@ class Formulation(ABC):
         self.histories: list[History] = [MaterialHistory(self, terms) for terms in changing]
         self.potential = self._energy(MaterialTerms.step_energy)
         self.energy = self._energy(MaterialTerms.stored_energy) if changing else self.potential
-        self.dissipation = self.dissipated(self._scale) if changing else None
+        timed = [terms for terms in changing if terms.material.rate_dependent]
+        self.dissipation = self.dissipated(self._scale) if timed else None
+        damaged = [self.weighted(self._scale * terms.damage_energy(), terms.names)
+                   for terms in changing if terms not in timed]
+        self.damage_energy = sum(damaged[1:], damaged[0]) if damaged else None
 
     def _take_supports(self, body: LoadedBody) -> None:
         """The energies of elastic supports."""

@@ -57,6 +57,7 @@ class MaterialHistory:
 
     def __init__(self, forms: Any, terms: Any):
         self._forms, self._terms = forms, terms
+        self.rate_dependent = terms.material.rate_dependent
         self._cells, self._own = terms.cells, terms.own_cells       # a ghost is computed as its owner computes it
         self._numbers = forms.domain.topology.original_cell_index[self._own]      # in the script's mesh
         updated = terms.updated(forms.elastic_F)

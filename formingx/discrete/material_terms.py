@@ -114,6 +114,10 @@ class MaterialTerms:
         """The power that is dissipated, per reference volume (UFL, stress over time)."""
         return self.material.dissipation(F, self.internal, **self.constants)
 
+    def damage_energy(self) -> Any:
+        """The energy that damage has cost, per reference volume (UFL, stress)."""
+        return self.material.damage_energy(self.internal, **self.constants)
+
     def updated(self, F: Any) -> dict[str, Any]:
         """{name: internal variable at the end of the step (UFL)}."""
         found = self.material.updated(F, self.internal, self._time_step, **self.constants)

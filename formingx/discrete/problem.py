@@ -157,8 +157,9 @@ class Problem(Units):
 
     @property
     def relaxes(self) -> bool:
-        """True if F depends on time."""
-        return bool(self.forms.histories)
+        """True if F depends on time: on histories other than those of rate-independent materials."""
+        return any(not isinstance(history, MaterialHistory) or history.rate_dependent
+                   for history in self.forms.histories)
 
     @property
     def time(self) -> float:

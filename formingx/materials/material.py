@@ -39,10 +39,12 @@ class Material:
         parameters: {name: constant}.
         internal: {name: value at rest}, a number or nested tuples, whose shape is that of the variable; of a quantity
             per quadrature point. Empty: no history.
+        rate_dependent: False: its history follows the strain alone, as damage does, and time is nothing to it.
     """
 
     parameters: dict[str, Any]
     internal: dict[str, Any] = {}
+    rate_dependent = True
 
     def __init_subclass__(cls, **options: Any):
         super().__init_subclass__(**options)
@@ -92,6 +94,10 @@ class Material:
         """The power per reference volume that is dissipated there, stress over time; 0 without a history."""
         return ufl.as_ufl(0.0)
 
+    def damage_energy(self, internal: dict[str, Any], **constants: Any) -> Any:
+        """The energy per reference volume that damage has cost, with the internal variables as they are then."""
+        return ufl.as_ufl(0.0)
+
     @property
     def varies(self) -> bool:
         """True if a constant varies over the body."""
@@ -122,19 +128,23 @@ class Material:
 
     @property
     def shear_modulus(self) -> float:
-        """Modulus of small shear, E/3. Unit: stress.
+        """Modulus of small shear, E/3; of fibres that of the stiffest direction. Unit: stress.
 
-        For any isotropic energy W = mu (e1^2 + e2^2 + e3^2) of small strains e = ln l with zero sum: W,11 = 4 mu.
+        Half the largest W'' of small strains e = ln l with zero sum: if isotropic, W = mu (e1^2 + e2^2 + e3^2).
         """
-        return float(self._moduli(self._numbers(), 1)[0])
+        return float(self._moduli(self._numbers(), 1)[1, 0])
 
     def shear_modulus_at(self, sample: Sample) -> np.ndarray:
         """`shear_modulus` for the values that the constants have over a sample, shape (n,)."""
         values = self._sampled(sample)
-        return self._moduli(values, values.shape[1])
+        return self._moduli(values, values.shape[1])[1]
 
     def _moduli(self, constants: Any, n: int) -> np.ndarray:
-        return self.response.logarithmic(np.ones((2, n)), constants)[1][0, 0] / 4
+        """The smallest and the largest modulus of small strains along the axes, for n sets of constants, (2, n)."""
+        H = self.response.logarithmic(np.ones((2, n)), constants)[1] / 2
+        a, b = (H[0, 0] - 2 * H[0, 1] + H[1, 1]) / 2, (H[0, 0] + 2 * H[0, 1] + H[1, 1]) / 6
+        half = np.hypot((a - b) / 2, (H[0, 0] - H[1, 1]) / math.sqrt(12))
+        return np.stack([(a + b) / 2 - half, (a + b) / 2 + half])
 
     @property
     def rest_stress(self) -> float:
@@ -226,15 +236,17 @@ class Material:
                            for name, value in self.parameters.items()}
         if self.varies and sample is None:
             return
-        if sample is None:
-            self.check_constants(**self.parameters)
-            moduli = np.array([self.shear_modulus])
-        else:
-            for values in self._sampled(sample).T.tolist():
-                self.check_constants(**dict(zip(self.parameters, values, strict=True)))
-            moduli = self.shear_modulus_at(sample)
+        sets = self._sampled(sample) if sample is not None else np.array(self._numbers()).reshape(-1, 1)
+        for values in sets.T.tolist():
+            self.check_constants(**dict(zip(self.parameters, values, strict=True)))
+        n = sets.shape[1]
+        moduli = self._moduli(sets, n)
         for mu in moduli[~((moduli > 0) & np.isfinite(moduli))][:1]:
             raise InputError(f"{self} has no stiffness: its shear modulus at rest is {mu:.6g}, must be positive")
+        stress = self.response.derivatives(np.ones((3, n)), sets)[0]
+        for g in stress.T[np.ptp(stress, axis=0) > 1e-6 * moduli[1]][:1]:
+            raise InputError(f"{self} is not free of stress at rest: dW/dl along r, z and the hoop are {g[0]:.6g},"
+                             f" {g[1]:.6g} and {g[2]:.6g}; what is equal in all of them is taken away, the rest is not")
 
     def check_constants(self, **constants: Any) -> None:
         """Raise an InputError unless these values of the constants are admissible."""

@@ -115,7 +115,8 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     component). Where several things can be driven each has its column, plug_travel for one named "plug"
     (`Scene.column`), a support plug_force. `timed`: process_time too. With materials that relax: dissipated_power
     (stress length^3 over time), and from it, in a run, dissipated_energy (stress length^3); with an axis and a known
-    equilibrium, pole_stress_ratio: the Mises stress at the pole over the one in equilibrium (`PoleStressRatio`).
+    equilibrium, pole_stress_ratio: the Mises stress at the pole over the one in equilibrium (`PoleStressRatio`). With
+    a rate-independent history: damage_energy (stress length^3).
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
     found: dict[str, Bound] = {"process_time": Amplitude(problem, -1)} if timed else {}
@@ -138,6 +139,8 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
         found["dissipated_power"] = _Scalar(problem, forms.dissipation, lambda v: v * forms.stress * volume)
         if PoleStressRatio.known(problem):
             found["pole_stress_ratio"] = _Ratio(problem)
+    if forms.damage_energy is not None:
+        found["damage_energy"] = _Scalar(problem, forms.damage_energy, lambda v: v * forms.stress * volume)
     if problem.contacts:
         found["contact_length"] = _Nodal(problem, lambda c, *at: c.contact_length(*at), sum)
         found["penetration"] = _Nodal(problem, lambda c, *at: c.largest_penetration(*at), max)

@@ -317,8 +317,7 @@ def work(path: Any) -> dict[str, np.ndarray]:
     found = {name: np.cumsum(np.concatenate([rows.get(name, zero) for rows, zero in zip(ledgers, empty)]))
              for name in names}
     lost: dict[str, np.ndarray] = {name: found.pop(name) for name in _LOSSES if name in found}
-    if "dissipated_energy" in path.columns:
-        lost["dissipated_energy"] = path["dissipated_energy"]
+    lost |= {name: path[name] for name in ("dissipated_energy", "damage_energy") if name in path.columns}
     stored = path["strain_energy"] - path["strain_energy"][0]
     zero = np.zeros(len(path))
     left = sum(found.values(), zero) - stored - sum(lost.values(), zero)
