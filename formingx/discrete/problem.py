@@ -156,6 +156,11 @@ class Problem(Units):
         return [history for history in self.forms.histories if isinstance(history, MaterialHistory)]
 
     @property
+    def body_has_history(self) -> bool:
+        """True if materials or the temperature have a history."""
+        return bool(self.forms.histories)
+
+    @property
     def relaxes(self) -> bool:
         """True if F depends on time: on histories other than those of rate-independent materials."""
         return any(not isinstance(history, MaterialHistory) or history.rate_dependent

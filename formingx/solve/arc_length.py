@@ -107,7 +107,7 @@ class Curve:
         The factors of its last iteration serve, unless many contact points differ or materials have advanced.
         """
         self._x.array_w[:] = state.x
-        at_hand, self._found = state is self._found and not (self.problem.relaxes or self.problem.materials), None
+        at_hand, self._found = state is self._found and not self.problem.body_has_history, None
         if at_hand and self.newton.update_ahead(self._x, state.control) or self.newton.tangent(
                 self._x, state.control, ahead=True):
             size = self._length_of(self.newton.b)

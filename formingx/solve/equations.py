@@ -234,6 +234,11 @@ class Histories(Protocol):
         return False
 
     @property
+    def body_has_history(self) -> bool:
+        """True if F depends on the states before by more than contact."""
+        return False
+
+    @property
     def relaxes(self) -> bool:
         """True if F depends on time."""
         return False
