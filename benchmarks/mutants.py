@@ -33,15 +33,15 @@ class Mutant(NamedTuple):
 
 MUTANTS = [Mutant(*row) for row in [
     # contact and friction
-    ("discrete/contact_nodes.py", "+= share * at", "+= share * at / 2", "details"),
-    ("discrete/contact_nodes.py", "        if ahead:\n            arrived", "        if False:\n            arrived",
+    ("discrete/contact/rule.py", "+= share * whole", "+= share * whole / 2", "details"),
+    ("discrete/contact/face.py", "        if ahead:\n            arrived", "        if False:\n            arrived",
      "contact plugs jumps"),
-    ("discrete/contact_nodes.py", "-self._scale[:, None] * (stiffness @", "self._scale[:, None] * (stiffness @",
+    ("discrete/contact/face.py", "-self._scale[:, None] * (stiffness @", "self._scale[:, None] * (stiffness @",
      "contact derivatives"),
-    ("discrete/contact_nodes.py", "> 2 * max(self._allowed, self._foreseen) + 2", "> 10**6", "details"),
-    ("discrete/contact_nodes.py", "arrival = np.where(at_end[:, None], np.nan, start + times[:, None] * velocity)",
-     "arrival = start + length * velocity", "contact plugs"),
-    ("discrete/contact_nodes.py", "        self._start_at(self.positions(fields, control))", "        pass", "details"),
+    ("discrete/contact/approach.py", "> 2 * max(self._allowed, self._foreseen) + 2", "> 10**6", "details"),
+    ("discrete/contact/approach.py", "np.where(at_end[:, None], np.nan, start + times[:, None] * velocity)",
+     "start + length * velocity", "contact plugs"),
+    ("discrete/contact/face.py", "        self._start_at(self.positions(fields, control))", "        pass", "details"),
     ("physics/contact.py", "pressed, ahead = k * F, d - at", "pressed, ahead = k * F, 0 * d", "contact plugs"),
     ("physics/contact.py", "sliding, limit = (np.abs(trial) > self.mu * pressed)",
      "sliding, limit = (np.abs(trial) > 2 * self.mu * pressed)", "contact plugs"),
@@ -52,7 +52,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("physics/contact.py", "theta * slope**2, d), slope", "theta * slope**2, d + self.theta), slope",
      "contact closed_forms"),
     ("physics/contact.py", "return slope * (d + self.theta), slope", "return slope * d, slope", "contact"),
-    ("discrete/contact_points.py", "np.tile(weights / 2, len(nodes))", "np.tile(weights / 2.1, len(nodes))",
+    ("discrete/contact/rule.py", "np.tile(weights / 2, len(nodes))", "np.tile(weights / 2.1, len(nodes))",
      "contact_points answers"),
     # the body and its loads
     ("physics/kinematics.py", "return _block(ufl.Identity(2) + ufl.grad(u), 1 + u[0] / X[0])",

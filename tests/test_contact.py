@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import formingx as fx
-from formingx.discrete.contact_nodes import ContactNodes
+from formingx.discrete.contact.increment import Increment
 from formingx.discrete.problem import Problem
 from formingx.physics.contact import Law, Touch
 
@@ -168,7 +168,7 @@ def work_error(largest):
     contact = path.problem.contacts[0]
     p, V = path.curve("pressure", "enclosed_volume", points=40)
     work = np.sum((p[1:] + p[:-1]) / 2 * np.diff(V))
-    energies = [contact.area @ contact.law.energy(contact.positions(s.x, s.control))
+    energies = [contact.rule.area @ contact.law.energy(contact.positions(s.x, s.control))
                 for s in (path.states[0], path.last)]                    # the rim touches from the start
     stored = energies[1] - energies[0]
     return abs(work / (path.last.measures["strain_energy"] + stored) - 1)
@@ -262,7 +262,7 @@ def test_points_that_arrive_cost_few_iterations_and_change_no_state(friction, cl
     (Fewer iterations make other steps, which with friction decide by so much where points slide.)
     """
     settled = form(cup(friction), 15.0)
-    monkeypatch.setattr(ContactNodes, "arrivals", property(lambda nodes: np.zeros(len(nodes.points), dtype=bool)))
+    monkeypatch.setattr(Increment, "arrivals", property(lambda increment: np.zeros(len(increment.active), dtype=bool)))
     plain = form(cup(friction), 15.0)
     assert settled.counts.iterations < 0.8 * plain.counts.iterations
     np.testing.assert_allclose(settled.profile().thickness, plain.profile().thickness, rtol=close)

@@ -16,8 +16,8 @@ from formingx.results.files.fields import Fields
 def test_areas_are_those_of_the_face(points):
     contact = Problem(cup("none", elements=(5, 1), points=points)).contacts[0]
     assert len(contact.points) == 5 * points
-    assert contact.area.sum() == pytest.approx(np.pi * 10.0**2, rel=1e-12)
-    assert contact.lengths.sum() == pytest.approx(10.0, rel=1e-12)
+    assert contact.rule.area.sum() == pytest.approx(np.pi * 10.0**2, rel=1e-12)
+    assert contact.rule.lengths.sum() == pytest.approx(10.0, rel=1e-12)
     assert contact.points[:, 1] == pytest.approx(0.3, rel=1e-12)
 
 

@@ -75,7 +75,7 @@ def test_area_of_the_node_on_the_axis():
                      contacts=[fx.Contact("top", tools.plane(0.1), "none", moves=(0, -1))])
     contact, = Problem(scene).contacts
     order = np.argsort(contact.points[:, 0])
-    R, area, lumped = contact.points[order, 0], contact.area[order], contact.lumped[order]
+    R, area, lumped = contact.points[order, 0], contact.rule.area[order], contact.rule.lumped[order]
     L = R[2]
     assert area[0] == pytest.approx(2 * np.pi * L**2 / 24, rel=1e-12) and abs(lumped[0]) < 1e-14
     assert area - lumped == pytest.approx(2 * np.pi * L**2 / 24 * np.array([1, -2, 1, *[0] * (len(R) - 3)]), abs=1e-14)

@@ -9,7 +9,7 @@ from scipy import integrate, optimize
 
 import formingx as fx
 from formingx import tools
-from formingx.discrete.contact_nodes import ContactNodes
+from formingx.discrete.contact.face import FaceContact
 from formingx.results.evaluate import snaps
 from formingx.results.show import plots
 from formingx.solve import snap_through
@@ -105,15 +105,15 @@ def weighed(run):
 
     Trapezoidal rule; every jump must find its end at once.
     """
-    rows, advance = [], ContactNodes.advance
+    rows, advance = [], FaceContact.advance
 
     def recorded(contact, fields, control):
         rows.append((contact.positions(fields, control),
-                     contact.area[:, None] * contact.tractions(fields, control).force))
+                     contact.rule.area[:, None] * contact.tractions(fields, control).force))
         advance(contact, fields, control)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ContactNodes, "advance", recorded)
+        patch.setattr(FaceContact, "advance", recorded)
         path = run()
     return path, sum(0.5 * float(np.sum((f + g) * (b - a))) for (a, f), (b, g) in zip(rows, rows[1:]))
 

@@ -57,6 +57,6 @@ def test_where_a_point_slides_over_a_convex_tool_its_way_may_cut_it():
         node = np.argmin(np.hypot(*(contact.points - (0.0, 1.2)).T))
         for by, passes in ((0.0, False), (0.1, False), (10.0, True)):      # seen from the tool, across it
             other = x.copy()
-            other[contact.dofs[node, 1]] += by / problem.forms.length
+            other[contact.rule.dofs[node, 1]] += by / problem.forms.length
             ways = [Way(at, path.last.control, x, 0.0, 1.0) for at in (x, other)]
             assert problem.limit.passes_through(*ways) == passes

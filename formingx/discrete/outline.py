@@ -10,7 +10,6 @@ import numpy as np
 from dolfinx import fem
 
 from ..mesh.check import crossing, crossings
-from .contact_points import ends_first
 
 _PARTS = 8
 """Straight pieces of an edge."""
@@ -92,3 +91,10 @@ def along(edges: np.ndarray, parts: int = _PARTS) -> np.ndarray:
     """Points of edges, shape (m, 3, 2), from one end to the other, shape (m, parts + 1, 2)."""
     s = np.linspace(0, 1, parts + 1)
     return np.einsum("pk,mki->mpi", np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)]), edges)
+
+
+def ends_first(nodes: np.ndarray, X: np.ndarray) -> np.ndarray:
+    """The two ends and the middle of an edge: no two of its nodes are further apart than the ends."""
+    away = np.linalg.norm(X[nodes][:, None] - X[nodes][None], axis=-1)
+    i, j = np.unravel_index(np.argmax(away), (3, 3))
+    return nodes[[i, j, 3 - i - j]]

@@ -21,8 +21,8 @@ from ..errors import InputError, together
 from ..scene.scene import Scene
 from .admissible import Admissible, Least
 from .constraints import Active, Constraints
-from .contact_nodes import ContactNodes
-from .contact_points import ContactPoints
+from .contact.face import FaceContact
+from .contact.resultants import penetration
 from .examine import Examination
 from .formulations import formulate
 from .history import MaterialHistory
@@ -60,7 +60,7 @@ class Problem(Units):
         comm: communicator.
         x: a vector of unknowns; inside `at` those of the state.
         matrix: the tangent, refilled by `tangent`.
-        contacts: the nodal forces of the scene's contacts (`ContactNodes`); present: of those that take part now.
+        contacts: the scene's contacts (`FaceContact`); present: of those that take part now.
         histories: what F depends on besides x and control (`History`); limit: what a step may bring (`StepLimit`).
         setting: the `Setting` that x and control are seen under; see `enter`.
         force_scale: norm of all support forces at the state whose residual was last computed.
@@ -77,8 +77,7 @@ class Problem(Units):
         self._residual = forms.compile(forms.residual)
         self._by_control, self._by_time = (form and forms.compile(form)
                                            for form in (forms.control_derivative, forms.time_derivative))
-        self.contacts = [(ContactNodes if contact.points == "nodes" else ContactPoints)(forms, contact, self.assemble)
-                         for contact in scene.contacts]
+        self.contacts = [FaceContact(forms, contact, self.assemble) for contact in scene.contacts]
         if scene.heat is not None:                              # after the materials, which heat it
             forms.histories.append(scene.heat.history(self))
         self.histories: list[Any] = [*(contact for contact in self.contacts if contact.law.remembers), *forms.histories]
@@ -143,7 +142,8 @@ class Problem(Units):
     @property
     def active_set(self) -> Any:
         """Which points touch and slide, of the residual last computed, the same on all ranks; hashable; None: none."""
-        return tuple(self.comm.allgather(tuple(c.active.tobytes() for c in self.present))) if self.present else None
+        status = tuple(c.increment.active.tobytes() for c in self.present)
+        return tuple(self.comm.allgather(status)) if self.present else None
 
     @property
     def has_history(self) -> bool:
@@ -213,7 +213,7 @@ class Problem(Units):
         for contact in self.contacts:
             if contact.contact is self.scene.things[number]:
                 contact.come_in(x, control)
-                depth = contact.largest_penetration(x, control)
+                depth = penetration(contact, x, control)
                 if depth > 1e-6 * self.forms.length:
                     raise InputError(f"{contact.contact!r} comes in where the body is, which reaches {depth:.6g} into"
                                      f" the tool")
@@ -320,7 +320,7 @@ class Problem(Units):
     def begin(self, old: Any = None) -> None:
         """Newton's method begins at a guess ahead of a state (None: of none)."""
         for contact in self.present:
-            contact.begin(None if old is None else contact.positions(old.x[: self._n], old.control))
+            contact.begin(*((None, 0.0) if old is None else (old.x[: self._n], old.control)))
 
     def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
         """Ready the tangent at (x, control) for an iteration, and F, the residual there, for the solve with it."""
@@ -338,7 +338,7 @@ class Problem(Units):
         """
         self.set_state(x, control)
         fields = x.array_r[: self._n]
-        return self._matrix.fill([(c.dofs, c.stiffness(fields, control, ahead)) for c in self.present])
+        return self._matrix.fill([(c.rule.dofs, c.tangent(fields, control, ahead)) for c in self.present])
 
     def viscosity(self) -> Viscosity:
         """That of the body as it is held now; to be destroyed."""
@@ -501,7 +501,7 @@ class Problem(Units):
         self.forms.set_loads(setting)
         for contact in self.contacts:
             i = number[id(contact.contact)]
-            contact.base, contact.rate, contact.present = setting.base[i], setting.rate[i], i not in setting.off
+            contact.enter(setting.base[i], setting.rate[i], i not in setting.off)
         self.present = [contact for contact in self.contacts if contact.present]
         if before is None or before.active is not stage.active:
             self._matrix.hold(stage.active.bcs, stage.active.rows)

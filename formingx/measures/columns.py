@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ..discrete.contact import resultants
 from ..discrete.tooling import Tooling
 from ..errors import InputError
 from .forces import resisting
@@ -142,13 +143,13 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     if forms.damage_energy is not None:
         found["damage_energy"] = _Scalar(problem, forms.damage_energy, lambda v: v * forms.stress * volume)
     if problem.contacts:
-        found["contact_length"] = _Nodal(problem, lambda c, *at: c.contact_length(*at), sum)
-        found["penetration"] = _Nodal(problem, lambda c, *at: c.largest_penetration(*at), max)
+        found["contact_length"] = _Nodal(problem, resultants.length, sum)
+        found["penetration"] = _Nodal(problem, resultants.penetration, max)
         tooling = Tooling.of_problem(problem)
         tools = {name: [c for c, tool in zip(problem.contacts, tooling.names, strict=True) if tool == name]
                  for name in tooling.force_columns}
         for name in sorted(tools, key=lambda tool: tools[tool][0].contact.moves is None):    # what moves comes first
-            force = _Nodal(problem, lambda c, *at: c.force(*at) @ resisting(c.contact), sum, tools[name])
+            force = _Nodal(problem, lambda c, *at: resultants.force(c, *at) @ resisting(c.contact), sum, tools[name])
             found[tooling.force_columns[name]] = force
             if tools[name][0].contact.name:
                 found[f"{name}_force"] = force

@@ -8,6 +8,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
+from ..discrete.contact import resultants
 from ..errors import InputError, finite, known
 from .targets import Bound, Target
 
@@ -83,7 +84,7 @@ class _ToolForce(Bound):
 
     def value(self, x, control):
         there = [c for c in self._contacts if c.present]
-        return float(sum(contact.force(x.array_r, control) @ self._way for contact in there))
+        return float(sum(resultants.force(contact, x.array_r, control) @ self._way for contact in there))
 
     def equation(self, target):
         problem = self._problem
@@ -94,9 +95,9 @@ class _ToolForce(Bound):
                 by_control = np.zeros(problem.n_owned)
                 blocks = contact.stiffness(x.array_r, control)
                 way = np.tile(self._way, blocks.shape[1] // 2)
-                np.add.at(values, contact.dofs, np.einsum("i,nij->nj", way, blocks))
+                np.add.at(values, contact.rule.dofs, np.einsum("i,nij->nj", way, blocks))
                 contact.add_control_derivative(by_control, x.array_r, control)
-                slope += float(np.sum(by_control[contact.dofs] @ self._way))
+                slope += float(np.sum(by_control[contact.rule.dofs] @ self._way))
             problem.fill(gradient, values)
             return (self.value(x, control) - target) / self._scale, problem.comm.allreduce(slope)
         return c

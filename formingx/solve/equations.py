@@ -53,18 +53,12 @@ class Tractions(Protocol):
     def active(self) -> np.ndarray: ...
 
 
-class ContactFace(Protocol):
-    """A face in contact: n own points, as the iteration that was linearised last sees them."""
-
-    points: np.ndarray
-
-    @property
-    def scale(self) -> np.ndarray:
-        """Of the forces in F by tractions, shape (n,)."""
+class Increment(Protocol):
+    """Newton's method at n own points of a face in contact, as the iteration that was linearised last sees them."""
 
     @property
     def ramp(self) -> float:
-        """Distance over which contact begins, length."""
+        """Half-width of the distances over which contact begins, length."""
 
     @property
     def active(self) -> np.ndarray:
@@ -74,20 +68,34 @@ class ContactFace(Protocol):
     def arrivals(self) -> np.ndarray:
         """Which points touch that did not where Newton's method began, shape (n,)."""
 
+    def taken(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forces and stiffnesses that `linearise` has taken, of some points, shapes (m, 2), (m, 2, 2)."""
+
+    def foretold(self, by: np.ndarray, points: np.ndarray | slice = slice(None)) -> Tractions:
+        """The law at some points that move on by so much, shape (m, 2), length."""
+
+    def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
+        """The next iteration takes this sense of sliding for the points in a mask, shape (n,)."""
+
+
+class ContactFace(Protocol):
+    """A face in contact: n own points, and the increment that goes on."""
+
+    points: np.ndarray
+
+    @property
+    def increment(self) -> Increment:
+        """Of the run of Newton's method that goes on: another after each `begin`."""
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Of the forces in F by tractions, shape (n,)."""
+
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
         """Add forces at the points, shape (n, 2), to own rows of F."""
 
     def moved(self, dx: np.ndarray, step: float) -> np.ndarray:
         """How the points move, seen from the tool, by a correction of x (own part) and the control; (n, 2), length."""
-
-    def taken(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Forces and stiffnesses that `linearise` has taken, of some points, shapes (m, 2), (m, 2, 2)."""
-
-    def foretold(self, by: np.ndarray, nodes: np.ndarray | slice = slice(None)) -> Tractions:
-        """The law at some points that move on by so much, shape (m, 2), length."""
-
-    def expect(self, nodes: np.ndarray, sense: np.ndarray) -> None:
-        """The next iteration takes this sense of sliding for the points in `nodes`, a mask, shape (n,)."""
 
 
 class Viscosity(Protocol):

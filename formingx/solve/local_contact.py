@@ -48,8 +48,8 @@ class Settling:
 
     def look(self) -> None:
         """To be called once an iteration, after the problem was linearised."""
-        now = [contact.active for contact in self._contacts]
-        self._marked = self._marked or [contact.arrivals for contact in self._contacts]
+        now = [contact.increment.active for contact in self._contacts]
+        self._marked = self._marked or [contact.increment.arrivals for contact in self._contacts]
         for mark, a, b in zip(self._marked, self._active, now):
             mark |= a != b
         self._active = now
@@ -80,11 +80,11 @@ class Settling:
         """Mark more points whose status changes on the way; True if there are any."""
         found = False
         for contact, mark, active in zip(self._contacts, self._marked, self._active):
-            law = contact.foretold(contact.moved(dx, step))
+            law = contact.increment.foretold(contact.moved(dx, step))
             new = (law.active != active) & ~mark
             mark |= new
             found |= bool(new.any())
-            contact.expect(mark, law.sense)
+            contact.increment.expect(mark, law.sense)
         return self._problem.comm.allreduce(found, MPI.LOR)
 
 
@@ -144,7 +144,7 @@ class _Points:
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._taken()
         y, by, least, halved = y0, np.zeros_like(y0), np.inf, 0
-        accuracy = 1e-4 * min(c.ramp for c in self._contacts)
+        accuracy = 1e-4 * min(c.increment.ramp for c in self._contacts)
         for k in range(_ITERATIONS):
             f, S = self._law(y - by)
             more = f - f0 + np.einsum("nij,nj->ni", S - S0, (y - by).reshape(-1, 2)).ravel()
@@ -187,13 +187,13 @@ class _Points:
 
     def _taken(self) -> tuple[np.ndarray, np.ndarray]:
         """Forces and stiffnesses that the iteration has taken."""
-        return self._all([c.taken(i) for c, i in zip(self._contacts, self._chosen)])
+        return self._all([c.increment.taken(i) for c, i in zip(self._contacts, self._chosen)])
 
     def _law(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Forces and stiffnesses of the law, linearised where the points would be."""
         mine, at, found = y[self._own].reshape(-1, 2), 0, []
         for contact, i in zip(self._contacts, self._chosen):
-            law = contact.foretold(mine[at:at + len(i)], i)
+            law = contact.increment.foretold(mine[at:at + len(i)], i)
             found.append((law.force, law.stiffness))
             at += len(i)
         return self._all(found)

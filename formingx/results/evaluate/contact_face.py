@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...discrete.contact import resultants
 from ...discrete.tooling import Tooling
 from ...errors import InputError
 from ..files.sheet import Sheet
@@ -41,7 +42,7 @@ class ContactTable(Sheet):
 
 
 class ContactFace:
-    """The face of one contact of a problem (`ContactNodes`), its points from all ranks in one order; collective.
+    """The face of one contact of a problem (`FaceContact`), its points from all ranks in one order; collective.
 
     Attributes:
         rest: the points at rest, shape (n, 2), length, by R, then Z.
@@ -69,13 +70,13 @@ class ContactFace:
             gap = -contact.contact.tool.signed_distance(contact.positions(fields, state.control))
             traction = np.zeros((len(self.rest), 2))
             if contact in path.problem.present:
-                _, traction = contact.traction(fields, state.control)
+                _, traction = resultants.traction(contact, fields, state.control)
         _, values = self._gathered(moved, gap)
         points = values[:, :2]
         if self._at_nodes:
             ratio = self.area_ratio(points)[:, None]
         else:
-            _, ratio = self._gathered(contact.area_ratio(fields))
+            _, ratio = self._gathered(contact.rule.area_ratio(fields))
         pressure, friction = (traction / ratio).T
         return ContactTable(self.rest, points, values[:, 2], pressure, friction, path.problem.comm)
 
@@ -110,7 +111,7 @@ class ContactFace:
 
 
 def contact_of(path: Any, tool: Any, who: str) -> list[Any]:
-    """The contacts (`ContactNodes`) of a tool: by its name, as the `Tool` or a `Contact`; None: the only one."""
+    """The contacts (`FaceContact`) of a tool: by its name, as the `Tool` or a `Contact`; None: the only one."""
     contacts = path.problem.contacts
     found = [c for c in contacts if tool is None or tool in (c.contact.name, c.contact.on)
              or tool is c.contact.tool or tool is c.contact]

@@ -37,7 +37,8 @@ def coarsest(path: Any, state: Any) -> Edge | None:
             x, law = contact.positions(fields, state.control), contact.tractions(fields, state.control)
             slides = (law.normal != 0) & (np.abs(law.tangential) >= 0.99 * contact.law.mu * np.abs(law.normal))
             slides &= contact.displacement(free).any(axis=1)
-            rows = np.column_stack([contact.points, contact.lengths, x, contact.contact.tool.nearest(x).normal, slides])
+            normal = contact.contact.tool.nearest(x).normal
+            rows = np.column_stack([contact.points, contact.rule.lengths, x, normal, slides])
             rows = np.concatenate(problem.comm.allgather(rows))
             X, length, x, normal, slides = np.split(rows[np.lexsort((rows[:, 1], rows[:, 0]))], [2, 3, 5, 7], axis=1)
             by, turned = np.diff(x, axis=0), np.diff(normal, axis=0)

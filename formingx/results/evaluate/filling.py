@@ -73,7 +73,7 @@ class Filling(Sheet):
 
 
 def filling(path: Any, contact: Any) -> Filling:
-    """See `Path.filling`; contact: the `ContactNodes`."""
+    """See `Path.filling`; contact: the `FaceContact`."""
     from ...discrete.tooling import Tooling
     tooling = Tooling.of_problem(path.problem)
     number = path.problem.contacts.index(contact)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...discrete.contact import resultants
 from ...discrete.outline import Outline, along
 from ...solve.state import State
 
@@ -67,7 +68,7 @@ class Verdict:
         with self._problem.at(state):
             edges, found = self._outline.edges(), []
             for contact in self._problem.present:
-                share = contact.energy(state.x, state.control) / (state.measures["strain_energy"] or np.inf)
+                share = resultants.energy(contact, state.x, state.control) / (state.measures["strain_energy"] or np.inf)
                 if share > _HELD:
                     found.append(("serious", f"Penetration of the tool of {_name(contact)!r} holds {100 * share:.2g} %"
                                              f" of the energy of the body: forces are off by more; give Contact a"
@@ -145,8 +146,8 @@ def _pulled(contact: Any, state: State) -> bool:
     law = contact.contact
     if not law.driven or not law.separates or law.friction_by_temperature or law.mu > 0:
         return False
-    force = contact.force(state.x, state.control) @ np.array(law.moves) / np.hypot(*law.moves)
-    return bool(force > _PULLS * contact.pressing(state.x, state.control))
+    force = resultants.force(contact, state.x, state.control) @ np.array(law.moves) / np.hypot(*law.moves)
+    return bool(force > _PULLS * resultants.pressing(contact, state.x, state.control))
 
 
 def _lengths(edges: np.ndarray) -> np.ndarray:

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
+from ...discrete.contact import resultants
 from ...discrete.step_limit import Way
 from ...discrete.tooling import Tooling
 from ...solve.newton import Failure
@@ -213,7 +214,8 @@ class Ledger:
                 elif thing in scene.contacts:
                     together = [scene.things[k] for k in scene.together(i)]
                     tools = [c for c in at.present if c.contact in together]
-                    force = -sum(float(c.force(fields, state.control) @ np.array(c.contact.moves)) for c in tools)
+                    force = -sum(float(resultants.force(c, fields, state.control) @ np.array(c.contact.moves))
+                                 for c in tools)
                     slope = sum(self._sum(free[self._nodes(c, fields, state.control)] @ np.array(c.contact.moves))
                                 for c in tools)
                 else:
@@ -224,7 +226,7 @@ class Ledger:
 
     def _nodes(self, contact: Any, fields: np.ndarray, control: float) -> np.ndarray:
         """Owned unknowns (u_r, u_z) of its face, shape (n, 2); of what touches, where it shares the face."""
-        problem, dofs = self._problem, contact.dofs
+        problem, dofs = self._problem, contact.rule.dofs
         if dofs.shape[1] == 2 and sum(c.contact.on == contact.contact.on for c in problem.contacts) > 1:
             return dofs[contact.touching(fields, control)]
         dofs = np.unique(dofs.reshape(-1, 2), axis=0)

@@ -1,0 +1,126 @@
+"""How the points of a face come to their tool in a step: where they arrive, and whether the step was too long."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from .face import FaceContact
+
+_NEAR = 1e-3
+"""Distances (over thickness) at which a point is as good as in touch."""
+
+_AT_END = 0.95
+"""Part of a step from which on what arrives, and will stick, has no friction until the next."""
+
+_SLIDES = 1e-2
+"""How far (over the length of face that is its own) a point may slide so."""
+
+_CUT_OFF, _MOST_PLACES = 0.5, 4000
+"""How deep the way of a point in a step may lead through a tool, over the length of face that is its own; at how many
+places the way is looked at."""
+
+
+class Approach:
+    """The step ahead of one contact. For each step: `reach`, `prepare`; of the state that it came to the others.
+
+    Args:
+        face: the contact.
+        points_per_step: that a step may bring into contact.
+    """
+
+    def __init__(self, face: FaceContact, points_per_step: int):
+        self.face, self._comm, self._allowed = face, face.comm, points_per_step
+        self._foreseen = 0                                  # points that the step is going to bring, all ranks
+
+    def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
+        """How long a step along a tangent may be: to the first touch, or until enough new points touch.
+
+        A step that would bring a whole region into contact at once would decide by its own length where it sticks.
+        """
+        face = self.face
+        start, velocity = face.positions(fields, control), face.moved(direction, slope)
+        free = ~face.law.touching(start, face.touch)
+        times = self._arrivals(start, velocity, length)
+        ahead = (times > 0.02 * length) & (times < length)         # nearer ones are as good as in touch
+        times = np.sort(np.concatenate(self._comm.allgather(times[ahead])))
+        touching = self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM)
+        allowed = self._allowed if touching > 1 else 1
+        return min(1.001 * times[allowed - 1], length) if len(times) >= allowed else length
+
+    def prepare(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float,
+                ends: bool) -> None:
+        """A step of this length along a tangent is about to be taken: foretell where points arrive.
+
+        ends: it is to end where a point touches that sticks (see `touches_by`), which has no friction before.
+        """
+        face = self.face
+        start, velocity = face.positions(fields, control), face.moved(direction, slope)
+        times = self._arrivals(start, velocity, length)
+        self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
+        at_end = ends & face.contact.sticks & (times >= _AT_END * length)
+        face.expect_arrivals(np.where(at_end[:, None], np.nan, start + times[:, None] * velocity))
+
+    def _arrivals(self, start: np.ndarray, velocity: np.ndarray, length: float) -> np.ndarray:
+        """Arc length at which free points meet the ramp, `length` if they do not before, shape (n,)."""
+        face, law = self.face, self.face.law
+        at, times = length * np.linspace(0, 1, 17), np.full(len(start), length)
+        ways = 1.01 * length * np.linalg.norm(velocity, axis=1)         # none comes nearer by more
+        free = ~law.touching(start, face.touch) & (face.rule.area > 0)
+        near = np.flatnonzero(free & (law.distance(start) + ways > -law.theta))
+        gap = -law.theta - law.part(near).distance(start[near] + at[:, None, None] * velocity[near])    # shape (17, m)
+        hit = np.flatnonzero((gap[1:] <= 0).any(0))
+        k = np.argmax(gap[1:, hit] <= 0, axis=0)
+        before, now = gap[k, hit], gap[k + 1, hit]
+        times[near[hit]] = at[k] + (at[k + 1] - at[k]) * before / (before - now)
+        return times
+
+    def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+        """More than twice the new points that a step is meant, or foreseen, to bring into contact."""
+        face, theta = self.face, self.face.law.theta
+        if face.touch is None:
+            return False
+        a, b = (face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control)))
+        found = int(np.sum((a <= -theta - _NEAR * face.thickness) & (b > -theta)))
+        return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self._allowed, self._foreseen) + 2)
+
+    def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+        """True if a point's straight way from one state to another, seen from the tool, leads through the tool.
+
+        That is, deeper than both its ends by `_CUT_OFF`: so much a point may cut off an edge that it slides over.
+        """
+        law, lengths = self.face.law, self.face.rule.lengths
+        a, b = self.face.positions(old, old_control), self.face.positions(new, control)
+        way, most = np.linalg.norm(b - a, axis=1), _CUT_OFF * lengths
+        ends = np.maximum(np.maximum(law.distance(a), law.distance(b)), 0.0)
+        between = (law.distance(a) + law.distance(b) + way) / 2            # no place of the way is deeper
+        far = np.flatnonzero((between > ends + most) & (lengths > 0))
+        found = False
+        if len(far):
+            parts = int(min(np.ceil((way / most)[far].max() * 2), _MOST_PLACES)) + 1
+            places = a[far] + np.linspace(0, 1, parts)[:, None, None] * (b - a)[far]
+            found = bool(np.any(law.part(far).distance(places).max(0) > (ends + most)[far]))
+        return bool(self._comm.allreduce(found, MPI.LOR))
+
+    def touches_by(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
+        """Part of a step by which the first of the points touched whose slip the step got wrong; 1 if there is none.
+
+        Since it touched its pressure has grown, and it has slid, as it does at the end, along (direction, slope). One
+        that sticks slid too far without friction; under Coulomb's law it slides the other way than it came.
+        """
+        face, law, touch = self.face, self.face.law, self.face.touch
+        if touch is None or not law.has_friction:
+            return 1.0
+        end, velocity = face.positions(new, control), face.moved(direction, slope)
+        near = law.nearest(end)
+        F, grows = law.ramp(near.distance)
+        rate = np.maximum(grows * np.einsum("ni,ni->n", near.normal, velocity), 0.0)
+        since = np.minimum(np.divide(F, rate, out=np.full(len(F), length), where=rate > 0), length)
+        slid = since * np.einsum("ni,ni->n", near.tangent, velocity)
+        if face.contact.sticks:
+            wrong = np.isnan(touch.arrival[:, 0]) & (np.abs(slid) > _SLIDES * face.rule.lengths)
+        else:
+            counted = np.einsum("ni,ni->n", near.tangent, end - touch.arrival)
+            wrong = (slid * counted < 0) & (np.minimum(np.abs(slid), np.abs(counted)) > law.elastic_slip)
+        late = (touch.distance <= -law.theta) & (F > 0) & wrong
+        return float(self._comm.allreduce(1 - float(since[late].max(initial=0.0)) / length, MPI.MIN))

@@ -1,0 +1,84 @@
+"""One increment of a contact: its tractions, as Newton's method linearises them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...physics.contact import Law, Motion, Touch, Tractions
+
+
+class Increment:
+    """Tractions at n points from what they remember of the last accepted state, until the next one is accepted.
+
+    It is begun for each run of Newton's method ahead of a state, or to look at one. In each iteration
+
+        tractions(x)     for the residual, at the positions x of the points seen from the tool, shape (n, components);
+        linearise(x)     at the same positions: the tangent of the iteration is that of `tractions(x)` from now on;
+
+    and then it is asked: `active`, `arrivals`, `taken`, `foretold`, and `expect` says what the next iteration is to
+    take. Whoever accepts the state begins another increment.
+
+    Args:
+        law: of the contact; touch: what the points remember; None without friction.
+        start: positions of the points at the state ahead of which Newton's method begins; None: of none.
+    """
+
+    def __init__(self, law: Law, touch: Touch | None, start: np.ndarray | None = None):
+        self._law, self._touch = law, touch
+        self._touched = None if start is None else law.touching(start, touch)
+        self._before: Motion | None = None if start is None else law.motion(start, touch)   # at the last iteration
+        self._sense: np.ndarray | None = None                                               # of sliding there
+        self._last: tuple[np.ndarray, Tractions] | None = None
+
+    def tractions(self, x: np.ndarray) -> Tractions:
+        """What the law gives at positions x, computed once for them; after `linearise` at them, linearised."""
+        if self._last is None or not np.array_equal(x, self._last[0]):
+            self._last = x, self._law.tractions(x, self._touch)
+        return self._last[1]
+
+    def linearise(self, x: np.ndarray) -> np.ndarray:
+        """Linearise the law where the last iteration foretold; by how much its forces at x change, shape of x."""
+        plain = found = self.tractions(x)
+        if self._before is not None:
+            found = self._law.tractions(x, self._touch, self._sense, self._before.to(x))
+            self._last = x, found
+        self._sense, self._before = found.sense, self._law.motion(x, self._touch)
+        return found.force - plain.force
+
+    @property
+    def active(self) -> np.ndarray:
+        """`Tractions.active` of those last computed, shape (n,)."""
+        return self._now[1].active
+
+    @property
+    def arrivals(self) -> np.ndarray:
+        """Which points touch at the positions last looked at that did not where Newton's method began, shape (n,)."""
+        if self._touched is None:
+            return np.zeros(len(self._now[0]), dtype=bool)
+        return self._law.touching(self._now[0], self._touch) & ~self._touched
+
+    @property
+    def ramp(self) -> float:
+        """Half-width of the ramp in which contact begins, length."""
+        return self._law.theta
+
+    def taken(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forces and stiffnesses per area that `linearise` has taken, of m points: (m, c), (m, c, c)."""
+        return self._now[1].force[points], self._now[1].stiffness[points]
+
+    def foretold(self, by: np.ndarray, points: np.ndarray | slice = slice(None)) -> Tractions:
+        """The law at m points, linearised where they come to if they move on by so much, shape (m, c), length."""
+        assert self._before is not None
+        touch = self._touch and Touch(*(part[points] for part in self._touch))
+        before = Motion(*(part[points] for part in self._before))
+        x = self._now[0][points]
+        return self._law.part(points).tractions(x, touch, None, before.to(x + by))
+
+    def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
+        """Which way points (a mask, shape (n,)) are going to slide."""
+        self._sense = np.where(points, sense, 0.0 if self._sense is None else self._sense)
+
+    @property
+    def _now(self) -> tuple[np.ndarray, Tractions]:
+        assert self._last is not None, "an increment is asked before `tractions`"
+        return self._last

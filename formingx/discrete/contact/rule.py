@@ -1,0 +1,172 @@
+"""Where the contact of a face acts, and how those points move with the unknowns: a rule on its facets.
+
+Gauss-Lobatto's points are the nodes of six-node triangles; at Gauss points a face lets go more smoothly.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from dolfinx import fem, la
+
+from ..outline import ends_first
+
+
+class Rule:
+    """The n points of a face that are this rank's.
+
+    Attributes:
+        dofs: local numbers of the unknowns that move each point, component by component of each of its nodes, (n, m).
+        points: reference positions, shape (n, components), length; nodes: of the nodes of each, shape (n, components),
+            where a point is a node, or (n, nodes, components).
+        lengths, lumped: reference length and area that belong to each point, shape (n,) (lumped: 0 on the axis).
+        area: that forces act on: `lumped`, but see `Lobatto`, shape (n,).
+    """
+
+    dofs: np.ndarray
+    points: np.ndarray
+    nodes: np.ndarray
+    lengths: np.ndarray
+    lumped: np.ndarray
+    area: np.ndarray
+
+    def displacement(self, values: np.ndarray) -> np.ndarray:
+        """Of the points, shape (n, components), for owned unknowns, in their units; collective."""
+        raise NotImplementedError
+
+    def add(self, values: np.ndarray, forces: np.ndarray) -> None:
+        """Add forces at the points, shape (n, components), to the owned residual; collective."""
+        raise NotImplementedError
+
+    def between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
+        """Stiffness of the points, shape (n, components, components), as that of their `dofs`, shape (n, m, m)."""
+        raise NotImplementedError
+
+    def at_points(self, values: np.ndarray) -> np.ndarray:
+        """Values at the points, shape (n,), of those at `nodes`."""
+        raise NotImplementedError
+
+
+class Lobatto(Rule):
+    """The nodes of the face. `lumped`, exact for what is cubic along a facet, gives the node on the axis no area."""
+
+    def __init__(self, solid: Any, on: str, assemble: Any):
+        kinematics, vectors, numbers = solid.scene.kinematics, *_displacements(solid)
+        nodes = np.sort(fem.locate_dofs_topological(vectors, 1, solid.scene.mesh.facets_of(on)))
+        own = numbers[nodes, 0] < solid.space.dofmap.index_map.size_local
+        self.dofs = numbers[nodes[own]]
+        self.points = self.nodes = vectors.tabulate_dof_coordinates()[nodes[own], :kinematics.components].copy()
+        self.lengths = assemble(solid.compile(solid.length_row(on)))[self.dofs[:, 0]]
+        self.lumped = self.lengths * kinematics.weight(self.points.T)
+        self.area = self.lumped.copy()
+        self._spread_to_axis(kinematics, solid.comm)
+
+    def displacement(self, values: np.ndarray) -> np.ndarray:
+        return values[self.dofs]
+
+    def add(self, values: np.ndarray, forces: np.ndarray) -> None:
+        values[self.dofs] += forces
+
+    def between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
+        return stiffness
+
+    def at_points(self, values: np.ndarray) -> np.ndarray:
+        return values
+
+    def _spread_to_axis(self, kinematics: Any, comm: Any) -> None:
+        """Give the node on the axis some area of its facet's, so that something holds it.
+
+        (1/24, -2/24, 1/24) of L times the weight at L: integrals of what is linear along the facet stay exact.
+        """
+        nodes = np.concatenate(comm.allgather(np.column_stack([self.points, self.lengths, self.lumped])))
+        for axis in nodes[without_area(nodes[:, -1], nodes[:, -2])]:
+            length, at = 6 * axis[-2], axis[:-2].copy()                 # of its facet, on which Gauss-Lobatto gives 1/6
+            away = np.linalg.norm(self.points - at, axis=1) / length
+            at[0] += length
+            whole = kinematics.weight(at) * length / 24
+            for place, share in ((0.0, 1), (0.5, -2), (1.0, 1)):
+                self.area[np.abs(away - place) < 0.1] += share * whole
+
+
+class Gauss(Rule):
+    """`count` Gauss points of each facet of a cell that this rank owns. Nodes of such a facet may be ghosts.
+
+    Attributes:
+        shapes: shape functions of the three nodes at the points, shape (n, 3).
+    """
+
+    def __init__(self, solid: Any, on: str, count: int):
+        self._kinematics, vectors, numbers = solid.scene.kinematics, *_displacements(solid)
+        self._length, components = solid.length, self._kinematics.components
+        X = vectors.tabulate_dof_coordinates()[:, :components]
+        self._unknowns = la.vector(solid.space.dofmap.index_map, 1)
+        facets = [ends_first(fem.locate_dofs_topological(vectors, 1, np.array([f], dtype=np.int32), remote=False), X)
+                  for f in _own_facets(solid.scene.mesh, on)]
+        nodes = np.array(facets, dtype=np.int32).reshape(-1, 3)
+        at, weights = np.polynomial.legendre.leggauss(count)
+        s, q = (1 + at) / 2, len(at)
+        shapes = np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)])
+        slopes = np.column_stack([4 * s - 3, 4 * s - 1, 4 - 8 * s])
+        self.dofs = np.repeat(numbers[nodes].reshape(-1, 3 * components), q, axis=0)
+        self.shapes, self._slopes = (np.tile(values, (len(nodes), 1)) for values in (shapes, slopes))
+        self.nodes = np.repeat(X[nodes], q, axis=0)
+        self.points = np.einsum("qa,fai->fqi", shapes, X[nodes]).reshape(-1, components)
+        self._along = np.einsum("qa,fai->fqi", slopes, X[nodes]).reshape(-1, components)
+        self.lengths = np.linalg.norm(self._along, axis=1) * np.tile(weights / 2, len(nodes))
+        self.area = self.lumped = self.lengths * self._kinematics.weight(self.points.T)
+
+    def displacement(self, values: np.ndarray) -> np.ndarray:
+        return np.einsum("na,nai->ni", self.shapes, self._at_nodes(values))
+
+    def add(self, values: np.ndarray, forces: np.ndarray) -> None:
+        unknowns, n = self._unknowns, self._owned
+        unknowns.array[:] = 0
+        np.add.at(unknowns.array, self.dofs, np.einsum("na,ni->nai", self.shapes, forces).reshape(self.dofs.shape))
+        unknowns.scatter_reverse(la.InsertMode.add)
+        values[:n] += unknowns.array[:n]
+
+    def between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
+        blocks = np.einsum("na,nb,nij->naibj", self.shapes, self.shapes, stiffness)
+        return blocks.reshape(len(blocks), *[3 * stiffness.shape[-1]] * 2)
+
+    def at_points(self, values: np.ndarray) -> np.ndarray:
+        """A face that is as hot all over stays so to the last bit."""
+        return values[:, 0] + np.einsum("na,na->n", self.shapes[:, 1:], values[:, 1:] - values[:, :1])
+
+    def area_ratio(self, fields: np.ndarray) -> np.ndarray:
+        """Deformed over reference area at the points, shape (n,); `fields`: owned unknowns; collective."""
+        along = self._along + self._length * np.einsum("na,nai->ni", self._slopes, self._at_nodes(fields))
+        weight, now = self._kinematics.weight, self.points + self._length * self.displacement(fields)
+        grown = np.linalg.norm(along, axis=1) / np.linalg.norm(self._along, axis=1)
+        return grown * weight(now.T) / weight(self.points.T)
+
+    def _at_nodes(self, values: np.ndarray) -> np.ndarray:
+        """Of the three nodes of each point, shape (n, 3, components), from owned unknowns."""
+        unknowns, n = self._unknowns, self._owned
+        unknowns.array[:n] = values[:n]
+        unknowns.scatter_forward()
+        return unknowns.array[self.dofs].reshape(len(self.dofs), 3, -1)
+
+    @property
+    def _owned(self) -> int:
+        return self._unknowns.index_map.size_local
+
+
+def without_area(lumped: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Which nodes of a face are on the axis, of all ranks, shape (n,)."""
+    return (lumped < 1e-9 * lumped.max()) & (lengths > 0)
+
+
+def _displacements(solid: Any) -> tuple[Any, np.ndarray]:
+    """(space of the displacement, local numbers of each node's unknowns, shape (nodes, components))."""
+    vectors, numbers = solid.space.sub(0).collapse()
+    return vectors, np.asarray(numbers, dtype=np.int32).reshape(-1, solid.scene.kinematics.components)
+
+
+def _own_facets(mesh: Any, on: str) -> np.ndarray:
+    """Local numbers of the facets of a boundary whose cells this rank owns: each facet is one rank's."""
+    topology, facets = mesh.domain.topology, mesh.facets_of(on)
+    topology.create_connectivity(1, 2)
+    cells = np.array([topology.connectivity(1, 2).links(f)[0] for f in facets], dtype=np.int64)
+    return facets[cells < topology.index_map(2).size_local]
