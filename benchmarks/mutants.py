@@ -92,7 +92,7 @@ MUTANTS = [Mutant(*row) for row in [
     # solution path
     ("solve/path_following.py", "if (limit.control - old.control) * old.slope < 0:", "if False:", "treloar"),
     ("solve/path_following.py", "if was_passed(self.curve", "if False and was_passed(self.curve", "details"),
-    ("solve/path_following.py", "if error > _TOO_MUCH:", "if False:", "time accuracy viscoelastic"),
+    ("solve/path_following.py", "if error > self.settings.inaccurate:", "if False:", "time accuracy viscoelastic"),
     ("solve/path_following.py", "if not 0 < self.curve.progress(old, new) < 2 * length:", "if False:",
      "details"),
     ("solve/path_following.py", "by *= now / (now - then) if now * then < 0 else 1.0", "by *= 1.0", "details"),
@@ -100,7 +100,7 @@ MUTANTS = [Mutant(*row) for row in [
      "admissible contact"),
     ("solve/arc_length.py", "share = (length / h) ** 2", "share = -(length / h) ** 2", "treloar stepping limit"),
     ("solve/arc_length.py", "if found.slope**2 < 2e-12 * curvature * abs(found.control):", "if True:", "treloar limit"),
-    ("solve/snap_through.py", "self.lost += 0.5 * (max(self._sum(self._drag * by), 0.0) + self._sum(drag * by))",
+    ("solve/snap_through.py", "self.lost += 0.5 * (max(self._sum(self._pull * by), 0.0) + self._sum(pull * by))",
      "self.lost += self._sum(drag * by)", "jumps process"),
     ("solve/snap_through.py", "        problem.memory = kept\n        raise", "        raise", "jumps"),
     ("solve/forces.py", "self._by_control)\n            return (force - target) / self._scale, slope",
@@ -115,7 +115,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("solve/predictor.py", "if after.kind == \"jump\":\n            return None",
      "if False:\n            return None",
      "details"),
-    ("solve/time_error.py", "return max(once / self._once, lasting", "return max(0 * once, lasting", "steps_in_time"),
+    ("solve/stepping.py", "return max(once / self._once, lasting", "return max(0 * once, lasting", "steps_in_time"),
     # heat
     ("heat/conduction.py", "F[1, 1]]])).T", "F[1, 1]]]))", "details"),
     ("heat/conduction.py", "self._area = ufl.sqrt(ufl.inner(area, area))", "self._area = self._weight",

@@ -24,12 +24,11 @@ from .solve.arc_length import Curve
 from .solve.load_control import FixedControlCurve
 from .solve.newton import Tolerances
 from .solve.path_following import Run
-from .solve.process import Execution
+from .solve.process import Execution, begin
 from .solve.stage import AT_FOLD, Plan, Stage, plan
-from .solve.start import begin
 from .solve.state import Record, State
 from .solve.stepping import StepControl
-from .solve.time_error import allowed as allowed_error
+from .solve.stepping import allowed as allowed_error
 
 log = logging.getLogger("formingx")
 

@@ -191,6 +191,7 @@ def test_a_jump_does_not_pass_its_target(monkeypatch):
             pass
     monkeypatch.setattr(path_following.Run, "_sense", 1.0)
     run = path_following.Run.__new__(path_following.Run)
-    run.curve, run.open = SimpleNamespace(value=lambda bound, x, control: control), [(fx.travel(0.5), Driven())]
+    run.curve = SimpleNamespace(value=lambda bound, x, control: control)
+    run.aim = SimpleNamespace(open=[(fx.travel(0.5), Driven())])
     near = State(np.zeros(1), 0.49, np.ones(1), 1.0)
     assert run._change(near, 0.1) == pytest.approx(0.01) and run._change(near, 1e-3) == pytest.approx(1e-3)

@@ -12,7 +12,8 @@ from formingx import tools
 from formingx.discrete.contact.face import FaceContact
 from formingx.results.evaluate import snaps
 from formingx.results.show import plots
-from formingx.solve import snap_through
+from formingx.solve.path_following import PathFollowing, Run
+from formingx.solve.snap_through import SnapThrough
 
 sys.path.insert(0, str(ROOT / "demos"))
 import plugs  # noqa: E402
@@ -174,10 +175,9 @@ def test_work_is_energy_and_friction_and_what_jumps_lose():
 
 
 @pytest.mark.parametrize("schedule", [
-    {"_FIRST": 3.0, "_FALLS": 0.5}, pytest.param({"_GROWS": (2.0, 2.0)}, marks=pytest.mark.slow)], ids=str)
+    {"eta": 3.0, "falls": 0.5}, pytest.param({"grows": 2.0, "grows_moving": 2.0}, marks=pytest.mark.slow)], ids=str)
 def test_where_jumps_end_does_not_depend_on_how_eta_changes(rough, schedule, monkeypatch):
-    for name, value in schedule.items():
-        monkeypatch.setattr(snap_through, name, value)
+    monkeypatch.setattr(Run, "settings", PathFollowing(snap_through=SnapThrough(**schedule)))
     other = pushed()
     assert other.jumps and other["tool_force"][-1] == pytest.approx(rough["tool_force"][-1], rel=1e-3)
 
@@ -186,8 +186,7 @@ def test_where_jumps_end_does_not_depend_on_how_eta_changes(rough, schedule, mon
 def test_nor_in_shorter_steps(monkeypatch):
     """At 7.2, past the third jump; at 6.9, at its brink, which of two states a run ends in is left to round-off."""
     before = pushed(7.2, largest=0.02)["tool_force"][-1]
-    monkeypatch.setattr(snap_through, "_FIRST", 3.0)
-    monkeypatch.setattr(snap_through, "_FALLS", 0.5)
+    monkeypatch.setattr(Run, "settings", PathFollowing(snap_through=SnapThrough(eta=3.0, falls=0.5)))
     assert pushed(7.2, largest=0.02)["tool_force"][-1] == pytest.approx(before, rel=1e-3)
 
 

@@ -10,7 +10,7 @@ from conftest import ROOT, treloar
 import formingx as fx
 from formingx.errors import InputError
 from formingx.exact.plug import membrane_sliding_over_plug, membrane_under_plug
-from formingx.solve.folds import snaps, was_passed
+from formingx.solve.snap_through import snaps, was_passed
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import plug_extremes  # noqa: E402
@@ -100,11 +100,11 @@ def test_work_ahead_is_that_of_the_pressure_on_the_volume_that_grows():
         growth = (ends[0] - ends[1]) / (2 * h)
         work = curve.work_ahead(state) * forms.stress * forms.volume / forms.control_scale
         assert work == pytest.approx(growth, rel=1e-6) and growth > 0
-    assert not any(snaps(curve, state, "blow", 1.0) for state in (path.states[3], limit, path.last))
+    assert not any(snaps(curve, state, "follow volume", 1.0) for state in (path.states[3], limit, path.last))
     back = replace(path.states[3], direction=-path.states[3].direction, slope=-path.states[3].slope)
-    assert snaps(curve, back, "blow", 1.0)                  # neither pressure nor volume grows
+    assert snaps(curve, back, "follow volume", 1.0)                  # neither pressure nor volume grows
     limit.direction, limit.slope = -limit.direction, -limit.slope
-    assert snaps(curve, limit, "blow", 1.0) and not snaps(curve, limit, "follow", 1.0)
+    assert snaps(curve, limit, "follow volume", 1.0) and not snaps(curve, limit, "follow", 1.0)
 
 
 WILLIAMS = dict(radius=8.89, plug_radius=1.905, thickness=0.6985, c10=0.448)

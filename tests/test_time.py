@@ -6,7 +6,7 @@ from conftest import run_json
 
 import formingx as fx
 from formingx import Stage
-from formingx.solve.time_error import ACCURACY
+from formingx.solve.stepping import ACCURACY
 
 RUBBER = fx.NeoHookean(c10=0.05)
 P0 = fx.Viscoelastic(RUBBER, branches=[(0.5, 1.0)])

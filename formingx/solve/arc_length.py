@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import ConvergenceError
 from .equations import Attempt, Equations
-from .newton import UNLOADED, BorderedNewton, Failure, Tolerances, fixed
+from .newton import BorderedNewton, Failure, Tolerances, fixed, relative
 from .state import State
 
 CONTROL_WEIGHT = 0.1
@@ -46,7 +46,7 @@ class Curve:
         history: list = []
         self._x.set(0)
         self.problem.residual(self._x, 0.0, self.newton.F)
-        if self.newton.F.norm() > Tolerances().residual * (self.problem.force_scale + UNLOADED):
+        if relative(self.problem, self.newton.F.norm()) > Tolerances().residual:
             try:
                 _, history = self.newton.correct(self._x, 0.0, fixed(0.0))
             except Failure as failure:

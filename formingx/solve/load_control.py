@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from .arc_length import Curve
 from .equations import Attempt, Equations
 from .linear import configure
-from .newton import UNLOADED, Failure, Iteration, Tolerances
+from .newton import Failure, Iteration, Tolerances, relative
 from .state import State
 
 _prefixes = itertools.count()
@@ -63,12 +63,12 @@ class FixedControl:
 
     def _test(self, snes: Any, iteration: int, norms: tuple) -> int:
         size, step, residual = norms
-        relative = residual / (self._problem.force_scale + UNLOADED)
+        left = relative(self._problem, residual)
         correction = step / (size + 1e-8) if iteration else 1.0
         work = abs(snes.getFunction()[0].dot(snes.getSolutionUpdate())) if iteration else 0.0
         self._work = self._work or work
-        self.history.append(Iteration(relative, correction, work / self._work if self._work else 1.0))
-        if not np.isfinite(relative):
+        self.history.append(Iteration(left, correction, work / self._work if self._work else 1.0))
+        if not np.isfinite(left):
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
         if self._tolerances.met([i.correction for i in self.history[1:]], [i.residual for i in self.history]):
             return PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE

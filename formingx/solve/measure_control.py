@@ -75,7 +75,7 @@ class Flow(Run):
 
     def _next_event(self, time: float) -> float:
         """The next time that must be hit: a corner of the course, or a target."""
-        times = [*self._times, *(t.value for t, _ in self.open if t.name == "process_time")]
+        times = [*self._times, *(t.value for t, _ in self.aim.open if t.name == "process_time")]
         return min(t for t in times if t > time + _SAME * max(abs(time), self._duration))
 
     def _at(self, old: State, time: float) -> State:
@@ -146,7 +146,7 @@ class Flow(Run):
     def _met_before(self, old: State, new: State) -> State:
         """The state between two in time that meets a target, the first if there are several; else the second."""
         problem, best = self.problem, new
-        for target, bound in self.open:
+        for target, bound in self.aim.open:
             if target.name == "process_time":
                 new.met = target if abs(target.value - new.time) <= _SAME * max(abs(new.time), 1e-300) else new.met
                 continue

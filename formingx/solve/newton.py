@@ -3,52 +3,69 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from petsc4py import PETSc
 
+from ..discrete.schedule import Setting
 from ..errors import count, positive
-from .chords import Chords
-from .equations import Attempt, Equations
+from .equations import Attempt, Equations, Residual, Standing
 from .linear import DirectSolver
 from .local_contact import Settling, woodbury
 
-UNLOADED = 1e-5
-"""Floor of the support forces (over stress times volume over length) in the relative residual."""
 
-AT_REST = 1e-2
-"""Floor of the displacements (dimensionless) in the relative correction: near the state of rest on a tool, whose force
-grows as the square of the penetration, corrections are no smaller than the displacements themselves."""
+@dataclass(frozen=True)
+class Newton:
+    """How Newton's method is carried out. `Tolerances` say when it ends.
 
-SETTLING = 40
-"""Iterations allowed while the active set of contact still changes. Those with a `SMALL` correction that find an active
-set for the first time do not count: of a slack sheet on a flat plug a hundred points let go one or two at a time.
-(With a history, which depends on the step, a shorter step is better.)"""
+    Attributes:
+        unloaded: floor of the support forces (over stress times volume over length) in the relative residual.
+        at_rest: floor of the displacements (dimensionless) in the relative correction: near the state of rest on a
+            tool, whose force grows as the square of the penetration, corrections are no smaller than the displacements.
+        hurried: iterations allowed while the active set of a contact with a history changes, where there is something
+            cheaper to try, such as half the step.
+        small: corrections (dimensionless displacement) that may grow without a sign of divergence while the active set
+            changes. Iterations with a small correction that visit an active set for the first time do not count
+            against `Tolerances.settling`, up to `exempt` of them: of a slack sheet on a flat plug a hundred points let
+            go one or two at a time. (With a history, which depends on the step, a shorter step is better.)
+        cycles: returns of the active set to one visited before, after which it counts as cycling (solutions took up
+            to 4).
+        diverged: the iteration has diverged, contact or not, where three relative corrections in a row are larger (of
+            solutions: below 0.1).
+        left_alone: the iteration (from 0) without a local solve of contact: what the first got wrong often comes right
+            in it.
+        chords: chord iterations that may cost less than one with a new tangent: each costs a residual and a solve,
+            about a sixth.
+        slow: fall of the residual in an iteration above which a tangent is not kept: round-off would look like
+            convergence.
+    """
 
-HURRIED = 16
-"""The same, of a contact with a history where there is something cheaper to try, such as half the step."""
+    unloaded: float = 1e-5
+    at_rest: float = 1e-2
+    hurried: int = 16
+    small: float = 1e-3
+    exempt: int = 160
+    cycles: int = 8
+    diverged: float = 0.3
+    left_alone: int = 1
+    chords: int = 3
+    slow: float = 0.1
 
-_CYCLES = 8
-"""Returns of the active set to one it has had before, after which it counts as cycling (solutions took up to 4)."""
 
-_DIVERGED = 0.3
-"""The iteration has diverged, contact or not, where three corrections in a row are larger (of solutions: below 0.1)."""
-
-_LEFT_ALONE = 1
-"""The iteration (from 0) that settles no contact points: what the first got wrong often comes right in it."""
-
-SMALL = 1e-3
-"""Corrections (dimensionless displacement) that may grow without a sign of divergence while the active set changes."""
+def relative(equations: Residual, forces: float, floor: float = Newton.unloaded) -> float:
+    """A norm of forces over that of the support forces, at the residual last computed."""
+    return float(forces / (equations.force_scale + floor))
 
 
 class Iteration(NamedTuple):
     """One Newton iteration: what it found and what it did. The last entry of a history is the converged state.
 
-    residual: |F| before it, over the norm of the support forces; correction: |dx|/(|x| + AT_REST), criterion (3.5.1);
-    work: |F . dx| over its first value, criterion (3.5.2). chord: with the tangent of an iteration before it.
+    residual: |F| before it, over the norm of the support forces; correction: |dx|/(|x| + `Newton.at_rest`),
+    criterion (3.5.1); work: |F . dx| over its first value, criterion (3.5.2). chord: with the tangent of an iteration
+    before it.
     """
 
     residual: float
@@ -77,13 +94,13 @@ class _ActiveSet:
     Attributes:
         changed: the iteration at which it changed last; share: of a correction to take, halved when an active set comes
             back: full corrections would cycle.
-        found: how often a small correction led to an active set for the first time; returns: how often one came back.
+        found: how often a small correction led to a new active set (`Newton.small`); returns: how often one came back.
     """
 
-    def __init__(self, problem: Equations):
-        self._problem, self._iteration = problem, -1
-        self._seen: dict[Any, int] = {}
-        self._last: Any = None
+    def __init__(self, problem: Equations, small: float):
+        self._problem, self._small, self._iteration = problem, small, -1
+        self._seen: dict[Hashable, int] = {}
+        self._last: Hashable = None
         self.changed, self.share, self.found, self.returns = 0, 1.0, 0, 0
 
     def look(self, moved: float) -> None:
@@ -96,7 +113,7 @@ class _ActiveSet:
                 self.share = max(self.share / 2, 0.25)
                 self.returns += 1
             else:
-                self.found += moved < SMALL and not self._problem.has_history
+                self.found += moved < self._small and not self._problem.has_history
         elif self._iteration > self.changed + 1:
             self.share = 1.0
         self._seen[now] = self._iteration
@@ -107,9 +124,9 @@ class _ActiveSet:
 class Tolerances:
     """When a state counts as converged: all of these.
 
-    correction: the next correction that quadratic convergence predicts, over the norm of x (and `AT_REST`).
+    correction: the next correction that quadratic convergence predicts, over the norm of x (and `Newton.at_rest`).
     residual: norm of F over the norm of the support forces.
-    iterations: at most so many with one active set of contact; settling: and while it changes, see `SETTLING`.
+    iterations: at most so many with one active set of contact; settling: and while it changes, see `Newton.small`.
 
     Raises:
         InputError: a value that is not greater than 0.
@@ -118,7 +135,7 @@ class Tolerances:
     correction: float = 1e-10
     residual: float = 1e-8
     iterations: int = 12
-    settling: int = SETTLING
+    settling: int = 40
 
     def __post_init__(self) -> None:
         positive("Tolerances: correction", self.correction)
@@ -154,25 +171,75 @@ class Tolerances:
         return (last < 1e-11 or stalled) and residual < 1e3 * self.residual
 
 
+class _ModifiedNewton:
+    """Keeps the tangent while a few chord iterations, as many as cost less than another, will do.
+
+    (Ortega and Rheinboldt 1970, section 7.1.) For the first iteration of a step the tangent is that of a state before.
+    How far a residual falls with such a tangent is known from the last step that began with one; that is halved for
+    every step since, so that it is tried again.
+    """
+
+    def __init__(self, settings: Newton) -> None:
+        self._settings = settings
+        self._setting: Setting | None = None                # of the tangent; None: there is none
+        self._before, self._fall = 0.0, 1.0
+
+    def made(self, setting: Setting | None) -> None:
+        """There is another tangent, of an equation with this setting; None: it could not be made."""
+        self._setting = setting
+
+    def begin(self, setting: Setting | None, allowed: bool) -> None:
+        """Newton's method begins at a guess; `allowed`: tangents may be kept in this step."""
+        self._allowed, self._first = allowed, True
+        self._fall = self._before if self._setting is setting else 1.0
+
+    def keeps(self, residual: float, wanted: float) -> bool:
+        """True if the tangent is kept for the next iteration, from this residual to the one wanted."""
+        ahead = residual * self._fall**self._settings.chords
+        return self._allowed and self._fall < self._settings.slow and ahead < wanted
+
+    def took(self, chord: bool, fall: float) -> None:
+        """An iteration, with a tangent that was kept or not, made the residual fall by a factor."""
+        if self._allowed and self._first:
+            self._before = fall if chord else self._before / 2
+        self._fall, self._first = fall, False
+
+
+Constraint = Callable[[PETSc.Vec, float, PETSc.Vec], tuple[float, float]]
+"""c(x, control, gradient) -> (c, dc/dcontrol), having put dc/dx into `gradient`."""
+
+
+class Drag(Protocol):
+    """Forces that are added to F, and their derivative."""
+
+    def forces(self, x: np.ndarray) -> np.ndarray:
+        """At x, own part, shape (n,)."""
+
+    def add_to(self, tangent: PETSc.Mat) -> None:
+        """Add their derivative by x."""
+
+
 class BorderedNewton:
     """Solves F(x, control) = 0 together with c(x, control) = 0.
 
     `norm(x, control)` measures corrections. The constraint is called as c(x, control, gradient) and returns
-    (c, dc/dcontrol), having put dc/dx into `gradient`.
+    (c, dc/dcontrol), having put dc/dx into `gradient`. `drag`: forces that are added to F.
     """
 
-    def __init__(self, problem: Equations, tolerances: Tolerances, norm: Callable[[PETSc.Vec, float], float]):
+    def __init__(self, problem: Equations, tolerances: Tolerances, norm: Callable[[PETSc.Vec, float], float],
+                 settings: Newton | None = None, drag: Drag | None = None):
         self.problem, self.tolerances, self._norm = problem, tolerances, norm
+        self.settings, self._drag = settings or Newton(), drag
         self.solver = DirectSolver(problem.matrix, problem.symmetric)
         new = problem.x.duplicate
         self.F, self.F_control, self.gradient, self.a, self.b = new(), new(), new(), new(), new()
         self.reached = 0.0, 0.0                             # control and its last correction in `correct`
         self._hurried = False
-        self._chords = Chords()
+        self._modified = _ModifiedNewton(self.settings)
 
     @contextlib.contextmanager
     def in_a_hurry(self, hurried: bool) -> Iterator[None]:
-        """While something cheaper is left to try, contact with a history has to settle within `HURRIED` iterations."""
+        """While something cheaper is left to try, contact with a history must settle in `Newton.hurried` iterations."""
         self._hurried = hurried and self.problem.has_history
         try:
             yield
@@ -192,9 +259,11 @@ class BorderedNewton:
 
     def _factorise(self, x: PETSc.Vec, control: float, ahead: bool = False, rescale: bool = True) -> bool:
         """Make factors of the tangent, and `F_control`; False if it is singular."""
-        self.problem.tangent(x, control, ahead)
+        matrix = self.problem.tangent(x, control, ahead)
+        if self._drag:
+            self._drag.add_to(matrix)
         good = self.solver.factorise(rescale)
-        self._chords.made(self.problem.setting if good else None)
+        self._modified.made(self.problem.setting if good else None)
         if good:
             self.problem.control_derivative(x, control, self.F_control, ahead)
         return good
@@ -203,12 +272,12 @@ class BorderedNewton:
         """Make `self.b`, at a solution just found, that of the tangent ahead, by the factors at hand; False: failed."""
         return woodbury(self.problem, self.problem.changes_ahead(x, control), self.solver, self.b)
 
-    def correct(self, x: PETSc.Vec, control: float, constraint: Any, old: Any = None,
+    def correct(self, x: PETSc.Vec, control: float, constraint: Constraint, old: Standing | None = None,
                 chords: bool = False) -> tuple[float, list[Iteration]]:
         """Iterate x (in place) and control to convergence; returns the control and the history.
 
         `old`: the state that they are a guess ahead of, if there is one. `chords`: tangents may be kept where
-        that costs less and no contact has kinks (see `Chords`).
+        that costs less and no contact has kinks (modified Newton).
 
         Afterwards `self.b` is dx/dcontrol at the solution (to the accuracy of the last correction, or of the tangent
         that was kept).
@@ -219,19 +288,19 @@ class BorderedNewton:
         problem = self.problem
         history: list[Iteration] = []
         problem.begin(old)
-        problem.residual(x, control, self.F)
+        self._residual(x, control)
         self.a.set(0)
         self.reached = control, 0.0
-        self._chords.begin(problem.setting, chords and not problem.has_kinks)
+        self._modified.begin(problem.setting, chords and not problem.has_kinks)
         work0 = moved = 0.0
-        active = _ActiveSet(problem)
+        active = _ActiveSet(problem, self.settings.small)
         points = Settling(problem) if problem.has_kinks else None
         while True:
-            residual = self.F.norm() / (problem.force_scale + UNLOADED)
+            residual = relative(problem, self.F.norm(), self.settings.unloaded)
             if not np.isfinite(residual):
                 raise Failure(f"the forces are not finite: {problem.why_not_finite}", history)
             if history:
-                self._chords.took(history[-1].chord, residual / (history[-1].residual or 1.0))
+                self._modified.took(history[-1].chord, residual / (history[-1].residual or 1.0))
             if self.tolerances.met([i.correction for i in history], [*(i.residual for i in history), residual],
                                    bool(history) and history[-1].chord):
                 history.append(Iteration(residual, 0.0, 0.0))
@@ -241,12 +310,12 @@ class BorderedNewton:
             if points:
                 points.look()
             self._check(history, active, moved)
-            chord = self._chords.serve(residual, self.tolerances.residual)
+            chord = self._modified.keeps(residual, self.tolerances.residual)
             if not self._solve(x, control, chord, rescale=not history):
                 raise Failure("the tangent matrix is singular", history)
             step = self._correction(x, control, constraint, history)
             share = active.share
-            if points and active.changed == len(history) != _LEFT_ALONE:
+            if points and active.changed == len(history) != self.settings.left_alone:
                 step, share = points.correct(self.solver, self.a, step, self._border), 1.0
                 if points.failed == 2 and problem.has_history:
                     raise Failure("contact does not settle: no state of the points that change is consistent", history)
@@ -255,24 +324,29 @@ class BorderedNewton:
             x.axpy(share, self.a)
             control += share * step
             moved = self._norm(self.a, step)
-            correction = moved / (self._norm(x, control) + AT_REST)
+            correction = moved / (self._norm(x, control) + self.settings.at_rest)
             if not np.isfinite(correction):
                 raise Failure("the tangent matrix is singular", history)
             history.append(Iteration(residual, correction, work / work0, chord))
             self.reached = control, step
-            problem.residual(x, control, self.F)
+            self._residual(x, control)
+
+    def _residual(self, x: PETSc.Vec, control: float) -> None:
+        self.problem.residual(x, control, self.F)
+        if self._drag:
+            self.F.array_w += self._drag.forces(x.array_r)
 
     def _check(self, history: list[Iteration], active: _ActiveSet, moved: float) -> None:
         """Raise `Failure` if the iteration diverges, or takes too long."""
-        quiet = history[active.changed:]
+        settings, quiet = self.settings, history[active.changed:]
         grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
-        diverged = len(history) > 2 and min(iteration.correction for iteration in history[-3:]) > _DIVERGED
-        if diverged or grown and not (self.problem.has_kinks and moved < SMALL):
+        diverged = len(history) > 2 and min(iteration.correction for iteration in history[-3:]) > settings.diverged
+        if diverged or grown and not (self.problem.has_kinks and moved < settings.small):
             raise Failure("the iteration diverges", history)
-        if active.returns >= _CYCLES:
+        if active.returns >= settings.cycles:
             raise Failure("contact does not settle: the same points touch, stick and slide in turns", history)
-        most = min(self.tolerances.settling, HURRIED) if self._hurried else self.tolerances.settling
-        settling = len(history) - min(active.found, 4 * SETTLING) >= most
+        most = min(self.tolerances.settling, settings.hurried) if self._hurried else self.tolerances.settling
+        settling = len(history) - min(active.found, settings.exempt) >= most
         if len(quiet) >= self.tolerances.iterations or settling:
             unsettled = settling and len(history) - active.changed < 3
             raise Failure("contact does not settle: " * unsettled + f"no convergence in {len(history)} iterations",
@@ -290,7 +364,7 @@ class BorderedNewton:
         self.a.array_w[:], self.b.array_w[:] = -both[:, 0], -both[:, 1]
         return bool(np.isfinite(self.b.norm()))
 
-    def _correction(self, x: PETSc.Vec, control: float, constraint: Any, history: list) -> float:
+    def _correction(self, x: PETSc.Vec, control: float, constraint: Constraint, history: list[Iteration]) -> float:
         """Make `self.a` the correction of x; returns that of the control."""
         c, c_control = constraint(x, control, self.gradient)
         self._slope = self.gradient.dot(self.b) + c_control
@@ -313,9 +387,9 @@ class BorderedNewton:
             vector.destroy()
 
 
-def fixed(target: float) -> Any:
+def fixed(target: float) -> Constraint:
     """The constraint control = target."""
-    def c(x: Any, control: float, gradient: Any) -> tuple[float, float]:
+    def c(x: PETSc.Vec, control: float, gradient: PETSc.Vec) -> tuple[float, float]:
         gradient.set(0)
         return control - target, 1.0
     return c

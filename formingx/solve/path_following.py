@@ -10,42 +10,39 @@ import contextlib
 import logging
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..discrete.step_limit import Way
 from ..errors import ConvergenceError
-from ..measures.targets import Amplitude, Bound, Target, is_met
+from ..measures.targets import Amplitude, Bound, Target
 from . import predictor
 from .diagnose import diagnose
-from .folds import snaps, usual, was_passed
 from .newton import Failure, tangents
-from .progress import Progress
-from .snap_through import AHEAD, MOST, NoEquilibrium, jump
+from .progress import Aim, Progress
+from .snap_through import NoEquilibrium, SnapThrough, at_limit_points, snap_through, snaps, was_passed
 from .state import Record, State, Unusable
-from .stepping import StepControl
-from .time_error import TimeError
+from .stepping import StepControl, TimeError
 
 log = logging.getLogger("formingx")
 
-_JUMPS = 1e-2, 1e-3
-"""Lengths of steps below which a second failure makes the body try to jump, once each (and at the shortest step).
-
-The last is also that of the step ahead where a kink turns the path back, or where no shorter step is left."""
-
-_FURTHEST = 1e-3
-"""By how much the (dimensionless) control goes on at most in a jump from where the body is."""
-
-_PATIENCE = 500
-"""States that gain less than a thousandth of the way to the target, after which a run gives up."""
-
-_TOO_MUCH = 2.0
-"""Errors in time, over what is allowed, at which a step is taken again."""
-
 _TRY = (" Try a target within what was met, a smaller first step (step=StepControl(length=...)), more elements where"
         " the body deforms most, or more max_steps.")
+
+
+@dataclass(frozen=True)
+class PathFollowing:
+    """When a run cuts a step back, and when it gives up. The length of steps is that of its `StepControl`.
+
+    Attributes:
+        inaccurate: errors in time, over what is allowed, at which a step is taken again.
+        snap_through: see `SnapThrough`.
+    """
+
+    inaccurate: float = 2.0
+    snap_through: SnapThrough = SnapThrough()
 
 
 class Run:
@@ -56,10 +53,12 @@ class Run:
         targets: (target, its measure): the last one ends the run, the others are met on the way.
         step: step control; default that of the record's last states, or `StepControl()`.
         at_fold: what to do where the control has a limit point: "follow" the path back, "jump" to the next state, or
-            "stop"; None: as `folds.usual` says.
+            "stop"; None: as `at_limit_points` says.
         accuracy: the error in time that is allowed, relative.
         label: what is said before the target beside a progress bar.
     """
+
+    settings = PathFollowing()
 
     def __init__(self, record: Record, targets: Sequence[tuple[Target, Bound]], step: StepControl | None = None,
                  at_fold: str | None = None, accuracy: float = 2e-3, label: str = ""):
@@ -67,18 +66,16 @@ class Run:
         self._at_fold = at_fold or ""
         self._accuracy = accuracy
         self._time_error = TimeError(self.problem, accuracy) if self.problem.relaxes else None
-        self.open = list(targets)
-        self.until, self._aim = self.open[-1]
-        self._step, self._best, self._began = step, 0.0, time.perf_counter()
-        self._ahead = AHEAD                                 # by how much the control goes on in a jump
+        self.aim = Aim(self.curve, targets)
+        self._step, self._began = step, time.perf_counter()
+        self._ahead = self.settings.snap_through.ahead      # by how much the control goes on in a jump
         self._no_rest_at = np.nan                           # control from which a body that jumped came to rest nowhere
-        self._values: list[float] = []                      # what is aimed at, in the states of this run
         self._turned: list[State] = []                      # its first state, if it goes back from there
 
     def follow(self, max_steps: int | None, progress: bool, start: State | None, may_turn: bool = False) -> None:
         """Follow the path from a state, or on from the last one, until the last target is met.
 
-        max_steps: states before the run gives up; None: it does when `_PATIENCE` states have come no nearer.
+        max_steps: states before the run gives up; None: it does when many states have come no nearer.
         may_turn: one that goes on, to another target than the states were on their way to, may go back to it.
 
         Raises:
@@ -87,37 +84,37 @@ class Run:
         record, before = self.record, self.record.counts.steps
         kept: dict[str, Any] = {}
         self._first = len(record.states)
-        self._progress = Progress(self.problem.comm, f"{self._label}to {self.until}", progress)
+        self._progress = Progress(self.problem.comm, f"{self._label}to {self.aim.until}", progress)
         try:
             if start is None:
                 kept = self._go_on(may_turn)
             else:
                 self._accept(self._facing_target(start))
-            self._at_fold = self._at_fold or usual(self.problem, self._falls)
+            self._at_fold = self._at_fold or at_limit_points(self.problem, self._falls)
             if self._step is None or asdict(self._step) == kept.get("given"):
                 self.step = StepControl(**kept.get("step", {}))
             else:
                 self.step = replace(self._step)
-            self._close_met(record.last)
-            self._settle()
-            while self._is_open(self.until):
+            self.aim.close_met(record.last)
+            self._complete_step()
+            while self.aim.is_open():
                 if max_steps is not None and record.counts.steps - before >= max_steps:
-                    self._give_up(f"{max_steps} states were accepted before it", pace=self._pace(max_steps))
+                    self._give_up(f"{max_steps} states were accepted before it", pace=self.aim.pace(max_steps))
                 self._check_progress()
                 for state in self._next(self.states[-1]):
                     self._accept(state)
-                    self._check_jump(state)
+                    self._stop_if(self.aim.jumped_past(state))
                     if state.kind == "limit point" and self._at_fold == "stop":
                         record.ended = f"the {self._driven} has a limit point at {record.describe(state)}"
                     if record.ended or self.problem.has_history or self._at_fold == "jump":
                         break                           # the rest of the step starts from here
-                    if not self._is_open(self.until) and state.met is self.until:
+                    if not self.aim.is_open() and state.met is self.aim.until:
                         break
-                self._settle()
+                self._complete_step()
                 if record.ended:
                     break
-                self._check_direction()
-                self._progress.show(self._gained(self._values[-1]), len(self.states), self.step.length)
+                self._stop_if(self.aim.turned_back())
+                self._progress.show(self.aim.gained(), len(self.states), self.step.length)
         except BaseException:
             record.counts.seconds += self._elapsed()
             raise
@@ -133,7 +130,7 @@ class Run:
     def _may_jump(self) -> bool:
         """True if the body may jump: at folds, or, if these are followed, where contact or friction ends the path."""
         may_end = self.problem.has_history or self.problem.has_kinks
-        return self._at_fold in ("jump", "blow") or self._at_fold == "follow" and may_end
+        return self._at_fold in ("jump", "follow volume") or self._at_fold == "follow" and may_end
 
     @property
     def _jumps_soon(self) -> bool:
@@ -141,7 +138,7 @@ class Run:
 
         Not where a pressure is followed with a history: what slips on the way counts.
         """
-        return self._at_fold == "jump" or self._at_fold == "blow" and not self.problem.has_history
+        return self._at_fold == "jump" or self._at_fold == "follow volume" and not self.problem.has_history
 
     @property
     def _sense(self) -> float:
@@ -151,7 +148,7 @@ class Run:
     @property
     def _falls(self) -> bool:
         """True if what is driven is taken back towards 0, as a pressure that is let off."""
-        return isinstance(self._aim, Amplitude) and abs(self.until.value) < abs(self._values[0])
+        return self.aim.of_control and abs(self.aim.until.value) < abs(self.aim.values[0])
 
     @property
     def states(self) -> list[State]:
@@ -165,20 +162,20 @@ class Run:
         """
         record, last = self.record, self.record.last
         there = record.stand()
-        pressure = isinstance(self._aim, Amplitude) and self._aim.of_load
-        if may_turn and last.stepping.get("until") != [*self.until[:2]] and not pressure:
+        aim, bound = self.aim, self.aim.measure
+        pressure = isinstance(bound, Amplitude) and bound.of_load
+        if may_turn and last.stepping.get("until") != [*aim.until[:2]] and not pressure:
             with self.problem.at(last):
                 facing = self._facing_target(replace(last))
             self._turned = [facing] if facing.slope != last.slope else []
         self._first -= 1 if self._turned else there
         for state in self.states:
             with self.problem.at(state):
-                self._values.append(self.curve.value(self._aim, state.x, state.control))
-        self._best = max(map(self._gained, self._values))
+                aim.look(state)
         met = [s.met[:2] for s in self.states if s.met]
-        self.open = [(target, bound) for target, bound in self.open if target[:2] not in met]
+        aim.open = [(target, bound) for target, bound in aim.open if target[:2] not in met]
         kept = next((s.stepping for s in reversed(self.states) if s.stepping), {})
-        self._ahead, no_rest_at = kept.get("jumps", (AHEAD, None))
+        self._ahead, no_rest_at = kept.get("jumps", (self.settings.snap_through.ahead, None))
         self._no_rest_at = np.nan if no_rest_at is None else no_rest_at
         return kept
 
@@ -187,11 +184,10 @@ class Run:
         before, self._began = self._began, time.perf_counter()
         return self._began - before
 
-    def _settle(self) -> None:
-        """A step is complete."""
+    def _complete_step(self) -> None:
         self.record.counts.seconds += self._elapsed()
         no_rest_at = None if np.isnan(self._no_rest_at) else float(self._no_rest_at)
-        self.record.settle(self.step, self.until, given=self._step and asdict(self._step),
+        self.record.complete_step(self.step, self.aim.until, given=self._step and asdict(self._step),
                            accuracy=self._accuracy, jumps=(self._ahead, no_rest_at))
 
     def _facing_target(self, start: State) -> State:
@@ -199,33 +195,27 @@ class Run:
 
         (At rest a target that does not change sign with the control may be reached both ways.)
         """
-        if self.until.signed or self.record.states:
-            left, rate = self.curve.aim(self._aim, self.until.value, start)
+        if self.aim.until.signed or self.record.states:
+            left, rate = self.curve.aim(self.aim.measure, self.aim.until.value, start)
             if left * rate > 0:
                 start.direction, start.slope = -start.direction, -start.slope
         return start
 
-    def _close_met(self, start: State) -> None:
-        """Close the targets that hold at the start already, to round-off."""
-        for target, bound in list(self.open):
-            if is_met(target, bound, self.curve.value(bound, start.x, start.control)):
-                start.met = start.met or target
-                self.open = [(t, b) for t, b in self.open if t is not target]
-
     def _next(self, old: State) -> list[State]:
         """The next states: one at a target within reach, or one step ahead, and what lies on the way to it.
 
-        Failures halve the step. Where short ones fail, or the control has its limit, the body jumps (where the
-        shortest fails, if a jump from near there came to rest nowhere; or from the first state, with a history: what
-        touches on the way slips by what the tangent foretells, which at rest knows nothing of what is about to touch).
+        A failure halves the step. Where short ones fail, or the control has its limit, the body snaps through. (Only
+        where the shortest fails if a snap-through from near there came to rest nowhere; and from the first state, with
+        a history: slip in a step is predicted along the tangent, which at rest knows no contact yet.)
         """
-        first, jumps, failed, most, limit = self.step.length, [*_JUMPS, 0.0], 0, np.inf, self.problem.limit
+        first, failed, most, limit = self.step.length, 0, np.inf, self.problem.limit
+        lengths, last = [*self.settings.snap_through.lengths, 0.0], self.settings.snap_through.lengths[-1]
         if snaps(self.curve, old, self._at_fold, self._sense):
             return self._snap(old)
         while True:
             length = min(self.step.length, most)
             length = limit.length(Way(old.x, old.control, old.direction, old.slope, length)) if limit else length
-            target, bound, reach = self._within_reach(old, length)
+            target, bound, reach = self.aim.within_reach(old, length)
             if length < self.step.length:
                 self._progress.limited("contact arriving", length)
             try:
@@ -240,11 +230,11 @@ class Run:
                 good = self.step.failed()
                 self._failed(failure.reason, self.step.length)
                 failed += not isinstance(failure, _Astray)
-                soon = (self._jumps_soon and failed > 1 and length < jumps[0]
+                soon = (self._jumps_soon and failed > 1 and length < lengths[0]
                         and (old.kind != "start" or not self.problem.has_history) and not self._found_no_rest_near(old))
                 if self._may_jump and (not good or soon):
-                    jumps.pop(0)
-                    for ahead in (reach,) if good else (_JUMPS[-1], 0.0):
+                    lengths.pop(0)
+                    for ahead in (reach,) if good else (last, 0.0):
                         with contextlib.suppress(Failure):
                             return [self._jump(old, ahead, first)]
                 if not good:
@@ -262,7 +252,7 @@ class Run:
         if limit:
             limit.prepare(Way(old.x, old.control, old.direction, old.slope, reach), ends=True)
         behind = None if self.problem.has_kinks else predictor.behind(self.states, reach, self.curve.distance)
-        with self.curve.newton.in_a_hurry(length > _JUMPS[0]):
+        with self.curve.newton.in_a_hurry(length > self.settings.snap_through.lengths[0]):
             if target is None:
                 new = self.curve.step(old, length, self._foretold, behind)
             else:
@@ -277,7 +267,7 @@ class Run:
         if was_passed(self.curve, self.states[:-1], old, new):
             raise _Astray("the iteration fell back to a part of the path that was passed", [])
         error = self._error_in_time(new)
-        states, self._ahead = self._sorted_into(old, new), AHEAD
+        states, self._ahead = self._sorted_into(old, new), self.settings.snap_through.ahead
         if target is None and length == self.step.length:   # not one that contact has made shorter
             self.step.accepted(tangents(new.history), error)
         return states
@@ -299,7 +289,7 @@ class Run:
         if self._time_error is None:
             return 0.0
         error = self._time_error.of(self.states, new.x, new.control)
-        if error > _TOO_MUCH:
+        if error > self.settings.inaccurate:
             raise Cutback("the error in time", max(0.8 * error ** (-1 / 3), 0.1), lasts=True)
         return error
 
@@ -307,7 +297,7 @@ class Run:
         """The state that the body jumps to from a fold; none if there is none: a body left alone has snapped."""
         if old.kind != "limit point":
             with contextlib.suppress(Failure):
-                return [self._jump(old, _JUMPS[-1])]
+                return [self._jump(old, self.settings.snap_through.lengths[-1])]
         try:
             return [self._jump(old, 0.0)]
         except Failure as failure:
@@ -324,14 +314,14 @@ class Run:
         From where the body is, contact that remembers may settle at one control and not at another next to it: others
         are tried, too. What fades is let go of at once: on the way it is a load of its own, which no process has.
         """
-        fading = self.problem.setting.fading
-        others = (AHEAD, _FURTHEST) if length == 0 and self.problem.has_history and not fading else ()
+        fading, settings = self.problem.setting.fading, self.settings.snap_through
+        others = (settings.ahead, settings.furthest) if length == 0 and self.problem.has_history and not fading else ()
         for ahead in dict.fromkeys((self._ahead, *others)):
             self._ahead = ahead
             try:
                 by = 1 - old.control if fading else self._change(old, max(ahead, length * abs(old.slope)))
-                new = jump(self.curve, old, by, length > 0 and not fading, self._solutions(old),
-                           lambda: self._progress.limited("a jump", self.step.length))
+                new = snap_through(self.curve, old, by, length > 0 and not fading, settings, self._solutions(old),
+                                   lambda: self._progress.limited("a jump", self.step.length))
                 break
             except Failure as last:
                 failure = last
@@ -339,50 +329,29 @@ class Run:
                     self._no_rest_at = old.control
         else:
             raise failure
-        self._ahead = min(10 * self._ahead, _FURTHEST)
-        new.met = next((target for target, bound in self.open
-                        if is_met(target, bound, self.curve.value(bound, new.x, new.control))), None)
+        self._ahead = min(10 * self._ahead, settings.furthest)
+        new.met = self.aim.met_by(new)
         self.step.length = max(self.step.length, step / 2)
         log.info("a jump: %s", new.jump)
         return new
 
     def _found_no_rest_near(self, old: State) -> bool:
         """True if a jump from about the control of a state, which costs most, came to rest nowhere."""
-        return abs(old.control - self._no_rest_at) < _FURTHEST
+        return abs(old.control - self._no_rest_at) < self.settings.snap_through.furthest
 
     def _solutions(self, old: State) -> int:
         """Viscous ones that a jump from a state may take."""
-        return MOST // 5 if self._found_no_rest_near(old) else MOST
+        most = self.settings.snap_through.solutions
+        return most // 5 if self._found_no_rest_near(old) else most
 
     def _change(self, old: State, size: float) -> float:
         """Of the control in a jump, of at most a size: it does not pass a target."""
         by = self._sense * size
-        for target, bound in self.open:
+        for target, bound in self.aim.open:
             if isinstance(bound, Amplitude) and bound.moves:
                 then, now = (self.curve.value(bound, old.x, c) - target.value for c in (old.control + by, old.control))
                 by *= now / (now - then) if now * then < 0 else 1.0
         return by
-
-    def _check_direction(self) -> None:
-        """Stop if the path has turned back: its target further away than half of what had been gained.
-
-        (A control may fall again after a limit point, but not below where it started.)
-        """
-        if not self._is_open(self.until):
-            return
-        gained = self._gained(self._values[-1])
-        self._best = max(self._best, gained)
-        kept = 0.0 if isinstance(self._aim, Amplitude) else 0.5
-        if self._best > 0.05 and gained < kept * self._best or gained < -0.05:
-            self._give_up("the path turned back, which a crease at a singular corner (a clamped rim on a fine mesh) can"
-                          " cause")
-
-    def _check_jump(self, state: State) -> None:
-        """Stop if the body has jumped past its target."""
-        if state.kind == "jump" and self._is_open(self.until):
-            before, now = self._values[-2:]
-            if (before - self.until.value) * (now - self.until.value) < 0:
-                self._give_up(f"the body snaps past it, from {before:.6g} to {now:.6g}: no state lies between")
 
     def _check_progress(self) -> None:
         """Stop if many states have come no nearer to the target, or what is driven has gone beyond all bounds."""
@@ -391,23 +360,11 @@ class Run:
         if absurd is not None:
             value = self.problem.shown(control)[1]
             self._give_up(f"the {self._driven} has come to {value:.4g}, and nothing holds it: {absurd}")
-        if len(self._values) > _PATIENCE:
-            now, then = (self._gained(self._values[k]) for k in (-1, -1 - _PATIENCE))
-            if abs(now - then) < 1e-3:
-                self._give_up(f"the last {_PATIENCE} states came no nearer to it")
+        self._stop_if(self.aim.stalled())
 
-    def _gained(self, value: float) -> float:
-        """How far a value of what is aimed at has come, from that of the first state (0) to the target (1)."""
-        return (value - self._values[0]) / ((self.until.value - self._values[0]) or 1.0)
-
-    def _within_reach(self, old: State, length: float) -> tuple:
-        """(target, its measure, distance) of the first open target that the tangent meets within `length`."""
-        best: tuple = (None, None, length)
-        for target, bound in self.open:
-            left, rate = self.curve.aim(bound, target.value, old)
-            if left * rate < 0 and -left / rate < best[2]:
-                best = (target, bound, -left / rate)
-        return best
+    def _stop_if(self, why: str) -> None:
+        if why:
+            self._give_up(why)
 
     def _sorted_into(self, old: State, new: State) -> list[State]:
         """The states from old to new in order: a limit point and targets inside the step, then new itself.
@@ -423,7 +380,7 @@ class Run:
             if (limit.control - old.control) * old.slope < 0:   # it belongs to what a jump has passed
                 raise Failure("a limit point lies ahead, but it was located behind", [])
             found.append(limit)
-        for target, bound in self.open:
+        for target, bound in self.aim.open:
             if target is new.met:
                 continue
             a, b = (self.curve.value(bound, s.x, s.control) - target.value for s in (old, new))
@@ -448,42 +405,26 @@ class Run:
             self._give_up(f"at {record.describe(state)} {unusable}; beyond=True goes on all the same")
         if self.problem.has_kinks:
             self.curve.look_ahead(state)
-        self._values.append(self.curve.value(self._aim, state.x, state.control))
+        self.aim.accept(state)
         record.counts.iterations += self.curve.spent()
-        self.open = [(t, b) for t, b in self.open if t is not state.met     # another may hold there, too
-                     and not is_met(t, b, self.curve.value(b, state.x, state.control))]
         log.info("state %d: %s, %d iterations", record.counts.steps, record.describe(state), len(state.history) - 1)
-
-    def _is_open(self, target: Target) -> bool:
-        return any(t is target for t, _ in self.open)
-
-    def _pace(self, max_steps: int) -> str:
-        """How far a run had come when its steps ran out."""
-        aim = self.until.value
-        before, now = self._values[-2:]
-        part = self._gained(now)
-        if not (aim - now) * (now - before) > 0:
-            return f"max_steps = {max_steps} ran out, and the last step led away from the target"
-        return (f"max_steps = {max_steps} ran out in good health at {100 * part:.3g} % of the target: the last step"
-                f" gained {now - before:.4g} of the {aim - now:.4g} that are left, which makes about"
-                f" {int(np.ceil((aim - now) / (now - before)))} steps more at that pace")
 
     def _give_up(self, why: str, attempt: Any = None, pace: str = "") -> None:
         self.record.counts.iterations += self.curve.spent()
         found = diagnose(self.curve, self.states, why, attempt, pace,
-                         self.until.value if isinstance(self._aim, Amplitude) else None)
+                         self.aim.until.value if self.aim.of_control else None)
         self.curve.spent()                                  # the diagnosis is not part of the run
         raise self._error(f"{why}.", found)
 
     def _error(self, why: str, diagnosis: Any) -> ConvergenceError:
         """What happened, what was met, what to try."""
-        record, states, values = self.record, self.states, self._values
-        best = int(np.argmin([abs(v - self.until.value) for v in values]))
+        record, states, values = self.record, self.states, self.aim.values
+        best = int(np.argmin([abs(v - self.aim.until.value) for v in values]))
         limits = "".join(f" A limit point was passed at {record.describe(s)}." for s in states
                          if s.kind == "limit point")
         return ConvergenceError(
-            f"{f'Stage {record.stage!r}: ' * bool(record.stage)}{self.until} was not reached: {why} The nearest met was"
-            f" {values[best]:.6g}, at {record.describe(states[best])}.{limits} The last good state is"
+            f"{f'Stage {record.stage!r}: ' * bool(record.stage)}{self.aim.until} was not reached: {why} The nearest met"
+            f" was {values[best]:.6g}, at {record.describe(states[best])}.{limits} The last good state is"
             f" {record.describe(record.last)}; it is kept in the error's `path`."
             + ("" if diagnosis.advice else _TRY), diagnosis=diagnosis)
 

@@ -16,11 +16,12 @@ import numpy as np
 from ..discrete.schedule import Setting
 from ..errors import ConvergenceError, InputError
 from ..measures.targets import Amplitude, Bound, Target, changed, process_time
+from .arc_length import Curve
+from .diagnose import diagnose
 from .measure_control import Flow
-from .newton import UNLOADED, Failure
+from .newton import Failure, relative
 from .path_following import Run
 from .stage import Plan
-from .start import begin
 from .state import Record, State
 from .stepping import StepControl
 
@@ -123,7 +124,7 @@ class Execution:
     def _take_up(self, state: State) -> None:
         """Take up a state that needs no solving."""
         self.record.accept(state)
-        self.record.settle(StepControl(), changed())
+        self.record.complete_step(StepControl(), changed())
 
     def _trace(self, targets: list, control: float | None) -> list:
         """Follow the path from a control (None: on from the last state); returns the targets that are still open."""
@@ -133,7 +134,7 @@ class Execution:
         run = Run(self.record, targets, step, self._stage.at_fold, self._accuracy, self._label)
         start = None if control is None else self._resumed(control)
         run.follow(self._max_steps, self._progress, start)
-        return run.open
+        return run.aim.open
 
     def _change(self, begun: bool) -> None:
         """Piece 0: what takes part changes. What that leaves without balance is taken away gradually."""
@@ -155,7 +156,7 @@ class Execution:
     def _out_of_balance(self, x: np.ndarray) -> bool:
         self.problem.x.array_w[:] = x
         self.problem.residual(self.problem.x, 1.0, self.curve.newton.F)
-        return self.curve.newton.F.norm() > self._balanced * (self.problem.force_scale + UNLOADED)
+        return relative(self.problem, self.curve.newton.F.norm()) > self._balanced
 
     def _drive(self, numbers: list[int], begun: bool) -> None:
         """Piece 1: one thing is the control."""
@@ -279,3 +280,39 @@ class Execution:
             if first[0] <= now + _SAME * abs(now) and abs(stands - first[1]) > 1e-9 * size:
                 raise InputError(f"{who}: the table of {name} begins with {first[1]:g} at time {first[0]:g}, but it"
                                  f" stands at {stands:g} then")
+
+
+def begin(curve: Curve) -> State:
+    """The first state of a path: the body at control 0, in equilibrium with whatever else acts on it.
+
+    Fixed loads for which Newton's method finds no equilibrium from rest are brought in gradually.
+
+    Raises:
+        ConvergenceError: there is none.
+    """
+    problem = curve.problem
+    try:
+        return curve.start()
+    except Failure as failure:
+        first, rest = problem.setting, np.zeros(problem.x.getLocalSize())
+        if not problem.fixed_loads:
+            raise _no_start(curve, failure) from None
+        record = Record(problem, curve)
+        target = Target("change", 1.0, None)
+        try:
+            problem.enter(replace(first, rate=[0.0] * len(first.rate), fading=True), rest, 0.0)
+            run = Run(record, [(target, Amplitude(problem, None))])
+            run.follow(1000, False, curve.resume(rest, 0.0))
+        except (ConvergenceError, Failure):
+            raise _no_start(curve, failure) from None
+        problem.enter(first, record.last.x, 0.0)
+        return curve.resume(record.last.x, 0.0)
+
+
+def _no_start(curve: Curve, failure: Failure) -> ConvergenceError:
+    """The error of a body for which no first state was found."""
+    loads = curve.problem.fixed_loads
+    words, advice = (f", under {', '.join(loads)}", "drive the largest of them instead") if loads else (
+        "", "a tool touches the body at rest: give its Contact a smaller ramp")
+    return ConvergenceError(f"no equilibrium was found before anything is driven{words}: {failure.reason}; {advice}",
+                            diagnosis=diagnose(curve, [], failure.reason, failure.attempt))

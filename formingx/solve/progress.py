@@ -1,26 +1,138 @@
-"""How far a run has come: a bar, and now and then a line in the log."""
+"""What a run aims at and how far it has come: its targets, a bar, and now and then a line in the log."""
 
 from __future__ import annotations
 
 import logging
 import time
 from collections import Counter
-from typing import Any
+from collections.abc import Sequence
+
+import numpy as np
+from mpi4py import MPI
+
+from ..measures.targets import Amplitude, Bound, Target, is_met
+from .arc_length import Curve
+from .state import State
 
 log = logging.getLogger("formingx")
 
-SILENCE = 30.0
-"""Seconds of processor time after which a line says where a run stands."""
+
+class Aim:
+    """The targets of a run that are still open, and what the last of them, which ends it, measures in its states.
+
+    Attributes:
+        open: [(target, its measure)]; until, measure: those of the last; values: of that, in the user's units.
+        patience: states that gain less than a thousandth of the way to the target, after which a run gives up.
+    """
+
+    patience = 500
+
+    def __init__(self, curve: Curve, targets: Sequence[tuple[Target, Bound]]):
+        self._curve, self.open, self._best = curve, list(targets), 0.0
+        self.until, self.measure = self.open[-1]
+        self.values: list[float] = []
+
+    @property
+    def of_control(self) -> bool:
+        """True if what is aimed at is the control, or something that follows it."""
+        return isinstance(self.measure, Amplitude)
+
+    def is_open(self) -> bool:
+        """True until the last target is met."""
+        return any(target is self.until for target, _ in self.open)
+
+    def gained(self, value: float | None = None) -> float:
+        """How far a value, by default the last, has come from that of the first state (0) to the target (1)."""
+        value = self.values[-1] if value is None else value
+        return (value - self.values[0]) / ((self.until.value - self.values[0]) or 1.0)
+
+    def look(self, state: State) -> None:
+        """Take up the value of a state."""
+        self.values.append(self._curve.value(self.measure, state.x, state.control))
+        self._best = max(self._best, self.gained())
+
+    def accept(self, state: State) -> None:
+        """A state is accepted: close the targets that it meets."""
+        self.values.append(self._curve.value(self.measure, state.x, state.control))
+        self.open = [(t, b) for t, b in self.open if t is not state.met     # another may hold there, too
+                     and not is_met(t, b, self._curve.value(b, state.x, state.control))]
+
+    def met_by(self, state: State) -> Target | None:
+        """The first open target that holds at a state, to round-off."""
+        return next((target for target, bound in self.open
+                     if is_met(target, bound, self._curve.value(bound, state.x, state.control))), None)
+
+    def close_met(self, start: State) -> None:
+        """Close the targets that hold at the start already."""
+        while (target := self.met_by(start)) is not None:
+            start.met = start.met or target
+            self.open = [(t, b) for t, b in self.open if t is not target]
+
+    def within_reach(self, old: State, length: float) -> tuple[Target | None, Bound | None, float]:
+        """(target, its measure, distance) of the first open target that the tangent meets within a length."""
+        best: tuple[Target | None, Bound | None, float] = (None, None, length)
+        for target, bound in self.open:
+            left, rate = self._curve.aim(bound, target.value, old)
+            if left * rate < 0 and -left / rate < best[2]:
+                best = (target, bound, -left / rate)
+        return best
+
+    # why a run should give up, in words; "" if nothing speaks against going on
+
+    def turned_back(self) -> str:
+        """The target is further away than half of what had been gained.
+
+        (A control may fall again after a limit point, but not below where it started.)
+        """
+        if not self.is_open():
+            return ""
+        gained = self.gained()
+        self._best = max(self._best, gained)
+        kept = 0.0 if self.of_control else 0.5
+        if self._best > 0.05 and gained < kept * self._best or gained < -0.05:
+            return ("the path turned back, which a crease at a singular corner (a clamped rim on a fine mesh) can"
+                    " cause")
+        return ""
+
+    def jumped_past(self, state: State) -> str:
+        """The body has snapped to a state beyond the target."""
+        if state.kind == "jump" and self.is_open():
+            before, now = self.values[-2:]
+            if (before - self.until.value) * (now - self.until.value) < 0:
+                return f"the body snaps past it, from {before:.6g} to {now:.6g}: no state lies between"
+        return ""
+
+    def stalled(self) -> str:
+        """Many states have come no nearer to the target."""
+        if len(self.values) > self.patience:
+            now, then = (self.gained(self.values[k]) for k in (-1, -1 - self.patience))
+            if abs(now - then) < 1e-3:
+                return f"the last {self.patience} states came no nearer to it"
+        return ""
+
+    def pace(self, max_steps: int) -> str:
+        """How far a run had come when its steps ran out."""
+        aim, (before, now) = self.until.value, self.values[-2:]
+        if not (aim - now) * (now - before) > 0:
+            return f"max_steps = {max_steps} ran out, and the last step led away from the target"
+        return (f"max_steps = {max_steps} ran out in good health at {100 * self.gained():.3g} % of the target: the last"
+                f" step gained {now - before:.4g} of the {aim - now:.4g} that are left, which makes about"
+                f" {int(np.ceil((aim - now) / (now - before)))} steps more at that pace")
 
 
 class Progress:
-    """Of a run to its target, on rank 0: a bar after two seconds, and a line after each `SILENCE`.
+    """Of a run to its target, on rank 0: a bar after two seconds, and a line after each `silence`.
 
     Args:
         comm: of the run. words: what it is about. shown: False: no bar, and lines are of the level INFO.
+
+    Attributes:
+        silence: seconds of processor time after which a line says where a run stands.
     """
 
-    def __init__(self, comm: Any, words: str, shown: bool):
+    silence = 30.0
+
+    def __init__(self, comm: MPI.Intracomm, words: str, shown: bool):
         from tqdm import tqdm
         self._words, self._here = words, comm.rank == 0
         self._level = logging.WARNING if shown else logging.INFO          # INFO is not seen unless asked for
@@ -52,7 +164,7 @@ class Progress:
 
     def _speak(self) -> None:
         now = time.process_time()
-        if not self._here or now - self._said < SILENCE:
+        if not self._here or now - self._said < self.silence:
             return
         spent, won = now - self._said, self._gained - self._gained_then
         left = f"about {_in_words((1 - self._gained) * spent / won)} left" if won > 0 else "no nearer than then"

@@ -1,114 +1,131 @@
-"""The next state where there is none to go on to: a body that moves against a viscous stress, at a fixed control.
+"""Snap-through: the next state where there is none to go on to, and when a body goes there.
 
 Where a process drives one way, a body snaps at a fold of its path, and at a kink beyond which there is no state nearby.
-It comes to rest in the next equilibrium. The way there is followed with vanishing viscosity,
+It comes to rest in the next equilibrium. The way there is followed with vanishing viscosity, at a fixed control,
 
     F(x) + eta V (x - x_k) = 0,   V that of a viscous stress in proportion to dF, as in a Kelvin-Voigt solid,
 
-from one x_k to the next, the histories taken up at each. (So a wave as short as an element is held no less, and a long
-one no more, than the body itself holds it; in a viscous medium, V = 1, what lets go at an edge wants 1e4 times the
-viscosity that lets the body come to rest.) eta falls where the body moves smoothly and grows where it does not; where
-it is 0 the body is at rest. What is out of balance on the way does work that is lost.
+from one x_k to the next, the histories taken up at each. (Kelvin-Voigt damping holds waves of all lengths in proportion
+to their stiffness. Damping in proportion to the mass holds short ones least: what lets go at an edge then wants 1e4
+times the viscosity that lets the body come to rest.) eta falls where the body moves smoothly and grows where it does
+not; where it is 0 the body is at rest. What is out of balance on the way does work that is lost.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from petsc4py import PETSc
 
 from ..discrete.step_limit import Way
-from .newton import UNLOADED, BorderedNewton, Failure, Iteration, Tolerances, fixed
+from .arc_length import Curve
+from .equations import Equations, Viscosity
+from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
 from .state import State
 
-AHEAD = 1e-6
-"""By how much the (dimensionless) control goes on in a jump from a limit point."""
 
-_FIRST, _LARGEST, _LEAST, _FALLS, _GROWS = 1.0, (1e5, 1e9), 1e-9, 0.3, (10.0, 3.0)
-"""Of eta (over the shear modulus): at first, at most (before and after the body has begun to move), at least; factors
-after a solution that took at most `_FEW` iterations, and after none was found (before and after).
+@dataclass(frozen=True)
+class SnapThrough:
+    """When a body snaps through, and how the way to its next state is followed.
 
-It begins low and grows to the least that gives a solution: where a state follows after all, only a little viscosity
-finds it; much would hold the body back while contact lets go, and what slips meanwhile changes where it ends. (At
-the brink of release two states may be near, and which is found still depends on eta: tests/test_jumps.py.)"""
+    eta, over the shear modulus, begins low and grows to the least that gives a solution: where a state follows after
+    all, only a little viscosity finds it; much would hold the body back while contact lets go, and what slips meanwhile
+    changes where it ends. (At the brink of release two states may be near, and which is found still depends on eta.)
+    What is lost depends on how far the body moves in a viscous solution and, with friction, where it ends: both are
+    measured in tests/test_jumps.py. Distances are dimensionless, in the mean; forces over the support forces.
 
-_LONGEST_WAIT = 8
-"""Solutions at most for which eta stays after a failure: twice as many from one failure to the next, and half as many
-again where eta has fallen and a solution was found."""
+    Attributes:
+        lengths: step lengths below which a second failure triggers a snap-through, once each. The last is also that of
+            the predictor where a kink turns the path back, or where no shorter step is left.
+        ahead, furthest: by how much the control goes on, at first and at most.
+        eta, least: the first eta, and where it is as good as 0.
+        most, most_moving: largest eta before and after the body has begun to move.
+        falls: factor of eta after a solution that took at most `few` iterations; grows, grows_moving: after none was
+            found, before and after the body has begun to move.
+        longest_wait: solutions at most for which eta stays after a failure: twice as many from one failure to the next,
+            and half as many again where eta has fallen and a solution was found.
+        tolerances: of a viscous solution. (Where contact does not settle soon more viscosity is cheaper than more
+            iterations.)
+        nearest, farthest, share: how far the body is to move in a viscous solution: this share of its way up to there,
+            within bounds. again: how many times as far the first may move it, or it is made again with more viscosity.
+        solutions, too_far: viscous solutions, and a distance, after which the body counts as never coming to rest.
+            (Where a sheet is drawn over an edge point by point hundreds of short ones are needed.)
+        near_rest: viscous forces below which the state at rest is looked for.
+        at_rest: viscous forces below which the body rests, though where a point is at a kink of its law of friction the
+            iteration without them may go to and fro.
+    """
 
-_FEW, _TOLERANCES = 6, Tolerances(1e-8, 1e-6, settling=8)
-"""Of a viscous solution. (Where contact does not settle soon more viscosity is cheaper than more iterations.)"""
-
-_FAR, _SHARE, _AGAIN = (3e-4, 0.1), 0.1, 3.0
-"""How far (dimensionless, in the mean) the body is to move in a viscous solution: within bounds, a share of its way up
-to there; how many times as far the first may move it, or it is made again with more viscosity. What is lost depends on
-it and, with friction, where it ends (tests/test_jumps.py)."""
-
-MOST, _TOO_FAR = 1000, 10.0
-"""Viscous solutions, and a distance (dimensionless, in the mean), after which the body counts as never coming to rest.
-(Where a sheet is drawn over an edge point by point a jump takes hundreds of short ones.)"""
-
-_NEAR_REST = 1e-3
-"""Viscous forces (over the support forces) below which the state at rest is looked for."""
-
-_AT_REST = 1e-10
-"""Viscous forces (over the support forces) below which the body rests, though where a point is at a kink of its law of
-friction the iteration without them may go to and fro."""
+    lengths: tuple[float, ...] = (1e-2, 1e-3)
+    ahead: float = 1e-6
+    furthest: float = 1e-3
+    eta: float = 1.0
+    least: float = 1e-9
+    most: float = 1e5
+    most_moving: float = 1e9
+    falls: float = 0.3
+    few: int = 6
+    grows: float = 10.0
+    grows_moving: float = 3.0
+    longest_wait: int = 8
+    tolerances: Tolerances = Tolerances(1e-8, 1e-6, settling=8)
+    nearest: float = 3e-4
+    farthest: float = 0.1
+    share: float = 0.1
+    again: float = 3.0
+    solutions: int = 1000
+    too_far: float = 10.0
+    near_rest: float = 1e-3
+    at_rest: float = 1e-10
 
 
 class NoEquilibrium(Failure):
     """A body that moved on came to rest nowhere."""
 
 
-class _Viscous:
-    """A problem with viscosity: F + eta V (x - origin), but for unknowns that are held."""
+class ViscousDrag:
+    """eta V (x - origin), own part; nothing at unknowns that are held."""
 
-    def __init__(self, problem: Any):
-        self._problem, self._viscosity = problem, problem.viscosity()
+    def __init__(self, viscosity: Viscosity):
+        self._viscosity = viscosity
         self.eta, self.origin = 0.0, np.zeros(0)
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._problem, name)
-
-    def residual(self, x: Any, control: float, out: Any) -> None:
-        """out = F(x, control) + eta V (x - origin)."""
-        self._problem.residual(x, control, out)
-        out.array_w += self.drag(x.array_r)
-
-    def tangent(self, x: Any, control: float, ahead: bool = False) -> Any:
-        """Its derivative by x."""
-        matrix = self._problem.tangent(x, control, ahead)
-        self._viscosity.add_to(matrix, self.eta)
-        return matrix
-
-    def drag(self, x: np.ndarray) -> np.ndarray:
-        """eta V (x - origin), own part."""
+    def forces(self, x: np.ndarray) -> np.ndarray:
+        """At x, own part, shape (n,)."""
         return self._viscosity.forces(x - self.origin, self.eta)
+
+    def add_to(self, tangent: PETSc.Mat) -> None:
+        """Add eta V."""
+        self._viscosity.add_to(tangent, self.eta)
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
         self._viscosity.destroy()
 
 
-class _Way:
-    """From a state to the next: where the body is on it, and what was lost."""
+class _Motion:
+    """From a state to the next: where the body is on the way, and what was lost."""
 
-    def __init__(self, curve: Any, old: State, control: float):
+    def __init__(self, curve: Curve, old: State, control: float, settings: SnapThrough):
         self.curve, self.problem, self._old, self.control = curve, curve.problem, old, control
-        self.viscous = _Viscous(curve.problem)
-        self._newton = BorderedNewton(self.viscous, _TOLERANCES, curve.norm)
-        self._x, self._drag = curve.problem.x.duplicate(), np.zeros(len(old.x))
+        self._settings, self._drag = settings, ViscousDrag(curve.problem.viscosity())
+        self._newton = BorderedNewton(curve.problem, settings.tolerances, curve.norm, drag=self._drag)
+        self._x, self._pull = curve.problem.x.duplicate(), np.zeros(len(old.x))
         self.at, self.lost, self.solved = old, 0.0, 0
-        self.rest, self.near = np.inf, _NEAR_REST           # what is out of balance; little enough to look for rest
+        self.rest, self.near = np.inf, settings.near_rest   # what is out of balance; little enough to look for rest
         self.settles = False
         self._wait, self._next_wait = 0, 1                  # solutions before eta may fall; after the next failure
 
+    def goes_on(self, eta: float) -> bool:
+        """True while neither eta nor the body has left its bounds."""
+        settings = self._settings
+        most = settings.most_moving if self.solved else settings.most
+        return settings.least < eta < most and self.curve.moved(self._old, self.at) < settings.too_far
+
     def move(self, origin: np.ndarray, eta: float) -> float:
         """One viscous solution from `origin`; the factor by which eta may change then."""
-        viscous = self.viscous
-        viscous.eta, viscous.origin = eta, origin
+        settings, self._drag.eta, self._drag.origin = self._settings, eta, origin
         self._x.array_w[:] = origin
         try:
             _, history = self._newton.correct(self._x, self.control, fixed(self.control), self.at)
@@ -120,30 +137,30 @@ class _Way:
         last, new = self.at, replace(self.at, x=x, control=self.control)
         if self.problem.folded(self._x, self.control) or limit and limit.passes_through(last, new):
             return self._hold_back()
-        drag = viscous.drag(x)
-        most = np.clip(_SHARE * self.curve.moved(self._old, last), *_FAR)
+        pull = self._drag.forces(x)
+        most = np.clip(settings.share * self.curve.moved(self._old, last), settings.nearest, settings.farthest)
         far = self.curve.moved(replace(last, x=origin), new) / most
-        if not self.solved and far > _AGAIN:
+        if not self.solved and far > settings.again:
             return self._hold_back(far)
-        before, self.rest = self.rest, np.sqrt(self._sum(drag * drag)) / (self.problem.force_scale + UNLOADED)
+        before, self.rest = self.rest, relative(self.problem, np.sqrt(self._sum(pull * pull)))
         self.settles = self.rest < min(self.near, before)
-        self._lose(origin, x, drag)                         # from where the body was, or was foretold to be
-        self._drag, self.at, by = drag, new, x - last.x
+        self._lose(origin, x, pull)                         # from where the body was, or was predicted to be
+        self._pull, self.at, by = pull, new, x - last.x
         self.problem.advance(x, self.control)
         if limit:
             limit.prepare(Way(x, self.control, by, 0.0, 1.0))
         self.solved += 1
-        if self._wait or len(history) - 1 > _FEW:
+        if self._wait or len(history) - 1 > settings.few:
             self._wait = max(self._wait - 1, 0)
             return max(1.0, far)
         self._next_wait = max(self._next_wait // 2, 1)
-        return max(_FALLS, far)
+        return max(settings.falls, far)
 
     def _hold_back(self, grows: float = 0.0) -> float:
         """No solution, or one too far off: the factor by which eta grows; it does not fall right after the next one."""
         self._wait = self._next_wait
-        self._next_wait = min(2 * self._next_wait, _LONGEST_WAIT)
-        return grows or _GROWS[self.solved > 0]
+        self._next_wait = min(2 * self._next_wait, self._settings.longest_wait)
+        return grows or (self._settings.grows_moving if self.solved else self._settings.grows)
 
     def end(self) -> State | None:
         """The state at rest, if there is one near; raises `Failure` if the body, without a history, rests at none."""
@@ -151,7 +168,7 @@ class _Way:
             with self.curve.newton.in_a_hurry(True):        # if it fails the body moves on, with viscosity
                 state = self.curve.solve(self.at.x, self.control, fixed(self.control), "jump", self.at)
         except Failure:
-            if self.rest > _AT_REST:
+            if self.rest > self._settings.at_rest:
                 self.settles, self.near = False, 0.3 * self.rest
                 return None
             if not self.problem.has_history:                # another branch starts here
@@ -163,13 +180,13 @@ class _Way:
         state.jump = {"dissipated": self.lost * energy, "moved": self.curve.moved(self._old, state) * length}
         return state
 
-    def _lose(self, a: np.ndarray, x: np.ndarray, drag: np.ndarray) -> None:
+    def _lose(self, a: np.ndarray, x: np.ndarray, pull: np.ndarray) -> None:
         """Work of what is out of balance from a to x (trapezoidal rule: half way there the chord cuts into tools).
 
         A force at a that has turned before x is none that the body moved by: viscous forces do no negative work.
         """
         by = x - a
-        self.lost += 0.5 * (max(self._sum(self._drag * by), 0.0) + self._sum(drag * by))
+        self.lost += 0.5 * (max(self._sum(self._pull * by), 0.0) + self._sum(pull * by))
 
     def _sum(self, values: np.ndarray) -> float:
         return float(self.problem.comm.allreduce(values.sum()))
@@ -177,41 +194,87 @@ class _Way:
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
         self._newton.destroy()
-        self.viscous.destroy()
+        self._drag.destroy()
         self._x.destroy()
 
 
-def jump(curve: Any, old: State, by: float, ahead: bool, solutions: int = MOST,
-         told: Callable[[], None] = lambda: None) -> State:
+def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: SnapThrough,
+                 solutions: int | None = None, told: Callable[[], None] = lambda: None) -> State:
     """The state that the body comes to from `old` when the control goes on; of kind "jump".
 
     Args:
-        curve: the `Curve`. by: change of the control, dimensionless; its sign is the way that the process drives.
-        ahead: start where the tangent leads to, not where the body is. solutions: viscous ones, at most; `told` is
-            called before each.
+        by: change of the control, dimensionless; its sign is the way that the process drives.
+        ahead: start where the tangent leads to, not where the body is.
+        solutions: viscous ones, at most; `told` is called before each.
 
     Raises:
         Failure: none was found, `NoEquilibrium` if the body comes to rest nowhere. The problem's histories are then
             those of `old`.
     """
     problem, kept = curve.problem, curve.problem.memory
-    way = _Way(curve, old, old.control + by)
+    motion = _Motion(curve, old, old.control + by, settings)
     origin = old.x + by / old.slope * old.direction if ahead else old.x
-    eta = _FIRST
+    eta, solutions = settings.eta, solutions or settings.solutions
     try:
-        while (way.solved < solutions and _LEAST < eta < _LARGEST[way.solved > 0]
-               and curve.moved(old, way.at) < _TOO_FAR):
+        while motion.solved < solutions and motion.goes_on(eta):
             told()
-            state = way.end() if way.settles else None
+            state = motion.end() if motion.settles else None
             if state is not None:
                 if state.slope * by < 0:
                     state.direction, state.slope = -state.direction, -state.slope
                 return state
-            eta *= way.move(way.at.x if way.solved else origin, eta)
-        where = "it comes to rest nowhere" if way.solved else "none is found from here, however viscous the body is"
-        raise (NoEquilibrium if way.solved else Failure)(f"no state follows that the body could snap to: {where}", [])
+            eta *= motion.move(motion.at.x if motion.solved else origin, eta)
+        where = "it comes to rest nowhere" if motion.solved else "none is found from here, however viscous the body is"
+        raise (NoEquilibrium if motion.solved else Failure)(f"no state follows that the body could snap to: {where}",
+                                                            [])
     except Failure:
         problem.memory = kept
         raise
     finally:
-        way.destroy()
+        motion.destroy()
+
+
+def at_limit_points(problem: Equations, falls: bool) -> str:
+    """What is done at limit points of the control: "follow", "jump", or "follow volume".
+
+    The last follows the path while the volume of the air grows, as under volume control, and lets the body snap where
+    that has its maximum, too.
+
+    Time goes one way. With a history so does whatever is driven, for to follow a fold would be to let it go back; but
+    where a pressure that is put on has its maximum it is the volume of the air that goes on growing. The same holds for
+    a pressure on a body in contact, with a history or without: where contact changes a path may end. `falls`: what is
+    driven is let off.
+    """
+    if problem.drives == "time":
+        return "jump"
+    by_pressure = problem.drives == "pressure"
+    if not (problem.has_history or problem.has_kinks and by_pressure):
+        return "follow"
+    return "follow volume" if by_pressure and not falls else "jump"
+
+
+def snaps(curve: Curve, old: State, at_fold: str, sense: float) -> bool:
+    """True if the body snaps from a state: its path leads back. sense: 1 or -1, which way the control goes at first.
+
+    (Right behind the maximum of a pressure that of the volume may follow.)
+    """
+    if at_fold not in ("jump", "follow volume") or old.kind != "limit point" and old.slope * sense >= 0:
+        return False
+    return at_fold == "jump" or curve.work_ahead(old) * sense < 0
+
+
+def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) -> bool:
+    """True if a state found from `old` lies on a piece of the path passed earlier, to which it never comes back.
+
+    (After a jump it may: then the body is another.)
+    """
+    near = 0.1 * curve.distance(old, new)
+    states = [] if old.kind == "jump" else passed[::-1]
+    for b, a in zip(states, states[1:]):
+        if b.kind == "jump":
+            break
+        if (a.control - new.control) * (b.control - new.control) < 0:
+            x, control = curve.interpolate(a, b, (new.control - a.control) / (b.control - a.control))
+            if curve.distance(new, replace(new, x=x, control=control)) < near:
+                return True
+    return False

@@ -173,7 +173,7 @@ class Record:
             log.warning("beyond %s: %s", self.describe(state), state.verdict)
         self.counts.steps += state.kind != "start"
 
-    def settle(self, step: Any, until: Target, **more: Any) -> None:
+    def complete_step(self, step: Any, until: Target, **more: Any) -> None:
         """A step is complete: note in the last state how the run goes on from it, with more that the run knows."""
         self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value],
                               **more}
