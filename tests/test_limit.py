@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from conftest import ROOT, run
 
-from formingx.discrete.history import MaterialHistory
+from formingx.discrete.material_history import MaterialHistory
 from formingx.solve.newton import BorderedNewton
 
 sys.path.insert(0, str(ROOT / "benchmarks"))

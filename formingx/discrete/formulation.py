@@ -22,8 +22,9 @@ from .. import _compat
 from ..errors import together
 from ..physics import kinematics as kin
 from .free_stretch import FreeStretch
-from .history import History, MaterialHistory
+from .history import History
 from .loaded_body import LoadedBody
+from .material_history import MaterialHistory
 from .material_terms import MaterialTerms
 from .probes import Probe
 from .temperature import Temperature

@@ -25,7 +25,8 @@ from .contact.face import FaceContact
 from .contact.resultants import penetration
 from .examine import Examination
 from .formulations import formulate
-from .history import MaterialHistory
+from .history import History
+from .material_history import MaterialHistory
 from .matrix import ExtendedMatrix
 from .schedule import Setting
 from .step_error import StepError
@@ -80,7 +81,8 @@ class Problem(Units):
         self.contacts = [FaceContact(forms, contact, self.assemble) for contact in scene.contacts]
         if scene.heat is not None:                              # after the materials, which heat it
             forms.histories.append(scene.heat.history(self))
-        self.histories: list[Any] = [*(contact for contact in self.contacts if contact.law.remembers), *forms.histories]
+        remembering = (contact for contact in self.contacts if contact.law.remembers)
+        self.histories: list[History] = [*remembering, *forms.histories]
         self.limit = StepLimit(self)
         self._admissible = Admissible(forms)
         self._constraints = Constraints(forms, self.assemble)
@@ -394,6 +396,12 @@ class Problem(Units):
             InputError: a constant or friction has no value at a temperature.
         """
         together(self.comm, [self.forms.take_temperature, *(contact.take_temperature for contact in self.contacts)])
+
+    def carry(self, source: Problem, memory: list[Any], x: np.ndarray, control: float) -> None:
+        """Remember what a problem of this scene on another mesh does (`State.memory`), as of (x, control), own part."""
+        self.look_at(x, control)
+        for mine, other, kept in zip(self.histories, source.histories, memory, strict=True):
+            mine.put(mine.carry(other, kept, x[: self._n], control))
 
     def foretell(self, start: np.ndarray, x: np.ndarray, control: float) -> list[Any]:
         """What the histories of the forms would remember, were a state accepted; they stay as they are.

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..discrete.carry import Carrier
 from ..errors import ConvergenceError, InputError, instance, known, positive, several
 from ..values.table import Table
 from ..values.temperature import ABSOLUTE_ZERO
@@ -218,6 +219,16 @@ class CoolingHistory:
                  for touch, d in zip(self._body.touches, data["lines"], strict=True)]
         before = (float(data["before"][0]), np.array(data["before"][1])[rows]) if "before" in data else None
         return Memory(float(data["time"]), np.array(data["temperature"])[rows], lines, data["step"], power, before)
+
+    def carry(self, source: CoolingHistory, memory: Memory, x: np.ndarray, control: float) -> Memory:
+        """See `History`; the materials have been carried."""
+        comm, before = self._problem.comm, memory.before
+        to_body = Carrier(comm, source._body.points, self._body.points).fitted
+        lines = [Carrier(comm, other.points, touch.points).fitted(kept) for touch, other, kept in
+                 zip(self._body.touches, source._body.touches, memory.lines, strict=True)]
+        power = None if memory.power is None else self._cooling.work_to_heat * self._body.assembled(self._dissipated)
+        return Memory(memory.time, to_body(memory.temperature), lines, memory.step, power,
+                      before and (before[0], to_body(before[1])))
 
     def _gathered(self, own: np.ndarray) -> np.ndarray:
         """Of all ranks, one after the other."""

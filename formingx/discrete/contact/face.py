@@ -8,6 +8,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...physics.contact import Contact, Touch, Tractions
+from ..carry import Carrier
 from .increment import Increment
 from .rule import Gauss, Lobatto, Rule
 
@@ -222,3 +223,15 @@ class FaceContact:
         touch = Touch(*(np.array(data[name], dtype=float)[rows].reshape(getattr(like, name).shape)
                         for name in Touch._fields))
         return Memory(touch, np.array(data["arrived"], dtype=bool)[rows])
+
+    def carry(self, source: FaceContact, memory: Memory | None, x: np.ndarray, control: float) -> Memory | None:
+        """See `History`: where its nearest point touched a point touches, and slipped as that did."""
+        if memory is None:
+            return None
+        carrier, touch, theta = Carrier(self.comm, source.points, self.points), memory.touch, self.law.theta
+        distance, arrived = (carrier.all(values)[carrier.nearest] for values in (touch.distance, memory.arrived))
+        touched, position = distance > -source.law.theta, self.positions(x, control)
+        free = np.minimum(self.law.distance(position), -(1 + 1e-9) * theta)
+        slip = np.where(touched, carrier.fitted(touch.slip), 0.0)
+        return Memory(Touch(position, np.where(touched, distance * theta / source.law.theta, free), slip, position),
+                      arrived)

@@ -1,0 +1,134 @@
+"""What materials remember: internal variables at quadrature points."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from .. import _compat
+from ..errors import InputError
+from .carry import Carrier
+
+
+class Memory(NamedTuple):
+    """Of a material: the process time of the last accepted state, and {name: values in the owned cells of the layers,
+    shape (cells, points, components)}."""
+
+    time: float
+    values: dict[str, np.ndarray]
+
+
+class MaterialHistory:
+    """Internal variables of one material at the quadrature points of the energy.
+
+    Args:
+        forms: the `Formulation`; terms: the `MaterialTerms`.
+    """
+
+    def __init__(self, forms: Any, terms: Any):
+        self._forms, self._terms = forms, terms
+        self.rate_dependent = terms.material.rate_dependent
+        self._cells, self._own = terms.cells, terms.own_cells       # a ghost is computed as its owner computes it
+        self._numbers = forms.domain.topology.original_cell_index[self._own]      # in the script's mesh
+        updated = terms.updated(forms.elastic_F)
+        self._sizes = {name: int(np.prod(f.ufl_shape, dtype=int)) for name, f in terms.internal.items()}
+        flat = [ufl.as_ufl(updated[name])[i] if i else ufl.as_ufl(updated[name])
+                for name, f in terms.internal.items() for i in np.ndindex(f.ufl_shape)]
+        self._updated = fem.Expression(ufl.as_vector(flat), terms.places, jit_options=_compat.JIT_OPTIONS)
+        self._now: Memory | None = None                              # what was put or got last, if it still holds
+        self.start()
+
+    def start(self) -> None:
+        """See `History`."""
+        self._now = None
+        for name, rest in self._terms.material.internal.items():
+            self._set(name, self._cells, np.asarray(rest, dtype=float).ravel())
+        self._terms.start.value = 0.0
+
+    def advance(self, x: np.ndarray, control: float, start: np.ndarray | None = None) -> None:
+        """See `History`."""
+        self._now = None
+        for name, values in self._after(self._cells).items():
+            self._set(name, self._cells, values)
+        self._terms.start.value = self._forms.time_at(control)
+
+    def _after(self, cells: np.ndarray) -> dict[str, np.ndarray]:
+        """{name: values in some cells, shape (cells, points, components)} at the end of the step."""
+        shape = len(cells), len(self._terms.places), sum(self._sizes.values())
+        values = self._updated.eval(self._forms.domain, cells).reshape(shape) if len(cells) else np.zeros(shape)
+        parts = np.split(values, np.cumsum(list(self._sizes.values()))[:-1], axis=2)
+        return dict(zip(self._sizes, parts, strict=True))
+
+    def get(self) -> Memory:
+        """See `History`."""
+        if self._now is None:
+            values = {name: self._array(name)[self._points(name, self._own)] for name in self._sizes}
+            self._now = _unchangeable(Memory(float(self._terms.start.value), values))
+        return self._now
+
+    def put(self, memory: Memory) -> None:
+        """See `History`."""
+        if memory is self._now:
+            return
+        for name, values in memory.values.items():
+            self._set(name, self._own, values)
+            self._terms.internal[name].x.scatter_forward()
+        self._terms.start.value = memory.time
+        self._now = memory
+
+    def save(self, memory: Memory) -> dict[str, Any]:
+        """See `History`."""
+        gather = self._forms.comm.allgather
+        numbers = np.concatenate(gather(self._numbers))
+        order = np.argsort(numbers)
+        return {"time": memory.time, "cells": numbers[order],
+                "values": {name: np.concatenate(gather(v))[order] for name, v in memory.values.items()}}
+
+    def load(self, data: dict[str, Any]) -> Memory:
+        """See `History`."""
+        numbers, values = np.array(data.get("cells", []), dtype=np.int64), data.get("values", {})
+        rows = np.minimum(np.searchsorted(numbers, self._numbers), len(numbers) - 1)
+        found = {name: np.array(v, dtype=float) for name, v in values.items()}
+        q = len(self._terms.places)
+        if list(found) != list(self._sizes) or not np.array_equal(numbers[rows], self._numbers) \
+                or any(v.shape != (len(numbers), q, self._sizes[name]) for name, v in found.items()):
+            raise InputError(f"what {self._terms.material} remembers is of another mesh, or another material")
+        return Memory(float(data["time"]), {name: v[rows] for name, v in found.items()})
+
+    def carry(self, source: MaterialHistory, memory: Memory, x: np.ndarray, control: float) -> Memory:
+        """See `History`."""
+        carrier = Carrier(self._forms.comm, source.points, self.points)
+        shape = len(self._own), len(self._terms.places)
+        return _unchangeable(Memory(memory.time, {
+            name: carrier.fitted(v.reshape(-1, v.shape[-1])).reshape(*shape, v.shape[-1])
+            for name, v in memory.values.items()}))
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """Reference positions of the owned quadrature points, shape (n, coordinates), length."""
+        X, components = self._forms.X, self._forms.X.ufl_shape[0]
+        if not len(self._own):
+            return np.zeros((0, components))
+        where = fem.Expression(X, self._terms.places, jit_options=_compat.JIT_OPTIONS)
+        return where.eval(self._forms.domain, self._own).reshape(-1, components)
+
+    def _array(self, name: str) -> np.ndarray:
+        """All values of a variable, a row for each point."""
+        return self._terms.internal[name].x.array.reshape(-1, self._sizes[name])
+
+    def _points(self, name: str, cells: np.ndarray) -> np.ndarray:
+        """Rows of the points of some cells, shape (cells, points)."""
+        return self._terms.internal[name].function_space.dofmap.list[cells]
+
+    def _set(self, name: str, cells: np.ndarray, values: np.ndarray) -> None:
+        self._array(name)[self._points(name, cells)] = values
+
+
+def _unchangeable(memory: Memory) -> Memory:
+    for array in memory.values.values():
+        array.setflags(write=False)
+    return memory

@@ -1,0 +1,99 @@
+"""What histories remember, carried to another mesh of the body."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from test_contact import cup, form
+from test_cooling import press, pressed
+
+import formingx as fx
+from formingx.discrete.carry import Carrier
+from formingx.discrete.problem import Problem
+
+
+def test_quadratics_are_exact_and_other_functions_converge_with_order_three():
+    rng, errors = np.random.default_rng(0), []
+    target = rng.uniform((0.02, 0.02), (0.98, 0.28), (300, 2))
+    for n in (20, 40, 80):
+        R, Z = np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 0.3, n // 3))
+        source = np.column_stack([R.ravel(), Z.ravel()])
+        source += rng.normal(0, 0.1 / n, source.shape)
+        carrier = Carrier(MPI.COMM_SELF, source, target)
+
+        def smooth(X):
+            return np.sin(5 * X[:, 0]) * np.exp(X[:, 1])
+
+        def quadratic(X):
+            return 1 + X[:, 0] - 2 * X[:, 1] + 3 * X[:, 0] * X[:, 1] + X[:, 1] ** 2
+        assert np.abs(carrier.fitted(quadratic(source)) - quadratic(target)).max() < 1e-12
+        errors.append(np.sqrt(np.mean((carrier.fitted(smooth(source)) - smooth(target)) ** 2)))
+        assert Carrier(MPI.COMM_SELF, source, source).fitted(smooth(source)) == pytest.approx(smooth(source), rel=1e-12)
+    assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 2.5), errors
+
+
+def blown(elements):
+    """A relaxing sheet after 0.5 s under pressure."""
+    sheet = fx.Viscoelastic(fx.NeoHookean(c10=0.2), [(1.0, 0.3)])
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=elements), materials=sheet,
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")])
+    blow = fx.Stage("blow", drive=scene.loads[0], until=fx.pressure(0.08), duration=0.5)
+    return fx.Process(scene).run([blow], progress=False, accuracy="draft", step=fx.StepControl(length=0.02))
+
+
+def test_internal_variables_are_those_of_a_run_on_the_other_mesh():
+    there, here = blown((10, 2)), blown((14, 3))
+    a, b = there.problem, here.problem
+    assert here.last.time == pytest.approx(there.last.time)
+    for problem, path, other, most in ((b, here, there, 0.01), (a, there, here, 0.01), (a, there, there, 1e-12)):
+        with problem.at(path.last):
+            problem.carry(other.problem, other.last.memory, path.last.x, path.last.control)
+            found, = problem.memory
+        wanted, = path.last.memory
+        assert found.time == wanted.time
+        for name, values in wanted.values.items():
+            size = np.abs(values - np.mean(values, (0, 1))).max()
+            assert np.sqrt(np.mean((found.values[name] - values) ** 2)) < most * size, name
+
+
+def test_temperatures_and_the_lines_of_tools():
+    path, fine = press(pressed()), Problem(fx.Scene(**parts(pressed(), elements=(12, 2))))
+    memory = path.last.memory
+    T = memory[-1]._replace(temperature=quadratic_of(path.problem.histories[-1]._body.points))
+    fine.carry(path.problem, [*memory[:-1], T], np.zeros(fine.x.getLocalSize()), 0.0)
+    body, found = fine.histories[-1]._body, fine.memory[-1]
+    assert found.temperature == pytest.approx(quadratic_of(body.points), rel=1e-9)
+    assert np.array_equal(fine.temperature.T.x.array[: len(found.temperature)], found.temperature)
+    lines, kept = found.lines[0], memory[-1].lines[0]
+    over = 0.1 * np.ptp(kept)                               # fits go beyond a jump, where the touch ends, by a little
+    assert kept.min() - over < lines.min() < lines.max() < kept.max() + over and len(lines) > len(kept)
+    assert lines.max() == pytest.approx(kept.max(), rel=0.1)
+
+
+def quadratic_of(X):
+    return 100 + 20 * X[:, 0] ** 2 - 30 * X[:, 0] * X[:, 1] + X[:, 1]
+
+
+def parts(scene, elements):
+    """The same scene on another mesh."""
+    return {"mesh": fx.mesh.disc(radius=1.0, thickness=0.05, elements=elements), "materials": scene.materials,
+            "temperature": 150.0, "supports": scene.supports, "contacts": scene.contacts, "heat": scene.heat,
+            "expansion": dict(scene.expansion)}
+
+
+@pytest.mark.parametrize("points", ["nodes", 3])
+def test_contact_comes_back_as_it_was(points):
+    path = form(cup(0.3, elements=(12, 1), points=points), 10.0)
+    here, kept = Problem(path.problem.scene), path.last.memory[0]
+    here.carry(path.problem, path.last.memory, path.last.x, path.last.control)
+    found = here.memory[0]
+    touched = kept.touch.distance > -here.contacts[0].law.theta
+    assert touched.sum() > 3 and np.abs(kept.touch.slip).max() > 0
+    assert found.touch.position == pytest.approx(kept.touch.position, rel=1e-9, abs=1e-12)
+    assert found.touch.slip == pytest.approx(kept.touch.slip, rel=1e-9)
+    assert found.touch.distance[touched] == pytest.approx(kept.touch.distance[touched], rel=1e-9)
+    assert np.all(found.touch.distance[~touched] < -here.contacts[0].law.theta)
+    assert np.array_equal(found.arrived, kept.arrived)
+    force = here.contacts[0].tractions(path.last.x, path.last.control).force
+    with path.problem.at(path.last) as problem:
+        there = problem.contacts[0].tractions(path.last.x, path.last.control).force
+    assert force == pytest.approx(there, rel=1e-6, abs=1e-9 * np.abs(there).max())
