@@ -42,3 +42,13 @@ class Carrier:
     def all(self, values: np.ndarray) -> np.ndarray:
         """Own values at `source` of all ranks, in the order of `nearest`; collective."""
         return np.concatenate(self._comm.allgather(values))
+
+
+def carry(source: Any, memory: list[Any], problem: Any, x: np.ndarray, control: float) -> None:
+    """Let a problem remember what one of the same body on another mesh does (`State.memory`); collective.
+
+    x, control: the state of it that this belongs to, own part.
+    """
+    problem.look_at(x, control)
+    for mine, other, kept in zip(problem.histories, source.histories, memory, strict=True):
+        mine.put(mine.carry(other, kept, x[: problem.n_owned], control))

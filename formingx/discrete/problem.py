@@ -397,12 +397,6 @@ class Problem(Units):
         """
         together(self.comm, [self.forms.take_temperature, *(contact.take_temperature for contact in self.contacts)])
 
-    def carry(self, source: Problem, memory: list[Any], x: np.ndarray, control: float) -> None:
-        """Remember what a problem of this scene on another mesh does (`State.memory`), as of (x, control), own part."""
-        self.look_at(x, control)
-        for mine, other, kept in zip(self.histories, source.histories, memory, strict=True):
-            mine.put(mine.carry(other, kept, x[: self._n], control))
-
     def foretell(self, start: np.ndarray, x: np.ndarray, control: float) -> list[Any]:
         """What the histories of the forms would remember, were a state accepted; they stay as they are.
 
