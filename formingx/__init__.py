@@ -41,6 +41,7 @@ from .solve.stepping import StepControl
 from .study import Study, StudyRun, study
 from .tools import Tool
 from .units import Units
+from .values.course import course
 from .values.table import table
 from .values.temperature import WLF, Arrhenius
 

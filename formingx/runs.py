@@ -69,6 +69,13 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
             checkpoint holds another run.
         ConvergenceError: the target was not reached. It carries the path so far and says what to try.
         OSError: the checkpoint cannot be written; the states in it are kept.
+
+    >>> import formingx as fx
+    >>> scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(8, 1)), loads=[fx.Pressure("bottom")],
+    ...                  materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    >>> path = fx.trace(scene, until=fx.pole_height(12.0), progress=False)
+    >>> len(path.limit_points), round(float(path["pole_height"][-1]), 6)           # through the pressure maximum
+    (1, 12.0)
     """
     instance("trace: scene", scene, Scene, "a formingx.Scene")
     through = several("trace: through", through, "targets, such as pole_stretch(3)")
@@ -114,6 +121,13 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     Raises:
         InputError: nothing is driven, or an argument is not allowed.
         ConvergenceError: an increment did not converge; it carries the path so far.
+
+    >>> import formingx as fx
+    >>> scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(8, 1)), loads=[fx.Pressure("bottom")],
+    ...                  materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    >>> path = fx.solve(scene, to=0.02)
+    >>> round(float(path["pressure"][-1]), 6)
+    0.02
     """
     instance("solve: scene", scene, Scene, "a formingx.Scene")
     instance("solve: tolerances", tolerances, Tolerances | None, "a Tolerances or None")

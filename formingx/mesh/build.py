@@ -56,6 +56,12 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
         InputError: a size that is not positive, a count that is not a whole number of at least 1, a radius to
             concentrate at that is not on the disc, fewer elements than there are parts between such radii, or a
             thickness that is not given all over the disc.
+
+    >>> import formingx as fx
+    >>> print(fx.mesh.disc(radius=40.0, thickness={"core": 1.0, "skin": 0.2}, elements=(30, (2, 1))))
+    180 six-node triangles, R from 0 to 40, Z from 0 to 1.2
+    layers: core, skin
+    boundaries: axis (3 edges), rim (3 edges), bottom (30 edges), top (30 edges)
     """
     radius = positive("disc: radius", radius)
     grading = _grading("disc", grading)
@@ -141,6 +147,10 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
 
     Raises:
         InputError: as in `disc`.
+
+    >>> import formingx as fx
+    >>> list(fx.mesh.sphere(inner_radius=1.0, thickness=0.2, elements=(8, 2)).boundaries)
+    ['axis', 'equator', 'inner', 'outer']
     """
     inner_radius = positive("sphere: inner_radius", inner_radius)
     layers = _layers("sphere", thickness, "wall", "")
@@ -168,6 +178,12 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
 
     Raises:
         InputError: as in `disc`; fewer than two elements along the meridian.
+
+    >>> import formingx as fx
+    >>> wall = {-10.0: 2.0, 60.0: 3.0}                                         # at heights of the inner face
+    >>> tube = fx.mesh.parison(inner_radius=10.0, thickness=wall, length=60.0, elements=(20, 1))
+    >>> float(tube.nodes_of("neck")[-1, 0])
+    13.0
     """
     inner_radius, length = positive("parison: inner_radius", inner_radius), positive("parison: length", length)
     grading = _grading("parison", grading)
@@ -213,7 +229,7 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
     >>> print(cone)
     96 six-node triangles, R from 0 to 32, Z from -2 to 40
     layers: wall
-    boundaries: axis (2 edges), end (2 edges), inner (24 edges), outer (24 edges)
+    boundaries: end (2 edges), axis (2 edges), inner (24 edges), outer (24 edges)
     """
     lines = [_points(f"from_lines: {name}", points) for name, points in (("inner", inner), ("outer", outer))]
     if len(lines[0]) != len(lines[1]):

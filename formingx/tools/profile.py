@@ -101,6 +101,11 @@ class Tool:
     Raises:
         InputError: fewer than two different points, a fillet without a corner or too large for it, a profile that
             crosses itself.
+
+    >>> import formingx as fx
+    >>> step = fx.Tool([(0, 2), (3, 2), (4, 0), (9, 0)], fillets=[0, 0.5, 0.2, 0])
+    >>> step.signed_distance([(0.0, 2.1), (8.0, -0.3)]).round(6).tolist()          # above 0: inside
+    [0.1, -0.3]
     """
 
     def __init__(self, points: Sequence[Sequence[float]], fillets: float | Sequence[float] = 0.0, closed: bool = False):

@@ -49,6 +49,11 @@ class WLF:
     Args:
         c1: number; c2: temperature difference; both above 0, for logarithms to the base 10.
         reference: Tr, temperature.
+
+    >>> import formingx as fx
+    >>> slower = fx.WLF(c1=17.44, c2=51.6, reference=100.0)
+    >>> round(float(np.log10(slower(110.0))), 4)
+    -2.8312
     """
 
     def __init__(self, c1: float, c2: float, reference: float):

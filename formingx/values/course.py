@@ -1,0 +1,51 @@
+"""A function of time as a table that a machine can follow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import InputError, finite, positive, values
+
+_MOST = 2000           # points: a function that jumps, or rattles, has no table
+
+
+def course(function: Callable, until: float, start: float = 0.0, *, tolerance: float = 1e-3,
+           ) -> list[tuple[float, float]]:
+    """[(time, value), ...] of a function of time, for `Stage(follow={thing: ...})`; straight between its points.
+
+    Args:
+        function: f(t), called with an array of times, or made of numbers; the value of what is driven then.
+        until, start: process times.
+        tolerance: how far a straight piece may be off f, over the span of its values.
+
+    Raises:
+        InputError: times in the wrong order, a value that is not finite, a function that takes over 2000 points.
+
+    >>> import formingx as fx
+    >>> stroke = fx.course(lambda t: 20 * (1 - np.cos(np.pi * t)), until=1.0)
+    >>> len(stroke), stroke[0], round(stroke[-1][1], 6)
+    (29, (0.0, 0.0), 40.0)
+    """
+    start, until = finite("course: start", start), finite("course: until", until)
+    tolerance = positive("course: tolerance", tolerance)
+    if not start < until:
+        raise InputError(f"course: until = {until:g}: must be after start = {start:g}")
+    t = np.linspace(start, until, 9)
+    f = _at(function, t)
+    while len(t) <= _MOST:
+        middle = (t[:-1] + t[1:]) / 2
+        there = _at(function, middle)
+        bent = np.abs(there - (f[:-1] + f[1:]) / 2) > tolerance * max(np.ptp(np.append(f, there)), 1e-300)
+        if not bent.any():
+            return list(zip(t.tolist(), f.tolist()))
+        t, f = np.append(t, middle[bent]), np.append(f, there[bent])
+        order = np.argsort(t)
+        t, f = t[order], f[order]
+    raise InputError(f"course: the function is not smooth near t = {middle[bent][0]:.6g}: {_MOST} points do not follow"
+                     f" it to {tolerance:g} of its span: give Stage a table")
+
+
+def _at(function: Callable, t: np.ndarray) -> np.ndarray:
+    return values("course: function", function, {"t": t})
