@@ -2,6 +2,9 @@
 
 from pathlib import Path
 
+import formingx
+
+release = formingx.__version__
 project, author, copyright = "formingx", "the formingx authors", "the formingx authors"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 myst_enable_extensions = ["dollarmath"]

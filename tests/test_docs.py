@@ -85,3 +85,11 @@ def public():
     rooms = {"": fx, "mesh.": fx.mesh, "tools.": fx.tools}
     return {prefix + name: getattr(room, name) for prefix, room in rooms.items() for name in dir(room)
             if not name.startswith("_") and callable(getattr(room, name)) and (room is fx or not hasattr(fx, name))}
+
+
+def test_one_version():
+    """In the package, the citation, the changelog and the pages."""
+    import formingx as fx
+    for file, line in (("CITATION.cff", f"version: {fx.__version__}"), ("CHANGELOG.md", f"## {fx.__version__}")):
+        assert re.search(rf"^{re.escape(line)}\b", (ROOT / file).read_text(), re.M), file
+    assert re.search(r'^version = \{ attr = "formingx.__version__" \}', (ROOT / "pyproject.toml").read_text(), re.M)

@@ -39,7 +39,7 @@ def course(function: Callable, until: float, start: float = 0.0, *, tolerance: f
         there = _at(function, middle)
         bent = np.abs(there - (f[:-1] + f[1:]) / 2) > tolerance * max(np.ptp(np.append(f, there)), 1e-300)
         if not bent.any():
-            return list(zip(t.tolist(), f.tolist()))
+            return [(float(a), float(b)) for a, b in zip(t, f)]
         t, f = np.append(t, middle[bent]), np.append(f, there[bent])
         order = np.argsort(t)
         t, f = t[order], f[order]
