@@ -1,4 +1,4 @@
-"""The command line: python -m formingx [demo NAME | doctor SCRIPT | compare OURS THEIRS | open or report FOLDER]."""
+"""The command line: python -m formingx [demo NAME | doctor SCRIPT | compare OURS THEIRS | COMMAND FOLDER]."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ import numpy as np
 from mpi4py import MPI
 
 from . import InputError, compare
-from .results.files import checkpoint
+from .results.files import checkpoint, status
 from .results.show import report
+from .units import NONE, Units
 
 _ROWS = 20                    # of states that `open` shows, about
 _COMPARE = """Compare a run's CSV file with another program's curve: differences, limit points, a picture.
@@ -29,8 +30,8 @@ def main(arguments: list[str] | None = None) -> int:
             _demo(words[1:])
         else:
             options = _parser().parse_args(words)
-            {"compare": _compare, "doctor": _doctor, "open": _open, "report": _report,
-             None: lambda _: _say(_overview())}[options.command](options)
+            {"compare": _compare, "doctor": _doctor, "open": _open, "report": _report, "status": _status,
+             "watch": _watch, None: lambda _: _say(_overview())}[options.command](options)
     except (InputError, OSError) as error:
         if MPI.COMM_WORLD.rank == 0:
             print(f"formingx: {error}", file=sys.stderr)
@@ -62,10 +63,20 @@ def _parser() -> argparse.ArgumentParser:
                                description="Say what is in a checkpoint: the scene, the states, how the run ended.")
     show = commands.add_parser("report", help="make a report of a checkpoint", description="Make one HTML file of a"
                                " checkpoint: inputs, curves, thickness, convergence.")
-    for one in (look, show):
+    now = commands.add_parser("status", help="say how far a run has come", description="Say where a run with a"
+                              " checkpoint stands: stage, target, what limits its steps, verdict, time left.")
+    watch = commands.add_parser("watch", help="say it again and again", description="The status of a run whenever it"
+                                " has new states, until it has had none for --patience seconds, or Ctrl-C.")
+    for one in (look, show, now, watch):
         one.add_argument("folder", metavar="FOLDER", help="a checkpoint (trace(..., checkpoint=FOLDER), Path.save)")
     show.add_argument("--out", type=Path, help="the HTML file (default: report.html in the checkpoint)")
     show.add_argument("--title", default="", help="heading of the report")
+    show.add_argument("--units", metavar="LENGTH,STRESS", help="what the numbers of the script are in, such as mm,MPa")
+    show.add_argument("--density", type=float, help="in g/cm3, for the weight")
+    show.add_argument("--trim", type=float, metavar="R", help="radius at which the part is cut off")
+    watch.add_argument("--every", type=float, default=5.0, metavar="SECONDS", help="between two looks (default: 5)")
+    watch.add_argument("--patience", type=float, default=600.0, metavar="SECONDS",
+                       help="how long a run may be without a new state (default: 600)")
     return parser
 
 
@@ -75,6 +86,7 @@ def _overview() -> str:
              "  doctor SCRIPT              look over the scene of a script before it runs",
              "  compare OURS THEIRS        compare two curves (compare --help)",
              "  open FOLDER                say what is in a checkpoint",
+             "  status, watch FOLDER       say how far a run has come that writes a checkpoint",
              "  report FOLDER              make one HTML file of a checkpoint (report --help)", ""]
     demos = _demos()
     if not demos:
@@ -164,8 +176,27 @@ def _states(record: report.Record) -> list[str]:
 
 def _report(options: argparse.Namespace) -> None:
     out = options.out or Path(options.folder) / "report.html"
-    report.write(report.of_checkpoint(*checkpoint.contents(options.folder)), out, options.title, None, MPI.COMM_WORLD)
+    report.write(report.of_checkpoint(*checkpoint.contents(options.folder)), out, options.title, None, MPI.COMM_WORLD,
+                 _units(options.units), options.density, options.trim)
     _say(f"The report is in {out}")
+
+
+def _units(given: str | None) -> Units:
+    if given is None:
+        return NONE
+    length, comma, stress = given.partition(",")
+    if not comma:
+        raise InputError(f"--units {given!r}: must be LENGTH,STRESS, such as mm,MPa")
+    return Units(length.strip(), stress.strip())
+
+
+def _status(options: argparse.Namespace) -> None:
+    _say(str(status.of_folder(options.folder)))
+
+
+def _watch(options: argparse.Namespace) -> None:
+    for found in status.watch(options.folder, options.every, options.patience):
+        _say(str(found))
 
 
 def _pair(option: str, word: str, both: bool) -> tuple[str, str]:

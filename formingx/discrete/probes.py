@@ -39,6 +39,19 @@ class Probe:
     def displacement(self, x: Any) -> np.ndarray:
         """u at the points in the user's unit, shape (n, 2), all ranks."""
         self._problem.place(x.array_r)
+        return self._read()
+
+    def displacement_in(self, state: Any) -> np.ndarray:
+        """`displacement` in a state: of its unknowns alone, so nothing else is set for it; collective."""
+        w = self._problem.forms.w.x.array
+        before = w.copy()
+        try:
+            self._problem.place(state.x)
+            return self._read()
+        finally:
+            w[:] = before
+
+    def _read(self) -> np.ndarray:
         w = self._problem.forms.w.x.array
         values = np.zeros((len(self.points), 2))
         values[self._mine] = self._problem.forms.length * self._local(w[self._dofs])

@@ -365,10 +365,10 @@ class Path:
         from .files import fields
         fields.to_xdmf(self, file, states)
 
-    def animate(self, file: Any, frames: int = 60, seconds: float = 5.0) -> Picture:
+    def animate(self, file: Any, frames: int = 60, seconds: float = 5.0, *, units: Any = None) -> Picture:
         """Draw the forming as a moving picture, a GIF or an MP4: the sheet's section and the loading curve (rank 0).
 
-        Returns the file, which a notebook shows.
+        Returns the file, which a notebook shows. units: a `formingx.Units`, for the labels.
 
         The frames are evenly spread over the process (`formingx.results.show.record.progress`), on the (cubic) path
         through the states; the last one stands for a second more.
@@ -377,8 +377,9 @@ class Path:
             InputError: the name ends neither in .gif nor in .mp4, there is no ffmpeg to make an MP4, a number is not
                 allowed, or the mesh is no sheet.
         """
+        from ..units import NONE
         from .show import animation
-        animation.animate(self, file, frames, seconds)
+        animation.animate(self, file, frames, seconds, units or NONE)
         return Picture(file)
 
     def report(self, file: Any = "report.html", title: str = "", failure: Any = None, *, units: Any = None,

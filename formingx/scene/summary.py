@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..values.temperature import FunctionOfTemperature
 
 
 def summary(scene: Any) -> dict[str, str]:
@@ -13,7 +19,7 @@ def summary(scene: Any) -> dict[str, str]:
                      f" {extent[1]:.6g} (R, Z); layers: {', '.join(mesh.layers)}"
                      f"; boundaries: {', '.join(mesh.boundaries)}"}
     for name, material in scene.materials.items():
-        lines[f"material of {name}"] = text(material)
+        lines[f"material of {name}"] = _material(material, _temperatures(scene))
     for kind in ("supports", "loads", "contacts"):
         for k, thing in enumerate(getattr(scene, kind), 1):
             numbers = "".join(f", {name.replace('_', ' ')} {value!r}" for name, value in vars(thing).items()
@@ -22,6 +28,28 @@ def summary(scene: Any) -> dict[str, str]:
     return lines | {"model": text(scene.model), "kinematics": text(scene.kinematics),
                     "quadrature degree": str(scene.quadrature_degree),
                     **({} if scene.temperature is None else {"temperature": text(scene.temperature)})}
+
+
+def _temperatures(scene: Any) -> list[float]:
+    """Those that a scene says as numbers: of its tools, and of the body at first."""
+    tools = [given.tool for given in scene.heat.tools.values()] if hasattr(scene.heat, "tools") else []
+    first = scene.temperature.T.x.array if scene.temperature is not None else []
+    even = len(first) and np.ptp(first) == 0
+    found = [*(t for t in tools if isinstance(t, int | float)), *(first[:1] if even else ())]
+    return sorted({float(f"{t:.6g}") for t in found})
+
+
+def _material(thing: Any, temperatures: list[float]) -> str:
+    """`text` of a material, with values in place of functions of the temperature that have no name."""
+    found = text(thing)
+    for value in getattr(thing, "parameters", {}).values():
+        if isinstance(value, FunctionOfTemperature) and "<lambda>" in repr(value):
+            values = []
+            for T in temperatures:
+                with contextlib.suppress(InputError):          # outside a table
+                    values.append(f"{float(value(T)):.4g} at {T:g}")
+            found = found.replace(text(value), f"({', '.join(values) or 'a function of the temperature'})", 1)
+    return re.sub(r"\d+\.\d{7,}", lambda digits: f"{float(digits[0]):.6g}", found)
 
 
 def text(thing: Any) -> str:

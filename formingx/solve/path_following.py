@@ -217,7 +217,7 @@ class Run:
             length = limit.length(Way(old.x, old.control, old.direction, old.slope, length)) if limit else length
             target, bound, reach = self.aim.within_reach(old, length)
             if length < self.step.length:
-                self._progress.limited("contact arriving", length)
+                self._limited("contact arriving", length)
             try:
                 return self._take(old, length, target, bound, reach)
             except Cutback as cut:
@@ -244,6 +244,12 @@ class Run:
     def _failed(self, why: str, length: float) -> None:
         """A step was not taken; `length` is tried next."""
         self.record.counts.failures += 1
+        self._limited(why, length)
+
+    def _limited(self, why: str, length: float) -> None:
+        """A step is made shorter, or was not taken; `length` is tried next."""
+        limits = self.record.counts.limits
+        limits[why] = limits.get(why, 0) + 1
         self._progress.limited(why, length)
 
     def _take(self, old: State, length: float, target: Target | None, bound: Any, reach: float) -> list[State]:

@@ -61,12 +61,13 @@ class State:
 @dataclass
 class Counts:
     """What a run cost: accepted states (without the start), failed attempts, all Newton iterations (with a tangent that
-    was kept, too), seconds."""
+    was kept, too), seconds; limits: {what made a step shorter, or fail: how often}."""
 
     steps: int = 0
     failures: int = 0
     iterations: int = 0
     seconds: float = 0.0
+    limits: dict[str, int] = field(default_factory=dict)
 
 
 @dataclass(eq=False)
@@ -146,7 +147,7 @@ class Record:
         mine = self.segments[-1]
         *earlier, last = other.segments
         self.segments = [*earlier, Segment(mine.problem, mine.curve, list(last.states))]
-        self.counts = replace(other.counts)
+        self.counts = replace(other.counts, limits=dict(other.counts.limits))
 
     def accept(self, state: State) -> None:
         """Take up a state: what has a history goes on from it.

@@ -28,6 +28,8 @@ class Part:
         weight: grams if a density in g/cm3 was given; else None: of what the material was at rest, before anything
             expanded, so that it does not change with the temperature.
         walls: {height: wall there}, lengths.
+        content: that the part holds, length^3: within its inner face, between planes across its ends (of a closed
+            bottle: all of it; of a pot: to its rim, or to the trim).
         scrap: volume beyond the trim over the volume of the whole sheet.
         units: of the labels.
     """
@@ -45,6 +47,7 @@ class Part:
     weight: float | None
     walls: dict[float, float]
     scrap: float
+    content: float
     units: Units = field(repr=False, default=NONE)
 
     @property
@@ -62,6 +65,7 @@ class Part:
                  ("coefficient of variation of the wall", f"{self.variation:.4g}"),
                  ("areal draw ratio", f"{self.draw_ratio:.4g}"), ("volume", said(self.volume, u.volume)),
                  ("area of the middle surface", said(self.area, u.area))]
+        rows += [("content", said(self.content, u.volume))]
         rows += [(f"wall at height {said(h, u.length or '')}", said(w, u.length or "")) for h, w in self.walls.items()]
         return rows + ([("scrap, of the sheet's volume", f"{100 * self.scrap:.3g} %")] if self.scrap else [])
 
@@ -92,7 +96,8 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     at = {finite("part: heights", h): wall.at_height(h) for h in several("part: heights", heights, "numbers")}
     return Part(kept[0], kept[1], kept[1] / kept[2], mean, float(wall.wall[k]), float(wall.reference_radius[k]),
                 (float(wall.r[k]), float(wall.z[k])), float(wall.height[k]), float(wall.wall[k] / mean),
-                float(np.sqrt(spread) / average), weight, at, float(1 - kept[0] / volume.sum()), units)
+                float(np.sqrt(spread) / average), weight, at, float(1 - kept[0] / volume.sum()),
+                _content(wall, inside, axisymmetric), units)
 
 
 def _inside(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndarray:
@@ -110,6 +115,16 @@ def _inside(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndarray:
     k = crossed[-1]
     inside[k], inside[k + 1:] = (value - line[k]) / (line[k + 1] - line[k]), 0.0
     return inside
+
+
+def _content(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
+    """The volume within the inner one of the two faces, as far as strips between nodes belong to the part."""
+    found = []
+    for face in (wall.profile.bottom, wall.profile.top):
+        (r, z), (s, w) = fine(face)[:-1].T, fine(face)[1:].T
+        slices = np.pi / 3 * (r * r + r * s + s * s) * (w - z) if axisymmetric else (r + s) / 2 * (w - z)
+        found.append(abs(float((_sums(slices, len(wall.r)) * inside).sum())))
+    return min(found)
 
 
 def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool) -> np.ndarray:

@@ -98,8 +98,7 @@ class Profiles:
     def of(self, state: Any) -> Profile:
         """The profile of a state (collective)."""
         self._probe = at = self._probe or self._make_probe()
-        with self._problem.at(state) as problem:
-            deformed = at.points + at.displacement(problem.x)
+        deformed = at.points + at.displacement_in(state)
         n = len(at.points) // 2
         return Profile(at.points[:n].copy(), at.points[n:].copy(), deformed[:n], deformed[n:])
 

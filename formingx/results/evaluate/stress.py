@@ -29,7 +29,7 @@ from petsc4py import PETSc
 
 from ... import _compat
 from ...errors import InputError, known, pair
-from ...mesh.locate import locate
+from ...mesh.locate import Place, locate
 from .patches import Patches
 from .stress_error import Fitted, StressError, StressPeak
 
@@ -126,8 +126,7 @@ class StressField:
         recovery = self._recovery
         layer = recovery.layer(layer)
         points = np.atleast_2d(np.asarray(points, dtype=float))
-        domain, comm = recovery.problem.forms.domain, recovery.problem.comm
-        place = locate(domain, points, recovery.problem.forms.length, recovery.cells[layer], f"layer {layer!r}")
+        comm, place = recovery.problem.comm, recovery.locate(points, layer)
         values = np.zeros((len(points), _COUNT))
         if len(place.mine):
             shapes: Any = recovery.element.tabulate(0, place.reference)
@@ -218,6 +217,7 @@ class Stresses:
         self._ready = False
         self._raw: dict[int, tuple] = {}
         self._patches: Patches | None = None
+        self._located: dict[str, tuple[np.ndarray, Place]] = {}
 
     def of(self, state: Any) -> StressField:
         """The stresses of a state (collective)."""
@@ -225,6 +225,15 @@ class Stresses:
             self._prepare()
             self._ready = True
         return StressField(self, state)
+
+    def locate(self, points: np.ndarray, layer: str) -> Place:
+        """Where points lie in a layer; those of the last call are not looked for again; collective."""
+        before = self._located.get(layer)
+        if before is None or not np.array_equal(before[0], points):
+            forms = self.problem.forms
+            before = points.copy(), locate(forms.domain, points, forms.length, self.cells[layer], f"layer {layer!r}")
+            self._located[layer] = before
+        return before[1]
 
     def layer(self, name: str | None) -> str:
         """A layer's name, checked."""

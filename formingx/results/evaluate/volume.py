@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-_VOLUME = 5e-3
+BOUND = 5e-3
 """Root mean square of J - 1 above which a report warns, and above four times which a run does: elements have
 other volumes, though the mass is kept."""
 
@@ -19,8 +19,8 @@ def doubts(error: float, where: str, furthest: Any) -> list[tuple[str, str]]:
     from 1 in the last state, or None.
     """
     found = []
-    if error > _VOLUME:
-        found.append(("serious" if error > 4 * _VOLUME else "minor",
+    if error > BOUND:
+        found.append(("serious" if error > 4 * BOUND else "minor",
                       f"The elements do not keep their volumes: the root mean square of J - 1 is up to"
                       f" {100 * error:.2g} % ({where}): use a finer mesh; the corner of a clamped rim is singular."))
     J = 1.0 if furthest is None else furthest.value

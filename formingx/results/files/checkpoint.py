@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 from dolfinx import fem
+from mpi4py import MPI
 
 from ... import _compat
 from ...discrete.problem import Problem
@@ -38,6 +39,7 @@ from ...solve.state import Counts, Record, State
 from .. import files
 from .arrays import pack, unpack
 from .description import describe, differences
+from .progress import progress
 
 FORMAT = 5
 _READ = (4, 5)
@@ -68,10 +70,12 @@ class Checkpoint:
         Raises:
             OSError: it cannot be written, or the disk is full; all states before are kept.
         """
-        path = self._path
-        for number in range(self._there, len(path)):
-            self._write_state(number, path.states[number], _profile(path, path.states[number]))
-            self._there = number + 1
+        path, first = self._path, self._there
+        with progress(self._problem.comm, f"{self.folder}: {len(path) - first} states") as done:
+            for number in range(first, len(path)):
+                self._write_state(number, path.states[number], _profile(path, path.states[number]))
+                self._there = number + 1
+                done((self._there - first) / (len(path) - first))
 
     def _begin(self) -> int:
         """Make the folder, or check what is in it; the number of states there."""
@@ -152,7 +156,7 @@ def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
             raise InputError(f"checkpoint {str(folder)!r} holds no state")
         if state is not None and not (isinstance(state, int) and 0 <= state < len(there)):
             raise InputError(f"load: state = {state!r}: the checkpoint holds states 0 to {len(there) - 1}")
-        found = [_read_data(folder, k) for k in range(len(there) if state is None else state + 1)]
+        found = _read_states(folder, len(there) if state is None else state + 1, problem.comm)
         settled = [k for k, data in enumerate(found) if data["stepping"]]
         return found[:settled[-1] + 1] if state is None and settled else found
     found = files.on_root(problem.comm, look)
@@ -172,6 +176,20 @@ def holds_states(folder: Any, comm: Any) -> bool:
     return files.on_root(comm, lambda: (folder / "scene.json").exists() and bool(_states(folder)))
 
 
+def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]]]:
+    """(how many states a checkpoint holds, what state.json says of the last ones); a run may be writing to it.
+
+    Raises:
+        InputError: there is no checkpoint, it holds no state, or it is damaged.
+    """
+    folder = place("checkpoint", folder)
+    _check_format(folder, _read_json(folder / "scene.json"))
+    n = len(_states(folder))
+    if not n:
+        raise InputError(f"checkpoint {str(folder)!r} holds no state")
+    return n, [_read_data(folder, k, checksums=False) for k in range(max(n - count, 0), n)]
+
+
 def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """(what scene.json says, what each state.json says) of a checkpoint; no scene is needed.
 
@@ -181,10 +199,20 @@ def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     folder = place("checkpoint", folder)
     about = _read_json(folder / "scene.json")
     _check_format(folder, about)
-    states = [_read_data(folder, k) for k in range(len(_states(folder)))]
+    states = _read_states(folder, len(_states(folder)), MPI.COMM_SELF)
     if not states:
         raise InputError(f"checkpoint {str(folder)!r} holds no state")
     return about, states
+
+
+def _read_states(folder: FilePath, count: int, comm: Any) -> list[dict]:
+    """The data of the first states."""
+    found = []
+    with progress(comm, f"{folder}: {count} states") as done:
+        for k in range(count):
+            found.append(_read_data(folder, k))
+            done((k + 1) / count)
+    return found
 
 
 def _check_format(folder: FilePath, about: dict) -> None:

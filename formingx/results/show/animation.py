@@ -14,12 +14,13 @@ import numpy as np
 from ... import figures
 from ...discrete.tooling import Tooling
 from ...errors import InputError, count, positive
+from ...units import NONE, Units
 from .. import files
 from . import plots
 from .record import progress
 
 
-def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
+def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NONE) -> None:
     """See `Path.animate`."""
     file = files.named("animate", file, ".gif", ".mp4")
     if file.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
@@ -39,7 +40,7 @@ def animate(path: Any, file: Any, frames: int, seconds: float) -> None:
     axisymmetric = path.problem.scene.kinematics.dimension_of_volume == 3
 
     def draw():
-        pictures = _draw(shapes, tools, now, curves, axisymmetric)
+        pictures = _draw(shapes, tools, now, curves, axisymmetric, units)
         save = _save_gif if file.suffix.lower() == ".gif" else _save_mp4
         files.replace(file, lambda stream: save(pictures, seconds, stream), "wb")
     files.on_root(path.problem.comm, draw)
@@ -67,7 +68,7 @@ def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
     return found
 
 
-def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool) -> list[Any]:
+def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool, units: Units) -> list[Any]:
     """The frames, each a picture."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -84,12 +85,13 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
     pictures: list[Any] = []
     for shape, ratio, tool, (names, at) in zip(shapes, ratios, tools, now):
         left.clear()
-        left.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="r", ylabel="z", aspect="equal")
+        left.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel=units.label("r"),
+                 ylabel=units.label("z"), aspect="equal")
         left.spines[["top", "right"]].set_visible(False)
         figures.tools(left, tool, low, high, mirror=len(sides) == 2)
         for side in sides:
             plots.section(left, shape, (side, 1), colormaps["viridis_r"](colours(ratio)))
-        _curve(right, names, curves[names], at)
+        _curve(right, names, curves[names], at, units)
         figure.canvas.draw()
         if not pictures:
             figure.set_layout_engine("none")                # or the axes would shift from frame to frame
@@ -97,16 +99,16 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
     return pictures
 
 
-def _curve(axes: Any, names: tuple[str, str], curve: list, at: list[float]) -> None:
+def _curve(axes: Any, names: tuple[str, str], curve: list, at: list[float], units: Units) -> None:
     """The loading curve, and a dot where the body is on it."""
-    x, y = (name.replace("_", " ") for name in names)
+    x, y = map(units.label, names)
     axes.clear()
     axes.grid(True, color="0.9", linewidth=0.7)
     axes.plot(*curve, color="0.6")
     axes.plot(*at, "o", color="tab:red")
-    axes.set(xlabel=x, ylabel=" ")                          # which keeps room for the numbers of the next stage
+    axes.set(xlabel=x, ylabel=y)
     value = at[1] if abs(at[1]) > 1e-9 * np.abs(curve[1]).max() else 0.0
-    axes.set_title(f"{y} {value:.4g}", fontsize=10)
+    axes.set_title(f"{names[1].replace('_', ' ')} {value:.4g} {units.of(names[1])}".rstrip(), fontsize=10)
 
 
 def _save_gif(pictures: list[Any], seconds: float, stream: Any) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import functools
 import gzip
 import json
 from typing import Any
@@ -11,8 +12,6 @@ import numpy as np
 
 from ...errors import InputError
 from ...units import Units
-from ..evaluate.filling import corners_of
-from ..evaluate.profile import distance_to_line, fine
 from .record import Record, words
 
 DIGITS = 5
@@ -21,6 +20,7 @@ STATIONS = 101
 """At most so many places along a sheet are drawn."""
 
 
+@functools.cache
 def library() -> str:
     """plotly.js, packed.
 
@@ -37,14 +37,14 @@ def library() -> str:
 
 def packed(text: str) -> str:
     """A text, compressed, in letters that a page can hold."""
-    return base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
+    return base64.b64encode(gzip.compress(text.encode(), 6, mtime=0)).decode()
 
 
 def data(records: list[Record], names: list[str], units: Units) -> str:
     """Everything that `report.js` draws, as JSON."""
     runs = [_run(record, name, units) for record, name in zip(records, names)]
-    charts = [chart for chart in (*_loading(records, names, units), _filling(records, names, units),
-                                  *_walls(records, names, units)) if chart]
+    charts = [chart for chart in (*_loading(records, names, units), *_in_time(records, names, units),
+                                  _filling(records, names, units), *_walls(records, names, units)) if chart]
     return json.dumps({"runs": runs, "charts": charts, "length": units.length or ""}, allow_nan=False,
                       separators=(",", ":"))
 
@@ -52,13 +52,13 @@ def data(records: list[Record], names: list[str], units: Units) -> str:
 def _run(record: Record, name: str, units: Units) -> dict[str, Any]:
     """One run: the section and what colours it, frame by frame."""
     ends = [k for k in range(1, len(record.stages)) if record.stages[k] != record.stages[k - 1]]
-    at = record.progress
+    at, frames = record.progress, record.frames
     stages = [{"name": words(record.stages[a]), "from": float(at[a]), "to": float(at[b - 1])}
               for a, b in zip([0, *ends], [*ends, len(at)])]
     shown = [c for c in record.measures if c.endswith(("pressure", "travel", "pole_height", "process_time"))]
-    found = {"name": name, "axisymmetric": record.axisymmetric, "stages": stages, "progress": _rounded(at),
-             "stage": record.stages,
-             "numbers": {units.label(c): _rounded(record.measures[c]) for c in shown},
+    found = {"name": name, "axisymmetric": record.axisymmetric, "stages": stages, "progress": _rounded(at[frames]),
+             "stage": [record.stages[k] for k in frames],
+             "numbers": {units.label(c): _rounded(record.measures[c][frames]) for c in shown},
              "tools": _tools(record), "sheet": None}
     if record.profiles[-1] is not None:
         found["sheet"] = _sheet(record, units)
@@ -69,15 +69,23 @@ def _sheet(record: Record, units: Units) -> dict[str, Any]:
     n = len(record.profiles[-1].bottom)
     some = np.unique(np.linspace(0, n - 1, min(n, STATIONS)).round().astype(int))
     fields: dict[str, list] = {}
-    for profile, more in zip(record.profiles, record.fields):
+    profiles = [record.profiles[k] for k in record.frames]
+    for profile, more in zip(profiles, [record.fields[k] for k in record.frames]):
         wall = profile.wall_thickness
         values = {units.label("wall"): wall, "wall / original": wall / profile.original_thickness}
-        values |= {units.label(key.replace(" ", "_"), key): v for key, v in more.items()}
+        values |= {_label(record, units, key): v for key, v in more.items()}
         for key, v in values.items():
             fields.setdefault(key, []).append(_rounded(v[some], each=True))
     last = record.profiles[-1]
-    return {"material": _rounded(last.reference_radius[some]), "bottom": [_rounded(p.bottom[some].T) for p in
-            record.profiles], "top": [_rounded(p.top[some].T) for p in record.profiles], "fields": fields}
+    along = int(np.argmax(np.ptp(last.rest_bottom, axis=0)))          # of a parison: Z
+    return {"from": "RZ"[along], "material": _rounded(last.rest_bottom[some, along]), "fields": fields,
+            "bottom": [_rounded(p.bottom[some].T) for p in profiles],
+            "top": [_rounded(p.top[some].T) for p in profiles]}
+
+
+def _label(record: Record, units: Units, key: str) -> str:
+    """Of a field, with its unit."""
+    return f"{key}, {record.unit}" if key == "temperature" and record.unit else units.label(key.replace(" ", "_"), key)
 
 
 def _tools(record: Record) -> list[dict[str, Any]]:
@@ -90,7 +98,8 @@ def _tools(record: Record) -> list[dict[str, Any]]:
         shell = line + 0.02 * size * contact.tool.nearest(line).normal
         found.append({"name": name, "line": _rounded(line.T), "shell": _rounded(shell.T),
                       "moves": list(contact.moves or (0.0, 0.0)),
-                      "travel": [None if t[k] is None else float(f"{t[k]:.7g}") for t in record.travels]})
+                      "travel": [None if t[k] is None else float(f"{t[k]:.7g}")
+                                 for t in (record.travels[i] for i in record.frames)]})
     return found
 
 
@@ -103,8 +112,7 @@ def _loading(records: list[Record], names: list[str], units: Units) -> list[dict
             of_stage = slice(a, b)
             for x, y, xs, ys in _driven(record, of_stage):
                 label = " ".join(w for w in (name if len(records) > 1 else "", words(record.stages[a])) if w)
-                pairs.setdefault((x, y), []).append({"x": _rounded(xs), "y": _rounded(ys), "name": label or words(y),
-                                                     "mode": "lines+markers", "marker": {"size": 4}})
+                pairs.setdefault((x, y), []).append(_trace(xs, ys, label or words(y)))
     drawn = [_chart(f"{words(y).capitalize()} against {words(x)}", units.label(x), units.label(y), traces)
              for (x, y), traces in pairs.items()]
     return [chart for chart in drawn if chart]
@@ -131,23 +139,52 @@ def _driven(record: Record, stage: slice) -> list[tuple[str, str, np.ndarray, np
     return found
 
 
-def _filling(records: list[Record], names: list[str], units: Units) -> dict[str, Any] | None:
-    """The gap left in every corner of the tools that stay, against the pressure, in the last stage."""
-    traces = []
+def _in_time(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any] | None]:
+    """What is driven, the forces of all tools and the temperature of the body over process time, where it runs."""
+    drawn: dict[str, tuple[str, list]] = {}
     for record, name in zip(records, names):
-        pressure = next((v for c, v in record.measures.items() if c.endswith("pressure")), None)
-        first = next(k for k, stage in enumerate(record.stages) if stage == record.stages[-1])
-        for contact in record.tooling.contacts:
-            if contact.moves is not None or pressure is None or record.profiles[-1] is None \
-                    or contact.on not in ("top", "bottom", "inner", "outer"):
-                continue
-            for k, (_, points) in enumerate(corners_of(contact.tool), 1):
-                lines = (p.top if contact.on in ("top", "outer") else p.bottom for p in record.profiles[first:])
-                gaps = np.array([distance_to_line(points, fine(line)).max() for line in lines])
-                label = f"{contact.name or 'tool'}, corner {k}"
-                traces.append({"x": _rounded(pressure[first:]), "y": _rounded(gaps), "mode": "lines+markers",
-                               "name": f"{name}: {label}" if len(records) > 1 else label, "marker": {"size": 4}})
-    return _chart("Gap left in the corners against pressure", units.label("pressure"), units.label("gap"), traces)
+        if not record.timed:
+            continue
+        time, lead = record.measures["process_time"], f"{name}: " if len(records) > 1 else ""
+        columns = {"Pressure": [c for c in record.measures if c.endswith("pressure")],
+                   "Travel": [c for c in record.measures if c.endswith(("travel", "displacement"))]}
+        for kind, found in columns.items():
+            for c in found:
+                drawn.setdefault(kind, (units.label(c, kind.lower()), []))[1].append(
+                    _trace(time, record.measures[c], lead + words(c)))
+        for tool, force in record.forces.items():
+            drawn.setdefault("Force", (units.label("force"), []))[1].append(_trace(time, force, lead + tool))
+        warm = [k for k in record.frames if "temperature" in record.fields[k]]
+        for which, of in (("hottest", np.max), ("mean", np.mean), ("coldest", np.min)) if warm else ():
+            values = np.array([of(record.fields[k]["temperature"]) for k in warm])
+            drawn.setdefault("Temperature", (_label(record, units, "temperature"), []))[1].append(
+                _trace(time[warm], values, lead + which))
+    return [_chart(f"{kind} over time", units.label("process_time"), label, traces)
+            for kind, (label, traces) in drawn.items()]
+
+
+def _trace(x: np.ndarray, y: np.ndarray, name: str) -> dict[str, Any]:
+    """A curve; the states on it as dots, where they are not too many."""
+    return {"x": _rounded(x), "y": _rounded(y), "name": name, "marker": {"size": 4},
+            "mode": "lines+markers" if len(x) <= 60 else "lines"}
+
+
+def _filling(records: list[Record], names: list[str], units: Units) -> dict[str, Any] | None:
+    """The gap left in every corner of the tools that stay, over process time where it runs, else against the pressure.
+
+    Without time, in the last stage.
+    """
+    traces, timed = [], any(record.timed for record in records)
+    for record, name in zip(records, names):
+        course = record.measures["process_time"] if timed else next(
+            (v for c, v in record.measures.items() if c.endswith("pressure")), None)
+        if course is None:
+            continue
+        drawn = [k for k in record.shown if timed or record.stages[k] == record.stages[-1]]
+        for label, gaps in record.gaps(drawn).items():
+            traces.append(_trace(course[drawn], gaps, f"{name}: {label}" if len(records) > 1 else label))
+    return _chart("Gap left in the corners " + ("over time" if timed else "against pressure"),
+                  units.label("process_time" if timed else "pressure"), units.label("gap"), traces)
 
 
 def _walls(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any] | None]:

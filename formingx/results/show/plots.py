@@ -26,9 +26,9 @@ def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
 def convergence(path: Any, axes: Any = None) -> Any:
     """Correction (3.5.1) against iteration, one line per state (as thesis figures 3.2 and 5.7); returns the axes."""
     axes = axes if axes is not None else figure()[1]
-    for state in path.states:
-        corrections = [i.correction for i in state.history if i.correction > 0]
-        axes.semilogy(range(1, len(corrections) + 1), corrections, ".-", color="tab:blue", alpha=0.5, linewidth=1)
+    lines = [[i.correction for i in state.history if i.correction > 0] for state in path.states]
+    number = [k for line in lines for k in (*range(1, len(line) + 1), None)]
+    axes.semilogy(number, [c for line in lines for c in (*line, None)], ".-", color="tab:blue", alpha=0.5, linewidth=1)
     axes.set_xlabel("Newton iteration")
     axes.set_ylabel("correction $|\\Delta x|/|x|$")
     axes.xaxis.get_major_locator().set_params(integer=True)

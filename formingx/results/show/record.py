@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -15,13 +15,19 @@ from ...errors import InputError
 from .. import files
 from ..evaluate import edges, snaps, tension, volume
 from ..evaluate.contact_face import ContactFace, ContactTable, tool_forces
-from ..evaluate.profile import Profile
+from ..evaluate.filling import corners_of
+from ..evaluate.profile import Profile, distance_to_line, fine
+from ..files.description import plain
+from ..files.progress import progress as shown_progress
 
 PENETRATION = 0.05
 """Penetration over the smallest thickness above which a report warns."""
 
 MASS = 1e-3
 """Relative error of the mass above which a report warns."""
+
+FRAMES = 100
+"""About so many states are drawn."""
 
 
 @dataclass
@@ -32,13 +38,14 @@ class Record:
         summary: {part of the scene: one line}; versions: {program: version}; axisymmetric: else plane strain.
         kinds: of the states; stages: their names, "" in a run without; measures: {column: shape (n,)}.
         histories: of the n states, rows (residual, correction, work) of Newton's iterations.
-        profiles: of the n states, each a `Profile`, or None.
+        profiles: of the n states, each a `Profile`, or None: of no sheet, or of a state that is not drawn (`frames`).
         counts: what the run cost; until: (measure, value) that it aimed at, or None.
         tooling: the `Tooling` of the scene; travels: of the n states, `Tooling.travels`.
         forces: {tool: the force that it takes, shape (n,)}, positive when it resists its travel; of a tool that stays,
             along Z.
         fields: of the n states, {name: values at the nodes of the bottom face, or of both faces, shape (m,)}; more than
-            the profiles say; empty of a checkpoint.
+            the profiles say; of those that are drawn. (A checkpoint knows the temperature alone.)
+        heat: {tool: (conductance, its temperature in words)} where tools take heat; unit: of temperatures, or "".
         layers: of the last state, as in `Wall`; script: the file that ran; or "".
         furthest: where J is furthest from 1 in the last state, or None: not known of a checkpoint or a membrane.
         edge: `edges.coarsest` in the last state, or None; compression: `tension.first_compression`, or None; snap:
@@ -67,6 +74,8 @@ class Record:
     compression: tuple[int, tension.Resultant] | None = None
     verdicts: Sequence[str] = ()
     snap: snaps.Snap | None = None
+    heat: dict[str, tuple[float, str]] = field(default_factory=dict)
+    unit: str = ""
 
     @property
     def control(self) -> str:
@@ -77,6 +86,21 @@ class Record:
     def progress(self) -> np.ndarray:
         """How far the process has come in each state, see `progress`, shape (n,)."""
         return progress(self.measures, self.profiles)
+
+    @property
+    def timed(self) -> bool:
+        """True if process time runs."""
+        return bool(np.ptp(self.measures.get("process_time", 0.0)) > 0)
+
+    @property
+    def frames(self) -> list[int]:
+        """Numbers of the states that are drawn, see `frames`."""
+        return frames(self.progress, self.kinds, self.stages)
+
+    @property
+    def shown(self) -> list[int]:
+        """Numbers of the drawn states that have a profile."""
+        return [k for k in self.frames if self.profiles[k] is not None]
 
     def findings(self) -> list[tuple[str, str]]:
         """(how bad: "serious", "minor" or "note"; what) a reader should know before trusting the numbers."""
@@ -89,31 +113,60 @@ class Record:
         if "penetration" in self.measures:
             deep, thickness = self.measures["penetration"].max(), self._smallest_thickness()
             if thickness is not None and deep > PENETRATION * thickness:
+                begins = self._from(self.measures["penetration"] > PENETRATION * thickness)
                 found.append(("serious" if deep > 4 * PENETRATION * thickness else "minor",
                               f"The body penetrates a tool by {deep:.3g}, {100 * deep / thickness:.2g} % of its"
-                              f" smallest thickness: a larger contact penalty makes that less."))
+                              f" smallest thickness{begins}: a larger contact penalty makes that less."))
         worst = np.abs(self.measures["mass_error"]).max()
         if worst > MASS:
             found.append(("serious" if worst > 10 * MASS else "minor",
-                          f"The mass changes by up to {100 * worst:.2g} %: a smaller eps, or a finer mesh, keeps it."))
+                          f"The mass changes by up to {100 * worst:.2g} %"
+                          f"{self._from(np.abs(self.measures['mass_error']) > MASS)}: a smaller eps, or a finer mesh,"
+                          f" keeps it."))
         found += self._of_volume() + self._of_verdict() + edges.doubts(self.edge)
         found += tension.doubts(self.compression) + snaps.doubts(self.snap)
         if self.counts.get("failures", 0) > len(self.kinds):
             found.append(("note", f"{self.counts['failures']} attempts at a step failed and were repeated with half its"
                                   f" length; the results do not suffer."))
+        return sorted(found, key=lambda one: ("serious", "minor", "note").index(one[0]))
+
+    @property
+    def limits(self) -> dict[str, int]:
+        """{what made steps shorter: how often}, the most frequent first; empty where it is not known."""
+        return dict(sorted(self.counts.get("limits", {}).items(), key=lambda one: -one[1]))
+
+    def gaps(self, states: list[int]) -> dict[str, np.ndarray]:
+        """{"tool, corner": gap left in that corner of a tool that stays} in each of some states with profiles."""
+        found = {}
+        for contact in self.tooling.contacts:
+            if contact.moves is not None or contact.on not in ("top", "bottom", "inner", "outer"):
+                continue
+            for k, (_, points) in enumerate(corners_of(contact.tool), 1):
+                faces = [self.profiles[i].top if contact.on in ("top", "outer") else self.profiles[i].bottom
+                         for i in states]
+                found[f"{contact.name or 'tool'}, corner {k}"] = np.array(
+                    [distance_to_line(points, fine(face)).max() for face in faces])
         return found
+
+    def _from(self, where: np.ndarray) -> str:
+        """In words, the first state at which something is so."""
+        k = int(np.argmax(where))
+        stage = f"{words(self.stages[k])!r}, " if self.stages[k] else ""
+        return f", from state {k} on ({stage}{words(self.control)} = {self.measures[self.control][k]:.5g})"
 
     def _of_volume(self) -> list[tuple[str, str]]:
         errors = self.measures["volume_error"]
         k = int(np.argmax(errors))
-        return volume.doubts(errors[k], f"state {k}, {words(self.control)} = {self.measures[self.control][k]:.5g}",
-                             self.furthest)
+        first = int(np.argmax(errors > volume.BOUND))
+        begins = f"; more than {100 * volume.BOUND:g} % from state {first} on" if first < k else ""
+        where = f"state {k}, {words(self.control)} = {self.measures[self.control][k]:.5g}{begins}"
+        return volume.doubts(errors[k], where, self.furthest)
 
     def _of_verdict(self) -> list[tuple[str, str]]:
         k = next((k for k, verdict in enumerate(self.verdicts) if verdict), None)
         return [] if k is None else [
-            ("serious", f"From state {k} on ({words(self.control)} = {self.measures[self.control][k]:.5g}) the run is"
-                        f" not to be used: {self.verdicts[k]}.")]
+            ("serious", f"From{self._from(np.arange(len(self.kinds)) >= k)[6:]} the run is not to be used:"
+                        f" {self.verdicts[k]}.")]
 
     def warnings(self) -> list[str]:
         """What a reader should know before trusting the numbers, without how bad it is."""
@@ -127,21 +180,35 @@ class Record:
 def of_path(path: Any) -> Record:
     """The record of a `Path`; collective."""
     from ...scene.summary import summary
-    try:
-        profiles = [path.profile(state) for state in path.states]
-    except InputError:
-        profiles = [None] * len(path)
-    problem = path.problem
-    stepping: dict = next((s.stepping for s in reversed(path.states) if s.stepping), {})
-    tooling = Tooling.of_problem(problem)
-    wall = path.wall() if profiles[-1] is not None else None
-    return Record(summary(problem.scene), files.versions(), problem.scene.kinematics.dimension_of_volume == 3,
-                  [s.kind for s in path.states], [s.stage for s in path.states], {c: path[c] for c in path.columns},
-                  [list(s.history) for s in path.states], profiles, vars(path.counts), stepping.get("until"), tooling,
-                  [tooling.travels(s.setting, s.control) for s in path.states], tool_forces(path),
-                  _fields(path, profiles), dict(wall.layers) if wall else {}, sys.argv[0],
-                  problem.furthest_volume_ratio(path.last), edges.coarsest(path, path.last),
-                  tension.first_compression(path), [s.verdict for s in path.states], snaps.largest(path))
+    problem, states, n = path.problem, path.states, len(path)
+    with shown_progress(problem.comm, f"report of {n} states") as done:
+        measures = {c: path[c] for c in path.columns}
+        kinds, stages = [s.kind for s in states], [s.stage for s in states]
+        timed = np.ptp(measures.get("process_time", 0.0)) > 0              # where it runs, progress needs no profiles
+        drawn: Any = frames(progress(measures, [None] * n), kinds, stages) if timed else range(n)
+        profiles: list[Any] = [None] * n
+        try:
+            for k in drawn:
+                profiles[k] = path.profile(states[k])
+        except InputError:
+            pass
+        drawn = drawn if timed else frames(progress(measures, profiles), kinds, stages)
+        shown: list[dict[str, np.ndarray]] = [{} for _ in states]
+        if profiles[-1] is not None:
+            fields = _Fields(path, profiles[-1])
+            for i, k in enumerate(drawn):
+                done(i / len(drawn))
+                shown[k] = fields.of(states[k])
+        stepping: dict = next((s.stepping for s in reversed(states) if s.stepping), {})
+        tooling = Tooling.of_problem(problem)
+        wall = path.wall() if profiles[-1] is not None else None
+        return Record(summary(problem.scene), files.versions(), problem.scene.kinematics.dimension_of_volume == 3,
+                      kinds, stages, measures, [list(s.history) for s in states], profiles, vars(path.counts),
+                      stepping.get("until"), tooling, [tooling.travels(s.setting, s.control) for s in states],
+                      tool_forces(path), shown, dict(wall.layers) if wall else {}, sys.argv[0],
+                      problem.furthest_volume_ratio(path.last), edges.coarsest(path, path.last),
+                      tension.first_compression(path), [s.verdict for s in states], snaps.largest(path),
+                      **_heat(plain(problem.scene.heat)))
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:
@@ -156,7 +223,46 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
                   stepping.get("until"), tooling,
                   [tooling.travels(s.get("setting", {}), s["control"]) for s in states],
                   {name: measures[column] for name, column in tooling.force_columns.items() if column in measures},
-                  [{} for _ in states], {}, verdicts=[s["verdict"] for s in states])
+                  _temperatures(states, profiles[-1]), {}, verdicts=[s["verdict"] for s in states],
+                  **_heat(about["scene"].get("heat")))
+
+
+def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
+    """`Record.heat` and `Record.unit` of a scene's heat as plain data (`description.plain`)."""
+    if not heat:
+        return {}
+
+    def said(tool):
+        return f"{tool:g}" if isinstance(tool, int | float) else f"{tool['start']:g} at first, {tool['back']:g} behind"
+    return {"heat": {name: (conductance, said(tool)) for name, (conductance, tool) in heat["tools"].items()},
+            "unit": heat["unit"]}
+
+
+def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np.ndarray]]:
+    """The temperature at the stations of profiles, of what the states of a checkpoint remember of it."""
+    from scipy.spatial import cKDTree
+    found: list[dict[str, np.ndarray]] = [{} for _ in states]
+    at = None
+    for here, state in zip(found, states):
+        kept = next((m for m in state["memory"] if "temperature" in m and "points" in m), None)
+        if kept is None or last is None:
+            return found
+        if at is None:
+            at = cKDTree(kept["points"]).query(np.array([last.rest_bottom, last.rest_top]))[1]
+        here["temperature"] = np.asarray(kept["temperature"])[at].mean(0)
+    return found
+
+
+def frames(at: np.ndarray, kinds: list[str], stages: list[str]) -> list[int]:
+    """Numbers of about `FRAMES` of n states at which a process has come so far (`progress`), shape (n,).
+
+    Ends of stages and limit points are among them; others are spread over the process and over the states alike.
+    """
+    n = len(at)
+    marked = {k for k in range(n) if kinds[k] == "limit point" or stages[k:k + 2] != [stages[k]] * 2} | {0, n - 1}
+    way = (at + np.linspace(0, 1, n)) / 2
+    even = np.searchsorted(way, np.linspace(0, 1, max(FRAMES - len(marked), FRAMES // 2)))
+    return sorted({*marked, *map(int, even.clip(0, n - 1))}) if n > FRAMES else list(range(n))
 
 
 def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray:
@@ -183,24 +289,26 @@ def words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _fields(path: Any, profiles: list) -> list[dict[str, np.ndarray]]:
-    """Stress and contact pressure at the nodes of both faces of a sheet, state by state."""
-    if profiles[-1] is None:
-        return [{} for _ in path.states]
-    points = [profiles[-1].rest_bottom, profiles[-1].rest_top]
-    solid = path.problem.forms.domain.topology.dim == 2
-    layers = list(path.problem.scene.mesh.layers)
-    faces = [ContactFace(path, contact) for contact in path.problem.contacts]
-    found = []
-    for state in path.states:
-        here = {}
-        if solid and len(layers) == 1:
+class _Fields:
+    """Stress, contact pressure and temperature at the stations of a profile, from both faces of a sheet."""
+
+    def __init__(self, path: Any, profile: Profile):
+        self._path, self._points = path, [profile.rest_bottom, profile.rest_top]
+        solid = path.problem.forms.domain.topology.dim == 2
+        self._stressed = solid and len(path.problem.scene.mesh.layers) == 1
+        self._faces = [ContactFace(path, contact) for contact in path.problem.contacts]
+
+    def of(self, state: Any) -> dict[str, np.ndarray]:
+        """Of a state, shape (m,) each; collective."""
+        path, points, here = self._path, self._points, {}
+        if path.problem.scene.heat is not None:
+            here["temperature"] = path.temperature(np.vstack(points), state).reshape(2, -1).mean(0)
+        if self._stressed:
             stress = path.stress(state).at(np.vstack(points))
             here["largest principal stress"] = stress.principal_stresses[:, 0].reshape(2, -1).max(0)
-        if faces:
-            here["contact pressure"] = sum(_nearest(face.of(state), points) for face in faces)
-        found.append(here)
-    return found
+        if self._faces:
+            here["contact pressure"] = sum(_nearest(face.of(state), points) for face in self._faces)
+        return here
 
 
 def _nearest(table: ContactTable, points: list[np.ndarray]) -> np.ndarray:

@@ -53,11 +53,14 @@ function sectionTraces(run, at, field, range) {
     line: {color: "#30405a", width: 0.5}, hoverinfo: "skip", showlegend: false,
     x: [...at.bottom[0], ...[...at.top[0]].reverse()].map(r => side * r),
     y: [...at.bottom[1], ...[...at.top[1]].reverse()]}));
+  const parts = 6, dense = v => v.flatMap((a, i) => i + 1 < v.length         // or thin walls would be a row of dots
+    ? Array.from({length: parts}, (_, k) => a === null ? a : a + k / parts * ((v[i + 1] ?? a) - a)) : [a]);
+  const r = dense(at.bottom[0].map((r, i) => (r + at.top[0][i]) / 2)), z = dense(at.bottom[1].map((z, i) => (z + at.top[1][i]) / 2));
   sides.forEach((side, n) => traces.push({type: "scatter", mode: "markers", showlegend: false, hovertemplate: "%{text}<extra></extra>",
-    x: at.bottom[0].map((r, i) => side * (r + at.top[0][i]) / 2), y: at.bottom[1].map((z, i) => (z + at.top[1][i]) / 2),
-    text: at.values.map((_, i) => `from R ${format(run.sheet.material[i])}<br>` +
+    x: r.map(r => side * r), y: z,
+    text: r.map((_, k) => Math.round(k / parts)).map(i => `from ${run.sheet.from} ${format(run.sheet.material[i])}<br>` +
       Object.entries(at.all).map(([name, v]) => `${name}: ${format(v[i])}`).join("<br>")),
-    marker: {size: 6, color: at.values, colorscale: "Viridis", reversescale: field.startsWith("wall"), cmin: range[0],
+    marker: {size: 6, color: dense(at.values), colorscale: field.startsWith("temperature") ? "Inferno" : "Viridis", reversescale: field.startsWith("wall"), cmin: range[0],
       cmax: range[1], showscale: n === 0, colorbar: {thickness: 12, len: 0.85, outlinewidth: 0,
       title: {text: field, side: narrow() ? "top" : "right"}, ...(narrow() ? {orientation: "h", y: -0.42, len: 1} : {})}}}));
   return traces;
@@ -69,7 +72,7 @@ function surface(run, at, field, range) {
   const turn = Array.from({length: 49}, (_, i) => 1.5 * Math.PI * i / 48), size = Math.max(...r);
   const x = run.axisymmetric ? turn.map(a => r.map(q => q * Math.cos(a))) : [-1, 1].map(() => r);
   const y = run.axisymmetric ? turn.map(a => r.map(q => q * Math.sin(a))) : [-1, 1].map(s => r.map(() => s * size));
-  return [{type: "surface", x, y, z: x.map(() => z), surfacecolor: x.map(() => v), colorscale: "Viridis",
+  return [{type: "surface", x, y, z: x.map(() => z), surfacecolor: x.map(() => v), colorscale: field.startsWith("temperature") ? "Inferno" : "Viridis",
     reversescale: field.startsWith("wall"), cmin: range[0], cmax: range[1], showscale: false, hoverinfo: "skip",
     lighting: {ambient: 0.6, diffuse: 0.6, specular: 0.15}}];
 }
@@ -96,8 +99,11 @@ function process(data) {
     height: narrow() ? 470 : 520, xaxis: {title: `r${unit}`, range: box(run)[0], zeroline: false, gridcolor: "#eceff3",
     constrain: "domain"}, yaxis: {title: `z${unit}`, range: box(run)[1], scaleanchor: "x", zeroline: false,
     gridcolor: "#eceff3", constrain: "domain"}, plot_bgcolor: "white"});
-  const scene = () => { const [r, z] = box(run); return {font, margin: {l: 0, r: 0, t: 0, b: 0},
-    height: narrow() ? 340 : 420, scene: {aspectmode: "data", camera: {eye: {x: 1.0, y: -1.25, z: 0.75}},
+  const scene = () => { const [r, z] = box(run), unit = Math.cbrt((r[1] - r[0]) ** 2 * (z[1] - z[0]));
+    const half = (r[1] - r[0]) / unit / 2, high = 0.9 * (z[1] - z[0]) / unit / 2 + 0.4 * half;     // as they are seen
+    const far = Math.max(half, high) / 0.41 + half / 2;
+    return {font, margin: {l: 0, r: 0, t: 0, b: 0},
+    height: narrow() ? 340 : 420, scene: {aspectmode: "data", camera: {eye: {x: 0.57 * far, y: -0.71 * far, z: 0.42 * far}},
     xaxis: {visible: false, range: r}, yaxis: {visible: false, range: r}, zaxis: {visible: false, range: z}}}; };
   function show(solid) {
     const s = slider.value / 1000, field = colour.value, range = limits(run, field), at = frame(run, s, field);

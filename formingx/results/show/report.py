@@ -77,11 +77,12 @@ def _page(records: list[Record], names: list[str], parts: list, title: str, fail
     alone = len(records) == 1
     body = [f"<h1>{html.escape(title)}</h1>", *(f"<p class=lead>{_lead(record, units)}</p>" for record in records[:1])]
     body += _trouble(failure)
+    body += [_warnings(record, "" if alone else f"{name}: ") for record, name in zip(records, names)]
+    body += ["<p id=trouble class='note bad' hidden>This browser cannot draw what follows (it needs DecompressionStream"
+             " and WebGL: Chrome 80, Firefox 113, Safari 16.4 or later); the tables need nothing.</p>", _PROCESS]
     if alone:
         body.append(_cards(records[0], parts[0], units))
     body += ["<h2>The answer</h2>", _answers(records, names, parts, units),
-             "<p id=trouble class='note bad' hidden>This browser cannot draw what follows (it needs DecompressionStream"
-             " and WebGL: Chrome 80, Firefox 113, Safari 16.4 or later); the tables need nothing.</p>", _PROCESS,
              "<h2>Curves</h2><div id=charts class=grid></div>"]
     for record, name in zip(records, names):
         body += [] if alone else [f"<h2>{html.escape(name)}</h2>"]
@@ -93,8 +94,8 @@ def _page(records: list[Record], names: list[str], parts: list, title: str, fail
     return page.page(title, body, f"{tail}\n<script>{code}</script>")
 
 
-_PROCESS = """<div id=process><h2>The process</h2>
-<div class=controls><button id=play>Play</button><label>Colour: <select id=colour></select></label>
+_PROCESS = """<div id=process><div class=controls><button id=play>Play</button>
+<label>Colour: <select id=colour></select></label>
 <label>Run: <select id=run></select></label></div>
 <input id=slider type=range min=0 max=1000 value=1000 aria-label='how far the process has come'>
 <div id=marks></div><div id=now></div>
@@ -117,23 +118,27 @@ def _behind(record: Record, units: Units) -> list[str]:
         found += ["<h2>Stages</h2>", _stages(record, units)]
     if record.tooling.contacts:
         found += ["<h2>Tools</h2>", _tools(record, units)]
-    found += ["<h2>Inputs</h2>", page.table(["", ""], [[k, v] for k, v in record.summary.items()]), "<h2>Warnings</h2>",
-              _warnings(record)]
+    found += ["<h2>Inputs</h2>", page.table(["", ""], [[k, v] for k, v in record.summary.items()])]
     found.append(page.details("All measures at limit points and at the end", _key_numbers(record, units)))
     caption = "Correction of every Newton iteration, one line a state."
+    if record.limits:
+        found.append("<p>What made steps shorter, or fail: " + html.escape(", ".join(
+            f"{why} ({times} times)" for why, times in record.limits.items())) + ".</p>")
     drawn = any(len(h) > 1 for h in record.histories)
     convergence = page.figure(_convergence(record), caption, "small") if drawn else ""
     found.append(page.details("Convergence", convergence + _iterations(record)))
-    found.append(page.details("All states", _states(record, units)))
+    some = "States that are drawn" if len(record.frames) < len(record.kinds) else "All states"
+    found.append(page.details(some, _states(record, units)))
     return found
 
 
-def _warnings(record: Record) -> str:
+def _warnings(record: Record, lead: str = "") -> str:
+    """What a reader should know first: two lines of each, all of it when it is opened."""
     if not record.findings():
-        return ("<p class=good>No warnings: the target was met; mass, volume of the elements and penetration are within"
-                " bounds, and no face crosses another or the axis.</p>")
-    return "".join(f"<div class='note{' bad' if bad == 'serious' else ''}'><b>{bad}</b>: {html.escape(text)}</div>"
-                   for bad, text in record.findings())
+        return (f"<p class=good>{html.escape(lead)}No warnings: the target was met; mass, volume of the elements and"
+                f" penetration are within bounds, and no face crosses another or the axis.</p>")
+    return "".join(f"<details class='note{' bad' if bad == 'serious' else ''}'><summary><b>{bad}</b>:"
+                   f" {html.escape(lead + text)}</summary></details>" for bad, text in record.findings())
 
 
 def _made(records: list[Record]) -> list[list[str]]:
@@ -212,18 +217,21 @@ def _course_columns(record: Record) -> list[list[str]]:
 
 
 def _stages(record: Record, units: Units) -> str:
-    """Every stage: its states and iterations, and where it ended."""
-    columns = [c for kind in _course_columns(record) for c in kind]
-    rows = []
+    """Every stage: its states and iterations, where it ended, the largest forces on tools in it, what gap is left."""
+    columns = [c for kind in _course_columns(record) for c in kind if not c.endswith("force")]
+    columns += ["process_time"] * record.timed
+    rows, extra = [], [units.label("force", f"largest force on {name}") for name in record.forces]
     for stage in dict.fromkeys(record.stages):
         mine = [k for k, s in enumerate(record.stages) if s == stage]
         iterations = sum(max(len(record.histories[k]) - 1, 0) for k in mine)
-        profile = record.profiles[mine[-1]]
-        ends = [page.number(record.measures[c][mine[-1]]) for c in columns]
-        rows.append([stage, str(len(mine) - 1), str(iterations), *ends,
-                     "" if profile is None else page.number(profile.wall_ratio.min())])
-    return page.table(["stage", "states", "iterations", *(f"{units.label(c)} at its end" for c in columns),
-                   "smallest thickness / original"], rows)
+        last = record.profiles[mine[-1]]
+        gap = max((v[0] for v in record.gaps([mine[-1]]).values()), default=None) if last is not None else None
+        rows.append([words(stage), str(len(mine) - 1), str(iterations), *(page.number(record.measures[c][mine[-1]])
+                     for c in columns), *(page.number(f[mine][np.argmax(np.abs(f[mine]))]) for f in
+                     record.forces.values()), "" if gap is None else page.number(gap),
+                     "" if last is None else page.number(last.wall_ratio.min())])
+    return page.table(["stage", "states", "iterations", *(f"{units.label(c)} at its end" for c in columns), *extra,
+                       units.label("gap", "largest gap in a corner"), "smallest thickness / original"], rows)
 
 
 def _tools(record: Record, units: Units) -> str:
@@ -236,8 +244,12 @@ def _tools(record: Record, units: Units) -> str:
         rows.append([contact.name or "", contact.on, repr(contact.tool)[5:-1],
                      f"{contact.friction}{'' if contact.separates else ', holds what has touched'}",
                      page.number(contact.penalty), moves, where, "" if force is None else page.number(force[-1])])
+        if record.heat:
+            conductance, warm = record.heat.get(contact.name or "", (0.0, "takes no heat"))
+            rows[-1] += [warm, page.number(conductance)]
     head = ["tool", "face", "profile", "friction", "penalty", "motion", units.label("travel", "travel at the end"),
             units.label("force", "force at the end")]
+    head += [f"temperature, {record.unit}", "conductance"] if record.heat else []
     return page.table(head, rows) + (
         "<p class=lead>A force is positive when it resists the tool's travel; of a tool that stays, along z.</p>")
 
@@ -260,7 +272,8 @@ def _convergence(record: Record) -> Any:
 
 def _iterations(record: Record) -> str:
     rows = []
-    for k, (kind, history) in enumerate(zip(record.kinds, record.histories)):
+    for k in record.frames:
+        kind, history = record.kinds[k], record.histories[k]
         corrections = ", ".join(f"{row[1]:.1e}" for row in history[:-1])
         rows.append([str(k), kind, page.number(record.measures[record.control][k]), str(max(len(history) - 1, 0)),
                      corrections, f"{history[-1][0]:.1e}" if history else ""])
@@ -268,8 +281,7 @@ def _iterations(record: Record) -> str:
 
 
 def _states(record: Record, units: Units) -> str:
-    rows = [[str(k), kind, *(page.number(v[k]) for v in record.measures.values())]
-            for k, kind in enumerate(record.kinds)]
+    rows = [[str(k), record.kinds[k], *(page.number(v[k]) for v in record.measures.values())] for k in record.frames]
     return page.table(["state", "kind", *map(units.label, record.measures)], rows)
 
 
