@@ -54,6 +54,18 @@ def test_mass_is_kept(inflated, formed):
         assert part.least_wall < part.mean_wall and part.evenness == pytest.approx(part.least_wall / part.mean_wall)
 
 
+def test_content_of_a_closed_and_of_an_open_part():
+    """What a parison holds at rest: half a ball and a tube; and a sheet that bulged: what it swept below its face."""
+    mesh = fx.mesh.parison(inner_radius=2.0, thickness=0.3, length=5.0, elements=(20, 1))
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("neck")],
+                     loads=[fx.Pressure("inner")])
+    path = fx.trace(scene, until=fx.pressure(0.05), progress=False)
+    exact = np.pi * (2 / 3 * 2**3 + 2**2 * 5)
+    assert path.part(path.states[0]).content == pytest.approx(exact, rel=1e-3)
+    swept = path["enclosed_volume"][-1]
+    assert path.part().content - path.part(path.states[0]).content == pytest.approx(swept, rel=2e-2) and swept > 0.3
+
+
 def test_trimmed_parts_add_up(formed):
     whole, inner = formed.part(), formed.part(trim=6.0)
     assert inner.volume == pytest.approx((1 - inner.scrap) * whole.volume, rel=1e-12) and inner.scrap > 0.1

@@ -380,6 +380,11 @@ def test_a_long_run_makes_a_small_file(formed, tmp_path):
     record.forces = {c: np.tile(v, times) for c, v in record.forces.items()}
     report.write(record, tmp_path / "long.html", "Long", None, MPI.COMM_WORLD)
     assert len(record.kinds) >= 300 and (tmp_path / "long.html").stat().st_size < 8e6
+    run, = drawn(tmp_path / "long.html")["runs"]
+    limits = [k for k, kind in enumerate(record.kinds) if kind == "limit point"]
+    assert 80 < len(run["progress"]) == len(run["sheet"]["top"]) < 120
+    assert {0, len(record.kinds) - 1, *limits} <= set(record.frames)
+    assert np.diff(record.progress[record.frames]).max() < 0.05
 
 
 def test_forces_of_tools_do_not_leap_between_states(formed):
@@ -403,6 +408,58 @@ def test_warnings(formed, inflated):
     record.measures |= {"penetration": np.full(n, 0.1), "mass_error": np.full(n, -0.02), "volume_error": np.zeros(n)}
     record.furthest = None
     assert [w[:24] for w in record.warnings()] == ["The body penetrates a to", "The mass changes by up t"]
+
+
+def test_report_of_a_warm_process(tmp_path, capsys):
+    """Temperatures, conductances, values of functions without a name, what limited the steps; of a checkpoint, too."""
+    sheet = fx.mesh.disc(radius=2.0, thickness=0.3, elements=(8, 1))
+    soft = fx.Viscoelastic(fx.NeoHookean(c10=fx.of_temperature(lambda T: 10 / T)), branches=[(0.3, 0.5)])
+    heat = fx.Cooling(fx.ThermalProperties(conductivity=1e-2, density=1.0, heat_capacity=1.0), unit="C",
+                      tools={"plug": (0.025, 40.0)})
+    scene = fx.Scene(mesh=sheet, materials=soft, temperature=100.0, heat=heat,
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", fx.tools.sphere(radius=1.0, z=0.3), "stick", moves=(0, -1),
+                                          name="plug")])
+    path = fx.Process(scene).run([fx.Stage("go_down", drive="plug", until=fx.travel(0.5), speed=1.0),
+                                  fx.Stage("hold", duration=1.0)], accuracy="draft", progress=False)
+    path.report(tmp_path / "one.html", units=fx.Units("mm", "MPa"))
+    path.save(tmp_path / "run")
+    words = ["report", str(tmp_path / "run"), "--out", str(tmp_path / "two.html"), "--units", "mm,MPa",
+             "--density", "1.2", "--trim", "1.5"]
+    assert main(words) == 0 and main([*words[:4], "--units", "mm"]) == 2
+    assert "must be LENGTH,STRESS" in capsys.readouterr().err
+    for name in ("one", "two"):
+        text, data = page(tmp_path / f"{name}.html"), drawn(tmp_path / f"{name}.html")
+        for said in ("0.25 at 40, 0.1 at 100", "temperature, C", "0.025", "contact arriving (", "go down"):
+            assert said in text
+        assert "lambda" not in text and ("volume of the part" in text) == (name == "one")
+        chart = next(chart for chart in data["charts"] if chart["title"] == "Temperature over time")
+        last = [trace["y"][-1] for trace in chart["traces"]]
+        T = path.temperature(np.vstack([path.profile().rest_bottom, path.profile().rest_top])).reshape(2, -1).mean(0)
+        assert last == pytest.approx([T.max(), T.mean(), T.min()], rel=1e-3) and T.min() < 95
+        assert "temperature, C" in data["runs"][0]["sheet"]["fields"]
+        assert next(chart for chart in data["charts"] if chart["title"] == "Force over time")["y"] == "force, N"
+    limits = path.counts.limits
+    for command in (["status"], ["watch", "--patience", "0"]):
+        assert main([*command, str(tmp_path / "run")]) == 0
+    said, again = capsys.readouterr().out.split(f"{len(path)} states, stage 'hold': ")[1:]
+    assert said == again and "process time 1.5 of 1.5" in said and "the target is met" in said and "good" in said
+    assert f"contact arriving ({limits['contact arriving']} times)" in said
+    for k in range(len(path) - 2, len(path)):               # as it was two states earlier
+        shutil.rmtree(tmp_path / "run" / f"{k:04d}")
+    assert main(["status", str(tmp_path / "run")]) == 0 and "to the end of the stage" in capsys.readouterr().out
+    for command in (["status"], ["watch", "--patience", "0"]):
+        assert main([*command, str(tmp_path / "nothing")]) == 2
+
+
+def test_findings_say_where_they_begin(formed):
+    record = report.of_path(formed)
+    n = len(formed)
+    deep = np.where(np.arange(n) >= n // 2, 0.1, 0.0)
+    record.measures |= {"penetration": deep, "mass_error": -deep, "volume_error": np.zeros(n)}
+    record.furthest = None
+    assert all(f"from state {n // 2} on (pressure = " in text for text in record.warnings())
+    assert len(record.warnings()) == 2
 
 
 def test_a_verdict_is_named(inflated):

@@ -22,7 +22,8 @@ class Part:
         area: of the middle surface, length^2.
         draw_ratio: area over the area that it had at rest (areal draw ratio).
         mean_wall: volume over area, length.
-        least_wall: length; and where: reference radius, (r, z) of the middle line, height (as in `Wall`).
+        least_wall: length; and where: reference radius, (r, z) of the middle line, height (as in `Wall`); least_from:
+            ("R", radius at rest), of a parison ("Z", height of its inner face at rest).
         evenness: least wall over mean wall, 1 for an even part.
         variation: standard deviation of the wall over the middle surface, over its mean: coefficient of variation.
         weight: grams if a density in g/cm3 was given; else None: of what the material was at rest, before anything
@@ -42,6 +43,7 @@ class Part:
     least_at_radius: float
     least_at: tuple[float, float]
     least_at_height: float
+    least_from: tuple[str, float]
     evenness: float
     variation: float
     weight: float | None
@@ -56,10 +58,11 @@ class Part:
         u = self.units
 
         def said(value, unit):
-            return f"{value:.5g} {unit}".rstrip()
+            return f"{value:{'.5g' if abs(value) < 1e5 else '.0f'}} {unit}".rstrip()
         rows = [("weight", said(self.weight, "g"))] if self.weight is not None else []
+        along, rest = self.least_from
         where = f"{said(self.least_wall, u.length or '')} at height {said(self.least_at_height, u.length or '')}," \
-                f" r = {said(self.least_at[0], u.length or '')}, from R = {said(self.least_at_radius, u.length or '')}"
+                f" r = {said(self.least_at[0], u.length or '')}, from {along} = {said(rest, u.length or '')}"
         rows += [("least wall", where), ("mean wall", said(self.mean_wall, u.length or "")),
                  ("evenness (least over mean wall)", f"{self.evenness:.4g}"),
                  ("coefficient of variation of the wall", f"{self.variation:.4g}"),
@@ -88,6 +91,7 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     reached = np.append(inside > 0, False) | np.append(False, inside == 1)
     reached[0] = True
     k = int(np.argmin(np.where(reached, wall.wall, np.inf)))
+    along = int(np.argmax(np.ptp(profile.rest_bottom, axis=0)))
     mean = kept[0] / kept[1]
     of_strip = (wall.wall[1:] + wall.wall[:-1]) / 2
     average = (of_strip * area * inside).sum() / kept[1]
@@ -95,7 +99,8 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     weight = None if density is None else units.mass(kept[3], positive("part: density", density))
     at = {finite("part: heights", h): wall.at_height(h) for h in several("part: heights", heights, "numbers")}
     return Part(kept[0], kept[1], kept[1] / kept[2], mean, float(wall.wall[k]), float(wall.reference_radius[k]),
-                (float(wall.r[k]), float(wall.z[k])), float(wall.height[k]), float(wall.wall[k] / mean),
+                (float(wall.r[k]), float(wall.z[k])), float(wall.height[k]),
+                ("RZ"[along], float(profile.rest_bottom[k, along])), float(wall.wall[k] / mean),
                 float(np.sqrt(spread) / average), weight, at, float(1 - kept[0] / volume.sum()),
                 _content(wall, inside, axisymmetric), units)
 

@@ -95,8 +95,9 @@ function process(data) {
   pick.parentElement.hidden = runs.length < 2;
   let run, timer = null;
   const unit = data.length ? `, ${data.length}` : "";
+  const tall = () => { const [r, z] = box(run); return (z[1] - z[0]) / (r[1] - r[0]); };
   const layout = () => ({font, margin: {l: 55, r: 10, t: 10, b: narrow() ? 110 : 45}, hovermode: "closest", showlegend: false,
-    height: narrow() ? 470 : 520, xaxis: {title: `r${unit}`, range: box(run)[0], zeroline: false, gridcolor: "#eceff3",
+    height: Math.min(narrow() ? 470 : 520, (narrow() ? 280 : 480) * tall() + (narrow() ? 180 : 110)), xaxis: {title: `r${unit}`, range: box(run)[0], zeroline: false, gridcolor: "#eceff3",
     constrain: "domain"}, yaxis: {title: `z${unit}`, range: box(run)[1], scaleanchor: "x", zeroline: false,
     gridcolor: "#eceff3", constrain: "domain"}, plot_bgcolor: "white"});
   const scene = () => { const [r, z] = box(run), unit = Math.cbrt((r[1] - r[0]) ** 2 * (z[1] - z[0]));

@@ -161,7 +161,7 @@ def _cards(record: Record, found: Part | None, units: Units) -> str:
         cards = [(f"{found.least_wall:.4g}{length}", f"least wall, at r = {found.least_at[0]:.4g}{length}"),
                  (f"{found.evenness:.3g}", "least over mean wall"),
                  (f"{found.weight:.4g} g", "weight") if found.weight is not None else
-                 (f"{found.volume:.4g} {units.volume}", "volume of the part")]
+                 (f"{found.volume:.{4 if found.volume < 1e4 else 6}g} {units.volume}", "volume of the part")]
     cards += [(value, what) for what, value in _peaks(record, units)]
     return "<div class=cards>" + "".join(f"<div class=card><b>{html.escape(value.strip())}</b><span>{html.escape(what)}"
                                          f"</span></div>" for value, what in cards) + "</div>"
