@@ -218,6 +218,11 @@ def test_every_stage_has_its_curve():
     assert animation.columns_of_stages(SimpleNamespace(states=states, columns=names)) == {
         "plug": ("plug_travel", "plug_force"), "air": ("pole_height", "pressure"),
         "hold": ("plug_travel", "plug_force")}
+    for k, state in enumerate(states):                       # while all stands still, but a force falls
+        state.measures |= {"process_time": float(k), "mould_force": -float(k)}
+    names += ["process_time", "mould_force"]
+    assert animation.columns_of_stages(SimpleNamespace(states=states, columns=names))["hold"] == (
+        "process_time", "mould_force")
 
 
 def test_solids_are_closed_and_hold_the_volume(formed, tmp_path):

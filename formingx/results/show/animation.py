@@ -58,13 +58,17 @@ def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
 
 
 def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
-    """{stage: (x, y) of its curve}: what stands still is not it."""
+    """{stage: (x, y) of its curve}: what stands still is not it; while nothing is driven, a force over time."""
     found = {}
     for stage in dict.fromkeys(state.stage for state in path.states):
         values = {c: [s.measures[c] for s in path.states if s.stage == stage] for c in path.columns}
         moving = [c for c, v in values.items() if np.ptp(v) > 0 or not c.endswith(("travel", "pressure"))]
         driven = any(c.endswith(("travel", "pressure")) for c in moving)
-        found[stage] = plots.main_columns(moving if driven else path.columns)
+        over_time = next((c for c, v in values.items() if c.endswith("force") and np.ptp(v) > 0), None)
+        if not driven and over_time and np.ptp(values.get("process_time", 0.0)) > 0:
+            found[stage] = "process_time", over_time
+        else:
+            found[stage] = plots.main_columns(moving if driven else path.columns)
     return found
 
 

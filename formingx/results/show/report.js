@@ -60,7 +60,7 @@ function sectionTraces(run, at, field, range) {
     x: r.map(r => side * r), y: z,
     text: r.map((_, k) => Math.round(k / parts)).map(i => `from ${run.sheet.from} ${format(run.sheet.material[i])}<br>` +
       Object.entries(at.all).map(([name, v]) => `${name}: ${format(v[i])}`).join("<br>")),
-    marker: {size: 6, color: dense(at.values), colorscale: field.startsWith("temperature") ? "Inferno" : "Viridis", reversescale: field.startsWith("wall"), cmin: range[0],
+    marker: {size: 6, color: dense(at.values), colorscale: field.startsWith("temperature") ? "Portland" : "Viridis", reversescale: field.startsWith("wall"), cmin: range[0],
       cmax: range[1], showscale: n === 0, colorbar: {thickness: 12, len: 0.85, outlinewidth: 0,
       title: {text: field, side: narrow() ? "top" : "right"}, ...(narrow() ? {orientation: "h", y: -0.42, len: 1} : {})}}}));
   return traces;
@@ -72,7 +72,7 @@ function surface(run, at, field, range) {
   const turn = Array.from({length: 49}, (_, i) => 1.5 * Math.PI * i / 48), size = Math.max(...r);
   const x = run.axisymmetric ? turn.map(a => r.map(q => q * Math.cos(a))) : [-1, 1].map(() => r);
   const y = run.axisymmetric ? turn.map(a => r.map(q => q * Math.sin(a))) : [-1, 1].map(s => r.map(() => s * size));
-  return [{type: "surface", x, y, z: x.map(() => z), surfacecolor: x.map(() => v), colorscale: field.startsWith("temperature") ? "Inferno" : "Viridis",
+  return [{type: "surface", x, y, z: x.map(() => z), surfacecolor: x.map(() => v), colorscale: field.startsWith("temperature") ? "Portland" : "Viridis",
     reversescale: field.startsWith("wall"), cmin: range[0], cmax: range[1], showscale: false, hoverinfo: "skip",
     lighting: {ambient: 0.6, diffuse: 0.6, specular: 0.15}}];
 }
