@@ -248,3 +248,10 @@ def test_gmsh_models(tmp_path, kind):
 def test_bad_profiles(build, message):
     with pytest.raises(fx.InputError, match=message):
         build()
+
+
+def test_bounds():
+    cup = fx.tools.cup(radius=2.0, depth=1.0, mouth=0.5, fillet=0.2).moved(z=1.0)
+    assert cup.bounds == pytest.approx(np.array([[0.0, 1.5], [4.0, 2.5]]))
+    ball = fx.tools.sphere(radius=1.0, z=-0.5, r=3.0)
+    assert ball.bounds == pytest.approx(np.array([[2.0, -0.5], [4.0, 1.5]]), abs=1e-2)

@@ -25,16 +25,16 @@ for the lumped area), or at Gauss points of the facets: history is read where it
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, count, instance, non_negative, pair, positive
 from ..tools.shapes import Nearest, Tool
+from ..tools.tool import RigidTool
 from ..values.table import Table
 from ..values.temperature import FunctionOfTemperature
+from .contact_law import ContactLaw, Motion, Touch, Tractions
 from .part import Part
 
 _STICKS = 100.0
@@ -146,7 +146,7 @@ class Contact(Part):
                              f" least 0")
         return mu
 
-    def law(self, k: float, thickness: float, points: np.ndarray, temperature: np.ndarray | None = None) -> Law:
+    def law(self, k: float, thickness: float, points: np.ndarray, temperature: np.ndarray | None = None) -> ContactLaw:
         """Tractions for a penalty k (stress/length) on a sheet of this thickness, at points, shape (n, 2).
 
         temperature: of the body there, shape (n,), if friction depends on it.
@@ -186,70 +186,8 @@ def _points(name: str, points: Any) -> str | int:
     return number
 
 
-class Touch(NamedTuple):
-    """What n points remember of the last accepted state, seen from the tool.
-
-    position: shape (n, 2), length; distance: signed, shape (n,), length; slip: elastic slip g, shape (n,), length;
-    arrival: where the point will be when it touches, if it does in the step ahead, shape (n, 2), length; NaN if it has
-    no friction before the end of that step.
-    """
-
-    position: np.ndarray
-    distance: np.ndarray
-    slip: np.ndarray
-    arrival: np.ndarray
-
-
-class Tractions:
-    """Tractions at n points per unit reference area, as the residual wants them (what the body does to the tool).
-
-    force: shape (n, 2), stress; normal, tangential: N and T, shape (n,), stress; sense: of sliding, 1 or -1 along the
-    tangent, 0 if stuck, shape (n,). stiffness, touch: what gives those properties when they are first asked for, which
-    most tractions never are.
-    """
-
-    def __init__(self, force: np.ndarray, normal: np.ndarray, tangential: np.ndarray, sense: np.ndarray,
-                 stiffness: Callable[[], np.ndarray], touch: Callable[[], Touch]):
-        self.force, self.normal, self.tangential, self.sense = force, normal, tangential, sense
-        self._stiffness, self._touch = stiffness, touch
-
-    @cached_property
-    def stiffness(self) -> np.ndarray:
-        """Derivative of the force, shape (n, 2, 2), stress/length."""
-        return self._stiffness()
-
-    @cached_property
-    def touch(self) -> Touch:
-        """What to remember."""
-        return self._touch()
-
-    @property
-    def active(self) -> np.ndarray:
-        """What each point does: 0 is free, 4 sticks, 3 and 5 slide either way, shape (n,)."""
-        return (self.sense + 4 * (self.normal != 0)).astype(np.int8)
-
-
-class Motion(NamedTuple):
-    """Where n points are with respect to a tool, to first order.
-
-    position: shape (n, 2), length; distance, slip: shape (n,), length; normal, along: their gradients, shape (n, 2).
-    """
-
-    position: np.ndarray
-    distance: np.ndarray
-    normal: np.ndarray
-    slip: np.ndarray
-    along: np.ndarray
-
-    def to(self, x: np.ndarray) -> Motion:
-        """What it foretells for the points moved to x, shape (n, 2)."""
-        by = x - self.position
-        distance = self.distance + np.einsum("ni,ni->n", self.normal, by)
-        return self._replace(position=x, distance=distance, slip=self.slip + np.einsum("ni,ni->n", self.along, by))
-
-
 class Law:
-    """Tractions at points, a function of their positions and of what they remember.
+    """The `ContactLaw` of this module: a penalty with a ramp, and friction.
 
     mu: of friction, a number, or one for each point, shape (n,). elastic_slip: g_s, length, not used by stick.
 
@@ -257,7 +195,7 @@ class Law:
     ramp, free of stress.
     """
 
-    def __init__(self, tool: Tool, mu: np.ndarray | float, k: float, theta: float, elastic_slip: float,
+    def __init__(self, tool: RigidTool, mu: np.ndarray | float, k: float, theta: float, elastic_slip: float,
                  shift: np.ndarray | float = 0.0, separates: bool = True):
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
         self.tool, self.mu, self.k, self.theta, self.elastic_slip = tool, mu, k, theta, elastic_slip

@@ -18,12 +18,12 @@ class Kinematics:
     """What the motion of a section of the body means in space.
 
     Attributes:
-        components: of a displacement and of a position; coordinates: of a point in the reference plane, (R, Z).
+        components: of a displacement and of a position.
         axisymmetric: True if the section turns about R = 0.
         dimension_of_volume: 3; of a volume per unit depth 2.
     """
 
-    components = coordinates = 2
+    components = 2
     axisymmetric = False
     dimension_of_volume = 3
 

@@ -105,7 +105,7 @@ def _room(scene: Scene, contact: Any) -> float:
     from scipy.ndimage import label
     face, low = scene.mesh.nodes_of(contact.on), scene.mesh.nodes_of(scene.driven.on)[:, 1].min()
     edge, top = face.max(0)
-    outline = contact.tool.outline().max(0)
+    outline = contact.tool.bounds[1]
     if np.ptp(face[:, 1]) > _NEAR * edge or face[:, 0].min() > 0 or outline[1] <= top:
         return np.inf
     corner = np.maximum(outline, face.max(0))

@@ -246,7 +246,7 @@ class Scene:
         contact.friction_at(None if self.temperature is None else self.temperature.on(contact.on))
         mesh, near = self.mesh, 1e-6 * max(self.extent)
         if self.kinematics.axisymmetric and contact.moves and contact.moves[0] \
-                and contact.tool.outline()[:, 0].min() <= near:
+                and contact.tool.bounds[0, 0] <= near:
             raise InputError(f"{contact!r}: it moves along R, but its tool covers the axis: no rigid tool of revolution"
                              f" does that; must be moves=(0, ...), or PlaneStrain()")
         tool_width.check(mesh, contact, self.kinematics.axisymmetric)
@@ -257,7 +257,7 @@ class Scene:
         worst = int(np.argmax(depth))
         if depth[worst] > near:
             free = contact.tool.reversed().signed_distance(points).max() <= near
-            size, length = np.ptp(contact.tool.outline(), axis=0).max(), max(self.extent)
+            size, length = np.ptp(contact.tool.bounds, axis=0).max(), max(self.extent)
             why = ("; the other side of its profile is free of it: use tool.reversed()" if free else "")
             if not length < _LARGER * size:
                 why = (f"; the tool is {size:.4g} large, the body {length:.4g}: are the units of length the same (mm"

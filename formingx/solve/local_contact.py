@@ -115,16 +115,18 @@ class _Points:
                  solver: DirectSolver, border: Any):
         self._comm, self._contacts, self._chosen = problem.comm, contacts, chosen
         unit, held = np.zeros(problem.x.getLocalSize()), problem.held
-        counts = self._comm.allgather(2 * sum(map(len, chosen)))
+        self._c = contacts[0].points.shape[1]               # components
+        counts = self._comm.allgather(self._c * sum(map(len, chosen)))
         first = sum(counts[: self._comm.rank])
         self._own = slice(first, first + counts[self._comm.rank])
-        own = [(c, point, way) for c, points in zip(contacts, chosen) for point in points for way in (0, 1)]
+        own = [(c, point, way) for c, points in zip(contacts, chosen) for point in points
+               for way in range(self._c)]
         units = []
         for rank, count in enumerate(counts):
             for k in range(count):
                 mine, point, way = own[k] if rank == self._comm.rank else (None, 0, 0)
                 for contact in contacts:                        # on all ranks: the force may act on nodes of another
-                    forces = np.zeros((len(contact.points), 2))
+                    forces = np.zeros_like(contact.points)
                     if contact is mine:
                         forces[point, way] = 1.0
                     contact.add(unit, forces)
@@ -134,7 +136,7 @@ class _Points:
         E[held] = 0
         self._columns = solver.solve_all(E)                                     # own rows
         self._steps = border(self._columns)
-        scale = np.concatenate([np.repeat(c.scale[i], 2) for c, i in zip(contacts, chosen)])
+        scale = np.concatenate([np.repeat(c.scale[i], self._c) for c, i in zip(contacts, chosen)])
         self._scale = self._gather(scale)
         moved = [self._moved(column, step) for column, step in zip(self._columns.T, self._steps)]
         self._C = self._gather(np.array(moved).T.reshape(len(own), len(moved))) * self._scale
@@ -147,7 +149,7 @@ class _Points:
         accuracy = 1e-4 * min(c.increment.ramp for c in self._contacts)
         for k in range(_ITERATIONS):
             f, S = self._law(y - by)
-            more = f - f0 + np.einsum("nij,nj->ni", S - S0, (y - by).reshape(-1, 2)).ravel()
+            more = f - f0 + np.einsum("nij,nj->ni", S - S0, (y - by).reshape(-1, self._c)).ravel()
             R = y - by - y0 + self._C @ more
             miss = np.abs(R).max()
             if miss < accuracy:
@@ -169,12 +171,12 @@ class _Points:
         y = self._within(more, self._gather(self._moved(b.array_r, 1.0)))
         if y is None:
             return None
-        return -self._columns @ (self._scale * np.einsum("nij,nj->ni", more, y.reshape(-1, 2)).ravel())
+        return -self._columns @ (self._scale * np.einsum("nij,nj->ni", more, y.reshape(-1, self._c)).ravel())
 
     def _within(self, more: np.ndarray, y: np.ndarray) -> np.ndarray | None:
         """What motions y become if the points are stiffer by `more`, (1 + C more)^-1 y; None if there is no answer."""
         n = len(y)
-        J = np.eye(n) + np.einsum("mni,nij->mnj", self._C.reshape(n, -1, 2), more).reshape(n, n)
+        J = np.eye(n) + np.einsum("mni,nij->mnj", self._C.reshape(n, -1, self._c), more).reshape(n, n)
         try:
             found = np.linalg.solve(J, y)
         except np.linalg.LinAlgError:
@@ -191,7 +193,7 @@ class _Points:
 
     def _law(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Forces and stiffnesses of the law, linearised where the points would be."""
-        mine, at, found = y[self._own].reshape(-1, 2), 0, []
+        mine, at, found = y[self._own].reshape(-1, self._c), 0, []
         for contact, i in zip(self._contacts, self._chosen):
             law = contact.increment.foretold(mine[at:at + len(i)], i)
             found.append((law.force, law.stiffness))

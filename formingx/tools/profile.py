@@ -208,6 +208,12 @@ class Tool:
         parts = [_sampled(p, per_arc) for p in self.pieces]
         return np.vstack([parts[0], *(part[1:] for part in parts[1:])])
 
+    @property
+    def bounds(self) -> np.ndarray:
+        """Lowest and highest (R, Z) of the outline, shape (2, 2)."""
+        points = self.outline()
+        return np.stack([points.min(axis=0), points.max(axis=0)])
+
     def __repr__(self) -> str:
         arcs = sum(isinstance(p, Arc) for p in self.pieces)
         numbers = ((len(self.pieces) - arcs, "line"), (arcs, "arc"))

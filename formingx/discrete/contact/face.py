@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import InputError
-from ...physics.contact import Contact, Touch, Tractions
+from ...physics.contact import Contact
+from ...physics.contact_law import Touch, Tractions
 from ..carry import Carrier
 from .increment import Increment
 from .rule import Gauss, Lobatto, Rule

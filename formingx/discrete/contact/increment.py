@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...physics.contact import Law, Motion, Touch, Tractions
+from ...physics.contact_law import ContactLaw, Motion, Touch, Tractions
 
 
 class Increment:
@@ -23,7 +23,7 @@ class Increment:
         start: positions of the points at the state ahead of which Newton's method begins; None: of none.
     """
 
-    def __init__(self, law: Law, touch: Touch | None, start: np.ndarray | None = None):
+    def __init__(self, law: ContactLaw, touch: Touch | None, start: np.ndarray | None = None):
         self._law, self._touch = law, touch
         self._touched = None if start is None else law.touching(start, touch)
         self._before: Motion | None = None if start is None else law.motion(start, touch)   # at the last iteration
