@@ -12,9 +12,10 @@ from .heat.cooling import Cooling
 from .heat.result import HeatRun
 from .heat.run import heat
 from .materials.constants import entropic, of_temperature
+from .materials.damping import PSM, Damping, DoubleWagner, LuoTanner, Wagner
 from .materials.expansion import ThermalExpansion
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
-from .materials.kbkz import KBKZ, PSM, Wagner
+from .materials.kbkz import KBKZ
 from .materials.material import Material
 from .materials.published import Published, published
 from .materials.sets import Sets

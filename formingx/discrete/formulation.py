@@ -26,6 +26,7 @@ from .history import History
 from .loaded_body import LoadedBody
 from .material_history import MaterialHistory
 from .material_terms import MaterialTerms
+from .past_states import PastStates
 from .probes import Probe
 from .temperature import Temperature
 
@@ -50,7 +51,7 @@ class Formulation(ABC):
         histories: what the forms depend on besides fields, control and time (`History`).
         potential: of a step, over stress times volume (UFL, rank 0); energy: the energy stored, likewise: the same
             without histories. dissipation: power, over stress times volume (UFL, rank 0), damage_energy: energy,
-            likewise; or None.
+            likewise. Each but the first may be None.
         load_values: [(load, its value (UFL, the user's unit))], as the stage and the control have it.
         residual: dpotential/dw - external virtual work (UFL, rank 1); control_derivative, time_derivative: its
             derivative by the control, in the loads and by way of the time in materials, or None.
@@ -148,12 +149,15 @@ class Formulation(ABC):
         self.coefficients = {(layer, name): c for layer, terms in self._terms.items()
                              for name, c in terms.constants.items()}
         self.terms = list(dict.fromkeys(self._terms.values()))
+        self._pasts = [PastStates(self, terms) for terms in self.terms if terms.held]
         changing = [terms for terms in self.terms if terms.internal]
-        self.histories: list[History] = [MaterialHistory(self, terms) for terms in changing]
+        self.histories: list[History] = [*self._pasts, *(MaterialHistory(self, terms) for terms in changing)]
         self.potential = self._energy(MaterialTerms.step_energy)
-        self.energy = self._energy(MaterialTerms.stored_energy) if changing else self.potential
+        self.energy = self.dissipation = None
         timed = [terms for terms in changing if terms.material.rate_dependent]
-        self.dissipation = self.dissipated(self._scale) if timed else None
+        if all(terms.material.stores_energy for terms in self.terms):
+            self.energy = self._energy(MaterialTerms.stored_energy) if changing else self.potential
+            self.dissipation = self.dissipated(self._scale) if timed else None
         damaged = [self.weighted(self._scale * terms.damage_energy(), terms.names)
                    for terms in changing if terms not in timed]
         self.damage_energy = sum(damaged[1:], damaged[0]) if damaged else None
@@ -166,7 +170,13 @@ class Formulation(ABC):
             if energy is not None:
                 there = self.constant(1.0)
                 self.elastic_supports.append((support, there))
-                self.potential, self.energy = (e + self._scale * there * energy for e in (self.potential, self.energy))
+                self.potential, self.energy = (None if e is None else e + self._scale * there * energy
+                                               for e in (self.potential, self.energy))
+
+    def refresh(self) -> None:
+        """The fields or the time have changed: coefficients that depend on them follow."""
+        for past in self._pasts:
+            past.refresh()
 
     def dissipated(self, factor: Any) -> Any:
         """The integral (UFL) of a factor times the power that is dissipated per reference volume."""
@@ -279,6 +289,11 @@ class Formulation(ABC):
         base, rate = self._time
         return float(base.value + rate.value * control)
 
+    @property
+    def time_now(self) -> float:
+        """Process time at the control that the forms hold now."""
+        return self.time_at(float(self.control.value))
+
     def set_loads(self, setting: Any) -> None:
         """Loads, elastic supports and process time as a `Setting` wants them."""
         for support, present in self.elastic_supports:
@@ -294,6 +309,9 @@ class Formulation(ABC):
         """`residual`, `control_derivative` and `time_derivative`."""
         v, control = self.test_function(), self._control
         residual = ufl.derivative(self.potential, self.w, v)
+        for one in self.terms:
+            if work := one.unsymmetric_work(self.elastic_F, lambda f: ufl.derivative(f, self.w, v)):
+                residual += self.weighted(self._scale * work, one.names)
         timed = ufl.Form([i for i in self.potential.integrals() if self.control in extract_constants(i.integrand())])
         by_time = ufl.derivative(ufl.diff(timed, control), self.w, v) if timed.integrals() else None
         terms = []

@@ -13,6 +13,7 @@ from dolfinx import fem
 
 from ..errors import InputError
 from ..materials.constants import Varying
+from ..materials.viscoelastic import _isochoric
 from .followed import Followed
 
 
@@ -26,6 +27,7 @@ class MaterialTerms:
         constants: {name: coefficient}: a `Constant` for a number; for what varies a `Function` or another UFL scalar.
         rest_stress: stress that the energy leaves at F = I (UFL scalar).
         internal: {name: `Function` of a quadrature element} of the internal variables at the beginning of the step.
+        held: likewise, of an integral over past states (`PastStates`) at the fields as they are.
         start: the process time there (`Constant`).
         cells, own_cells: in which it is, ghosts included, and this rank's own.
         places: of the quadrature points of the energy in the reference cell, shape (q, dimension).
@@ -45,6 +47,8 @@ class MaterialTerms:
         self.rest_stress = self._rest_stress(self.constants) if material.varies else forms.constant(
             material.rest_stress)
         self.internal = {name: self.quadrature_function(np.shape(value)) for name, value in material.internal.items()}
+        self.held = {name: self.quadrature_function(np.shape(value)) for name, value in
+                     (material.integral.coefficients if material.integral else {}).items()}
 
     def _constant(self, name: str, value: Any) -> Any:
         self._in_middle = name in self.material.of_flow
@@ -54,6 +58,11 @@ class MaterialTerms:
     def follows_temperature(self) -> bool:
         """True if a constant depends on the temperature."""
         return bool(self._followed)
+
+    @property
+    def remembers(self) -> bool:
+        """True if its stress depends on more than the deformation."""
+        return bool(self.internal or self.held)
 
     def quadrature_function(self, shape: tuple[int, ...] = ()) -> fem.Function:
         """A `Function` with a value of a shape at every quadrature point of the energy."""
@@ -92,15 +101,25 @@ class MaterialTerms:
 
     def step_energy(self, F: Any) -> Any:
         """The potential of the step, per reference volume (UFL, stress)."""
-        if not self.internal:
+        if not self.remembers:
             return self.material.strain_energy(F, **self.constants)
-        return self.material.step_energy(F, self.internal, self._time_step, **self.constants)
+        return self.material.step_energy(F, self.internal | self.held, self._time_step, **self.constants)
 
     def stored_energy(self, F: Any) -> Any:
         """The energy that is stored, per reference volume (UFL, stress)."""
-        if not self.internal:
+        if not self.remembers:
             return self.material.strain_energy(F, **self.constants)
-        return self.material.stored_energy(F, self.internal, **self.constants)
+        return self.material.stored_energy(F, self.internal | self.held, **self.constants)
+
+    def unsymmetric_work(self, F: Any, derivative: Any) -> Any:
+        """Virtual work beside that of the step's potential, per reference volume (UFL, stress), or None.
+
+        derivative: what makes of a UFL expression its virtual change.
+        """
+        if self.material.symmetric:
+            return None
+        C = _isochoric(F)
+        return self.material.integral.unsymmetric_work(C, [derivative(c) for c in C], self.held)
 
     def equilibrium_energy(self, F: Any) -> Any:
         """The energy that is left when all has relaxed, per reference volume (UFL, stress), or None."""

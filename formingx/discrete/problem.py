@@ -28,6 +28,7 @@ from .formulations import formulate
 from .history import History
 from .material_history import MaterialHistory
 from .matrix import ExtendedMatrix
+from .past_states import PastStates
 from .schedule import Setting
 from .step_error import StepError
 from .step_limit import StepLimit
@@ -114,7 +115,7 @@ class Problem(Units):
     @property
     def symmetric(self) -> bool:
         """True if the tangent is symmetric: no follower load in the scene."""
-        return all(x.symmetric for x in (*self.scene.loads, *self.scene.contacts))
+        return all(x.symmetric for x in (*self.scene.loads, *self.scene.contacts, *self.scene.materials.values()))
 
     @property
     def setting(self) -> Setting:
@@ -153,9 +154,9 @@ class Problem(Units):
         return bool(self.histories)
 
     @property
-    def materials(self) -> list[MaterialHistory]:
+    def materials(self) -> list[MaterialHistory | PastStates]:
         """The histories of materials."""
-        return [history for history in self.forms.histories if isinstance(history, MaterialHistory)]
+        return [history for history in self.forms.histories if isinstance(history, (MaterialHistory, PastStates))]
 
     @property
     def body_has_history(self) -> bool:
@@ -442,6 +443,7 @@ class Problem(Units):
         w = self.forms.w.x
         w.array[: self._n] = x[: self._n]
         w.scatter_forward()
+        self.forms.refresh()
 
     def stiff_state(self, out: PETSc.Vec) -> None:
         """out = a state near rest with a regular tangent, for the first direction of a path: for a solid, rest."""

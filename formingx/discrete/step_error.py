@@ -35,7 +35,7 @@ class StepError:
         self._materials = problem.materials
         heat = len(self._materials) < len(forms.histories)
         self._stresses = [_Stress(forms, terms) for terms in forms.terms
-                          if terms.internal or heat and terms.follows_temperature]
+                          if terms.remembers or heat and terms.follows_temperature]
 
     def of(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
         """(error of the stress at the end of a step, what is left of it after another step as long), relative.
@@ -78,8 +78,8 @@ class StepError:
 
     def _at(self, x: np.ndarray, time: float) -> list[np.ndarray]:
         """Stresses of the materials at the end of a step from what is remembered now to x at a time."""
-        self._problem.place(x)
         self._at_time(time)
+        self._problem.place(x)
         return [stress.values() for stress in self._stresses]
 
     def _advance(self, x: np.ndarray, control: float, time: float) -> None:

@@ -5,19 +5,25 @@
 tau the Kirchhoff stress up to a pressure, B(t, t') the Finger tensor of the deformation from t' to t, I1 = tr B,
 I2 = tr B^-1: Kaye (1962), Bernstein, Kearsley and Zapas (1963); factorised, without a term in B^-1, as by Wagner (1976)
 and Papanastasiou, Scriven and Macosko (1983). Without damping it is Lodge's (1956) network, `TransientNetwork`.
-For homogeneous tests: no material of a scene (`docs/kbkz.md` says why).
+In a scene its stress is computed at each quadrature point from the past states there (`discrete.past_states`).
 """
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, finite, instance, positive, several
+from ..errors import InputError, instance, known, positive, several
 from . import branches
+from .constants import OfTemperature, Sample
+from .damping import Damping
 from .homogeneous import MODES
 from .in_time import HistoryTests
+from .material import Material
+from .past import Integral
+from .viscoelastic import _inner, _isochoric
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 _PANELS = 1.5
@@ -26,64 +32,23 @@ _STRAIN = 0.25
 """Longest logarithmic strain in a panel."""
 
 
-class Damping:
-    """How much of a past state's stress is left, h(I1, I2), 1 where I1 = I2 = 3.
+class KBKZ(HistoryTests, Material):
+    """The factorised K-BKZ equation, the body at rest before.
 
-    With a term in I2 the stress h B has no potential: only functions of I1 alone have one.
-    """
-
-    def __call__(self, I1: Any, I2: Any) -> Any:
-        """h at invariants of any shape."""
-        raise NotImplementedError
-
-    def __str__(self) -> str:
-        return f"{type(self).__name__}({', '.join(f'{k}={v!r}' for k, v in vars(self).items())})"
-
-    __repr__ = __str__
-
-
-class PSM(Damping):
-    """h = alpha/[(alpha - 3) + beta I1 + (1 - beta) I2]: Papanastasiou, Scriven and Macosko, J. Rheol. 27 (1983) 387.
-
-    Args:
-        alpha: above 0; the larger, the less is damped.
-        beta: from 0 to 1; the smaller, the less is damped in uniaxial, and the more in equibiaxial extension.
-    """
-
-    def __init__(self, alpha: float, beta: float):
-        self.alpha, self.beta = positive("PSM: alpha", alpha), _share("PSM: beta", beta)
-
-    def __call__(self, I1, I2):
-        return self.alpha / (self.alpha - 3 + self.beta * I1 + (1 - self.beta) * I2)
-
-
-class Wagner(Damping):
-    """h = exp(-beta sqrt(alpha I1 + (1 - alpha) I2 - 3)): Wagner, Rheol. Acta 15 (1976) 136 and 18 (1979) 33.
-
-    Args:
-        alpha: from 0 to 1, the share of I1.
-        beta: above 0; the larger, the more is damped.
-    """
-
-    def __init__(self, alpha: float, beta: float):
-        self.alpha, self.beta = _share("Wagner: alpha", alpha), positive("Wagner: beta", beta)
-
-    def __call__(self, I1, I2):
-        return np.exp(-self.beta * np.sqrt(np.maximum(self.alpha * I1 + (1 - self.alpha) * I2 - 3, 0)))
-
-
-class KBKZ(HistoryTests):
-    """The factorised K-BKZ equation in homogeneous tests, the body at rest before.
-
-    In small strains G(t) = sum G_k exp(-t/tau_k); after a step of strain the stress is G(t) h times that of a neo-
-    Hookean body of unit modulus, so that time and strain separate.
+    In small strains G(t) = G_equilibrium + sum G_k exp(-t/tau_k); after a step of strain the stress is G(t) h times
+    that of a neo-Hookean body of unit modulus, so that time and strain separate. A damped material stores no
+    energy that the state alone would tell, so runs with it have no columns of energies.
 
     Args:
         spectrum: [(G, tau), ...], at least one: modulus, stress, and relaxation time, time; each above 0.
-        damping: `PSM` or `Wagner`, or None: h = 1.
+        damping: `PSM`, `Wagner`, ... or None: h = 1.
+        equilibrium: a material that does not relax, beside it, or None.
+        shift: how relaxation times depend on the temperature of the scene, see `Viscoelastic`.
+        irreversible: h of a past state is the least that it has been since then.
     """
 
-    def __init__(self, spectrum: Any, damping: Damping | None = None):
+    def __init__(self, spectrum: Any, damping: Damping | None = None, equilibrium: Material | None = None,
+                 shift: Any = None, irreversible: bool = False):
         pairs = several("KBKZ: spectrum", spectrum, "(G, tau)")
         if not pairs:
             raise InputError(f"KBKZ: spectrum = {spectrum!r}: must be at least one (G, tau)")
@@ -92,12 +57,99 @@ class KBKZ(HistoryTests):
             if len(values := several(f"KBKZ: spectrum: number {k}", pair, "G and tau")) != 2:
                 raise InputError(f"KBKZ: spectrum: number {k} is {pair!r}: must be (G, tau)")
             self.spectrum.append((positive(f"KBKZ: G_{k}", values[0]), positive(f"KBKZ: tau_{k}", values[1])))
+        G, tau = np.array(self.spectrum).T
+        if len(G) > 2 and np.all(np.diff(G[np.argsort(tau)]) > 0) and np.ptp(np.log(G)) > 3:
+            raise InputError(f"KBKZ: spectrum = {spectrum!r}: the moduli grow with the times, from {G.min():g} to"
+                             f" {G.max():g}: must be (G, tau); of (eta, lambda) make KBKZ.of_viscosities(...)")
         if damping is not None:
             instance("KBKZ: damping", damping, Damping, "PSM(alpha, beta), Wagner(alpha, beta) or None")
-        self.damping = damping
+        if equilibrium is not None:
+            instance("KBKZ: equilibrium", equilibrium, Material, "a material, or None")
+            if equilibrium.internal or equilibrium.integral:
+                raise InputError(f"KBKZ: equilibrium = {equilibrium}: must not relax itself")
+        self.damping, self._equilibrium = damping, equilibrium
+        self.integral = Integral(self.spectrum, damping, instance("KBKZ: irreversible", irreversible, bool,
+                                                                  "True or False"), shift is not None)
+        self.parameters = {} if equilibrium is None else dict(equilibrium.parameters)
+        if shift is not None:
+            if not callable(shift):
+                raise InputError(f"KBKZ: shift = {shift!r}: must be WLF(...), Arrhenius(...) or a function of"
+                                 f" temperature")
+            self.parameters["aT"] = OfTemperature(shift, repr(shift))
+        self.check()
+
+    of_flow = ("aT",)
+    stores_energy = False
+
+    @classmethod
+    def of_viscosities(cls, spectrum: Any, *args: Any, **more: Any) -> KBKZ:
+        """The same from a card of viscosities and times, [(eta, lambda), ...]: G = eta/lambda."""
+        return cls([(positive("KBKZ: eta", eta) / positive("KBKZ: lambda", time), time) for eta, time in spectrum],
+                   *args, **more)
+
+    @property
+    def symmetric(self) -> bool:  # type: ignore[override]  # read only here
+        """See `Material`."""
+        return self.damping is None or self.damping.of_I1_alone
+
+    @property
+    def equilibrium(self) -> Material | None:
+        """The material that is left when all has relaxed, or None."""
+        if self._equilibrium is None:
+            return None
+        rest = copy.copy(self._equilibrium)
+        rest.parameters = {k: self.parameters[k] for k in self._equilibrium.parameters}
+        return rest
+
+    @property
+    def shear_modulus(self):
+        """That of the instantaneous response; stress."""
+        return float(self.relaxation_modulus(0.0))
+
+    def shear_modulus_at(self, sample: Sample) -> np.ndarray:
+        rest = 0.0 if self._equilibrium is None else self._equilibrium.shear_modulus_at(sample)
+        return np.atleast_1d(sum(G for G, _ in self.spectrum) + rest)
+
+    @property
+    def rest_stress(self):
+        return 0.0 if (rest := self.equilibrium) is None else rest.rest_stress
+
+    @property
+    def largest_I1(self):
+        return np.inf if (rest := self.equilibrium) is None else rest.largest_I1
+
+    def check_constants(self, **constants):
+        if self._equilibrium is not None:
+            self._equilibrium.check_constants(**self._of_equilibrium(constants))
+
+    def _of_equilibrium(self, constants: dict[str, Any]) -> dict[str, Any]:
+        return {} if self._equilibrium is None else {k: constants[k] for k in self._equilibrium.parameters}
+
+    def equilibrium_energy(self, F, **constants):
+        return None if self._equilibrium is None else self._equilibrium.strain_energy(
+            F, **self._of_equilibrium(constants))
+
+    def strain_energy(self, F, **constants):
+        """That at once, of the network without damping: for moduli and stresses at rest."""
+        G = sum(G for G, _ in self.spectrum)
+        return G / 2 * (_inner(_isochoric(F), (1, 1, 0, 1)) - 3) + (self.equilibrium_energy(F, **constants) or 0)
+
+    def step_energy(self, F, internal, time_step, **constants):
+        """A UFL scalar whose derivative by F is the stress at the end of a step; no energy."""
+        return self.integral.potential(_isochoric(F), internal, time_step) + (
+            self.equilibrium_energy(F, **constants) or 0)
+
+    def stored_energy(self, F, internal, **constants):
+        """As `step_energy` where no time passes: its derivative is the stress; its value means nothing."""
+        return self.step_energy(F, internal, 0.0, **constants)
 
     def relaxation_modulus(self, times: Any) -> np.ndarray:
-        """G(t) = sum G exp(-t/tau) of small shear, at times of any shape; stress."""
+        """G(t) = G_equilibrium + sum G exp(-t/tau) of small shear, at times of any shape; stress."""
+        rest = 0.0 if (left := self.equilibrium) is None else left.shear_modulus
+        return rest + self._modulus(times)
+
+    def _modulus(self, times: Any) -> np.ndarray:
+        """`relaxation_modulus` without the equilibrium."""
         t = np.asarray(times, float)
         return sum((G * np.exp(-t / tau) for G, tau in self.spectrum), np.zeros(t.shape))
 
@@ -117,15 +169,32 @@ class KBKZ(HistoryTests):
         if times is None:
             l = np.asarray(stretches, float)
             branches.checked(f"{self}: stress", mode, np.zeros(l.size), l.ravel(), between)
-            return self.relaxation_modulus(0.0) * self._strained(mode, l) / l
+            return self._modulus(0.0) * self._strained(mode, l) / l + self._relaxed(mode, l)
         t, l = branches.checked(f"{self}: stress", mode, times, stretches, between)
-        return np.array([self._at(mode, t[:n + 1], l[:n + 1], between) for n in range(len(t))]) / l
+        found = np.array([self._at(mode, t[:n + 1], l[:n + 1], between) for n in range(len(t))]) / l
+        return found + self._relaxed(mode, l)
+
+    def rupture_stretch(self, mode: str) -> float:
+        """The stretch at which h (B_11 - B_33) of a step of strain is largest; infinity without a maximum up to 100.
+
+        Put on at once, no more stress is to be had beyond: a damped melt that is stretched faster than it relaxes thins
+        there without end.
+        """
+        known(f"{self}: rupture_stretch: mode", mode, MODES)
+        l = np.geomspace(1, 100, 4000)
+        bears = self._modulus(0.0) * self._strained(mode, l) + self._relaxed(mode, l) * l
+        falls = np.flatnonzero(bears[1:] < bears[:-1])
+        return float(l[falls[0]]) if len(falls) else np.inf
+
+    def _relaxed(self, mode: str, stretches: Any) -> Any:
+        """Nominal stress of the equilibrium."""
+        return 0.0 if (rest := self.equilibrium) is None else rest.stress(mode, stretches)
 
     def _at(self, mode: str, times: np.ndarray, stretches: np.ndarray, between: str) -> float:
         """tau_1 - tau_3 at the last of the times."""
         now, last = times[-1], stretches[-1]
         modulus, tau = np.array(self.spectrum).T
-        rested = self.relaxation_modulus(now - times[0]) * self._strained(mode, last)
+        rested = self._modulus(now - times[0]) * self._strained(mode, last)
         ends = self._ages(times, stretches)
         half = np.diff(ends)[:, None] / 2
         age = (ends[:-1, None] + half * (1 + _NODES))
@@ -152,7 +221,10 @@ class KBKZ(HistoryTests):
         return difference if self.damping is None else difference * self.damping(square.sum(-1), (1 / square).sum(-1))
 
     def __str__(self) -> str:
-        return f"KBKZ({self.spectrum!r}, damping={self.damping})"
+        more = f", equilibrium={self.equilibrium}" if self._equilibrium is not None else ""
+        more += f", shift={self.parameters['aT']!r}" if "aT" in self.parameters else ""
+        return f"KBKZ({self.spectrum!r}, damping={self.damping}{more}" + ", irreversible=True" * (
+            self.integral.irreversible) + ")"
 
     __repr__ = __str__
 
@@ -162,9 +234,3 @@ def _between(at: np.ndarray, times: np.ndarray, stretches: np.ndarray, between: 
     if between == "stretch":
         return np.interp(at, times, stretches)
     return np.exp(np.interp(at, times, np.log(stretches)))
-
-
-def _share(name: str, value: Any) -> float:
-    if not 0 <= (number := finite(name, value)) <= 1:
-        raise InputError(f"{name} = {value!r}: must be from 0 to 1")
-    return number

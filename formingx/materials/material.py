@@ -40,11 +40,17 @@ class Material:
         internal: {name: value at rest}, a number or nested tuples, whose shape is that of the variable; of a quantity
             per quadrature point. Empty: no history.
         rate_dependent: False: its history follows the strain alone, as damage does, and time is nothing to it.
+        integral: the stress that comes of all past states (`past.Integral`), or None.
+        stores_energy: True if `stored_energy` is one.
+        symmetric: True if its tangent is.
     """
 
     parameters: dict[str, Any]
     internal: dict[str, Any] = {}
     rate_dependent = True
+    integral: Any = None
+    stores_energy: Any = True
+    symmetric: Any = True
 
     def __init_subclass__(cls, **options: Any):
         super().__init_subclass__(**options)

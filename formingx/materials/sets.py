@@ -45,6 +45,7 @@ class Sets(Material):
             raise InputError(f"Sets: the base has a constant {name!r}: that is one of Sets; give it another name")
         # a step takes the logarithm of a constant to go on in proportion to time: so phi goes on, also from 0
         exp_phi = OfTemperature(lambda T: np.exp(self._phi(T)), f"exp({self._phi})")
+        self.integral, self.stores_energy, self.symmetric = base.integral, base.stores_energy, base.symmetric
         self.parameters = {**base.parameters, "G_set": positive("Sets: modulus", modulus), "set_end": exp_phi,
                            "set_middle": exp_phi}
         self.check()
@@ -130,7 +131,7 @@ class Sets(Material):
         return {name: constants[name] for name in self._base.parameters if name in constants}
 
     def _of_base_internal(self, internal: dict[str, Any]) -> dict[str, Any]:
-        return {name: internal[name] for name in self._base.internal}
+        return {name: value for name, value in internal.items() if name not in (_BEFORE, _LAST, _GLASS, _FRACTION)}
 
     def __repr__(self) -> str:
         return f"Sets({self.base!r}, modulus={self.parameters['G_set']!r}, {self._phi})"

@@ -132,7 +132,8 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     if any(thing.quantity == "pressure" for thing in scene.drivable):
         found["enclosed_volume"] = bind_volume(problem)
     change = forms.J - 1
-    found["strain_energy"] = _Scalar(problem, forms.energy, lambda v: v * forms.stress * volume)
+    if forms.energy is not None:
+        found["strain_energy"] = _Scalar(problem, forms.energy, lambda v: v * forms.stress * volume)
     found["mass_error"] = _Scalar(problem, change * forms.weight * forms.dx, lambda v: v / volume)
     found["volume_error"] = _Scalar(problem, change**2 * forms.weight * forms.dx,
                                     lambda v: (v / volume) ** 0.5)

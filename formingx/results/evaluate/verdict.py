@@ -68,7 +68,8 @@ class Verdict:
         with self._problem.at(state):
             edges, found = self._outline.edges(), []
             for contact in self._problem.present:
-                share = resultants.energy(contact, state.x, state.control) / (state.measures["strain_energy"] or np.inf)
+                stored = state.measures.get("strain_energy") or np.inf
+                share = resultants.energy(contact, state.x, state.control) / stored
                 if share > _HELD:
                     found.append(("serious", f"Penetration of the tool of {_name(contact)!r} holds {100 * share:.2g} %"
                                              f" of the energy of the body: forces are off by more; give Contact a"

@@ -21,6 +21,7 @@ from mpi4py import MPI
 from ...discrete.contact import resultants
 from ...discrete.step_limit import Way
 from ...discrete.tooling import Tooling
+from ...errors import InputError
 from ...solve.newton import Failure
 
 _LOSSES = "friction", "jumps"
@@ -313,6 +314,8 @@ def _called(scene: Any, thing: Any) -> str:
 
 def work(path: Any) -> dict[str, np.ndarray]:
     """See `Path.work`."""
+    if "strain_energy" not in path.columns:
+        raise InputError("Path.work: a material of the scene stores no energy that its state alone would tell (KBKZ)")
     ledgers = [Ledger(segment).rows() for segment in path.segments]
     names = dict.fromkeys(name for rows in ledgers for name in rows)
     empty = [np.zeros(len(segment.states)) for segment in path.segments]
