@@ -89,6 +89,12 @@ class Sets(Material):
     def largest_I1(self):
         return self.base.largest_I1
 
+    def strain_energy(self, F, **constants):
+        """See `Material`: that of a body that was never strained until now."""
+        phi = ufl.max_value(ufl.min_value(ufl.ln(constants["set_end"]), 1.0), 0.0)
+        return self._base.strain_energy(F, **self._of_base(constants)) \
+            + constants["G_set"] / 2 * phi * (_inner(_isochoric(F), _IDENTITY) - 3)
+
     def step_energy(self, F, internal, time_step, **constants):
         """See `Material`. What sets in the step is born half in the shape at its beginning, half in that at its end."""
         A, begin, end = self._begin(internal, constants)
