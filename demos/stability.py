@@ -17,6 +17,8 @@ INFLATED, LENGTHS = (0.5, 0.8), (0.25, 1, 2)
 BLOCKS = {0.25: ["flexure"], 0.5: ["flexure"], 1: ["flexure", "barrelling"], 2: ["flexure", "barrelling"]}
 MATERIAL = fx.NeoHookean(c10=0.5)
 ENDS = [fx.Symmetry("bottom", "z"), fx.Displaced("top", "z")]
+STRETCHES = (0.95, 0.85, 0.7, 0.6, 0.5, 0.42, 0.38)
+RATIOS = (1.5, 2.0, 2.5, 3.0, 3.5)
 
 
 def purity(loss, radius, length):
@@ -24,49 +26,62 @@ def purity(loss, radius, length):
     there = np.abs(loss.points[:, 0] - radius) < 1e-9
     z, U = loss.points[there, 1], loss.amplitudes[there, 0]
     z, U = z[np.argsort(z)], U[np.argsort(z)]
-    parts = [abs(np.trapezoid(U * np.cos(m * np.pi * z / length), z)) for m in range(40)]
-    return parts[1] / np.linalg.norm(parts)
+    part, whole = (np.trapezoid(f, z) for f in (U * np.cos(np.pi * z / length), U**2))
+    return abs(part) * np.sqrt(2 / length / whole)
 
 
-def one_half_wave(path, n, radius, length, flipped=None, states=20):
-    """The loss whose mode has one half wave, or None."""
-    found = [loss for loss in path.stability([n], states).losses if loss.flipped == flipped]
-    best = max(found, key=lambda loss: purity(loss, radius, length), default=None)
-    return best if best is not None and purity(best, radius, length) > 0.7 else None
+def search(scene, targets, wanted, radius, length):
+    """{(n, flipped): its loss with one half wave}: the path goes on from target to target until all are found.
+
+    Every state is counted: before one half wave is lost, or in the same step, many shorter ones may be.
+    """
+    found, path = {}, None
+    for target in targets:
+        seen = [] if path is None else path.states[:-1]
+        path = fx.trace(scene, start=path, until=target, progress=False)
+        new = [state for state in path.states if all(state is not one for one in seen)]
+        for n, flipped in [kind for kind in wanted if kind not in found]:
+            losses = [one for one in path.stability([n], new).losses if one.flipped == flipped]
+            best = max(losses, key=lambda one: purity(one, radius, length), default=None)
+            if best is not None and purity(best, radius, length) > 0.7:
+                found[n, flipped] = best
+        if len(found) == len(wanted):
+            break
+    return found
 
 
-def around(stretch, length):
-    """Travels of a plate shortly before and behind a stretch: shorter waves may have been lost before."""
-    return [fx.travel(-(1 - s) * length) for s in (min(1.015 * stretch, (1 + stretch) / 2), 0.985 * stretch)]
-
-
-def compress(scene, stretches, length):
-    """A path to the least of the stretches, and {stretch: its states around}."""
-    targets = {s: around(s, length) for s in stretches}
-    every = sorted((t for pair in targets.values() for t in pair), key=lambda t: -t.value)
-    path = fx.trace(scene, until=every[-1], through=every[:-1], progress=False)
-    return path, {s: [path.met(t) for t in pair] for s, pair in targets.items()}
+def compressed(length):
+    """How far plates go."""
+    return [fx.travel(-(1 - s) * length) for s in STRETCHES]
 
 
 def cylinder(nu, numbers, fine):
-    """{n: the loss with one half wave} of a cylinder between plates, its height."""
+    """{n: the loss with one half wave} of a cylinder between plates, its height.
+
+    A stubby one loses short waves at its side first: elements grow smaller towards it, and none is shorter than an
+    eighth of the height, which is enough for one half wave.
+    """
     height = np.pi / nu
-    stubby = nu > 1
-    elements = (5 * fine, 16 * fine) if stubby else (4 * fine, max(8, round(height * (4 if nu < 1 else 8))) * fine // 2)
-    mesh = fx.mesh.disc(radius=1.0, thickness=height, elements=elements, grading=0.2 if stubby else 1.0)
+    elements = (6 * fine, 5 * fine) if nu > 1 else (4 * fine, max(8, round(height * (4 if nu < 1 else 8))) * fine // 2)
+    mesh = fx.mesh.disc(radius=1.0, thickness=height, elements=elements, grading=0.2 if nu > 1 else 1.0)
     scene = fx.Scene(mesh=mesh, materials=MATERIAL, supports=[fx.Symmetry("axis"), *ENDS])
-    stretch = {n: exact.cylinder(nu, n) for n in numbers}
-    path, states = compress(scene, stretch.values(), height)
-    return {n: one_half_wave(path, n, 1.0, height, states=states[s]) for n, s in stretch.items()}, height
+    found = search(scene, compressed(height), [(n, None) for n in numbers], 1.0, height)
+    return {n: found.get((n, None)) for n in numbers}, height
 
 
 def tube(ratio, fine):
-    """A ring of a long tube under outer pressure, until it has lost four waves."""
+    """{n: its loss} of a ring of a long tube under outer pressure."""
     mesh = fx.mesh.disc(radius=1.0, inner_radius=ratio, thickness=(1 - ratio) / (8 * fine), elements=(8 * fine, 1))
     scene = fx.Scene(mesh=mesh, materials=MATERIAL, loads=[fx.Pressure("rim")],
                      supports=[fx.Symmetry("bottom", "z"), fx.Symmetry("top", "z")])
-    inward = 1.1 * (1 - exact.tube(ratio, max(WAVES))[1]) * ratio
-    return fx.trace(scene, until=fx.displacement(-inward, at=(ratio, 0.0), component="r"), progress=False)
+    found, path = {}, None
+    for inward in (0.01, 0.1, 0.3, 0.5):
+        path = fx.trace(scene, start=path, progress=False,
+                        until=fx.displacement(-inward * ratio, at=(ratio, 0.0), component="r"))
+        found = {n: path.stability([n], "all").first_of(n) for n in WAVES}
+        if None not in found.values():
+            break
+    return found
 
 
 def inflated(ratio, kB, numbers, fine):
@@ -76,12 +91,9 @@ def inflated(ratio, kB, numbers, fine):
     mesh = fx.mesh.disc(radius=1.0, inner_radius=ratio, thickness=length, elements=(2 * fine, along * fine // 2))
     scene = fx.Scene(mesh=mesh, materials=MATERIAL, loads=[fx.Pressure("inner")],
                      supports=[fx.Symmetry("bottom", "z"), fx.Symmetry("top", "z")])
-    targets = {n: [fx.displacement((s * exact.inflated_tube(ratio, kB, n) - 1) * ratio, at=(ratio, 0.0), component="r")
-                   for s in (0.985, 1.015)] for n in numbers}
-    every = sorted((t for pair in targets.values() for t in pair), key=lambda t: t.value)
-    path = fx.trace(scene, until=every[-1], through=every[:-1], progress=False)
-    return {n: one_half_wave(path, n, ratio, length, states=[path.met(t) for t in pair])
-            for n, pair in targets.items()}, length
+    targets = [fx.displacement((s - 1) * ratio, at=(ratio, 0.0), component="r") for s in RATIOS]
+    found = search(scene, targets, [(n, None) for n in numbers], ratio, length)
+    return {n: found.get((n, None)) for n in numbers}, length
 
 
 def block(nu, kinds, fine):
@@ -91,10 +103,9 @@ def block(nu, kinds, fine):
     mesh = fx.mesh.disc(radius=1.0, thickness=length, elements=(5 * fine, along * fine // 2), grading=0.3)
     scene = fx.Scene(mesh=mesh, materials=MATERIAL, kinematics=fx.PlaneStrain(),
                      supports=[fx.Symmetry("axis", mirror=True), *ENDS])
-    stretch = {kind: exact.block(nu, kind) for kind in kinds}
-    path, states = compress(scene, stretch.values(), length)
-    return {kind: one_half_wave(path, 0, 1.0, length, "axis" if kind == "flexure" else None, states[s])
-            for kind, s in stretch.items()}, length
+    wanted = {kind: (0, "axis" if kind == "flexure" else None) for kind in kinds}
+    found = search(scene, compressed(length), list(wanted.values()), 1.0, length)
+    return {kind: found.get(key) for kind, key in wanted.items()}, length
 
 
 def plate(fine):
@@ -103,7 +114,7 @@ def plate(fine):
     mesh = fx.mesh.disc(radius=1.0, thickness=thickness, elements=(32 * fine, 2 * fine))
     scene = fx.Scene(mesh=mesh, materials=MATERIAL,
                      supports=[fx.Symmetry("axis"), fx.Symmetry("rim", "z"), fx.Displaced("rim", "r")])
-    path = fx.trace(scene, until=fx.travel(-62 / 18 * thickness**2), progress=False)
+    path = fx.trace(scene, until=fx.travel(-4 * thickness**2), progress=False)
     found = path.stability(range(4), states="all")
     return {n: -18 * found.first_of(n).control / thickness**2 for n in range(4)}
 
@@ -117,7 +128,7 @@ def switched(ratio, kB, fine):
         branch = loss.branch(sense)
         U = loss.amplitudes[np.argmin(np.hypot(loss.points[:, 0] - ratio, loss.points[:, 1]))][0] * sense
         here = 0.0 if U > 0 else length                                  # the end that bulges
-        now = float((exact.inflated_tube(ratio, kB, 0) - 1) * ratio)
+        now = _radial(path, loss.state, ratio)
         ends[sense] = fx.trace(path.problem.scene, start=branch, progress=False,
                                until=fx.displacement(1.15 * now, at=(ratio, here), component="r"))
     from formingx.discrete.probes import probe
@@ -155,11 +166,9 @@ def main():
                  "cylinder", f"nu_{nu}", f"n_{n}")
             pictures[f"cylinder_nu_{nu}_n_{n}"] = loss
     for ratio in TUBES[1:2] if quick else TUBES:
-        path = tube(ratio, fine if ratio > 0.6 else 3)
-        found = path.stability(WAVES)
-        for n in WAVES:
-            loss, (pressure, inner) = found.first_of(n), exact.tube(ratio, n)
-            here = 1 + _radial(path, loss.state, ratio) / ratio
+        for n, loss in tube(ratio, fine if ratio > 0.6 else 3).items():
+            pressure, inner = exact.tube(ratio, n)
+            here = 1 + _radial(loss.path, loss.state, ratio) / ratio
             note(loss.control, pressure, "tube", f"{ratio}", f"n_{n}", "pressure_over_mu")
             note(here, inner, "tube", f"{ratio}", f"n_{n}", "inner_radius_ratio")
             pictures[f"tube_{ratio}_n_{n}"] = loss

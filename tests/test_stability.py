@@ -161,6 +161,19 @@ def test_cylinder(nu, n):
     assert 1 + loss.control / (np.pi / nu) == pytest.approx(exact.cylinder(nu, n), abs=1e-5)
 
 
+@pytest.mark.parametrize("n", [0, 1])
+def test_modes_that_cross_in_one_long_step(n):
+    """A tube inflated in six states: the mode that is lost in the last step crosses another one there first."""
+    ratio = 0.8
+    mesh = fx.mesh.disc(radius=1.0, inner_radius=ratio, thickness=np.pi / 2, elements=(2, 10))
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.5), loads=[fx.Pressure("inner")],
+                     supports=[fx.Symmetry("bottom", "z"), fx.Symmetry("top", "z")])
+    path = fx.trace(scene, until=fx.displacement(2.2 * ratio, at=(ratio, 0.0), component="r"), progress=False)
+    (loss,) = path.stability([n], "all").losses
+    inner = np.sqrt(1 + loss.state.measures["enclosed_volume"] / (np.pi * ratio**2 * np.pi / 2))
+    assert len(path.states) < 10 and inner == pytest.approx(exact.inflated_tube(ratio, 2, n), rel=1e-4)
+
+
 def test_flipped_half_is_the_whole():
     """What a half cylinder loses, with its image and against it, is what the whole one loses."""
     whole, half = (fx.trace(column(0.2, elements=e, half=h), until=fx.travel(-d), progress=False)

@@ -226,8 +226,12 @@ class Watch:
         amplitudes = np.concatenate(comm.allgather(found.mode))
         size = np.linalg.norm(amplitudes, axis=1)
         amplitudes = amplitudes / size.max()
-        if not found.state.measures:
+        if found.solved and not found.state.measures:
             found.state.measures = self._path._measures(segment, found.state)
+        elif not found.state.measures:                      # no equilibrium: its forces would be none
+            before, behind = found.left.measures, found.right.measures
+            found.state.measures = {name: before[name] + found.fraction * (behind[name] - before[name])
+                                    for name in before.keys() & behind.keys()}
         with segment.problem.at(found.left):
             driven, control = segment.problem.shown(found.state.control)
         return Loss(self._path, found, float(control), driven, fold, points, amplitudes)

@@ -18,8 +18,9 @@ from .state import State
 _STEPS, _ACCURATE = 80, 1e-10
 """Of Lanczos' method: steps at most, and its error, relative."""
 
-_EVALUATIONS, _LOCATED = 14, 1e-8
-"""Of locating a loss: states solved for at most, and its error, in parts of the step that it lies in."""
+_EVALUATIONS, _LOCATED, _PATIENCE, _ALIKE = 40, 1e-8, 3, 0.7
+"""Of locating a loss: states solved for at most; its error, in parts of the step that it lies in; how many times its
+bracket may fail to halve before it is halved; and how alike (a cosine) two modes are that are one."""
 
 _ASTRAY = 0.1
 """How far from the cubic between two states, in parts of their distance, a state between them may be."""
@@ -36,18 +37,31 @@ class Located(NamedTuple):
     """Where a mode begins, or ceases, to be unstable.
 
     kind: of the mode; left, right: the states before and behind; state: there; mode: amplitudes (U, W, V) at `nodes` of
-    the second variation, own part; x: its U and W as unknowns of the problem, own part; gained: True if the body is
-    less stable behind; solved: True if `state` was solved for, else it lies on the cubic between left and right.
+    the second variation, own part; x: its U and W as unknowns of the problem, own part; fraction: where it is from left
+    (0) to right (1); gained: True if the body is less stable behind; solved: True if `state` was solved for, else it
+    lies on the cubic between left and right.
     """
 
     kind: Kind
     left: State
     right: State
     state: State
+    fraction: float
     mode: np.ndarray
     x: np.ndarray
     gained: bool
     solved: bool
+
+
+class _Look(NamedTuple):
+    """A state between two others, how many modes are unstable, and those nearest to 0: eigenvalues, ascending,
+    dimensionless, and own unknowns."""
+
+    fraction: float
+    state: State
+    count: int
+    values: np.ndarray
+    modes: np.ndarray
 
 
 class Modes:
@@ -77,61 +91,61 @@ class Modes:
             raise Failure("the second variation is singular: something in the body has no stiffness at all", [])
         return self._solver.negative_pivots() - self.variation.negative
 
-    def nearest(self, state: State, kind: Kind, number: int = 4) -> tuple[int, np.ndarray, np.ndarray]:
-        """(count, eigenvalues ascending, modes (eigenvalues, own unknowns)): of those nearest to 0, dimensionless."""
-        with self.problem.at(state):
-            return self._count(kind), *self._lanczos(number)
-
     def locate(self, a: State, b: State, kind: Kind, index: int) -> Located:
-        """Where between two states the eigenvalue with so many below it changes its sign."""
-        found: list[tuple[float, float, State, np.ndarray]] = []       # fraction, eigenvalue, state, mode
-        solved = True
+        """Where between two states the eigenvalue with so many below it changes its sign.
 
-        def look(fraction: float, state: State) -> float:
-            count, values, modes = self.nearest(state, kind, abs(counts[1] - counts[0]) + 3)
-            below, above = np.flatnonzero(values < 0)[::-1], np.flatnonzero(values >= 0)
-            side, k = (below, count - index - 1) if count > index else (above, index - count)
-            if k >= len(side):
-                found.append((fraction, np.nan, state, modes[0]))
-                return 1.0 if count <= index else -1.0
-            found.append((fraction, values[side[k]], state, modes[side[k]]))
-            return 1.0 if count <= index else -1.0
-        counts = [self.count(s, kind) for s in (a, b)]
-        signs = [look(0.0, a), look(1.0, b)]
-        low, high = 0.0, 1.0
-        while len(found) < _EVALUATIONS:
-            guess = self._crossing(found, low, high)
-            if min(abs(guess - f) for f, *_ in found) < _LOCATED:
+        Counts bracket it; inside the bracket it is foretold by the eigenvalues of one mode, which is followed by its
+        shape: others cross it on their way.
+        """
+        looks = [self._look(0.0, a, kind, index), self._look(1.0, b, kind, index)]
+        low, high = looks
+        gained, solved, shrunk = high.count > low.count, True, 0
+        while True:
+            values = self._follow(looks, high if gained else low, index)
+            fraction = _root(values, low.fraction, high.fraction) if shrunk < _PATIENCE else None
+            if fraction is None:
+                fraction, shrunk = (low.fraction + high.fraction) / 2, 0
+            nearest = min(looks, key=lambda look: abs(look.fraction - fraction))
+            if abs(nearest.fraction - fraction) < _LOCATED or len(looks) == _EVALUATIONS:
                 break
             try:
-                state = self._between(a, b, guess)
+                looks.append(new := self._look(fraction, self._between(a, b, fraction), kind, index))
             except Failure:
                 solved = False
                 break
-            low, high = (guess, high) if look(guess, state) == signs[0] else (low, guess)
-        fraction = self._crossing(found, low, high)
-        nearest = min(found, key=lambda one: abs(one[0] - fraction))
-        state = nearest[2]
-        solved = solved and abs(nearest[0] - fraction) < 1e-3 and 0 < nearest[0] < 1
-        if abs(nearest[0] - fraction) >= _LOCATED:
+            width = high.fraction - low.fraction
+            low, high = (low, new) if (new.count > index) is gained else (new, high)
+            shrunk = 0 if high.fraction - low.fraction < width / 2 else shrunk + 1
+        state, exact = nearest.state, abs(nearest.fraction - fraction) < _LOCATED
+        if not exact:
             x, control = self.curve.interpolate(a, b, fraction)
             state = State(x, control, a.direction, a.slope, memory=a.memory, stage=a.stage, setting=a.setting,
-                          time=self.problem.time_at(control))
-        with self.problem.at(nearest[2]):
+                          time=self.problem.forms.time_at(control))
+        with self.problem.at(nearest.state):
             self.variation.fill(*kind)
-            mode, plane = self.variation.amplitudes(nearest[3]), self.variation.plane(nearest[3])
-        return Located(kind, a, b, state, mode, plane, counts[1] > counts[0], solved)
+            x = self._of_index(nearest, index)
+            mode, plane = self.variation.amplitudes(x), self.variation.plane(x)
+        return Located(kind, a, b, state, fraction, mode, plane, gained, solved and exact)
 
-    def _crossing(self, found: list, low: float, high: float) -> float:
-        """Where a polynomial through the eigenvalues nearest to 0 has its root: between low and high."""
-        known = sorted((one for one in found if np.isfinite(one[1])), key=lambda one: abs(one[1]))[:4]
-        for n in range(len(known), 1, -1):
-            s, f = (np.array([one[k] for one in known[:n]]) for k in (0, 1))
-            if len(np.unique(f)) == n:
-                guess = sum(s[i] * np.prod([f[j] / (f[j] - f[i]) for j in range(n) if j != i]) for i in range(n))
-                if low < guess < high:
-                    return float(guess)
-        return (low + high) / 2
+    def _look(self, fraction: float, state: State, kind: Kind, index: int) -> _Look:
+        with self.problem.at(state):
+            count = self._count(kind)
+            return _Look(fraction, state, count, *self._lanczos(4 + abs(count - index)))
+
+    def _of_index(self, look: _Look, index: int) -> np.ndarray:
+        """The mode whose eigenvalue has so many below it; of those that are known the nearest to it."""
+        negative = np.flatnonzero(look.values < 0)
+        k = (negative[-1] + 1 if len(negative) else 0) + index - look.count
+        return look.modes[min(max(k, 0), len(look.modes) - 1)]
+
+    def _follow(self, looks: list[_Look], unstable: _Look, index: int) -> list[tuple[float, float]]:
+        """(fraction, eigenvalue) of the mode that is unstable at that end of the bracket, where it is found again."""
+        mode, found = self._of_index(unstable, index), []
+        for look in looks:
+            alike = [abs(self._inner(mode, other)) for other in look.modes]
+            if max(alike) > _ALIKE:
+                found.append((look.fraction, float(look.values[np.argmax(alike)])))
+        return found
 
     def _between(self, a: State, b: State, fraction: float) -> State:
         """The state there, solved for; raises `Failure`."""
@@ -206,3 +220,15 @@ class Modes:
         self._in.destroy()
         self._out.destroy()
         self.variation.destroy()
+
+
+def _root(values: list[tuple[float, float]], low: float, high: float) -> float | None:
+    """Where the polynomial (of the fraction over the eigenvalue) through those nearest to 0 has its root, if inside."""
+    known = sorted(values, key=lambda one: abs(one[1]))[:4]
+    for n in range(len(known), 1, -1):
+        s, f = (np.array([one[k] for one in known[:n]]) for k in (0, 1))
+        if len(np.unique(f)) == n:
+            guess = sum(s[i] * np.prod([f[j] / (f[j] - f[i]) for j in range(n) if j != i]) for i in range(n))
+            if low < guess < high:
+                return float(guess)
+    return None
