@@ -18,9 +18,9 @@ from .state import State
 _STEPS, _ACCURATE = 80, 1e-10
 """Of Lanczos' method: steps at most, and its error, relative."""
 
-_EVALUATIONS, _LOCATED, _PATIENCE, _ALIKE = 40, 1e-8, 3, 0.7
-"""Of locating a loss: states solved for at most; its error, in parts of the step that it lies in; how many times its
-bracket may fail to halve before it is halved; and how alike (a cosine) two modes are that are one."""
+_EVALUATIONS, _LOCATED, _BESIDE, _PATIENCE, _ALIKE = 60, 1e-8, 1e-6, 3, 0.7
+"""Of locating a loss: states solved for at most; its error, and where it is made sure that it is there, in parts of the
+step that it lies in; how often its bracket may fail to halve before it is halved; how alike two modes are that are one."""
 
 _ASTRAY = 0.1
 """How far from the cubic between two states, in parts of their distance, a state between them may be."""
@@ -59,7 +59,7 @@ class _Look(NamedTuple):
 
     fraction: float
     state: State
-    count: int
+    unstable: int
     values: np.ndarray
     modes: np.ndarray
 
@@ -99,31 +99,35 @@ class Modes:
         """
         looks = [self._look(0.0, a, kind, index), self._look(1.0, b, kind, index)]
         low, high = looks
-        gained, solved, shrunk = high.count > low.count, True, 0
+        gained, solved, shrunk = high.unstable > low.unstable, True, 0
         while True:
             values = self._follow(looks, high if gained else low, index)
             fraction = _root(values, low.fraction, high.fraction) if shrunk < _PATIENCE else None
             if fraction is None:
                 fraction, shrunk = (low.fraction + high.fraction) / 2, 0
             nearest = min(looks, key=lambda look: abs(look.fraction - fraction))
-            if abs(nearest.fraction - fraction) < _LOCATED or len(looks) == _EVALUATIONS:
+            width = high.fraction - low.fraction
+            if width < 2 * _BESIDE or len(looks) == _EVALUATIONS:
                 break
+            if abs(nearest.fraction - fraction) < _LOCATED:     # the root of a mode, but of that which is looked for?
+                fraction = low.fraction + _BESIDE if nearest is low else high.fraction - _BESIDE
             try:
                 looks.append(new := self._look(fraction, self._between(a, b, fraction), kind, index))
             except Failure:
                 solved = False
                 break
-            width = high.fraction - low.fraction
-            low, high = (low, new) if (new.count > index) is gained else (new, high)
+            low, high = (low, new) if (new.unstable > index) is gained else (new, high)
             shrunk = 0 if high.fraction - low.fraction < width / 2 else shrunk + 1
-        state, exact = nearest.state, abs(nearest.fraction - fraction) < _LOCATED
-        if not exact:
+        state, exact = nearest.state, width < 2 * _BESIDE
+        if exact:
+            fraction = nearest.fraction
+        else:
             x, control = self.curve.interpolate(a, b, fraction)
             state = State(x, control, a.direction, a.slope, memory=a.memory, stage=a.stage, setting=a.setting,
                           time=self.problem.forms.time_at(control))
         with self.problem.at(nearest.state):
             self.variation.fill(*kind)
-            x = self._of_index(nearest, index)
+            x = nearest.modes[np.argmin(abs(nearest.values))] if exact else self._of_index(nearest, index)
             mode, plane = self.variation.amplitudes(x), self.variation.plane(x)
         return Located(kind, a, b, state, fraction, mode, plane, gained, solved and exact)
 
@@ -135,12 +139,12 @@ class Modes:
     def _of_index(self, look: _Look, index: int) -> np.ndarray:
         """The mode whose eigenvalue has so many below it; of those that are known the nearest to it."""
         negative = np.flatnonzero(look.values < 0)
-        k = (negative[-1] + 1 if len(negative) else 0) + index - look.count
+        k = (negative[-1] + 1 if len(negative) else 0) + index - look.unstable
         return look.modes[min(max(k, 0), len(look.modes) - 1)]
 
-    def _follow(self, looks: list[_Look], unstable: _Look, index: int) -> list[tuple[float, float]]:
+    def _follow(self, looks: list[_Look], end: _Look, index: int) -> list[tuple[float, float]]:
         """(fraction, eigenvalue) of the mode that is unstable at that end of the bracket, where it is found again."""
-        mode, found = self._of_index(unstable, index), []
+        mode, found = self._of_index(end, index), []
         for look in looks:
             alike = [abs(self._inner(mode, other)) for other in look.modes]
             if max(alike) > _ALIKE:
