@@ -19,8 +19,9 @@ _STEPS, _ACCURATE = 80, 1e-10
 """Of Lanczos' method: steps at most, and its error, relative."""
 
 _EVALUATIONS, _LOCATED, _BESIDE, _PATIENCE, _ALIKE = 60, 1e-8, 1e-6, 3, 0.7
-"""Of locating a loss: states solved for at most; its error, and where it is made sure that it is there, in parts of the
-step that it lies in; how often its bracket may fail to halve before it is halved; how alike two modes are that are one."""
+"""Of locating a loss: states solved for at most; its error, and how far beside it a count makes sure of it, in parts of
+the step that it lies in; how often its bracket may fail to halve before it is halved; how alike two modes are that are
+one."""
 
 _ASTRAY = 0.1
 """How far from the cubic between two states, in parts of their distance, a state between them may be."""
