@@ -99,8 +99,8 @@ def inflated(ratio, kB, numbers, fine):
 def block(nu, kinds, fine):
     """{kind: the loss with one half wave} of half a plane-strain block between plates, its length."""
     length = np.pi / nu
-    along = max(10, round(length * (6 if nu < 1 else 10)))
-    mesh = fx.mesh.disc(radius=1.0, thickness=length, elements=(5 * fine, along * fine // 2), grading=0.3)
+    elements = (6 * fine, 5 * fine) if nu >= 1 else (5 * fine, max(10, round(6 * length)) * fine // 2)     # as `cylinder`
+    mesh = fx.mesh.disc(radius=1.0, thickness=length, elements=elements, grading=0.2 if nu >= 1 else 0.3)
     scene = fx.Scene(mesh=mesh, materials=MATERIAL, kinematics=fx.PlaneStrain(),
                      supports=[fx.Symmetry("axis", mirror=True), *ENDS])
     wanted = {kind: (0, "axis" if kind == "flexure" else None) for kind in kinds}

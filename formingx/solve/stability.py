@@ -103,9 +103,8 @@ class Modes:
         gained, solved, shrunk = high.unstable > low.unstable, True, 0
         while True:
             values = self._follow(looks, high if gained else low, index)
-            fraction = _root(values, low.fraction, high.fraction) if shrunk < _PATIENCE else None
-            if fraction is None:
-                fraction, shrunk = (low.fraction + high.fraction) / 2, 0
+            guess = _root(values, low.fraction, high.fraction) if shrunk < _PATIENCE else None
+            fraction, shrunk = ((low.fraction + high.fraction) / 2, 0) if guess is None else (guess, shrunk)
             nearest = min(looks, key=lambda look: abs(look.fraction - fraction))
             width = high.fraction - low.fraction
             if width < 2 * _BESIDE or len(looks) == _EVALUATIONS:
