@@ -99,7 +99,7 @@ def inflated(ratio, kB, numbers, fine):
 def block(nu, kinds, fine):
     """{kind: the loss with one half wave} of half a plane-strain block between plates, its length."""
     length = np.pi / nu
-    elements = (6 * fine, 5 * fine) if nu >= 1 else (5 * fine, max(10, round(6 * length)) * fine // 2)     # as `cylinder`
+    elements = (5 * fine, max(10, round(6 * length)) * fine // 2) if nu < 1 else (6 * fine, 5 * fine)   # see `cylinder`
     mesh = fx.mesh.disc(radius=1.0, thickness=length, elements=elements, grading=0.2 if nu >= 1 else 0.3)
     scene = fx.Scene(mesh=mesh, materials=MATERIAL, kinematics=fx.PlaneStrain(),
                      supports=[fx.Symmetry("axis", mirror=True), *ENDS])
