@@ -195,6 +195,14 @@ def test_damaged(file, how, copied):
         fx.load(folder, scene)
 
 
+def test_what_is_many_numbers_is_no_text(whole):
+    """Histories are saved as arrays: state.json does not grow with the mesh."""
+    folder, _, path = whole["coulomb"]
+    for k in range(len(path)):
+        memory = json.loads((folder / f"{k:04d}" / "state.json").read_text())["memory"]
+        assert len(json.dumps(memory)) < 600, memory
+
+
 def as_format_4(folder, path):
     """Rewrite a checkpoint as versions did that wrote format 4: fields by adios4dolfinx, all else as text."""
     import adios4dolfinx

@@ -208,13 +208,13 @@ class FaceContact:
         self._memory = memory
         self.increment = Increment(self.law, self.touch)
 
-    def save(self, memory: Memory) -> dict[str, list]:
+    def save(self, memory: Memory) -> dict[str, np.ndarray]:
         """See `History`: point by point with its reference position."""
         parts = self.comm.allgather((self.points, *memory.touch, memory.arrived))
         names = ("points", *memory.touch._fields, "arrived")
-        return {name: np.concatenate(column).tolist() for name, column in zip(names, zip(*parts, strict=True))}
+        return {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True))}
 
-    def load(self, data: dict[str, list]) -> Memory:
+    def load(self, data: dict[str, Any]) -> Memory:
         """See `History`; an InputError if a point of the face is not in the data."""
         from scipy.spatial import cKDTree
         away, rows = cKDTree(np.array(data["points"]).reshape(-1, self.points.shape[1])).query(self.points)

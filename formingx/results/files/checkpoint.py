@@ -199,14 +199,14 @@ def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     folder = place("checkpoint", folder)
     about = _read_json(folder / "scene.json")
     _check_format(folder, about)
-    states = _read_states(folder, len(_states(folder)), MPI.COMM_SELF)
+    states = _read_states(folder, len(_states(folder)), MPI.COMM_WORLD)
     if not states:
         raise InputError(f"checkpoint {str(folder)!r} holds no state")
     return about, states
 
 
 def _read_states(folder: FilePath, count: int, comm: Any) -> list[dict]:
-    """The data of the first states."""
+    """The data of the first states; a bar on rank 0 of `comm`, not collective."""
     found = []
     with progress(comm, f"{folder}: {count} states") as done:
         for k in range(count):

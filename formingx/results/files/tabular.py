@@ -70,7 +70,8 @@ def on_root(comm: Any, action: Callable[[], Any]) -> Any:
             result = action()
         except (OSError, ValueError, ImportError) as found:
             error = found
-    result, error = comm.bcast((result, error), root=0)
+    if comm.size > 1:                                       # (alone, a message would be a copy)
+        result, error = comm.bcast((result, error), root=0)
     if error is not None:
         raise error
     return result
