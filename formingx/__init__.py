@@ -24,7 +24,7 @@ from .measures.forces import force
 from .measures.targets import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel
 from .physics.contact import Contact
 from .physics.kinematics import Axisymmetric, PlaneStrain
-from .physics.loads import Load, Pressure
+from .physics.loads import Gravity, Load, Pressure, Spin
 from .physics.models import DisplacementPenalty, Membrane, MixedPressure
 from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Support, Symmetry
 from .results.compare import Comparison, compare

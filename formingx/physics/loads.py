@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import ufl
 
-from ..errors import InputError, finite, instance
+from ..errors import InputError, finite, instance, positive
 from .kinematics import cofactor_change
 from .part import Part
 
@@ -94,3 +95,58 @@ class Pressure(Load):
     def unit(self, body):
         """Stress times thickness over length, thickness being the volume of the body over the loaded area."""
         return body.stress * body.thickness(self.on) / body.length
+
+
+class Gravity(Load):
+    """Weight along -Z: dW = -integral over the reference volume of density acceleration du_z. A dead load.
+
+    Args:
+        density: of the body at rest, above 0, or {layer: density} for those that have weight: kg/m3 with Pa, m and s;
+            t/mm3 with MPa, mm and s.
+        value: the acceleration, length/time^2 (9.81 m/s2 or 9810 mm/s2; below 0: upward); None: the run controls it.
+        name: what it is called in a process and in its columns.
+    """
+
+    symmetric = True
+
+    def __init__(self, density: Any, value: float | None = None, name: str | None = None):
+        super().__init__(None, value, name)
+        self.density = _density("Gravity", density)
+
+    def virtual_work(self, body, value):
+        return -value * _weighed(body, self.density, body.du[1])
+
+    def mode_work(self, body, value):
+        return None
+
+
+class Spin(Load):
+    """Centrifugal force of a body that turns about the axis: dW = integral of density omega^2 (R + u_r) du_r.
+
+    Args:
+        density, name: as of `Gravity`.
+        value: omega^2, the square of the angular speed, 1/time^2; None: the run controls it.
+    """
+
+    symmetric = True
+
+    def __init__(self, density: Any, value: float | None = None, name: str | None = None):
+        super().__init__(None, value, name)
+        self.density = _density("Spin", density)
+
+    def virtual_work(self, body, value):
+        return value * _weighed(body, self.density, (body.X[0] + body.u[0]) * body.du[0])
+
+    def mode_work(self, body, value):
+        return value * _weighed(body, self.density, body.mode[0] * body.dmode[0] + body.mode[2] * body.dmode[2])
+
+
+def _density(who: str, given: Any) -> dict[str | None, float]:
+    """{layer: density}; the layer None: all of them."""
+    each = given if isinstance(given, Mapping) else {None: given}
+    return {layer: positive(f"{who}: density", value) for layer, value in each.items()}
+
+
+def _weighed(body: Any, density: dict[str | None, float], integrand: Any) -> Any:
+    """The integral (UFL) of density times an integrand."""
+    return sum(body.integral(body.constant(rho) * integrand, layer) for layer, rho in density.items())
