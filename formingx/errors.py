@@ -28,7 +28,7 @@ class ConvergenceError(RuntimeError):
 
     Attributes:
         path: what was computed up to there (`formingx.Path`), its last state converged; or None.
-        diagnosis: why, in numbers and words, and as a picture (`formingx.results.diagnosis.Diagnosis`); or None.
+        diagnosis: why, in numbers and words, and as a picture (`formingx.solve.diagnose.Diagnosis`); or None.
     """
 
     def __init__(self, message: str, path: Any = None, diagnosis: Any = None):

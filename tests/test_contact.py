@@ -78,6 +78,24 @@ def test_force_is_continuous(mu):
     assert np.abs(a - b).max() < 10 * K * step
 
 
+def test_a_shear_limit_of_ones_own():
+    """The stiffness is the derivative of the force, stuck and sliding, below the strength and at it; no force jumps."""
+    strength, mu = 0.3 * K * THETA, 0.3
+
+    def limit(pressure, mu):
+        free = mu * pressure < strength
+        return np.where(free, mu * pressure, strength), np.where(free, mu, 0.0)
+    law = Law(TOOL, mu, K, THETA, SLIP, shear_limit=limit)
+    x, tangent = points_near(TOOL, SIDES)
+    for slid in (0.3 * SLIP, -20 * SLIP):
+        old = Touch(x, np.full(len(x), -2 * THETA), np.zeros(len(x)), x + slid * tangent)
+        found = law.tractions(x, old)
+        assert np.all(np.abs(found.tangential) <= strength * (1 + 1e-12))
+        exact = derivative(lambda y, old=old: law.tractions(y, old).force, x, 1e-7)
+        np.testing.assert_allclose(exact, found.stiffness, atol=1e-5 * K)
+    assert np.abs(found.tangential).max() == pytest.approx(strength)
+
+
 @pytest.mark.parametrize("mu", [0.3, np.inf])
 def test_an_accepted_state_keeps_its_forces(mu):
     law = Law(TOOL, mu, K, THETA, SLIP)

@@ -3,6 +3,8 @@
 import doctest
 import importlib
 import pkgutil
+import re
+from pathlib import Path
 
 import pytest
 
@@ -23,3 +25,11 @@ def test_example(test, tmp_path, monkeypatch):
     runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE, verbose=False)
     runner.run(test, out=said.append)
     assert runner.failures == 0, "".join(said)
+
+
+def test_references():
+    """What a docstring calls by its full name is there."""
+    for name in MODULES:
+        source = Path(importlib.import_module(name).__file__).read_text()
+        for reference in re.findall(r"`(formingx(?:\.\w+)+)`", source):
+            pkgutil.resolve_name(reference)

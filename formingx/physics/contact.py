@@ -25,6 +25,7 @@ for the lumped area), or at Gauss points of the facets: history is read where it
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -127,6 +128,13 @@ class Contact(Part):
         """True without friction or memory: contact then has an energy."""
         return not self.friction_by_temperature and self.mu == 0 and self.separates
 
+    def shear_limit(self, pressure: np.ndarray, mu: np.ndarray | float) -> tuple[np.ndarray, np.ndarray | float]:
+        """The shear stress at which n points slide under a pressure, shape (n,), and its derivative: Coulomb's mu p.
+
+        A law of one's own gives another: 0 without pressure, and never less under more of it. Not asked for stick.
+        """
+        return mu * pressure, mu
+
     def friction_at(self, temperature: np.ndarray | None) -> Any:
         """mu: a number, or at the temperatures of n points, shape (n,).
 
@@ -154,7 +162,8 @@ class Contact(Part):
         theta, elastic_slip = self.ramp * thickness, self.elastic_slip * thickness
         foot = (1 - _AT_FOOT * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)
-        return Law(self.tool, self.friction_at(temperature), k, theta, elastic_slip, shift, self.separates)
+        return Law(self.tool, self.friction_at(temperature), k, theta, elastic_slip, shift, self.separates,
+                   self.shear_limit)
 
     def __repr__(self) -> str:
         return f"Contact({self.on!r}, {self.tool!r}, {self.friction!r})"
@@ -190,13 +199,15 @@ class Law:
     """The `ContactLaw` of this module: a penalty with a ramp, and friction.
 
     mu: of friction, a number, or one for each point, shape (n,). elastic_slip: g_s, length, not used by stick.
+    shear_limit: (pressure, shape (n,), mu): see `Contact.shear_limit`.
 
     Distances are less by `shift`, shape (n,), length: a point that touches from the start begins at the foot of the
     ramp, free of stress.
     """
 
     def __init__(self, tool: RigidTool, mu: np.ndarray | float, k: float, theta: float, elastic_slip: float,
-                 shift: np.ndarray | float = 0.0, separates: bool = True):
+                 shift: np.ndarray | float = 0.0, separates: bool = True, shear_limit: Callable | None = None):
+        self.shear_limit = shear_limit or (lambda pressure, mu: (mu * pressure, mu))
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
         self.tool, self.mu, self.k, self.theta, self.elastic_slip = tool, mu, k, theta, elastic_slip
         self.shift, self.separates = shift, separates
@@ -207,11 +218,11 @@ class Law:
         """The law of some of its points."""
         shift = self.shift[points] if isinstance(self.shift, np.ndarray) else self.shift
         mu = self.mu[points] if isinstance(self.mu, np.ndarray) else self.mu
-        return Law(self.tool, mu, self.k, self.theta, self.elastic_slip, shift, self.separates)
+        return Law(self.tool, mu, self.k, self.theta, self.elastic_slip, shift, self.separates, self.shear_limit)
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
         """The same law with other coefficients of friction."""
-        return Law(self.tool, mu, self.k, self.theta, self.elastic_slip, self.shift, self.separates)
+        return Law(self.tool, mu, self.k, self.theta, self.elastic_slip, self.shift, self.separates, self.shear_limit)
 
     @property
     def remembers(self) -> bool:
@@ -294,10 +305,11 @@ class Law:
         if np.all(np.isfinite(self.mu)):
             trial = s * foretold
             turned = False if sense is None else np.sign(trial) * sense < 0
-            sliding, limit = (np.abs(trial) > self.mu * pressed) & ~np.asarray(turned), np.sign(trial) * self.mu
+            limit, grows = self.shear_limit(pressed, self.mu)
+            sliding = (np.abs(trial) > limit) & ~np.asarray(turned)
             sense_now = np.where(sliding, np.sign(trial), 0.0)
-            T, bent = np.where(sliding, limit * N, T), np.clip(T, -self.mu * pressed, self.mu * pressed)
-            dT = np.where(sliding[:, None], (limit * k * slope)[:, None] * n, dT)
+            T, bent = np.where(sliding, sense_now * (limit + grows * (N - pressed)), T), np.clip(T, -limit, limit)
+            dT = np.where(sliding[:, None], (sense_now * grows * k * slope)[:, None] * n, dT)
         force = force + T[:, None] * t
 
         def stiffness() -> np.ndarray:
@@ -313,9 +325,10 @@ class Law:
     def _resistance(self, d: np.ndarray, pressed: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Stiffness T/g of elastic slip at distances d, and its derivative by them, shape (n,) each."""
         sticks, k = np.asarray(self.mu >= _STICKS), self.k
-        along = np.where(sticks, 0.0, self.mu) / self.elastic_slip
+        limit, grows = self.shear_limit(pressed, np.where(sticks, 0.0, self.mu))
         rising = (np.abs(d) < self.theta) * k / (2 * self.theta) * self.separates
-        return np.where(sticks, k * slope, along * pressed), np.where(sticks, rising, along * k * slope)
+        return (np.where(sticks, k * slope, limit / self.elastic_slip),
+                np.where(sticks, rising, grows / self.elastic_slip * k * slope))
 
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
         """Derivative of the traction round the axis by the motion there, shape (n,), stress/length.

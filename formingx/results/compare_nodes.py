@@ -77,8 +77,8 @@ def write_nodes(path: Any, file: Any, *, state: Any = None, mesh: str | os.PathL
 
     Args:
         state: of the path; default: the last.
-        mesh: a text mesh file (`formingx.grid`) whose nodes and numbers are taken; default: those of the run's own mesh
-            as `mesh.write` numbers them (one rank only).
+        mesh: a text mesh file (`formingx.mesh.Grid`) whose nodes and numbers are taken; default: those of the run's own
+            mesh as `mesh.write` numbers them (one rank only).
 
     Raises:
         InputError: the mesh file cannot be read, or a node of it lies outside the run's mesh.
@@ -97,7 +97,7 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
     Args:
         theirs: a CSV file or {column: values} with u_r, u_z and either R, Z or, with `mesh`, node.
         state: of the path; default: the last. To compare at a pressure: `path.at(formingx.pressure(...))`.
-        mesh: a text mesh file (`formingx.grid`) that gives the coordinates of the numbered nodes, in our unit.
+        mesh: a text mesh file (`formingx.mesh.Grid`) that gives the coordinates of the numbered nodes, in our unit.
         columns: {our name: their name} for columns that are called otherwise.
         units: as for `compare`, by our column names: R, Z, u_r, u_z.
 

@@ -351,7 +351,7 @@ class Path:
         Checkpoint(folder, self).write()
 
     def to_vtx(self, folder: Any, states: Any = None) -> None:
-        """Write fields of states (default: the last) for ParaView, one time step each; see `formingx.results.fields`.
+        """Write fields of states (default: the last) for ParaView, a time step each: `formingx.results.files.fields`.
 
         Args:
             folder: its name ends in .bp.

@@ -252,7 +252,7 @@ class Ledger:
         with problem.at(b):
             for c, (x, touch, T) in before.items():
                 slid = _slid(c.law, x, touch, c.positions(b.x[: problem.n_owned], b.control)) - c.touch.slip
-                lost += self._sum(c.area * (T + _friction_of(c, b, problem)) / 2 * slid)
+                lost += self._sum(c.rule.area * (T + _friction_of(c, b, problem)) / 2 * slid)
         return lost
 
     def _warmed(self, a: Any, b: Any) -> float:

@@ -212,7 +212,7 @@ def of_path(path: Any) -> Record:
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:
-    """The record of what `formingx.checkpoint.contents` gives."""
+    """The record of what `formingx.results.files.checkpoint.contents` gives."""
     stepping: dict = next((s["stepping"] for s in reversed(states) if s["stepping"]), {})
     tooling = Tooling.of_description(about["scene"])
     measures = {c: np.array([s["measures"][c] for s in states]) for c in states[0]["measures"]}
