@@ -25,8 +25,9 @@ from .solve.load_control import FixedControlCurve
 from .solve.newton import Tolerances
 from .solve.path_following import Run
 from .solve.process import Execution, begin
+from .solve.record import Record
 from .solve.stage import AT_FOLD, Plan, Stage, plan
-from .solve.state import Record, State
+from .solve.state import State
 from .solve.stepping import StepControl
 from .solve.stepping import allowed as allowed_error
 

@@ -14,7 +14,7 @@ from formingx.solve.arc_length import Curve
 from formingx.solve.equations import Equations
 from formingx.solve.path_following import Run
 from formingx.solve.process import begin
-from formingx.solve.state import Record
+from formingx.solve.record import Record
 
 pytestmark = pytest.mark.quick
 

@@ -245,6 +245,6 @@ def _pole(problem):
     return float(nodes[:, 1].min()), float(nodes[:, 1].max())
 
 
-def is_met(target: Target, bound: Bound, value: float) -> bool:
-    """True if a value of the target's measure is the target's, to round-off."""
-    return abs(value - target.value) <= 1e-12 * max(abs(value), abs(target.value), bound.size)
+def is_met(target: Target, size: float, value: float) -> bool:
+    """True if a value of the target's measure is the target's, to round-off. size: see `Bound`."""
+    return abs(value - target.value) <= 1e-12 * max(abs(value), abs(target.value), size)

@@ -16,7 +16,8 @@ from ..measures.targets import Bound, Target, is_met, process_time
 from ..solve import predictor
 from ..solve.newton import Failure
 from ..solve.path_following import Run
-from ..solve.state import Counts, Record, Segment, State
+from ..solve.record import Counts, Record, Segment
+from ..solve.state import State
 from ..solve.stepping import StepControl
 from .evaluate.profile import Profile, Profiles
 from .evaluate.stress import Stresses, StressField
@@ -165,7 +166,7 @@ class Path:
                     a, b = ends = [segment.curve.value(bound, s.x, s.control) for s in (left, right)] \
                         if bound.smooth else [self.value(bound, s) for s in (left, right)]
                     for value, state in zip(ends, (left, right)):
-                        if is_met(target, bound, value):
+                        if is_met(target, bound.size, value):
                             return state
                     if (a - target.value) * (b - target.value) < 0:
                         return self._between(segment, left, right, target, bound)
@@ -239,16 +240,16 @@ class Path:
         bounds = [self._view(segment).columns.get(c) for c in columns]
         at = np.concatenate([[0.0], np.cumsum([max(segment.curve.distance(a, b), 1e-300)
                                                for a, b in zip(states, states[1:])])])
-        through = {c: PchipInterpolator(at, [s.measures[c] for s in states]) for c, bound in zip(columns, bounds)
-                   if bound is None or not bound.smooth}
+        smooth = {c: bound for c, bound in zip(columns, bounds) if bound is not None and bound.smooth}
+        through = {c: PchipInterpolator(at, [s.measures[c] for s in states]) for c in columns if c not in smooth}
         rows = []
         with segment.problem.at(states[0]):
             for k, (a, b) in enumerate(zip(states, states[1:])):
                 for fraction in np.arange(1, points) / points:
                     there = segment.curve.interpolate(a, b, fraction)
                     s = at[k] + fraction * (at[k + 1] - at[k])
-                    rows.append([float(through[c](s)) if c in through else segment.curve.value(bound, *there)
-                                 for c, bound in zip(columns, bounds)])
+                    rows.append([float(through[c](s)) if c in through else segment.curve.value(smooth[c], *there)
+                                 for c in columns])
                 rows.append([b.measures[c] for c in columns])
         return rows
 

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, count, finite, several
+from ..solve.record import Record
 from ..solve.stability import Kind, Located, Modes
-from ..solve.state import Record, State
+from ..solve.state import State
 from .show.picture import Picture
 
 

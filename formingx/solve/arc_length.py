@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
+from petsc4py import PETSc
 
 from ..errors import ConvergenceError
-from .equations import Attempt, Equations
-from .newton import BorderedNewton, Failure, Tolerances, fixed, relative
+from ..measures.targets import Target
+from .equations import Array, Attempt, Constraint, Equations, Measure
+from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
 from .state import State
 
-CONTROL_WEIGHT = 0.1
-"""Weight of the squared control against the mean squared displacement in arc length (both dimensionless)."""
+Predictor: TypeAlias = Callable[[float], Array | None]
+"""x at a control, own part, or None where the tangent is the better guess."""
 
 
 class Curve:
@@ -21,9 +23,11 @@ class Curve:
 
     Attributes:
         fixed_control: True if it cannot pass a limit point.
+        control_weight: of the squared control against the mean squared displacement in arc length (dimensionless).
     """
 
     fixed_control = False
+    control_weight = 0.1
 
     def __init__(self, problem: Equations, tolerances: Tolerances):
         self.problem = problem
@@ -32,9 +36,9 @@ class Curve:
         self._found: State | None = None                    # whose factors are at hand
         self._x, self._a, self._b = (problem.x.duplicate() for _ in range(3))
 
-    def norm(self, x: Any, control: float) -> float:
+    def norm(self, x: PETSc.Vec, control: float) -> float:
         """Arc length of a straight piece (x, control) of path."""
-        return float(np.sqrt(self.problem.inner(x, x) + CONTROL_WEIGHT * control**2))
+        return float(np.sqrt(self.problem.inner(x, x) + self.control_weight * control**2))
 
     def start(self) -> State:
         """The body at control 0, in equilibrium with whatever else acts on it, and the tangent there.
@@ -43,7 +47,7 @@ class Curve:
             Failure: Newton's method does not find it from rest.
             ConvergenceError: the body has no stiffness.
         """
-        history: list = []
+        history: list[Iteration] = []
         self._x.set(0)
         self.problem.residual(self._x, 0.0, self.newton.F)
         if relative(self.problem, self.newton.F.norm()) > Tolerances().residual:
@@ -76,7 +80,7 @@ class Curve:
         spent, self._iterations = self._iterations, 0
         return spent
 
-    def resume(self, x: np.ndarray, control: float) -> State:
+    def resume(self, x: Array, control: float) -> State:
         """A state once more, under the setting that the problem has taken, and the tangent there."""
         self._x.array_w[:] = x
         self.problem.residual(self._x, control, self.newton.F)
@@ -84,7 +88,7 @@ class Curve:
             raise Failure("the tangent is singular: something in the body is held no more, or has no stiffness", [])
         return self._state(control, [], "start", None)
 
-    def solve(self, x: np.ndarray, control: float, constraint: Callable, kind: str, before: State,
+    def solve(self, x: Array, control: float, constraint: Constraint, kind: str, before: State,
               chords: bool = False) -> State:
         """The solution of F = 0 and of the constraint, from a guess; raises `Failure`. chords: see `BorderedNewton`."""
         self._x.array_w[:] = x
@@ -115,7 +119,7 @@ class Curve:
             sense = np.sign(self._inner(direction, slope, state.direction, state.slope)) or 1.0
             state.direction, state.slope = sense * direction, sense * slope
 
-    def guess_from_rest(self, rest: State, control: float) -> np.ndarray:
+    def guess_from_rest(self, rest: State, control: float) -> Array:
         """A guess of the state at a control, to correct at that control: rest, with what is held moved.
 
         Where rest has no stiffness (a flat membrane) it is the state in the first direction on which F does no work.
@@ -124,11 +128,11 @@ class Curve:
             return self.problem.motion(control)
         sign, low, high = np.sign(control), 0.0, 1e-6
 
-        def work(length):
+        def work(length: float) -> float:
             self._x.array_w[:] = sign * length * rest.direction
             self.problem.residual(self._x, control, self.newton.F)
             self._b.array_w[:] = rest.direction
-            return sign * self.newton.F.dot(self._b)
+            return float(sign * self.newton.F.dot(self._b))
 
         while work(high) < 0 and high < 1:
             low, high = high, 2 * high
@@ -137,21 +141,21 @@ class Curve:
             low, high = (middle, high) if work(middle) < 0 else (low, middle)
         return sign * high * rest.direction
 
-    def step(self, old: State, length: float, foretold: Callable | None = None, behind: State | None = None) -> State:
+    def step(self, old: State, length: float, predictor: Predictor | None = None, behind: State | None = None) -> State:
         """One step: predict along the tangent, correct in the plane normal to it at that distance (4.14 to 4.31).
 
-        foretold: of a step in time: x at a control, or None if the tangent is the better guess. behind: an earlier
+        predictor: of a step in time: x at a control, or None if the tangent is the better guess. behind: an earlier
         state, the path smooth from there on: the guess is on the parabola through it, the old one and its tangent.
         """
         plane = self._plane(old, *self._ahead(old, length))
-        return self._solve_from(*self._ahead(old, length, behind), plane, "step", old, foretold)
+        return self._solve_from(*self._ahead(old, length, behind), plane, "step", old, predictor)
 
-    def step_to(self, old: State, length: float, equation: Callable, foretold: Callable | None = None,
+    def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
                 behind: State | None = None) -> State:
         """Predict as `step` does, correct to where an equation such as "measure = target" holds."""
-        return self._solve_from(*self._ahead(old, length, behind), equation, "target", old, foretold)
+        return self._solve_from(*self._ahead(old, length, behind), equation, "target", old, predictor)
 
-    def _ahead(self, old: State, length: float, behind: State | None = None) -> tuple[np.ndarray, float]:
+    def _ahead(self, old: State, length: float, behind: State | None = None) -> tuple[Array, float]:
         """(x, control) so far along the tangent, or along the parabola that a state behind gives."""
         x, control = old.x + length * old.direction, old.control + length * old.slope
         if behind is not None:
@@ -161,12 +165,12 @@ class Curve:
             control += share * (behind.control - old.control + h * old.slope)
         return x, control
 
-    def _solve_from(self, x: np.ndarray, control: float, constraint: Callable, kind: str, old: State,
-                    foretold: Callable | None) -> State:
-        """`solve`; in time with a foretold guess and kept tangents, but not near a fold, which tangents locate."""
-        if foretold is None or not self._runs_along_control(old.slope):
+    def _solve_from(self, x: Array, control: float, constraint: Constraint, kind: str, old: State,
+                    predictor: Predictor | None) -> State:
+        """`solve`; in time with a predictor guess and kept tangents, but not near a fold, which tangents locate."""
+        if predictor is None or not self._runs_along_control(old.slope):
             return self.solve(x, control, constraint, kind, old)
-        guess = foretold(control)
+        guess = predictor(control)
         new = self.solve(x if guess is None else guess, control, constraint, kind, old, chords=True)
         if self._runs_along_control((new.control - old.control) / self.distance(old, new)):
             return new
@@ -174,7 +178,7 @@ class Curve:
 
     def _runs_along_control(self, slope: float) -> bool:
         """True if the control makes the greater part of a path of this slope, whose fold is then not near."""
-        return slope**2 * CONTROL_WEIGHT > 0.5
+        return slope**2 * self.control_weight > 0.5
 
     def unit_slope(self, state: State) -> float:
         """dcontrol by arc length at a state."""
@@ -194,12 +198,12 @@ class Curve:
         self.problem.control_derivative(self._x, state.control, self.newton.F_control)
         return -float(self.newton.F_control.dot(self._b))
 
-    def value(self, bound: Any, x: np.ndarray, control: float) -> float:
+    def value(self, bound: Measure, x: Array, control: float) -> float:
         """A bound measure at (x, control)."""
         self._b.array_w[:] = x
-        return bound.value(self._b, control)
+        return float(bound.value(self._b, control))
 
-    def aim(self, bound: Any, target: float, state: State) -> tuple[float, float]:
+    def aim(self, bound: Measure, target: float, state: State) -> tuple[float, float]:
         """What is left over of "measure = target" at a state, and its derivative by arc length along the tangent.
 
         The measure may be stiff (a force of contact): its values a step ahead along the tangent tell nothing.
@@ -208,7 +212,7 @@ class Curve:
         left, by_control = bound.equation(target)(self._a, state.control, self.newton.gradient)
         return left, self.newton.gradient.dot(self._b) + by_control * state.slope
 
-    def interpolate(self, a: State, b: State, fraction: float) -> tuple[np.ndarray, float]:
+    def interpolate(self, a: State, b: State, fraction: float) -> tuple[Array, float]:
         """(x, control) on the cubic through two states and their tangents."""
         s, h = fraction, self.distance(a, b)
         weights = (1 - 3 * s**2 + 2 * s**3, 3 * s**2 - 2 * s**3, h * (s - 2 * s**2 + s**3), h * (s**3 - s**2))
@@ -216,7 +220,7 @@ class Curve:
         control = weights[0] * a.control + weights[1] * b.control + weights[2] * a.slope + weights[3] * b.slope
         return x, control
 
-    def between(self, a: State, b: State, bound: Any, target: float) -> State:
+    def between(self, a: State, b: State, bound: Measure, target: float) -> State:
         """The state between two where a measure has a target value that lies between theirs; raises `Failure`."""
         low, high = 0.0, 1.0
         sign = self.value(bound, a.x, a.control) - target
@@ -233,7 +237,7 @@ class Curve:
         x, control = self.interpolate(a, b, fraction)
         return self.solve(x, control, self._plane(a, x, control), "step", a)
 
-    def find(self, a: State, b: State, bound: Any, target: Any) -> State:
+    def find(self, a: State, b: State, bound: Measure, target: Target) -> State:
         """`between` for a target that lies between two states; raises `ConvergenceError`."""
         try:
             return self.between(a, b, bound, target.value)
@@ -267,7 +271,7 @@ class Curve:
         control, step = self.newton.reached
         return Attempt(self._x.array_r.copy(), control, self.newton.a.array_r.copy(), step)
 
-    def _state(self, control: float, history: list, kind: str, before: State | None) -> State:
+    def _state(self, control: float, history: list[Iteration], kind: str, before: State | None) -> State:
         """The state at (self._x, control); its tangent, from the last factorisation, points away from `before`."""
         b = self.newton.b
         size = self._length_of(b)
@@ -278,26 +282,26 @@ class Curve:
             state.direction, state.slope = -state.direction, -state.slope
         return state
 
-    def _length_of(self, b: Any) -> float:
+    def _length_of(self, b: PETSc.Vec) -> float:
         """Arc length per control along a tangent dx/dcontrol."""
         return self.norm(b, 1.0)
 
-    def _inner(self, x: np.ndarray, control: float, y: np.ndarray, other: float) -> float:
+    def _inner(self, x: Array, control: float, y: Array, other: float) -> float:
         self._a.array_w[:] = x
         self._b.array_w[:] = y
-        return self.problem.inner(self._a, self._b) + CONTROL_WEIGHT * control * other
+        return self.problem.inner(self._a, self._b) + self.control_weight * control * other
 
     def distance(self, a: State, b: State) -> float:
         """Length of the straight line between two states."""
         return float(np.sqrt(self._inner(b.x - a.x, b.control - a.control, b.x - a.x, b.control - a.control)))
 
-    def _plane(self, old: State, x0: np.ndarray, control0: float) -> Callable:
+    def _plane(self, old: State, x0: Array, control0: float) -> Constraint:
         """The plane through (x0, control0) normal to the tangent of `old`, as a constraint."""
-        def c(x, control, gradient):
+        def c(x: PETSc.Vec, control: float, gradient: PETSc.Vec) -> tuple[float, float]:
             self._a.array_w[:] = old.direction
             self.problem.metric_times(self._a, gradient)
             self._b.array_w[:] = x.array_r - x0
-            weight = CONTROL_WEIGHT * old.slope
+            weight = self.control_weight * old.slope
             return gradient.dot(self._b) + weight * (control - control0), weight
         return c
 

@@ -60,15 +60,15 @@ class Diagnosis:
     shape: float | None = None
     I1: float | None = None
     limit: Place | None = None
-    turned: tuple = ()
-    limit_points: tuple = ()
+    turned: tuple[tuple[float, float], ...] = ()
+    limit_points: tuple[float, ...] = ()
     limit_ahead: float | None = None
     flipped: int | None = None
     touching: int = 0
     condition: float | None = None
     condition_before: float | None = None
-    causes: tuple = ()
-    advice: tuple = ()
+    causes: tuple[str, ...] = ()
+    advice: tuple[str, ...] = ()
     what: str = "control"
     examined: Findings | None = field(default=None, repr=False)
 
@@ -139,7 +139,7 @@ def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     problem = curve.problem
     solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
 
-    def sign(state):
+    def sign(state: State) -> int:
         with problem.at(state):
             problem.tangent(problem.x, state.control)
             return solver.sign() if solver.factorise() else 0
@@ -167,9 +167,10 @@ def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     return facts
 
 
-def _changes(states: Sequence[State], usable: Sequence[State], sign: Callable[[State], int]) -> list[tuple]:
+def _changes(states: Sequence[State], usable: Sequence[State],
+             sign: Callable[[State], int]) -> list[tuple[State, State]]:
     """Neighbours between which the sign of the determinant changed though the control has no limit point there."""
-    pieces: list[list] = [[]]
+    pieces: list[list[State]] = [[]]
     for state in states:
         if state.kind == "limit point":
             pieces.append([])
@@ -191,7 +192,8 @@ def _changes(states: Sequence[State], usable: Sequence[State], sign: Callable[[S
     return found
 
 
-def _verdict(facts: dict, fixed_control: bool, pace: str, target: float | None) -> tuple[list[str], list[str]]:
+def _verdict(facts: dict[str, Any], fixed_control: bool, pace: str,
+             target: float | None) -> tuple[list[str], list[str]]:
     """What the numbers prove or make likely, and what to try."""
     found = [*_of_material(facts), *_of_elements(facts), *_of_limits(facts, fixed_control, target),
              *_of_branches(facts), *_of_numbers(facts)]
@@ -200,7 +202,7 @@ def _verdict(facts: dict, fixed_control: bool, pace: str, target: float | None) 
     return [cause for cause, _ in found], list(dict.fromkeys(advice for _, advice in found))
 
 
-def _of_material(facts: dict) -> Iterator[tuple[str, str]]:
+def _of_material(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """(cause, advice) of a material near the end of its domain."""
     if (facts.get("I1") or 0) > 0.8:
         yield (f"a material is near the end of its domain: I1 - 3 is {100 * facts['I1']:.3g} % of what its limit"
@@ -209,7 +211,7 @@ def _of_material(facts: dict) -> Iterator[tuple[str, str]]:
                " (StepControl(largest=...))")
 
 
-def _of_elements(facts: dict) -> Iterator[tuple[str, str]]:
+def _of_elements(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """(cause, advice) of an element that turns inside out."""
     J, failed_J = facts.get("smallest_J"), facts.get("failed_J")
     infinite = any(np.isinf(v) for v in facts.get("residual", {}).values())
@@ -223,7 +225,7 @@ def _of_elements(facts: dict) -> Iterator[tuple[str, str]]:
                f" elements that start long in the direction in which they are squeezed there")
 
 
-def _of_limits(facts: dict, fixed_control: bool, target: float | None) -> Iterator[tuple[str, str]]:
+def _of_limits(facts: dict[str, Any], fixed_control: bool, target: float | None) -> Iterator[tuple[str, str]]:
     """(cause, advice) of a limit point before the target."""
     what, limits = facts["what"], facts.get("limit_points", ())
     if target is not None and limits and abs(target) > max(map(abs, limits)):
@@ -237,7 +239,7 @@ def _of_limits(facts: dict, fixed_control: bool, target: float | None) -> Iterat
                "`trace`, which passes limit points, or a lower target")
 
 
-def _of_branches(facts: dict) -> Iterator[tuple[str, str]]:
+def _of_branches(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """(cause, advice) of another branch, and of contact that does not settle."""
     what = facts["what"]
     for a, b in facts.get("turned", ()):
@@ -255,13 +257,13 @@ def _of_branches(facts: dict) -> Iterator[tuple[str, str]]:
                " (Contact)")
 
 
-def _singular(facts: dict) -> bool:
+def _singular(facts: dict[str, Any]) -> bool:
     """True if the tangent is near a singular one: its condition has grown from state to state."""
     before = facts.get("condition_before")
     return bool(before and (facts.get("condition") or 0) > _SINGULAR * before)
 
 
-def _of_numbers(facts: dict) -> Iterator[tuple[str, str]]:
+def _of_numbers(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """(cause, advice) of round-off."""
     if (facts.get("condition") or 0) > 1e14 and not _singular(facts):
         yield (f"round-off: the condition number of the tangent is {facts['condition']:.1g}, next to nothing of"

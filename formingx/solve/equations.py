@@ -17,22 +17,40 @@ What is written out here is what equations without contact, history, time or uni
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from contextlib import AbstractContextManager
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..discrete.schedule import Setting
 from ..discrete.step_limit import StepLimit
 
+Array: TypeAlias = npt.NDArray[Any]
+
+Constraint = Callable[[PETSc.Vec, float, PETSc.Vec], tuple[float, float]]
+"""c(x, control, gradient) -> (c, dc/dcontrol), having put dc/dx into `gradient`: zero where it holds."""
+
+
+class Measure(Protocol):
+    """A number of every state. size: what counts as one of it, in the user's units: 1e-12 of that is nothing."""
+
+    size: float
+
+    def value(self, x: PETSc.Vec, control: float) -> float:
+        """At a state, in the user's units."""
+
+    def equation(self, target: float) -> Constraint:
+        """The constraint measure = target."""
+
 
 class Standing(Protocol):
     """A state to stand at. x: own part, shape (n,); setting: plain data of a `Setting`, or empty."""
 
-    x: np.ndarray
+    x: Array
     control: float
     time: float
     memory: list[Any]
@@ -43,14 +61,14 @@ class Tractions(Protocol):
     """What the law of contact gives at n points: force, shape (n, 2), stress; sense of sliding, shape (n,);
     stiffness, dforce/dposition, shape (n, 2, 2), stress/length; active: the status of each, shape (n,)."""
 
-    force: np.ndarray
-    sense: np.ndarray
+    force: Array
+    sense: Array
 
     @property
-    def stiffness(self) -> np.ndarray: ...
+    def stiffness(self) -> Array: ...
 
     @property
-    def active(self) -> np.ndarray: ...
+    def active(self) -> Array: ...
 
 
 class Increment(Protocol):
@@ -61,47 +79,47 @@ class Increment(Protocol):
         """Half-width of the distances over which contact begins, length."""
 
     @property
-    def active(self) -> np.ndarray:
+    def active(self) -> Array:
         """Status of the points: hashable as bytes, shape (n,)."""
 
     @property
-    def arrivals(self) -> np.ndarray:
+    def arrivals(self) -> Array:
         """Which points touch that did not where Newton's method began, shape (n,)."""
 
-    def taken(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def taken(self, points: Array) -> tuple[Array, Array]:
         """Forces and stiffnesses that `linearise` has taken, of some points, shapes (m, 2), (m, 2, 2)."""
 
-    def foretold(self, by: np.ndarray, points: np.ndarray | slice = slice(None)) -> Tractions:
+    def foretold(self, by: Array, points: Array | slice = slice(None)) -> Tractions:
         """The law at some points that move on by so much, shape (m, 2), length."""
 
-    def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
+    def expect(self, points: Array, sense: Array) -> None:
         """The next iteration takes this sense of sliding for the points in a mask, shape (n,)."""
 
 
 class ContactFace(Protocol):
     """A face in contact: n own points, and the increment that goes on."""
 
-    points: np.ndarray
+    points: Array
 
     @property
     def increment(self) -> Increment:
         """Of the run of Newton's method that goes on: another after each `begin`."""
 
     @property
-    def scale(self) -> np.ndarray:
+    def scale(self) -> Array:
         """Of the forces in F by tractions, shape (n,)."""
 
-    def add(self, values: np.ndarray, forces: np.ndarray) -> None:
+    def add(self, values: Array, forces: Array) -> None:
         """Add forces at the points, shape (n, 2), to own rows of F."""
 
-    def moved(self, dx: np.ndarray, step: float) -> np.ndarray:
+    def moved(self, dx: Array, step: float) -> Array:
         """How the points move, seen from the tool, by a correction of x (own part) and the control; (n, 2), length."""
 
 
 class Viscosity(Protocol):
     """Forces eta V dx of a body that moves through a viscous stress."""
 
-    def forces(self, change: np.ndarray, eta: float) -> np.ndarray:
+    def forces(self, change: Array, eta: float) -> Array:
         """eta V dx, own part, shape (n,)."""
 
     def add_to(self, tangent: PETSc.Mat, eta: float) -> None:
@@ -114,9 +132,9 @@ class Viscosity(Protocol):
 class Attempt(NamedTuple):
     """Where a failed Newton iteration ended: x (own part) and control, and the last correction of both."""
 
-    x: np.ndarray
+    x: Array
     control: float
-    dx: np.ndarray
+    dx: Array
     dcontrol: float
 
 
@@ -181,7 +199,7 @@ class Residual(Protocol):
     def stiff_state(self, out: PETSc.Vec) -> None:
         """out = a state near rest where dF/dx is regular, for the first direction of a path."""
 
-    def motion(self, control: float) -> np.ndarray:
+    def motion(self, control: float) -> Array:
         """Rest with what is held where it is at a control: the first guess from there; own part."""
         return np.zeros(self.x.getLocalSize())
 
@@ -205,7 +223,7 @@ class ActiveSet(Protocol):
         return None
 
     @property
-    def held(self) -> np.ndarray:
+    def held(self) -> Array:
         """Local numbers of the own unknowns that are held: no force moves them."""
         return np.zeros(0, dtype=np.int32)
 
@@ -220,7 +238,7 @@ class ActiveSet(Protocol):
     def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
         """Ready the tangent at (x, control) for an iteration, and F, the residual there, for the solve with it."""
 
-    def changes_ahead(self, x: PETSc.Vec, control: float) -> list[np.ndarray]:
+    def changes_ahead(self, x: PETSc.Vec, control: float) -> list[Array]:
         """Of each face: stiffness `ahead` less that in the tangent last made, shape (n, 2, 2), stress/length."""
         return []
 
@@ -251,14 +269,14 @@ class Histories(Protocol):
         """True if F depends on time."""
         return False
 
-    def advance(self, x: np.ndarray, control: float) -> None:
+    def advance(self, x: Array, control: float) -> None:
         """A state is accepted: the histories take it up. x: own part."""
 
     def time_at(self, control: float) -> float:
         """Process time at a control."""
         return self.clock
 
-    def step_error(self, past: Sequence[Standing], share: np.ndarray, x: np.ndarray,
+    def step_error(self, past: Sequence[Standing], share: Array, x: Array,
                    control: float) -> tuple[float, float]:
         """Error of the step in time from the last of `past` to (x, control), relative: at its end; what lasts of it.
 
@@ -274,7 +292,7 @@ class Stages(Protocol):
     def setting(self) -> Setting:
         """How what can be driven follows the control, and what takes no part."""
 
-    def enter(self, setting: Setting, x: np.ndarray, control: float) -> None:
+    def enter(self, setting: Setting, x: Array, control: float) -> None:
         """Take a setting, in which (x, control), own part, is a state."""
 
     def stand(self, state: Standing) -> None:
@@ -283,7 +301,7 @@ class Stages(Protocol):
     def at(self, state: Standing) -> AbstractContextManager[Any]:
         """Stand at a state, its x and control too, and come back on leaving."""
 
-    def bring_in(self, number: int, x: np.ndarray, control: float) -> None:
+    def bring_in(self, number: int, x: Array, control: float) -> None:
         """A thing (its number in the setting) is going to take part, and remembers nothing.
 
         Raises:

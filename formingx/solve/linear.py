@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
+from .equations import Array
+
 _SCALE, _KEEP_SCALING = 77, -1          # ICNTL(8) of MUMPS: as it thinks best, as it was
 
 
@@ -60,7 +62,7 @@ class DirectSolver:
         """out = matrix^-1 rhs."""
         self._ksp.solve(rhs, out)
 
-    def solve_all(self, rhs: np.ndarray) -> np.ndarray:
+    def solve_all(self, rhs: Array) -> Array:
         """matrix^-1 of columns, all at once, which takes a fraction of the time; own rows, shape (n, m)."""
         given, found = self._dense(*rhs.shape)
         given.getDenseArray()[:] = rhs

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
-from .arc_length import Curve
-from .equations import Attempt, Equations
+from .arc_length import Curve, Predictor
+from .equations import Array, Attempt, Constraint, Equations
 from .linear import configure
 from .newton import Failure, Iteration, Tolerances, relative
 from .state import State
@@ -45,23 +43,23 @@ class FixedControl:
         """Iterate x, in place, to the solution; False if there was no convergence (x is then worthless)."""
         self._control, self._work, self.history = control, 0.0, []
         self._snes.solve(None, x)
-        return self._snes.getConvergedReason() > 0
+        return bool(self._snes.getConvergedReason() > 0)
 
-    def correction(self) -> np.ndarray:
+    def correction(self) -> Array:
         """The last correction of x, own part, shape (n,)."""
-        return -self._snes.getSolutionUpdate().array_r
+        return np.negative(self._snes.getSolutionUpdate().array_r)
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
         self._snes.destroy()
 
-    def _function(self, snes: Any, x: PETSc.Vec, out: PETSc.Vec) -> None:
+    def _function(self, snes: PETSc.SNES, x: PETSc.Vec, out: PETSc.Vec) -> None:
         self._problem.residual(x, self._control, out)
 
-    def _jacobian(self, snes: Any, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
+    def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
         self._problem.tangent(x, self._control)
 
-    def _test(self, snes: Any, iteration: int, norms: tuple) -> int:
+    def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         size, step, residual = norms
         left = relative(self._problem, residual)
         correction = step / (size + 1e-8) if iteration else 1.0
@@ -69,10 +67,10 @@ class FixedControl:
         self._work = self._work or work
         self.history.append(Iteration(left, correction, work / self._work if self._work else 1.0))
         if not np.isfinite(left):
-            return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
+            return int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
         if self._tolerances.met([i.correction for i in self.history[1:]], [i.residual for i in self.history]):
-            return PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE
-        return PETSc.SNES.ConvergedReason.ITERATING
+            return int(PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE)
+        return int(PETSc.SNES.ConvergedReason.ITERATING)
 
 
 class FixedControlCurve(Curve):
@@ -87,11 +85,11 @@ class FixedControlCurve(Curve):
         super().__init__(problem, tolerances)
         self._fixed = FixedControl(problem, tolerances)
 
-    def step(self, old: State, length: float, foretold: Callable | None = None, behind: State | None = None) -> State:
+    def step(self, old: State, length: float, predictor: Predictor | None = None, behind: State | None = None) -> State:
         """One step to the control that the tangent foretells."""
         return self._correct(old, length, "step")
 
-    def step_to(self, old: State, length: float, equation: Callable, foretold: Callable | None = None,
+    def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
                 behind: State | None = None) -> State:
         """The same, to where an equation for the control holds."""
         return self._correct(old, length, "target")
@@ -106,10 +104,10 @@ class FixedControlCurve(Curve):
         self._a.array_w[:] = state.direction
         return state.slope / self.norm(self._a, state.slope)
 
-    def _length_of(self, b: Any) -> float:
+    def _length_of(self, b: PETSc.Vec) -> float:
         return 1.0
 
-    def _inner(self, x: np.ndarray, control: float, y: np.ndarray, other: float) -> float:
+    def _inner(self, x: Array, control: float, y: Array, other: float) -> float:
         return control * other
 
     def _correct(self, old: State, length: float, kind: str) -> State:

@@ -13,27 +13,45 @@ by itself. With f linear it is Woodbury's formula, by which a tangent follows a 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
 
-from .equations import ContactFace, Equations
+from .equations import Array, ContactFace, Equations
 from .linear import DirectSolver
 
-MOST = 40
-"""Points that are settled together; with more, the iteration is left to itself."""
+Border: TypeAlias = Callable[[Array], Array]
+"""What solutions V = K^-1 E, shape (n, m), become in the bordered system, in place; returns those of the control."""
 
-FEW = 3
-"""Points that change for which solutions with the factors at hand cost less than other factors."""
+@dataclass(frozen=True)
+class LocalContact:
+    """How the local problem of a few contact points is solved.
 
-_ITERATIONS, _FULL, _HALVED = 40, 8, 4
-"""Of the small problem: at most so many, with full corrections at first (which may cycle), then with halved ones where
-a full one would lead further away, but not more often than so in a row (which may stall at a kink)."""
+    Attributes:
+        most: points that are solved for together; with more, the iteration is left to itself.
+        few: points that change for which solutions with the factors at hand cost less than other factors.
+        iterations: at most so many, with `full` corrections at first (which may cycle), then with halved ones where a
+            full one would lead further away, but not more often than `halved` times in a row (which may stall at a
+            kink).
+        accuracy: of positions, over the ramp in which contact begins.
+    """
+
+    most: int = 40
+    few: int = 3
+    iterations: int = 40
+    full: int = 8
+    halved: int = 4
+    accuracy: float = 1e-4
 
 
-class Settling:
+_LOCAL = LocalContact()
+
+
+class LocalSolve:
     """The points that arrived, or whose status changed, in one run of Newton's method.
 
     Attributes:
@@ -42,8 +60,8 @@ class Settling:
 
     def __init__(self, problem: Equations):
         self._problem, self._contacts = problem, problem.present
-        self._marked: list[np.ndarray] = []
-        self._active: list[np.ndarray] = []
+        self._marked: list[Array] = []
+        self._active: list[Array] = []
         self.failed = 0
 
     def look(self) -> None:
@@ -54,7 +72,7 @@ class Settling:
             mark |= a != b
         self._active = now
 
-    def correct(self, solver: DirectSolver, dx: Any, step: float, border: Any) -> float:
+    def correct(self, solver: DirectSolver, dx: PETSc.Vec, step: float, border: Border) -> float:
         """Make a correction (dx, in place, and step, of the control) consistent with the law; returns the step.
 
         border(V): what solutions V = K^-1 E, shape (n, m), become in the bordered system, in place; returns those of
@@ -63,7 +81,7 @@ class Settling:
         for _ in range(4):
             chosen = [np.flatnonzero(mark) for mark in self._marked]
             points = self._problem.comm.allreduce(sum(map(len, chosen)), MPI.SUM)
-            if not 0 < points <= MOST:
+            if not 0 < points <= _LOCAL.most:
                 return step
             small = _Points(self._problem, self._contacts, chosen, solver, border)
             change = small.solve(dx, step)
@@ -76,7 +94,7 @@ class Settling:
         dx.array_w += more
         return step + by
 
-    def _others(self, dx: np.ndarray, step: float) -> bool:
+    def _others(self, dx: Array, step: float) -> bool:
         """Mark more points whose status changes on the way; True if there are any."""
         found = False
         for contact, mark, active in zip(self._contacts, self._marked, self._active):
@@ -88,7 +106,7 @@ class Settling:
         return self._problem.comm.allreduce(found, MPI.LOR)
 
 
-def woodbury(problem: Equations, changes: list[np.ndarray], solver: DirectSolver, b: Any) -> bool:
+def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver, b: PETSc.Vec) -> bool:
     """Make b = dx/dcontrol by a factorised tangent that of one which differs at a few points (Woodbury's formula).
 
     changes: of the stiffness per area of each contact's points, shape (n, 2, 2). False, and b as it was, where so many
@@ -98,7 +116,7 @@ def woodbury(problem: Equations, changes: list[np.ndarray], solver: DirectSolver
     points = problem.comm.allreduce(sum(map(len, chosen)), MPI.SUM)
     if not points:
         return True
-    if points > FEW:
+    if points > _LOCAL.few:
         return False
     small = _Points(problem, problem.present, chosen, solver, lambda V: np.zeros(V.shape[1]))
     by = small.updated(b, [change[i] for change, i in zip(changes, chosen)])
@@ -111,8 +129,8 @@ def woodbury(problem: Equations, changes: list[np.ndarray], solver: DirectSolver
 class _Points:
     """A few points and the body as they see it. Arrays: all of all ranks, but for what is said to be own."""
 
-    def __init__(self, problem: Equations, contacts: Sequence[ContactFace], chosen: list[np.ndarray],
-                 solver: DirectSolver, border: Any):
+    def __init__(self, problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array],
+                 solver: DirectSolver, border: Border):
         self._comm, self._contacts, self._chosen = problem.comm, contacts, chosen
         unit, held = np.zeros(problem.x.getLocalSize()), problem.held
         self._c = contacts[0].points.shape[1]               # components
@@ -141,13 +159,13 @@ class _Points:
         moved = [self._moved(column, step) for column, step in zip(self._columns.T, self._steps)]
         self._C = self._gather(np.array(moved).T.reshape(len(own), len(moved))) * self._scale
 
-    def solve(self, dx: Any, step: float) -> tuple[np.ndarray, float] | None:
+    def solve(self, dx: PETSc.Vec, step: float) -> tuple[Array, float] | None:
         """How a correction and its step change, own part; None if no consistent state was found."""
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._taken()
         y, by, least, halved = y0, np.zeros_like(y0), np.inf, 0
-        accuracy = 1e-4 * min(c.increment.ramp for c in self._contacts)
-        for k in range(_ITERATIONS):
+        accuracy = _LOCAL.accuracy * min(c.increment.ramp for c in self._contacts)
+        for k in range(_LOCAL.iterations):
             f, S = self._law(y - by)
             more = f - f0 + np.einsum("nij,nj->ni", S - S0, (y - by).reshape(-1, self._c)).ravel()
             R = y - by - y0 + self._C @ more
@@ -155,7 +173,7 @@ class _Points:
             if miss < accuracy:
                 forces = -self._scale * more
                 return self._columns @ forces, float(self._steps @ forces)
-            if k > _FULL and miss > least and halved < _HALVED:
+            if k > _LOCAL.full and miss > least and halved < _LOCAL.halved:
                 by, halved = by / 2, halved + 1
                 continue
             y, least, halved = y - by, miss, 0
@@ -165,7 +183,7 @@ class _Points:
             by = found
         return None
 
-    def updated(self, b: Any, changes: list[np.ndarray]) -> np.ndarray | None:
+    def updated(self, b: PETSc.Vec, changes: list[Array]) -> Array | None:
         """How dx/dcontrol changes, own part, with stiffnesses per area of own points; None: the tangent is singular."""
         more = self._gather(np.concatenate(changes))
         y = self._within(more, self._gather(self._moved(b.array_r, 1.0)))
@@ -173,7 +191,7 @@ class _Points:
             return None
         return -self._columns @ (self._scale * np.einsum("nij,nj->ni", more, y.reshape(-1, self._c)).ravel())
 
-    def _within(self, more: np.ndarray, y: np.ndarray) -> np.ndarray | None:
+    def _within(self, more: Array, y: Array) -> Array | None:
         """What motions y become if the points are stiffer by `more`, (1 + C more)^-1 y; None if there is no answer."""
         n = len(y)
         J = np.eye(n) + np.einsum("mni,nij->mnj", self._C.reshape(n, -1, self._c), more).reshape(n, n)
@@ -183,15 +201,15 @@ class _Points:
             return None
         return found if np.isfinite(found).all() else None
 
-    def _moved(self, dx: np.ndarray, step: float) -> np.ndarray:
+    def _moved(self, dx: Array, step: float) -> Array:
         """Own points' part of a correction, seen from their tools, flat."""
         return np.concatenate([c.moved(dx, step)[i].ravel() for c, i in zip(self._contacts, self._chosen)])
 
-    def _taken(self) -> tuple[np.ndarray, np.ndarray]:
+    def _taken(self) -> tuple[Array, Array]:
         """Forces and stiffnesses that the iteration has taken."""
         return self._all([c.increment.taken(i) for c, i in zip(self._contacts, self._chosen)])
 
-    def _law(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _law(self, y: Array) -> tuple[Array, Array]:
         """Forces and stiffnesses of the law, linearised where the points would be."""
         mine, at, found = y[self._own].reshape(-1, self._c), 0, []
         for contact, i in zip(self._contacts, self._chosen):
@@ -200,9 +218,9 @@ class _Points:
             at += len(i)
         return self._all(found)
 
-    def _all(self, parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    def _all(self, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
         force, stiffness = (np.concatenate(part) for part in zip(*parts))
         return self._gather(force).ravel(), self._gather(stiffness)
 
-    def _gather(self, values: np.ndarray) -> np.ndarray:
+    def _gather(self, values: Array) -> Array:
         return np.concatenate(self._comm.allgather(values))

@@ -12,11 +12,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..discrete.step_limit import Way
-from ..measures.targets import Bound, Target, is_met, process_time
+from ..measures.targets import Target, is_met, process_time
 from . import predictor
+from .equations import Array, Measure
 from .newton import Failure, tangents
 from .path_following import Cutback, Run
-from .state import Record, State
+from .record import Record
+from .state import State
 from .stepping import StepControl
 
 _SAME = 1e-12          # relative: times that are the same
@@ -35,11 +37,11 @@ class Flow(Run):
         step: step control whose lengths are parts of the duration.
     """
 
-    def __init__(self, record: Record, measure: Bound, course: Callable[[float], float], times: Sequence[float],
-                 targets: Sequence[tuple[Target, Bound]], step: StepControl | None, accuracy: float,
+    def __init__(self, record: Record, measure: Measure, course: Callable[[float], float], times: Sequence[float],
+                 targets: Sequence[tuple[Target, Measure]], step: StepControl | None, accuracy: float,
                  label: str = ""):
         end = process_time(times[-1])
-        super().__init__(record, [*targets, (end, end.bind(record.problem))], step, "follow", accuracy, label)
+        super().__init__(record, [*targets, (end, end.bind(record.equations))], step, "follow", accuracy, label)
         self._measure, self._course, self._times, self._duration = measure, course, times, times[-1] - times[0]
 
     def _facing_target(self, start: State) -> State:
@@ -82,7 +84,7 @@ class Flow(Run):
         """The state at a time, one step from `old`; raises `Failure`."""
         problem, problem.clock = self.problem, time
         value = float(self._course(time))
-        x, control = self._foretold(old, time, value)
+        x, control = self._predicted(old, time, value)
         by, slope = x - old.x, control - old.control
         way, limit = Way(old.x, old.control, by, slope, 1.0), problem.limit
         if limit and limit.length(way) < 0.5:
@@ -111,9 +113,9 @@ class Flow(Run):
             return new
         tried: list[State] = []
 
-        def below(time):
+        def below(time: float) -> float:
             tried.append(self._at(old, time))
-            return -np.sign(before) * tried[-1].control
+            return -float(np.sign(before)) * tried[-1].control
         from scipy.optimize import minimize_scalar
         with contextlib.suppress(Failure):                   # then there is no state of its own
             minimize_scalar(below, bounds=(old.time, new.time), options={"xatol": 1e-4 * (new.time - old.time)})
@@ -121,7 +123,7 @@ class Flow(Run):
             new.kind = "limit point"
         return new
 
-    def _foretold(self, old: State, time: float, value: float) -> tuple[np.ndarray, float]:
+    def _predicted(self, old: State, time: float, value: float) -> tuple[Array, float]:
         """(x, control) at a time: on the polynomial through the last states, or along the tangent of the first."""
         past = predictor.before(self.states, time, predictor.CUBIC - self.problem.has_kinks)
         if len(past) == 1:
@@ -129,9 +131,9 @@ class Flow(Run):
         w = predictor.weights(past, time)
         return w @ [s.x for s in past], float(w @ [s.control for s in past])
 
-    def _along(self, old: State, value: float) -> tuple[np.ndarray, float]:
+    def _along(self, old: State, value: float) -> tuple[Array, float]:
         """Where the tangent of a state has a value of the measure; the state itself if it has it nowhere near."""
-        def off(s):
+        def off(s: float) -> float:
             return self.curve.value(self._measure, old.x + s * old.direction, old.control + s * old.slope) - value
         now = off(0.0)
         for sense in (1.0, -1.0):
@@ -161,16 +163,17 @@ class Flow(Run):
             best.kind = "target"
         return best
 
-    def _meeting(self, old: State, target: Target, bound: Bound, low: float, high: float) -> State:
+    def _meeting(self, old: State, target: Target, bound: Measure, low: float, high: float) -> State:
         """The state, one step from `old`, at the time between two when a measure has its target value."""
         found: dict[float, State] = {}
 
-        def off(time):
+        def off(time: float) -> float:
             found[time] = self._at(old, time) if time > low else old
             return self.curve.value(bound, found[time].x, found[time].control) - target.value
         time = _root(off, low, high)
         state = found.get(time) or self._at(old, time)
-        if not is_met(target, bound, off(time) + target.value) and abs(off(time)) > 1e-8 * max(abs(target.value), 1e-8):
+        left = abs(off(time))
+        if not is_met(target, bound.size, off(time) + target.value) and left > 1e-8 * max(abs(target.value), 1e-8):
             raise Failure(f"{target} was passed but could not be solved for", [])
         state.met = target
         return state

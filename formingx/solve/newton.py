@@ -12,9 +12,9 @@ from petsc4py import PETSc
 
 from ..discrete.schedule import Setting
 from ..errors import count, positive
-from .equations import Attempt, Equations, Residual, Standing
+from .equations import Array, Attempt, Constraint, Equations, Residual, Standing
 from .linear import DirectSolver
-from .local_contact import Settling, woodbury
+from .local_contact import LocalSolve, woodbury
 
 
 @dataclass(frozen=True)
@@ -205,14 +205,10 @@ class _ModifiedNewton:
         self._fall, self._first = fall, False
 
 
-Constraint = Callable[[PETSc.Vec, float, PETSc.Vec], tuple[float, float]]
-"""c(x, control, gradient) -> (c, dc/dcontrol), having put dc/dx into `gradient`."""
-
-
 class Drag(Protocol):
     """Forces that are added to F, and their derivative."""
 
-    def forces(self, x: np.ndarray) -> np.ndarray:
+    def forces(self, x: Array) -> Array:
         """At x, own part, shape (n,)."""
 
     def add_to(self, tangent: PETSc.Mat) -> None:
@@ -294,7 +290,7 @@ class BorderedNewton:
         self._modified.begin(problem.setting, chords and not problem.has_kinks)
         work0 = moved = 0.0
         active = _ActiveSet(problem, self.settings.small)
-        points = Settling(problem) if problem.has_kinks else None
+        points = LocalSolve(problem) if problem.has_kinks else None
         while True:
             residual = relative(problem, self.F.norm(), self.settings.unloaded)
             if not np.isfinite(residual):
@@ -374,7 +370,7 @@ class BorderedNewton:
         self.a.axpy(step, self.b)
         return step
 
-    def _border(self, V: np.ndarray) -> np.ndarray:
+    def _border(self, V: Array) -> Array:
         """Make V = K^-1 E, own rows, shape (n, m), in place, those of the bordered system; the control's part, (m,)."""
         steps = -self.problem.comm.allreduce(self.gradient.array_r @ V) / self._slope
         V += np.outer(self.b.array_r, steps)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -17,13 +17,16 @@ import numpy as np
 
 from ..discrete.step_limit import Way
 from ..errors import ConvergenceError
-from ..measures.targets import Amplitude, Bound, Target
+from ..measures.targets import Amplitude, Target
 from . import predictor
-from .diagnose import diagnose
+from .arc_length import Predictor
+from .diagnose import Diagnosis, diagnose
+from .equations import Array, Attempt, Measure
 from .newton import Failure, tangents
 from .progress import Aim, Progress
+from .record import Record, Unusable
 from .snap_through import NoEquilibrium, SnapThrough, at_limit_points, snap_through, snaps, was_passed
-from .state import Record, State, Unusable
+from .state import State
 from .stepping import StepControl, TimeError
 
 log = logging.getLogger("formingx")
@@ -60,9 +63,9 @@ class Run:
 
     settings = PathFollowing()
 
-    def __init__(self, record: Record, targets: Sequence[tuple[Target, Bound]], step: StepControl | None = None,
+    def __init__(self, record: Record, targets: Sequence[tuple[Target, Measure]], step: StepControl | None = None,
                  at_fold: str | None = None, accuracy: float = 2e-3, label: str = ""):
-        self.record, self._label, self.curve, self.problem = record, label, record.curve, record.problem
+        self.record, self._label, self.curve, self.problem = record, label, record.curve, record.equations
         self._at_fold = at_fold or ""
         self._accuracy = accuracy
         self._time_error = TimeError(self.problem, accuracy) if self.problem.relaxes else None
@@ -143,7 +146,7 @@ class Run:
     @property
     def _sense(self) -> float:
         """1 or -1: which way the control goes from the first state."""
-        return np.sign(self.states[0].slope) or 1.0
+        return float(np.sign(self.states[0].slope)) or 1.0
 
     @property
     def _falls(self) -> bool:
@@ -252,17 +255,18 @@ class Run:
         limits[why] = limits.get(why, 0) + 1
         self._progress.limited(why, length)
 
-    def _take(self, old: State, length: float, target: Target | None, bound: Any, reach: float) -> list[State]:
+    def _take(self, old: State, length: float, target: Target | None, bound: Measure | None,
+              reach: float) -> list[State]:
         """One step of a length, or to a target that is within reach; raises `Failure` or `Cutback`."""
         limit = self.problem.limit
         if limit:
             limit.prepare(Way(old.x, old.control, old.direction, old.slope, reach), ends=True)
         behind = None if self.problem.has_kinks else predictor.behind(self.states, reach, self.curve.distance)
         with self.curve.newton.in_a_hurry(length > self.settings.snap_through.lengths[0]):
-            if target is None:
-                new = self.curve.step(old, length, self._foretold, behind)
+            if target is None or bound is None:
+                new = self.curve.step(old, length, self._predictor, behind)
             else:
-                new = self.curve.step_to(old, reach, bound.equation(target.value), self._foretold, behind)
+                new = self.curve.step_to(old, reach, bound.equation(target.value), self._predictor, behind)
         if target is not None:
             if not 0 < self.curve.progress(old, new) < 2 * length:
                 raise _Astray("the target was met on a far part of the path", [])
@@ -279,12 +283,12 @@ class Run:
         return states
 
     @property
-    def _foretold(self) -> Callable | None:
+    def _predictor(self) -> Predictor | None:
         """Of a step in which a body relaxes: x at a control, or None where the tangent of the last state is better."""
         if self._time_error is None or not self.problem.setting.rate[-1] or self.problem.has_kinks:
             return None
 
-        def x(control: float) -> np.ndarray | None:
+        def x(control: float) -> Array | None:
             time = self.problem.time_at(control)
             past = predictor.before(self.states, time, predictor.CUBIC)
             return predictor.weights(past, time) @ [s.x for s in past] if len(past) > 2 else None
@@ -415,14 +419,14 @@ class Run:
         record.counts.iterations += self.curve.spent()
         log.info("state %d: %s, %d iterations", record.counts.steps, record.describe(state), len(state.history) - 1)
 
-    def _give_up(self, why: str, attempt: Any = None, pace: str = "") -> None:
+    def _give_up(self, why: str, attempt: Attempt | None = None, pace: str = "") -> None:
         self.record.counts.iterations += self.curve.spent()
         found = diagnose(self.curve, self.states, why, attempt, pace,
                          self.aim.until.value if self.aim.of_control else None)
         self.curve.spent()                                  # the diagnosis is not part of the run
         raise self._error(f"{why}.", found)
 
-    def _error(self, why: str, diagnosis: Any) -> ConvergenceError:
+    def _error(self, why: str, diagnosis: Diagnosis) -> ConvergenceError:
         """What happened, what was met, what to try."""
         record, states, values = self.record, self.states, self.aim.values
         best = int(np.argmin([abs(v - self.aim.until.value) for v in values]))

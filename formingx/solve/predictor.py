@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from .equations import Array
 from .state import State
 
 CUBIC, QUADRATIC = 4, 3
@@ -39,7 +40,7 @@ def behind(states: Sequence[State], length: float, distance: Callable[[State, St
     return None
 
 
-def weights(states: Sequence[State], time: float) -> np.ndarray:
+def weights(states: Sequence[State], time: float) -> Array:
     """Of each state, with times that grow, in the value at a time; shape (states,)."""
     t = np.array([state.time for state in states])
     apart, ahead = t[:, None] - t, np.tile(time - t, (len(t), 1))

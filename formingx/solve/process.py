@@ -10,23 +10,28 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
 from ..discrete.schedule import Setting
 from ..errors import ConvergenceError, InputError
-from ..measures.targets import Amplitude, Bound, Target, changed, process_time
+from ..measures.targets import Amplitude, Target, changed, process_time
 from .arc_length import Curve
 from .diagnose import diagnose
+from .equations import Array, Measure
 from .measure_control import Flow
 from .newton import Failure, relative
 from .path_following import Run
+from .record import Record
 from .stage import Plan
-from .state import Record, State
+from .state import State
 from .stepping import StepControl
 
 _IN_TIME = StepControl(length=1e-3, smallest=1e-13)
 """Step control of a material that relaxes: the error in time soon takes over."""
+
+_Targets: TypeAlias = list[tuple[Target, Measure]]
 
 _SAME = 1e-12          # relative: times that are the same
 
@@ -47,7 +52,7 @@ class Execution:
     def __init__(self, record: Record, plans: list[Plan], unsure: list[Plan],
                  look: Callable[[Plan, Callable[[int], float]], None], step: StepControl | None, balanced: float,
                  accuracy: float = 2e-3):
-        problem = record.problem
+        problem = record.equations
         self.record, self.curve, self.problem = record, record.curve, problem
         self.plans, self._unsure, self._look, self._step, self._balanced = plans, unsure, look, step, balanced
         self._accuracy = accuracy
@@ -81,7 +86,7 @@ class Execution:
             if self.record.ended:
                 break
 
-    def _bind(self, plan: Plan) -> list[tuple[Target, Bound]]:
+    def _bind(self, plan: Plan) -> list[tuple[Target, Measure]]:
         """The targets of a stage and their measures; where it drives one thing the last is `until`."""
         stage, moving = plan.stage, {*plan.numbers, *(i for i, _ in plan.tables)}
         rate = [float(i in moving) for i in range(len(self._still.rate) - 1)] + [float(stage.timed)]
@@ -97,7 +102,7 @@ class Execution:
             found.append((target, bound))
         return found
 
-    def _standing(self) -> tuple[Setting, np.ndarray, float]:
+    def _standing(self) -> tuple[Setting, Array, float]:
         """The setting, the unknowns and the control where the process stands now."""
         last = self.record.last if self.record.states else None
         return self.problem.setting, last.x if last else self._rest, last.control if last else 0.0
@@ -126,7 +131,7 @@ class Execution:
         self.record.accept(state)
         self.record.complete_step(StepControl(), changed())
 
-    def _trace(self, targets: list, control: float | None) -> list:
+    def _trace(self, targets: _Targets, control: float | None) -> _Targets:
         """Follow the path from a control (None: on from the last state); returns the targets that are still open."""
         step = self._stage.step or self._step
         if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
@@ -153,7 +158,7 @@ class Execution:
             target = changed()
             self._trace([(target, target.bind(self.problem))], start)
 
-    def _out_of_balance(self, x: np.ndarray) -> bool:
+    def _out_of_balance(self, x: Array) -> bool:
         self.problem.x.array_w[:] = x
         self.problem.residual(self.problem.x, 1.0, self.curve.newton.F)
         return relative(self.problem, self.curve.newton.F.norm()) > self._balanced
@@ -219,7 +224,7 @@ class Execution:
         at = course if callable(course) else lambda time: np.interp(time, *course.T)
         return measure(float(at(now))), at, [now, *(t for t in corners if now < t < last), last]
 
-    def _follow(self, tables: list[tuple[int, np.ndarray]], piece: int) -> None:
+    def _follow(self, tables: list[tuple[int, Array]], piece: int) -> None:
         """Pieces 1, 2, ...: from knot to knot of the tables, the time being the control."""
         before, _, control = self._standing()
         stage, through = self._stage, self._targets[self._k]
@@ -237,7 +242,7 @@ class Execution:
             through = self._line(then, through, begun)
             now, begun = then, False
 
-    def _enter_line(self, tables: list, now: float, then: float, piece: int) -> None:
+    def _enter_line(self, tables: list[tuple[int, Array]], now: float, then: float, piece: int) -> None:
         """All tables are straight between these times; the control is the time, scaled: no amplitude is faster."""
         before, _, control = self._standing()
         base, scales = self._amplitudes(), self.problem.scales
@@ -254,7 +259,7 @@ class Execution:
         base[-1], change[-1] = now, then - now
         self._enter(base, [c / (most or 1.0) for c in change], piece, 0.0)
 
-    def _line(self, then: float, through: list, begun: bool) -> list:
+    def _line(self, then: float, through: _Targets, begun: bool) -> _Targets:
         """Go to the end of a piece of the tables; returns the targets that are still open."""
         if self.problem.setting.rests and not self.problem.relaxes:     # only time goes by, and nothing cares
             if not begun:
@@ -265,7 +270,7 @@ class Execution:
         target = process_time(then)
         return self._trace([*through, (target, target.bind(self.problem))], None if begun else 0.0)
 
-    def _check_beginning(self, tables: list[tuple[int, np.ndarray]], now: float, end: float) -> None:
+    def _check_beginning(self, tables: list[tuple[int, Array]], now: float, end: float) -> None:
         who = self._stage.who
         if end <= now:
             raise InputError(f"{who}: ends at time {end:g}, but the process time is {now:g} already: time cannot go"

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 from mpi4py import MPI
 
-from ..measures.targets import Amplitude, Bound, Target, is_met
+from ..measures.targets import Amplitude, Target, is_met
 from .arc_length import Curve
+from .equations import Measure
 from .state import State
 
 log = logging.getLogger("formingx")
@@ -27,7 +28,7 @@ class Aim:
 
     patience = 500
 
-    def __init__(self, curve: Curve, targets: Sequence[tuple[Target, Bound]]):
+    def __init__(self, curve: Curve, targets: Sequence[tuple[Target, Measure]]):
         self._curve, self.open, self._best = curve, list(targets), 0.0
         self.until, self.measure = self.open[-1]
         self.values: list[float] = []
@@ -55,12 +56,12 @@ class Aim:
         """A state is accepted: close the targets that it meets."""
         self.values.append(self._curve.value(self.measure, state.x, state.control))
         self.open = [(t, b) for t, b in self.open if t is not state.met     # another may hold there, too
-                     and not is_met(t, b, self._curve.value(b, state.x, state.control))]
+                     and not is_met(t, b.size, self._curve.value(b, state.x, state.control))]
 
     def met_by(self, state: State) -> Target | None:
         """The first open target that holds at a state, to round-off."""
         return next((target for target, bound in self.open
-                     if is_met(target, bound, self._curve.value(bound, state.x, state.control))), None)
+                     if is_met(target, bound.size, self._curve.value(bound, state.x, state.control))), None)
 
     def close_met(self, start: State) -> None:
         """Close the targets that hold at the start already."""
@@ -68,9 +69,9 @@ class Aim:
             start.met = start.met or target
             self.open = [(t, b) for t, b in self.open if t is not target]
 
-    def within_reach(self, old: State, length: float) -> tuple[Target | None, Bound | None, float]:
+    def within_reach(self, old: State, length: float) -> tuple[Target | None, Measure | None, float]:
         """(target, its measure, distance) of the first open target that the tangent meets within a length."""
-        best: tuple[Target | None, Bound | None, float] = (None, None, length)
+        best: tuple[Target | None, Measure | None, float] = (None, None, length)
         for target, bound in self.open:
             left, rate = self._curve.aim(bound, target.value, old)
             if left * rate < 0 and -left / rate < best[2]:

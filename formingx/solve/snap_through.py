@@ -21,7 +21,7 @@ from petsc4py import PETSc
 
 from ..discrete.step_limit import Way
 from .arc_length import Curve
-from .equations import Equations, Viscosity
+from .equations import Array, Equations, Viscosity
 from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
 from .state import State
 
@@ -89,9 +89,10 @@ class ViscousDrag:
 
     def __init__(self, viscosity: Viscosity):
         self._viscosity = viscosity
-        self.eta, self.origin = 0.0, np.zeros(0)
+        self.eta = 0.0
+        self.origin: Array = np.zeros(0)
 
-    def forces(self, x: np.ndarray) -> np.ndarray:
+    def forces(self, x: Array) -> Array:
         """At x, own part, shape (n,)."""
         return self._viscosity.forces(x - self.origin, self.eta)
 
@@ -111,7 +112,8 @@ class _Motion:
         self.curve, self.problem, self._old, self.control = curve, curve.problem, old, control
         self._settings, self._drag = settings, ViscousDrag(curve.problem.viscosity())
         self._newton = BorderedNewton(curve.problem, settings.tolerances, curve.norm, drag=self._drag)
-        self._x, self._pull = curve.problem.x.duplicate(), np.zeros(len(old.x))
+        self._x = curve.problem.x.duplicate()
+        self._pull: Array = np.zeros(len(old.x))
         self.at, self.lost, self.solved = old, 0.0, 0
         self.rest, self.near = np.inf, settings.near_rest   # what is out of balance; little enough to look for rest
         self.settles = False
@@ -123,7 +125,7 @@ class _Motion:
         most = settings.most_moving if self.solved else settings.most
         return settings.least < eta < most and self.curve.moved(self._old, self.at) < settings.too_far
 
-    def move(self, origin: np.ndarray, eta: float) -> float:
+    def move(self, origin: Array, eta: float) -> float:
         """One viscous solution from `origin`; the factor by which eta may change then."""
         settings, self._drag.eta, self._drag.origin = self._settings, eta, origin
         self._x.array_w[:] = origin
@@ -180,7 +182,7 @@ class _Motion:
         state.jump = {"dissipated": self.lost * energy, "moved": self.curve.moved(self._old, state) * length}
         return state
 
-    def _lose(self, a: np.ndarray, x: np.ndarray, pull: np.ndarray) -> None:
+    def _lose(self, a: Array, x: Array, pull: Array) -> None:
         """Work of what is out of balance from a to x (trapezoidal rule: half way there the chord cuts into tools).
 
         A force at a that has turned before x is none that the body moved by: viscous forces do no negative work.
@@ -188,7 +190,7 @@ class _Motion:
         by = x - a
         self.lost += 0.5 * (max(self._sum(self._pull * by), 0.0) + self._sum(pull * by))
 
-    def _sum(self, values: np.ndarray) -> float:
+    def _sum(self, values: Array) -> float:
         return float(self.problem.comm.allreduce(values.sum()))
 
     def destroy(self) -> None:

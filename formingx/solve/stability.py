@@ -6,11 +6,13 @@ these in K = L D L^T, and one more for each unstable mode (Sylvester's law of in
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..discrete.second_variation import SecondVariation
+from .arc_length import Curve
+from .equations import Array
 from .linear import DirectSolver
 from .newton import Failure
 from .state import State
@@ -48,8 +50,8 @@ class Located(NamedTuple):
     right: State
     state: State
     fraction: float
-    mode: np.ndarray
-    x: np.ndarray
+    mode: Array
+    x: Array
     gained: bool
     solved: bool
 
@@ -61,8 +63,8 @@ class _Look(NamedTuple):
     fraction: float
     state: State
     unstable: int
-    values: np.ndarray
-    modes: np.ndarray
+    values: Array
+    modes: Array
 
 
 class Modes:
@@ -75,7 +77,7 @@ class Modes:
         InputError: as `SecondVariation`.
     """
 
-    def __init__(self, curve: Any):
+    def __init__(self, curve: Curve):
         self.curve, self.problem = curve, curve.problem
         self.variation = SecondVariation(curve.problem)
         self._solver = DirectSolver(self.variation.matrix, True, inertia=True)
@@ -124,7 +126,7 @@ class Modes:
         else:
             x, control = self.curve.interpolate(a, b, fraction)
             state = State(x, control, a.direction, a.slope, memory=a.memory, stage=a.stage, setting=a.setting,
-                          time=self.problem.forms.time_at(control))
+                          time=self.problem.time_at(control))
         with self.problem.at(nearest.state):
             self.variation.fill(*kind)
             x = nearest.modes[np.argmin(abs(nearest.values))] if exact else self._of_index(nearest, index)
@@ -136,7 +138,7 @@ class Modes:
             count = self._count(kind)
             return _Look(fraction, state, count, *self._lanczos(4 + abs(count - index)))
 
-    def _of_index(self, look: _Look, index: int) -> np.ndarray:
+    def _of_index(self, look: _Look, index: int) -> Array:
         """The mode whose eigenvalue has so many below it; of those that are known the nearest to it."""
         negative = np.flatnonzero(look.values < 0)
         k = (negative[-1] + 1 if len(negative) else 0) + index - look.unstable
@@ -165,13 +167,13 @@ class Modes:
             raise Failure("the state that was found lies on another branch", [])
         return state
 
-    def _lanczos(self, number: int) -> tuple[np.ndarray, np.ndarray]:
+    def _lanczos(self, number: int) -> tuple[Array, Array]:
         """Eigenvalues nearest to 0 of K x = value M x, and modes; all vectors are kept orthogonal to each other.
 
         M is the lumped mass, which is 0 for pressures: so all begin in the range of K^-1 M. Rigid motions are left out.
         """
         variation = self.variation
-        out: list[np.ndarray] = []
+        out: list[Array] = []
         for mode in variation.rigid:
             out.append(self._normal(self._clean(mode, out)))
         rng = np.random.default_rng(0)
@@ -198,19 +200,19 @@ class Modes:
         modes = ways[:, best].T @ np.array(basis)
         return 1 / theta[best], modes
 
-    def _invert(self, x: np.ndarray) -> np.ndarray:
+    def _invert(self, x: Array) -> Array:
         """K^-1 M x."""
         self._in.array_w[:] = self.variation.mass(x)
         self._solver.solve(self._in, self._out)
         return self._out.array_r.copy()
 
-    def _inner(self, x: np.ndarray, y: np.ndarray) -> float:
+    def _inner(self, x: Array, y: Array) -> float:
         return float(self.problem.comm.allreduce(float(x @ self.variation.mass(y))))
 
-    def _normal(self, x: np.ndarray) -> np.ndarray:
+    def _normal(self, x: Array) -> Array:
         return x / np.sqrt(self._inner(x, x))
 
-    def _clean(self, x: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
+    def _clean(self, x: Array, others: list[Array]) -> Array:
         """x without its parts along others, which are normal to each other."""
         if not others:
             return x

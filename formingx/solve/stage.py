@@ -11,6 +11,7 @@ from ..errors import InputError, finite, instance, known, positive, several
 from ..measures.targets import Target
 from ..scene import aims
 from ..scene.scene import Scene
+from .equations import Array
 from .stepping import StepControl
 
 _OF_CONTROL = ("pressure", "travel")
@@ -50,7 +51,7 @@ class Stage:
 
     def __init__(self, name: str, drive: Any = None, until: Target | None = None,
                  through: Sequence[Target] = (), without: Sequence[Any] = (), *,
-                 follow: Mapping[Any, Sequence] | None = None, step: StepControl | None = None,
+                 follow: Mapping[Any, Sequence[Any]] | None = None, step: StepControl | None = None,
                  at_fold: str | None = None, speed: float | None = None, duration: float | None = None,
                  hold: Target | None = None):
         if not isinstance(name, str) or not name:
@@ -117,7 +118,7 @@ class Stage:
                  "made by its measure")
         return measure, course
 
-    def _tables(self, follow: Any) -> list[tuple[Any, np.ndarray]]:
+    def _tables(self, follow: Any) -> list[tuple[Any, Array]]:
         """[(thing, knots, shape (n, 2))]."""
         if not isinstance(follow, Mapping) or not follow:
             raise InputError(f"{self.who}: follow = {follow!r}: must be {{thing: [(time, value), ...]}}")
@@ -145,7 +146,7 @@ class Plan(NamedTuple):
 
     stage: Stage
     numbers: list[int]
-    tables: list[tuple[int, np.ndarray]]
+    tables: list[tuple[int, Array]]
     off: list[int]
     names: list[str]
 

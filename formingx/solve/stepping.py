@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError, count, finite, positive
 from . import predictor
-from .equations import Equations
+from .equations import Array, Equations
 from .state import State
 
 ACCURACY = {"draft": 1e-2, "standard": 2e-3, "fine": 3e-4}
@@ -88,7 +88,7 @@ class TimeError:
         self._problem = problem
         self._once, self._adding_up = once * accuracy, adding_up * accuracy**1.5
 
-    def of(self, states: Sequence[State], x: np.ndarray, control: float) -> float:
+    def of(self, states: Sequence[State], x: Array, control: float) -> float:
         """Error of the step from the last of some states to (x, control) over what is allowed; 0: no time goes by."""
         time = self._problem.time_at(control)
         past = predictor.before(states, time, predictor.QUADRATIC - 1)

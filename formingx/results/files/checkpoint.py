@@ -35,7 +35,8 @@ from ...scene.scene import Scene
 from ...scene.summary import summary
 from ...solve.arc_length import Curve
 from ...solve.newton import Iteration, Tolerances
-from ...solve.state import Counts, Record, State
+from ...solve.record import Counts, Record
+from ...solve.state import State
 from .. import files
 from .arrays import pack, unpack
 from .description import describe, differences

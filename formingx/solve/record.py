@@ -1,0 +1,154 @@
+"""The record of a run: its accepted states."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+from ..errors import ConvergenceError
+from ..measures.targets import Target
+from .arc_length import Curve
+from .equations import Equations
+from .state import State
+from .stepping import StepControl
+
+log = logging.getLogger("formingx")
+
+
+@dataclass
+class Counts:
+    """What a run cost: accepted states (without the start), failed attempts, all Newton iterations (with a tangent that
+    was kept, too), seconds; limits: {what made a step shorter, or fail: how often}."""
+
+    steps: int = 0
+    failures: int = 0
+    iterations: int = 0
+    seconds: float = 0.0
+    limits: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(eq=False)
+class Segment:
+    """States of one problem, in order; a run that changes its problem goes on in another segment.
+
+    Attributes:
+        problem: the `Equations`, as whoever made them knows them (`Problem`); curve: the `Curve` that solves for
+            their states; states: list of `State`.
+    """
+
+    problem: Any
+    curve: Curve
+    states: list[State] = field(default_factory=list)
+
+
+class Unusable(ConvergenceError):
+    """A state was found, but none that a body can have."""
+
+
+class Record:
+    """The accepted states of a run, in order, and who is told of them.
+
+    Attributes:
+        segments: list of `Segment`, the last of which grows.
+        counts: what the run cost (`Counts`).
+        stage: name of the stage of a process that is going on.
+        ended: why the run ended before its targets, as a result and not as an error; "" if it did not.
+        on_state: functions called with every accepted state, while the problem stands there (they fill `measures`).
+        on_step: functions called whenever a step is complete.
+        judge: says of a state whose measures are known why it is none that a body can have, "" if it is one.
+        beyond: keep such states, too.
+    """
+
+    def __init__(self, problem: Equations, curve: Curve):
+        self.segments = [Segment(problem, curve)]
+        self.counts, self.stage, self.ended = Counts(), "", ""
+        self.on_state: list[Callable[[State], None]] = []
+        self.on_step: list[Callable[[], None]] = []
+        self.judge: Callable[[State], str] = lambda state: ""
+        self.beyond = False
+
+    @property
+    def problem(self) -> Any:
+        """The problem that is being solved, as whoever made it knows it."""
+        return self.segments[-1].problem
+
+    @property
+    def equations(self) -> Equations:
+        """The same as the solver sees it."""
+        return self.curve.problem
+
+    @property
+    def curve(self) -> Curve:
+        """What solves for its states."""
+        return self.segments[-1].curve
+
+    @property
+    def states(self) -> list[State]:
+        """All accepted states."""
+        if len(self.segments) == 1:
+            return self.segments[0].states
+        return [state for segment in self.segments for state in segment.states]
+
+    @property
+    def last(self) -> State:
+        """The last accepted state."""
+        return self.segments[-1].states[-1]
+
+    def stand(self) -> int:
+        """Let the problem stand at the last state, its setting taken where it began; the number of states with that.
+
+        (What is held, and what fades, is reckoned from where a setting began: elsewhere it would differ by round-off.)
+        """
+        setting = self.last.setting
+        states = list(itertools.takewhile(lambda s: s.setting == setting, reversed(self.segments[-1].states)))
+        for state in (states[-1], self.last):
+            self.equations.stand(state)
+        return len(states)
+
+    def go_on_from(self, other: Record) -> None:
+        """Begin with the states of another record, which stays as it is."""
+        mine = self.segments[-1]
+        *earlier, last = other.segments
+        self.segments = [*earlier, Segment(mine.problem, mine.curve, list(last.states))]
+        self.counts = replace(other.counts, limits=dict(other.counts.limits))
+
+    def accept(self, state: State) -> None:
+        """Take up a state: what has a history goes on from it.
+
+        Raises:
+            Unusable: it is none that a body can have; the record is as it was before.
+        """
+        problem, memory = self.equations, self.equations.memory
+        problem.advance(state.x, state.control)
+        state.memory, state.stage, state.setting = problem.memory, self.stage, asdict(problem.setting)
+        state.time = problem.time_at(state.control)
+        self.segments[-1].states.append(state)
+        try:
+            for told in self.on_state:
+                told(state)
+            state.verdict = self.judge(state)
+            if state.verdict and not self.beyond:
+                raise Unusable(state.verdict)
+        except BaseException:
+            self.segments[-1].states.pop()
+            problem.memory = memory
+            raise
+        if state.verdict and not any(s.verdict for s in self.states[-2:-1]):
+            log.warning("beyond %s: %s", self.describe(state), state.verdict)
+        self.counts.steps += state.kind != "start"
+
+    def complete_step(self, step: StepControl, until: Target, **more: Any) -> None:
+        """A step is complete: note in the last state how the run goes on from it, with more that the run knows."""
+        self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value],
+                              **more}
+        for told in self.on_step:
+            told()
+
+    def describe(self, state: State) -> str:
+        """A state's main numbers in one line."""
+        return f"stage {state.stage!r}, " * bool(state.stage) + ", ".join(
+            f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in self.equations.main_columns
+            if k in state.measures)
