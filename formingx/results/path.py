@@ -237,18 +237,17 @@ class Path:
     def _smooth(self, segment: Segment, states: list[State], columns: Any, points: int) -> list[list[float]]:
         """Rows of columns after the first, to the last, of states with one setting."""
         from scipy.interpolate import PchipInterpolator
-        bounds = [self._view(segment).columns.get(c) for c in columns]
+        known_columns = self._view(segment).columns
         at = np.concatenate([[0.0], np.cumsum([max(segment.curve.distance(a, b), 1e-300)
                                                for a, b in zip(states, states[1:])])])
-        smooth = {c: bound for c, bound in zip(columns, bounds) if bound is not None and bound.smooth}
+        smooth = {c: known_columns[c] for c in columns if c in known_columns and known_columns[c].smooth}
         through = {c: PchipInterpolator(at, [s.measures[c] for s in states]) for c in columns if c not in smooth}
         rows = []
         with segment.problem.at(states[0]):
             for k, (a, b) in enumerate(zip(states, states[1:])):
                 for fraction in np.arange(1, points) / points:
-                    there = segment.curve.interpolate(a, b, fraction)
-                    s = at[k] + fraction * (at[k + 1] - at[k])
-                    rows.append([float(through[c](s)) if c in through else segment.curve.value(smooth[c], *there)
+                    there, s = segment.curve.interpolate(a, b, fraction), at[k] + fraction * (at[k + 1] - at[k])
+                    rows.append([segment.curve.value(smooth[c], *there) if c in smooth else float(through[c](s))
                                  for c in columns])
                 rows.append([b.measures[c] for c in columns])
         return rows
