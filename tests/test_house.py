@@ -5,7 +5,7 @@ import ast
 from conftest import ROOT
 
 PACKAGE = ROOT / "formingx"
-ROOMS = ["errors", "_compat", "units", "io", "figures", "values", "mesh", "tools", "physics", "materials",
+ROOMS = ["errors", "ranks", "_compat", "units", "io", "figures", "values", "mesh", "tools", "physics", "materials",
          "calibration", "exact", "scene", "discrete", "measures", "solve", "results", "heat"]
 # what is not here is above them all
 FILES = sorted(PACKAGE.rglob("*.py"))

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from ..ranks import gathered
+
 _NEIGHBOURS = 12
 """Points of a fit: twice the six coefficients of a quadratic polynomial in the plane."""
 
@@ -24,7 +26,7 @@ class Carrier:
     def __init__(self, comm: Any, source: np.ndarray, target: np.ndarray):
         from scipy.spatial import cKDTree
         self._comm = comm
-        points = np.concatenate(comm.allgather(source))
+        points = gathered(comm, source)
         k = min(_NEIGHBOURS, len(points))
         away, self._rows = (found.reshape(len(target), k) for found in cKDTree(points).query(target, k))
         self.nearest = self._rows[:, 0]
@@ -41,7 +43,7 @@ class Carrier:
 
     def all(self, values: np.ndarray) -> np.ndarray:
         """Own values at `source` of all ranks, in the order of `nearest`; collective."""
-        return np.concatenate(self._comm.allgather(values))
+        return gathered(self._comm, values)
 
 
 def carry(source: Any, memory: list[Any], problem: Any, x: np.ndarray, control: float) -> None:

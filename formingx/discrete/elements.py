@@ -45,7 +45,7 @@ def body(problem: Any, x: Any, control: float) -> Body | None:
     F = ufl.as_vector([forms.F[i] for i in ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))])
     cells = np.arange(domain.topology.index_map(2).size_local, dtype=np.int32)
 
-    def at(expression, points, n):
+    def at(expression: Any, points: Any, n: int) -> np.ndarray:
         if not len(cells):
             return np.zeros((0, len(points), n))
         return fem.Expression(expression, points).eval(domain, cells).reshape(len(cells), len(points), n)

@@ -11,6 +11,7 @@ from dolfinx import fem
 
 from .. import _compat
 from ..errors import InputError
+from ..ranks import gathered
 from .carry import Carrier
 
 
@@ -82,11 +83,11 @@ class MaterialHistory:
 
     def save(self, memory: Memory) -> dict[str, Any]:
         """See `History`."""
-        gather = self._forms.comm.allgather
-        numbers = np.concatenate(gather(self._numbers))
+        comm = self._forms.comm
+        numbers = gathered(comm, self._numbers)
         order = np.argsort(numbers)
         return {"time": memory.time, "cells": numbers[order],
-                "values": {name: np.concatenate(gather(v))[order] for name, v in memory.values.items()}}
+                "values": {name: gathered(comm, v)[order] for name, v in memory.values.items()}}
 
     def load(self, data: dict[str, Any]) -> Memory:
         """See `History`."""

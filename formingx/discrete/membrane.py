@@ -21,6 +21,7 @@ from .. import _compat
 from ..errors import InputError
 from ..mesh.mesh import Mesh
 from ..physics.supports import Held
+from ..ranks import gathered
 from .formulation import Formulation
 from .probes import MidSurfaceProbe
 
@@ -41,12 +42,12 @@ class MidSurface(Formulation):
     slack_at_rest = True
 
     @property
-    def bodies(self):
+    def bodies(self) -> list[tuple[Any, list[str]]]:
         """Not there: raises an InputError."""
         raise InputError("a membrane knows no stress through its thickness, nor between its layers: use a solid model,"
                          " MixedPressure() for one")
 
-    def face(self, name, quadrature_degree):
+    def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
         """(normal of the mid-surface away from the loaded face, the whole mid-surface)."""
         nodes = self.scene.mesh.nodes_of(name)
         near = 1e-8 * self.length
@@ -58,7 +59,7 @@ class MidSurface(Formulation):
         raise InputError(f"boundary {name!r}: a membrane takes loads on the whole of its lower or of its upper face"
                          f" only")
 
-    def constraints(self, support):
+    def constraints(self, support: Any) -> list[Any]:
         """A mean over an end is the value at its point; a membrane is held at its ends only."""
         held = [Held(c.component, on=c.on) if not isinstance(c, Held) else c for c in support.constraints()]
         for item in held:
@@ -67,25 +68,25 @@ class MidSurface(Formulation):
                                  f" {list(self.mesh.boundaries)}")
         return held
 
-    def nearest(self, points):
+    def nearest(self, points: np.ndarray) -> np.ndarray:
         """Points of the mid-surface at the same R, shape (n, 2)."""
         R = np.asarray(points, dtype=float)[:, 0]
         return np.column_stack([R, np.interp(R, self._R, (self._low + self._high) / 2)])
 
-    def mid(self, layer, R, Z):
+    def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
         """Halfway between the faces of the layer."""
         low, high = self._ends[layer]
         return np.interp(R, self._R, (low + high) / 2)
 
-    def weighted(self, density, layers, metadata=None):
+    def weighted(self, density: Any, layers: list[str], metadata: dict | None = None) -> Any:
         dx = self.dx(metadata=metadata) if metadata else self.dx
         return sum(density * self.thicknesses[name] * self._area() * dx for name in layers)
 
-    def cells_of(self, layers):
+    def cells_of(self, layers: list[str]) -> np.ndarray:
         topology = self.domain.topology
         return np.arange(topology.index_map(1).size_local + topology.index_map(1).num_ghosts, dtype=np.int32)
 
-    def temperatures(self, terms, values=None):
+    def temperatures(self, terms: Any, values: Any = None) -> np.ndarray:
         """That halfway between the faces of the layer."""
         nodes = self.domain.geometry.x[_compat.cell_nodes(self.domain)[terms.cells], :2]
         geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(self.domain).degree)
@@ -94,10 +95,10 @@ class MidSurface(Formulation):
         points = np.column_stack([R.ravel(), self.mid(terms.names[0], R.ravel(), Z.ravel())])
         return self.temperature.at(points).reshape(R.shape)
 
-    def probe(self, problem, points):
+    def probe(self, problem: Any, points: Any) -> MidSurfaceProbe:
         return MidSurfaceProbe(problem, points)
 
-    def set_stiff(self):
+    def set_stiff(self) -> None:
         """A small stretch in all directions."""
         self.w.sub(0).interpolate(lambda X: _FIRST_STRETCH / self.length * X[:2])
 
@@ -182,7 +183,7 @@ def _faces(mesh: Mesh, layer: str, R: np.ndarray, near: float) -> tuple[np.ndarr
     if nodes.shape[1] == 6:
         halves = [pair for a, b, m in edges for pair in ((a, m), (m, b))]
     pieces = geometry.x[np.concatenate([nodes[:, pair] for pair in (*halves, *((b, a) for a, b in halves))]), :2]
-    pieces = np.concatenate(mesh.comm.allgather(pieces.reshape(-1, 2, 2)))
+    pieces = gathered(mesh.comm, pieces.reshape(-1, 2, 2))
     first = np.searchsorted(R, pieces[:, :, 0].min(axis=1) - near)
     last = np.searchsorted(R, pieces[:, :, 0].max(axis=1) + near)
     which = np.repeat(np.arange(len(pieces)), last - first)                    # every piece meets some of the R

@@ -10,6 +10,7 @@ import numpy as np
 from dolfinx import fem
 
 from ..mesh.check import crossing, crossings
+from ..ranks import gathered
 
 _PARTS = 8
 """Straight pieces of an edge."""
@@ -84,7 +85,7 @@ class Outline:
 
     def _gathered(self, values: np.ndarray) -> np.ndarray:
         comm = self._forms.comm
-        return values if comm.size == 1 else np.concatenate(comm.allgather(values))
+        return values if comm.size == 1 else gathered(comm, values)
 
 
 def along(edges: np.ndarray, parts: int = _PARTS) -> np.ndarray:

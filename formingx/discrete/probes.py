@@ -11,6 +11,7 @@ from mpi4py import MPI
 from .. import _compat
 from ..errors import InputError
 from ..mesh.locate import locate
+from ..ranks import gathered
 
 
 class Probe:
@@ -81,8 +82,8 @@ class Probe:
                 triples[1].append(factors[i, component] * point_weights[k])
         dofs = np.concatenate(triples[0]) if triples[0] else np.zeros(0, dtype=np.int64)
         weights = np.concatenate(triples[1]) if triples[1] else np.zeros(0)
-        dofs = np.concatenate(problem.comm.allgather(dofs))
-        weights = np.concatenate(problem.comm.allgather(weights))
+        dofs = gathered(problem.comm, dofs)
+        weights = gathered(problem.comm, weights)
         first, last = index_map.local_range
         own = (dofs >= first) & (dofs < last)
         row = np.zeros(last - first)
@@ -111,12 +112,12 @@ class MidSurfaceProbe(Probe):
             h = nodes[k, far, 0]
             self._slopes[k, 0, [far, 2]] = -1 / (3 * h), 8 / (3 * h)
 
-    def across(self):
+    def across(self) -> tuple[np.ndarray, float]:
         """See `Probe.across`: at the pole the membrane stays normal to the axis, and is stretched by 1 + du_r/dR."""
         row = self._row(np.array([[1.0, 0.0], [0.0, 0.0]]), self._slopes[:, 0] * self._problem.forms.length)
         return row, 1.0
 
-    def row(self, factors):
+    def row(self, factors: np.ndarray) -> np.ndarray:
         """See `Probe.row`; only points of the mid-surface."""
         middle = self._problem.forms.nearest(self.points)
         off = np.abs(self.points - middle).max(axis=1) > 1e-8 * self._problem.forms.length
@@ -126,7 +127,7 @@ class MidSurfaceProbe(Probe):
                              f" other: there it is ({middle[np.argmax(off)][0]:.6g}, {middle[np.argmax(off)][1]:.6g})")
         return super().row(factors)
 
-    def _local(self, values):
+    def _local(self, values: np.ndarray) -> np.ndarray:
         u, du = super()._local(values), np.einsum("kij,kij->ki", self._slopes, values)
         forms = self._problem.forms
         t = self._tangent + forms.length * du

@@ -165,15 +165,15 @@ class SecondVariation:
         forms, kinematics = self._forms, self.problem.scene.kinematics
         h, v, w = fem.Function(self.space), ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
 
-        def displacement(mode):
+        def displacement(mode: Any) -> Any:
             U, W, V = (ufl.split(mode)[0][i] for i in range(3))
             return forms.constant(forms.length) * ufl.as_vector([U, W, V - self._turned * U])
 
-        def gradient(mode):
+        def gradient(mode: Any) -> Any:
             return kinematics.mode_gradient(displacement(mode), forms.X, self._number)
         F, H = forms.elastic_F, forms.elastic(gradient(h))
 
-        def changed(within):
+        def changed(within: bool) -> Any:
             return ufl.as_tensor([[(F[i, j] if (i, j) in _WITHIN else 0) + (H[i, j] if ((i, j) in _WITHIN) is within
                                                                             else 0)
                                    for j in range(3)] for i in range(3)])

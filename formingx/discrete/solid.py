@@ -31,24 +31,24 @@ class Solid(Formulation):
         """The measure of a named boundary."""
         return self.ds(self.scene.mesh.boundaries[name], metadata={"quadrature_degree": quadrature_degree})
 
-    def face(self, name, quadrature_degree):
+    def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
         return ufl.FacetNormal(self.domain), self.boundary(name, quadrature_degree)
 
-    def constraints(self, support):
+    def constraints(self, support: Any) -> list[Any]:
         return support.constraints()
 
-    def nearest(self, points):
+    def nearest(self, points: np.ndarray) -> np.ndarray:
         return points
 
-    def mid(self, layer, R, Z):
+    def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
         return Z
 
-    def weighted(self, density, layers, metadata=None):
+    def weighted(self, density: Any, layers: list[str], metadata: dict | None = None) -> Any:
         tags = tuple(self.mesh.layers[name] for name in layers)
         dx = self.dx if len(tags) == len(self.mesh.layers) else self.dx(tags)
         return density * self.weight * (dx(metadata=metadata) if metadata else dx)
 
-    def mean_row(self, held):
+    def mean_row(self, held: Any) -> Any:
         ds, weight = self.boundary(held.on, 3), self.weight
         if held.by_stiffness:
             stiffness = fem.Function(fem.functionspace(self.domain, ("DG", 0)))
@@ -78,7 +78,7 @@ class Solid(Formulation):
             found.append((sub, dofs[used.array[dofs] == 0].astype(np.int32)))
         return found
 
-    def set_stiff(self):
+    def set_stiff(self) -> None:
         """Rest; of a sheet so thin that its bending stiffness is lost to round-off, a small stretch in all directions.
 
         u = s X: the stress stiffens it as a membrane. (Interpolated: unknowns of bubbles are no nodal values.)

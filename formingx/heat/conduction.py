@@ -24,6 +24,7 @@ from .. import _compat
 from ..errors import ConvergenceError
 from ..mesh import Mesh
 from ..physics import kinematics as kin
+from ..ranks import gathered
 from ..results.evaluate.profile import distance_to_line
 from ..solve.linear import DirectSolver
 from ..values.table import Table
@@ -307,7 +308,7 @@ class Conduction:
         from scipy.spatial import cKDTree
         dofs = self._dofs(boundary)
         own = dofs[dofs < self._n]
-        X, u = (np.concatenate(self.comm.allgather(a)) for a in (self.points[own], u[own]))
+        X, u = (gathered(self.comm, a) for a in (self.points[own], u[own]))
         return line + u[cKDTree(X).query(line)[1]]
 
     def source(self, make: Any) -> Any:

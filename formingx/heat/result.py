@@ -8,6 +8,7 @@ import numpy as np
 from dolfinx import fem
 
 from ..errors import InputError, finite, known
+from ..ranks import gathered
 from ..results import files
 from ..scene.fields import PointReader
 from .conduction import Conduction
@@ -178,7 +179,7 @@ class HeatRun:
     def field_to_csv(self, file: Any, time: float | None = None) -> None:
         """Write the temperature at a time (default: the end) as CSV, columns R, Z, T, for `start` (rank 0)."""
         table = np.column_stack([self._body.points, self._at(time)[0]])
-        rows = np.concatenate(self._comm.allgather(table))
+        rows = gathered(self._comm, table)
         files.write_rows(file, ["R", "Z", "T"], rows.tolist(), self._comm)
 
     def plot_through(self, times: Any = None, *, line: Any = None, scale: float = 1.0, axes: Any = None,

@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from .. import _compat
 from ..errors import InputError, known, pair
+from ..ranks import gathered
 from .check import check_elements
 
 
@@ -99,7 +100,7 @@ class Mesh:
         lowest, highest = ends.min(1), ends.max(1)
         inside = (lowest > low - near) & (highest < high + near)
         cut = ~inside & (lowest < high - near) & (highest > low + near)
-        cuts = np.concatenate(comm.allgather(np.column_stack([lowest, highest])[cut]))
+        cuts = gathered(comm, np.column_stack([lowest, highest])[cut])
         if len(cuts):
             raise InputError(f"{who}: within = {within!r} cuts the element edge from {along} = {cuts[0, 0]:.6g} to"
                              f" {cuts[0, 1]:.6g}: both must be {along} of nodes; a disc has nodes where it is told to"
@@ -125,7 +126,7 @@ class Mesh:
         domain.topology.create_connectivity(1, 2)
         nodes = np.unique(entities_to_geometry(domain, 1, facets)) if len(facets) else np.zeros(0, dtype=np.int64)
         local = domain.geometry.x[nodes, :2].reshape(-1, 2)
-        points = np.concatenate(self.comm.allgather(local))
+        points = gathered(self.comm, local)
         scale = np.ptp(points, axis=0).max() if len(points) else 1.0
         keys = np.round(points / (scale or 1.0), 12)
         _, first = np.unique(keys, axis=0, return_index=True)
@@ -149,7 +150,7 @@ class Mesh:
         facets = self.facets_of(boundary)             # entities_to_geometry divides by zero if there are none
         nodes = entities_to_geometry(domain, 1, facets) if len(facets) else np.zeros(0, dtype=np.int32)
         nodes = nodes.reshape(-1, 3 if mid_edge else 2)
-        edges = np.concatenate(self.comm.allgather(domain.geometry.x[nodes][..., :2]))
+        edges = gathered(self.comm, domain.geometry.x[nodes][..., :2])
         corners, ends = np.unique(np.round(edges[:, :2].reshape(-1, 2) / max(np.ptp(edges, axis=(0, 1)).max(), 1e-300),
                                            12), axis=0, return_inverse=True)
         ends = ends.reshape(-1, 2)

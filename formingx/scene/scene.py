@@ -20,6 +20,7 @@ from ..physics.loads import Load
 from ..physics.models import MixedPressure, Model
 from ..physics.part import Part
 from ..physics.supports import Held, Support
+from ..ranks import gathered
 from . import tool_width
 from .sampling import sample
 from .summary import summary
@@ -252,7 +253,7 @@ class Scene:
         tool_width.check(mesh, contact, self.kinematics.axisymmetric)
         face = mesh.nodes_of(contact.on)
         comm = mesh.comm
-        points = np.concatenate(comm.allgather(mesh.domain.geometry.x[:, :2]))
+        points = gathered(comm, mesh.domain.geometry.x[:, :2])
         depth = contact.tool.signed_distance(points)
         worst = int(np.argmax(depth))
         if depth[worst] > near:

@@ -8,6 +8,7 @@ import numpy as np
 from dolfinx import fem
 
 from ..mesh import Mesh
+from ..ranks import gathered
 from . import fields
 
 
@@ -44,7 +45,7 @@ class GivenTemperature:
     def on(self, boundary: str) -> np.ndarray:
         """Temperatures at the nodes of T on a boundary, shape (n,), all ranks; collective."""
         nodes = fem.locate_dofs_topological(self.T.function_space, 1, self.mesh.facets_of(boundary))
-        return np.concatenate(self.mesh.comm.allgather(self.T.x.array[nodes]))
+        return gathered(self.mesh.comm, self.T.x.array[nodes])
 
     def __repr__(self) -> str:
         return self._text

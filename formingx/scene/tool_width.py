@@ -9,6 +9,7 @@ from dolfinx.mesh import entities_to_geometry
 
 from ..errors import InputError
 from ..physics.contact import Contact
+from ..ranks import gathered
 
 _DIRECTIONS = 90
 
@@ -28,7 +29,7 @@ def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
     mesh.domain.topology.create_connectivity(1, 2)
     facets = mesh.facets_of(contact.on)
     nodes = entities_to_geometry(mesh.domain, 1, facets) if len(facets) else np.zeros((0, 2), dtype=int)
-    ends = np.concatenate(mesh.comm.allgather(mesh.domain.geometry.x[nodes][:, :2, :2]))
+    ends = gathered(mesh.comm, mesh.domain.geometry.x[nodes][:, :2, :2])
     nearest = ends[np.argmax(contact.tool.signed_distance(ends.mean(1)))]
     points = 2 if contact.points == "nodes" else int(contact.points)
     edge = float(np.hypot(*(nearest[1] - nearest[0])))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+from ...ranks import gathered
 from .face import FaceContact
 
 _NEAR = 1e-3
@@ -43,7 +44,7 @@ class Approach:
         free = ~face.law.touching(start, face.touch)
         times = self._arrivals(start, velocity, length)
         ahead = (times > 0.02 * length) & (times < length)         # nearer ones are as good as in touch
-        times = np.sort(np.concatenate(self._comm.allgather(times[ahead])))
+        times = np.sort(gathered(self._comm, times[ahead]))
         touching = self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM)
         allowed = self._allowed if touching > 1 else 1
         return min(1.001 * times[allowed - 1], length) if len(times) >= allowed else length

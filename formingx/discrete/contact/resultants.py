@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+from ...ranks import gathered
 from .face import FaceContact
 from .rule import without_area
 
@@ -47,7 +48,7 @@ def traction(face: FaceContact, fields: np.ndarray, control: float) -> tuple[np.
     """
     found, rule, c = face.tractions(fields, control), face.rule, face.points.shape[1]
     rows = np.column_stack([rule.points, rule.area, rule.lumped, rule.lengths, found.normal, found.tangential])
-    rows = np.concatenate(face.comm.allgather(rows))
+    rows = gathered(face.comm, rows)
     rows = rows[np.lexsort(rows[:, c - 1::-1].T)]
     points, (area, lumped, lengths), values = rows[:, :c], rows[:, c:c + 3].T, rows[:, c + 3:]
     axis = without_area(lumped, lengths)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from dolfinx import fem, la
 
+from ...ranks import gathered
 from ..outline import ends_first
 
 
@@ -79,7 +80,7 @@ class Lobatto(Rule):
 
         (1/24, -2/24, 1/24) of L times the weight at L: integrals of what is linear along the facet stay exact.
         """
-        nodes = np.concatenate(comm.allgather(np.column_stack([self.points, self.lengths, self.lumped])))
+        nodes = gathered(comm, np.column_stack([self.points, self.lengths, self.lumped]))
         for axis in nodes[without_area(nodes[:, -1], nodes[:, -2])]:
             length, at = 6 * axis[-2], axis[:-2].copy()                 # of its facet, on which Gauss-Lobatto gives 1/6
             away = np.linalg.norm(self.points - at, axis=1) / length

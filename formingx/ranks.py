@@ -1,0 +1,12 @@
+"""What every rank has of an array, put together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+def gathered(comm: Any, own: Any) -> np.ndarray:
+    """The rows of all ranks, one rank after the other, on each of them; collective."""
+    return np.concatenate(comm.allgather(own))
