@@ -119,7 +119,8 @@ class Pushed:
         """Points of the other face, and where each meets a tool straight on (or infinity), shape (n, 2) each."""
         points = np.unique(np.vstack([self._body.scene.mesh.nodes_of(c.on) for c in self.tools]), axis=0)
         through = points - self._line[np.argmin(np.hypot(*(points[:, None] - self._line).transpose(2, 0, 1)), axis=1)]
-        way = through / np.hypot(*through.T)[:, None]
+        size = np.hypot(*through.T)
+        points, way = points[size > 0], through[size > 0] / size[size > 0, None]     # faces may share their ends
         far = 100 * self._body.length
         gone = np.min([_free_way(c.tool, points, way, far) for c in self.tools], axis=0)[:, None]
         return points, np.where(np.isfinite(gone), points + np.where(np.isfinite(gone), gone, 0.0) * way, np.inf)
