@@ -143,16 +143,18 @@ class Tolerances:
         count("Tolerances: iterations", self.iterations)
         count("Tolerances: settling", self.settling)
 
-    def met(self, corrections: list[float], residuals: list[float], chord: bool = False) -> bool:
+    def met(self, corrections: list[float], residuals: list[float], chord: bool = False, smooth: bool = False) -> bool:
         """True if a state with these corrections behind it, and these residuals (its own last), has converged.
 
         `chord`: the last correction was one of a chord iteration, which converges linearly: the next one is foretold
-        from the fall of residuals and corrections, and doubled.
+        from the fall of residuals and corrections, and doubled. `smooth`: F has no kinks, between which an iteration
+        could go to and fro.
 
         Corrections that no longer shrink, below 1e-7, or that are below 1e-11, have met round-off (a flat thin sheet:
         near 1e-8): then nothing better is to be had, and the residual may be what round-off leaves. A
         residual that no longer shrinks with corrections below the tolerance is at round-off, however large: a stiff
         penalty (8 mu/eps) times the round-off of the displacements can well exceed the support forces of a thin sheet.
+        (r0/h0 = 1e6: corrections go up and down between 1e-10 and 4e-9, and the residual stays where it is.)
         """
         if not corrections:
             return False
@@ -166,6 +168,9 @@ class Tolerances:
         if ahead < self.correction and residual < self.residual:
             return True
         if last < self.correction and residual > 0.3 * residuals[-2]:
+            return True
+        if smooth and len(corrections) >= 5 and max(corrections[-5:]) < 1e-8 and max(residuals[-5:]) < 3 * min(
+                residuals[-5:]):
             return True
         stalled = 0.3 * before < last < 1e-7 and residual > 0.3 * residuals[-2]
         return (last < 1e-11 or stalled) and residual < 1e3 * self.residual
@@ -298,7 +303,7 @@ class BorderedNewton:
             if history:
                 self._modified.took(history[-1].chord, residual / (history[-1].residual or 1.0))
             if self.tolerances.met([i.correction for i in history], [*(i.residual for i in history), residual],
-                                   bool(history) and history[-1].chord):
+                                   bool(history) and history[-1].chord, not problem.has_kinks):
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
             problem.linearise(x, control, self.F)
