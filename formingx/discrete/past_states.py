@@ -138,7 +138,7 @@ class PastStates:
         comm = self._forms.comm
         squares = comm.allreduce(np.array([*np.sum(off, axis=1), np.sum(total)]), MPI.SUM)
         jump = comm.allreduce(np.concatenate([[False], np.any(np.diff(felt, axis=0) <= 0, axis=1)]).astype(int),
-                              MPI.MAX)                                      # a state that begins or ends one is needed
+                              MPI.SUM)                                      # a state that begins or ends one is needed
         small = squares[:-1] < _NOTHING**2 * squares[-1]
         chosen, left_out = [0], False
         for k in range(1, len(states) - 1):
