@@ -60,3 +60,28 @@ def test_no_circle():
 def test_no_file_is_long():
     long = {name_of(file): n for file in FILES if (n := len(file.read_text().splitlines())) > 520}
     assert long == {}
+
+
+def members(tree):
+    """Names in the class bodies of `solve/equations.py`."""
+    return {getattr(n, "name", None) or n.target.id for c in ast.walk(tree) if isinstance(c, ast.ClassDef)
+            for n in c.body if isinstance(n, (ast.FunctionDef, ast.AnnAssign))}
+
+
+def test_the_solver_sees_equations_alone():
+    """No UFL, no forms and no scene; of what is called problem or equations nothing but members of `Equations`."""
+    allowed = members(ast.parse((PACKAGE / "solve" / "equations.py").read_text()))
+    found = set()
+    for file in (PACKAGE / "solve").glob("*.py"):
+        tree = ast.parse(file.read_text())
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import) and any(a.name.split(".")[0] == "ufl" for a in node.names):
+                found.add((file.name, "ufl"))
+            if (isinstance(node, ast.arg) and node.arg in ("problem", "equations")
+                    and getattr(node.annotation, "id", None) in ("Any", None)):
+                found.add((file.name, node.arg, "Any"))
+            if isinstance(node, ast.Attribute):
+                owner = getattr(node.value, "attr", getattr(node.value, "id", None))
+                if node.attr == "forms" or owner in ("problem", "_problem", "equations") and node.attr not in allowed:
+                    found.add((file.name, node.attr))
+    assert found == set()
