@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 import ufl
 from conftest import treloar
+from mpi4py import MPI
 from test_heat import body_of
+from test_ledger import RELAXES, sheet
 
 import formingx as fx
 from formingx import Stage, tools
@@ -14,8 +16,9 @@ from formingx.discrete.problem import Problem
 from formingx.discrete.step_limit import Way
 from formingx.measures.targets import Amplitude
 from formingx.results.evaluate.part import _strips
-from formingx.solve import path_following, predictor
+from formingx.solve import path_following, predictor, snap_through
 from formingx.solve.arc_length import Curve
+from formingx.solve.newton import Failure
 from formingx.solve.state import State
 
 
@@ -195,3 +198,42 @@ def test_a_jump_does_not_pass_its_target(monkeypatch):
     run.aim = SimpleNamespace(open=[(fx.travel(0.5), Driven())])
     near = State(np.zeros(1), 0.49, np.ones(1), 1.0)
     assert run._change(near, 0.1) == pytest.approx(0.01) and run._change(near, 1e-3) == pytest.approx(1e-3)
+
+
+def test_loss_in_a_jump_is_that_of_the_mean_force_on_the_way():
+    """Out of balance by 3 where it begins and by 1 where it ends; one that has turned since counts for nothing."""
+    way = snap_through._Motion.__new__(snap_through._Motion)
+    way.problem, way.lost, way._pull = SimpleNamespace(comm=MPI.COMM_SELF), 0.0, np.array([3.0, 0.0])
+    way._lose(np.zeros(2), np.array([2.0, 5.0]), np.array([1.0, 0.0]))
+    assert way.lost == pytest.approx((3 + 1) / 2 * 2)
+    way._pull = np.array([-3.0, 0.0])
+    way._lose(np.zeros(2), np.array([2.0, 5.0]), np.array([1.0, 0.0]))
+    assert way.lost == pytest.approx(4 + 1 / 2 * 2)
+
+
+def test_a_jump_that_fails_leaves_what_is_remembered():
+    """One viscous solution has advanced it; that is no rest."""
+    path = fx.Process(sheet(RELAXES, elements=(4, 1))).run(
+        [Stage("blow", drive="air", until=fx.pole_height(0.2), speed=0.1)], progress=False)
+    with path.problem.at(path.last) as problem:
+        before = problem.memory
+        with pytest.raises(snap_through.NoEquilibrium):
+            snap_through.snap_through(path.record.curve, path.last, 0.01, False, snap_through.SnapThrough(), 1)
+        assert all(one is other for one, other in zip(problem.memory, before, strict=True))
+
+
+def test_a_state_with_an_element_inside_out_is_none(monkeypatch):
+    path = fx.trace(treloar((4, 1)), until=fx.pole_height(0.2), progress=False)
+    monkeypatch.setattr(Problem, "folded", lambda *_: True)
+    with path.problem.at(path.last), pytest.raises(Failure, match="inside out"):
+        path.record.curve.step(path.last, 1e-3)
+
+
+def test_a_step_of_a_flow_ends_at_the_first_of_two_targets():
+    """Both lie within its first step; whichever is named first."""
+    near, far = fx.pole_height(0.2), fx.pole_height(0.25)
+    for through in ([near, far], [far, near]):
+        stage = Stage("flow", drive="air", follow={fx.enclosed_volume: [(0, 0), (1, 1.0)]}, through=through,
+                      step=fx.StepControl(length=1.0))
+        path = fx.Process(sheet(RELAXES, elements=(4, 1))).run([stage], progress=False, accuracy=0.5)
+        assert path.met(near).time < path.met(far).time

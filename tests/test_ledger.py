@@ -119,7 +119,7 @@ def rubbed(path):
             there = contact.positions(x, state.control)
         if before is not None:
             slid = np.hypot(*(there - before[1]).T) * ((traction != 0) & (before[0] != 0))
-            lost += contact.area @ (np.abs(traction + before[0]) / 2 * slid)
+            lost += contact.rule.area @ (np.abs(traction + before[0]) / 2 * slid)
         before = traction, there
     return lost
 
@@ -201,6 +201,6 @@ def test_a_body_that_lies_on_a_tool_has_a_tangent_that_goes_with_it():
     path = fx.trace(sheet(friction="none"), until=fx.travel(0.05), progress=False)
     start = path.states[0]
     with path.problem.at(start) as problem:
-        pole = -problem.forms.length * start.direction[path.problem.contacts[0].dofs[:, 1]].min()
+        pole = -problem.forms.length * start.direction[path.problem.contacts[0].rule.dofs[:, 1]].min()
         moved = problem.forms.length * sum(problem.setting.rate) * start.slope
     assert pole == pytest.approx(moved, rel=0.1)

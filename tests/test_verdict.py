@@ -1,5 +1,7 @@
 """A state that a body cannot have ends a run, in words, with the path up to the last good state."""
 
+import re
+
 import pytest
 
 import formingx as fx
@@ -66,17 +68,28 @@ def test_open_and_report_say_it_too(tmp_path):
 def test_a_travel_that_the_body_did_not_follow_is_no_target_met(height, gap):
     with pytest.raises(fx.ConvergenceError, match="did not follow the tool .* give Contact a penalty of") as error:
         fx.trace(block(height), until=fx.travel(height - gap), progress=False)
-    penalty = float(str(error.value).split("a penalty of ")[1].split(";")[0])
+    penalty = float(re.search("a penalty of ([^;]+);", str(error.value))[1])
     left = gap / height
     path = fx.trace(block(height, penalty=10 * penalty), until=fx.travel(height - gap), progress=False)
     assert path["tool_force"][-1] == pytest.approx(left**-3 - left, rel=0.1)
 
 
-@pytest.mark.parametrize("gap, warns", [(0.5, False), (0.2, True), (0.1, True)])
-def test_a_run_warns_where_penetration_changes_the_force(gap, warns, caplog):
-    path = fx.trace(block(), until=fx.travel(1 - gap), progress=False)
+@pytest.mark.parametrize("gap, penalty", [(0.5, 2e5), (0.35, 2e5), (0.26, 2e5), (0.2, 2e5), (0.14, 2e5), (0.8, 1e3)])
+def test_a_run_says_how_much_penetration_changes_the_force(gap, penalty, caplog):
+    path = fx.trace(block(penalty=penalty), until=fx.travel(1 - gap), progress=False)
     off = abs(path["tool_force"][-1] / (gap**-3 - gap) - 1)
-    assert ("forces are off by more" in caplog.text) == warns and (off > 5e-3) == warns
+    said = re.search(r"changes the force on the tool of 'top' by about (\S+) %", caplog.text)
+    assert (said is not None) == (off > 2e-3)
+    assert said is None or float(said[1]) == pytest.approx(100 * off, rel=0.2)
+
+
+@pytest.mark.parametrize("gap, penalty", [(0.1, 2e5), (0.6, 100)])
+def test_a_force_that_penetration_changes_by_more_than_5_percent_is_none(gap, penalty):
+    with pytest.raises(fx.ConvergenceError, match="penetration changes the force by about .* %: give") as error:
+        fx.trace(block(penalty=penalty), until=fx.travel(1 - gap), progress=False)
+    harder = float(re.search("a penalty of ([^;]+);", str(error.value))[1])
+    path = fx.trace(block(penalty=harder), until=fx.travel(1 - gap), progress=False)
+    assert path["tool_force"][-1] == pytest.approx(gap**-3 - gap, rel=5e-3)
 
 
 def test_a_pole_that_is_thinner_than_nothing_is_no_state():

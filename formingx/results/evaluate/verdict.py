@@ -23,9 +23,17 @@ _INSIDE = 0.25
 _SUNK = 0.05
 """Penetration of contact points over the wall that is left there: above it the body did not follow the tool."""
 
-_HELD = 2e-3
-"""Energy that penetration holds, over that of the body, above which a run warns. (Of a block between plates the force
-is off by three times as much.)"""
+_WARNS, _ENDS = 2e-3, 0.05
+"""By how much penetration may change a force before a run warns (that is its accuracy), and before it ends."""
+
+_STIFFEST = 3.0
+"""That change over the part of the body's energy that penetration holds: at most, of a body pressed flat."""
+
+_SMALL = 1e-5
+"""Of arc length: half of a difference quotient."""
+
+_FELT = 1e-3
+"""Penetration over the thickness below which it ends no run: at a first touch the body holds nothing yet."""
 
 _THINNEST = 1e100
 """Pole stretch: the square root of a wall that is not above 0 is taken of 1e-300."""
@@ -68,12 +76,10 @@ class Verdict:
         with self._problem.at(state):
             edges, found = self._outline.edges(), []
             for contact in self._problem.present:
-                stored = state.measures.get("strain_energy") or np.inf
-                share = resultants.energy(contact, state.x, state.control) / stored
-                if share > _HELD:
-                    found.append(("serious", f"Penetration of the tool of {_name(contact)!r} holds {100 * share:.2g} %"
-                                             f" of the energy of the body: forces are off by more; give Contact a"
-                                             f" penalty of {contact.contact.penalty * share / _HELD * 10:.1g}."))
+                off = _off(contact, state)
+                if off > _WARNS:
+                    found.append(("serious", f"Penetration changes the force on the tool of {_name(contact)!r} by about"
+                                             f" {100 * off:.2g} %: {_harder(contact, off)}."))
             for cut in self._deepest(edges, state, own=True):
                 found.append(("serious", f"Between contact points the face is {cut.depth:.3g} deep in the tool of"
                                          f" {cut.name!r} at (r, z) = ({cut.place[0]:.5g}, {cut.place[1]:.5g}): smaller"
@@ -106,6 +112,11 @@ class Verdict:
                        f" it, {100 * sunk.share * _SUNK:.2g} % of the wall that is left there: give Contact a penalty"
                        f" of {50 * sunk.share * sunk.contact.contact.penalty:.1g}")
             for contact in problem.present:
+                off = _off(contact, state)
+                deep = off > _ENDS and resultants.penetration(contact, state.x, state.control)
+                if deep > _FELT * contact.thickness:
+                    yield (f"the body did not follow the tool of {_name(contact)!r}: penetration changes the force by"
+                           f" about {100 * off:.2g} %: {_harder(contact, off)}")
                 if _pulled(contact, state):
                     yield (f"the body pulls at the tool of {_name(contact)!r}, which has no friction and lets go: it is"
                            f" behind it")
@@ -140,6 +151,29 @@ class Verdict:
             k = int(np.argmax(share))
             if share[k] > 1:
                 yield Depth(share[k], depth[k], edges[face][k, 2], contact, _name(contact))
+
+
+def _off(contact: Any, state: State) -> float:
+    """By how much penetration changes the force F on a tool, relative; collective.
+
+    What the tool gains on the body, 2 E/F (E: energy of penetration), times dF/dtravel, over F. On one that stays air
+    presses: it is as large as that.
+    """
+    if not contact.contact.driven:
+        return 0.0
+    energy = resultants.energy(contact, state.x, state.control)
+    share = energy / (state.measures.get("strain_energy") or np.inf)
+    if share < 0.1 * _WARNS:
+        return share
+    along = np.array(contact.contact.moves) / np.hypot(*contact.contact.moves)
+    by = [(state.x + e * state.direction, state.control + e * state.slope) for e in (-_SMALL, 0.0, _SMALL)]
+    less, force, more = (resultants.force(contact, *at) @ along for at in by)
+    way = (contact.travelled(by[2][1]) - contact.travelled(by[0][1])) @ along
+    return min(2 * energy * abs((more - less) / way) / force**2, _STIFFEST * share) if force and way else share
+
+
+def _harder(contact: Any, off: float) -> str:
+    return f"give Contact a penalty of {contact.contact.penalty * off / _WARNS * 10:.1g}"
 
 
 def _pulled(contact: Any, state: State) -> bool:
