@@ -113,8 +113,8 @@ class Verdict:
                        f" of {50 * sunk.share * sunk.contact.contact.penalty:.1g}")
             for contact in problem.present:
                 off = _off(contact, state)
-                deep = off > _ENDS and resultants.penetration(contact, state.x, state.control)
-                if deep > _FELT * contact.thickness:
+                felt = resultants.penetration(contact, state.x, state.control) > _FELT * contact.thickness
+                if off > _ENDS and felt:
                     yield (f"the body did not follow the tool of {_name(contact)!r}: penetration changes the force by"
                            f" about {100 * off:.2g} %: {_harder(contact, off)}")
                 if _pulled(contact, state):
