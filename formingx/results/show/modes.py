@@ -69,7 +69,7 @@ def _draw(loss: Any, lines: list, file: str, scale: float) -> None:
         high, wide = np.ptp(everything[:, 1]), 2 * everything[:, 0].max()
         plotter.camera_position = [(2.0, -3.4, 1.2 if high > wide else 1.9), (0, 0, 0), (0, 0, 1)]
         plotter.reset_camera()
-        plotter.camera.zoom(1.25)
+        plotter.camera.zoom(0.95 if high > wide else 1.25)
         plotter.enable_anti_aliasing("ssaa")
         try:
             plotter.screenshot(file)
