@@ -1,8 +1,8 @@
 """The top load of a blown bottle: crushed, it buckles in waves round it before its axisymmetric path has its peak.
 
 A parison is blown into a mould, taken as a new body free of stress (cm, MPa: forces times 100 are N) and crushed,
-elastic. From 1.1 cm on the ring on which it stands hops from element to element: the force there is good to 3 %, and the
-run ends at 1.15 cm, before the path turns back.
+elastic. From 1.1 cm on the ring on which it stands hops from element to element: the force there is good to 3 %, and
+the run ends at 1.15 cm, before the path turns back.
 """
 
 from common import parser, save, say, summarise
@@ -58,7 +58,7 @@ def main():
     summary["first_n"] = None if found.first is None else found.first.number
     say(str(found), f"axisymmetric: {summary['axisymmetric']}")
     drawing, axes = figure()
-    axes.plot(down, force, color="0.4", lw=2.5, label="axisymmetric path")
+    axes.plot(down, force, color="C0", label="axisymmetric path")
     for n in WAVES:
         if f"n_{n}" in summary:
             one = summary[f"n_{n}"]
