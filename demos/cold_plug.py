@@ -79,7 +79,7 @@ def form(case):
             continue
         shapes[stage.name] = path.profile(states[-1])
         if stage.name == "plug":
-            found |= under_plug(path, states[-1], made)
+            found |= under_plug(path, states[-1])
         elif not stopped:
             found |= thickness(shapes[stage.name])
     counts = path.counts
@@ -88,10 +88,9 @@ def form(case):
     return found, shapes
 
 
-def under_plug(path, state, made):
+def under_plug(path, state):
     """Force on the plug at full travel, temperature and wall of the base there."""
-    with path.problem.at(state):
-        below, above = made.temperature.at([[0.0, 0.0], [0.0, THICKNESS]])
+    below, above = path.temperature([[0.0, 0.0], [0.0, THICKNESS]], state)
     return {"plug_force_N": -float(state.measures["plug_force"]),
             "base_under_plug": float(path.profile(state).wall_ratio[0]),
             "base_C_at_plug": float(below), "base_C_on_top": float(above)}

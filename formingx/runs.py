@@ -12,6 +12,7 @@ from typing import Any
 
 from .discrete.problem import Problem
 from .errors import ConvergenceError, InputError, Interrupted, count, finite, instance, known, several
+from .heat import cooling
 from .measures.columns import Measure
 from .measures.targets import Amplitude, Target
 from .physics.contact import Contact
@@ -317,6 +318,7 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
     path = paths[0]
     of_volume = volume.doubts(path.last.measures["volume_error"], "the last state",
                               path.problem.furthest_volume_ratio(path.last))
+    of_volume += cooling.doubts(path.problem, path.segments[-1].states)
     for bad, text in (of_volume + path.doubts() + edges.doubts(edges.coarsest(path, path.last))
                       + tension.doubts(tension.first_compression(path)) + snaps.doubts(snaps.largest(path))):
         if bad == "serious" and path.problem.comm.rank == 0:

@@ -135,3 +135,35 @@ if scene.mesh.comm.rank == 0:
 def test_two_ranks_are_one():
     one, two = (run_json(RANKS, ranks) for ranks in (1, 2))
     assert two == pytest.approx(one, rel=1e-9)
+
+
+def laid_on(layers, stays=0.1):
+    """(path, z and temperatures on the axis) of a sheet of 1 mm at 150 degrees that air presses on cold aluminium."""
+    tool = fx.ConductingTool(thickness=0.02, back=30.0, conductivity=200.0, heat_capacity=2.43e6)
+    heat = fx.Cooling(fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=1800.0), unit="C",
+                      tools={"table": (1000.0, tool)}, tolerance=0.02)
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=0.01, thickness=1e-3, elements=(2, layers)), temperature=150.0, heat=heat,
+                     materials=fx.NeoHookean(c10=fx.table({20.0: 2e6, 150.0: 1e6})),
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("top", name="air")],
+                     contacts=[fx.Contact("bottom", fx.tools.plane(0.0).reversed(), "none", name="table")])
+    path = fx.Process(scene).run([fx.Stage("press", drive="air", until=fx.pressure(1e3), duration=stays)],
+                                 progress=False)
+    with path.problem.at(path.last):
+        T = path.problem.temperature.T
+        X, values = T.function_space.tabulate_dof_coordinates(), T.x.array
+        axis = np.flatnonzero(X[:, 0] < 1e-12)
+    return path, X[axis, 1], values[axis]
+
+
+def test_a_mesh_too_coarse_for_the_heat_is_said(caplog):
+    """Right after it was laid on a tool; the estimate is within a factor of 3."""
+    _, z, T = laid_on([2 ** (k / 3) for k in range(16)])
+    order = np.argsort(z)
+    assert "in space" not in caplog.text
+    for layers in (1, 4, [1, 2, 4, 8]):
+        caplog.clear()
+        path, there, found = laid_on(layers)
+        error = np.abs(found - np.interp(there, z[order], T[order])).max()
+        history, = (h for h in path.problem.forms.histories if hasattr(h, "errors_in_space"))
+        assert error / 3 < history.errors_in_space([path.last])[0] < 3 * error
+        assert "The error of the temperature in space is about" in caplog.text and error > 0.2

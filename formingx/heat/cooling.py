@@ -16,8 +16,13 @@ from .boundaries import ThermalProperties
 from .conduction import Conduction
 from .contact import ConductingTool, ContactWithTool
 from .run import checked_boundaries, checked_materials
+from .space_error import SpaceError
 
 _MOST_STEPS = 10_000
+_WARNS = 2e-3
+"""Error in space over the span of temperatures above which a run warns: what is promised of stress."""
+_LOOKS = 8
+"""States in which the error in space is estimated, beside the ends of stages."""
 _NEAR = 1e-2
 """Distance to a tool over the thickness of the body within which a node touches it, for heat: so thin a layer of air
 conducts as well as a contact does. (A sheet that is drawn over a flat face lifts off its middle by less.)"""
@@ -126,15 +131,9 @@ class CoolingHistory:
     def __init__(self, cooling: Cooling, problem: Any):
         forms, scene = problem.forms, problem.scene
         self._cooling, self._problem, self._forms = cooling, problem, forms
-        zero = ABSOLUTE_ZERO[cooling.unit]
         self._field = problem.temperature
-        touches = cooling._touches(scene)
-        self._body = Conduction(scene.mesh, checked_materials(scene.mesh, cooling.materials),
-                                checked_boundaries(scene.mesh, [*cooling.boundaries, *touches], zero),
-                                scene.kinematics, zero, forms.u)
-        touching = [c for c in problem.contacts if cooling.conducts(c.contact)]
-        self._touches = [(touch, contact, touch.conductance.copy())
-                         for touch, contact in zip(self._body.touches, touching, strict=True)]
+        self._body = self._conduction()
+        self._touches = self._touching(self._body)
         self._n = len(self._body.points)
         self._first = scene.temperature.T.x.array[: self._n]
         self._seen: Any = None                              # by the field, and by what depends on it
@@ -142,6 +141,35 @@ class CoolingHistory:
         self._field.limits = low, np.inf if cooling.work_to_heat else high
         self._dissipated = self._body.source(forms.dissipated) if cooling.work_to_heat else None
         self.start()
+
+    def _conduction(self, degree: int = 2) -> Conduction:
+        scene, zero = self._problem.scene, ABSOLUTE_ZERO[self._cooling.unit]
+        laws = [*self._cooling.boundaries, *self._cooling._touches(scene)]
+        return Conduction(scene.mesh, checked_materials(scene.mesh, self._cooling.materials),
+                          checked_boundaries(scene.mesh, laws, zero), scene.kinematics, zero, self._forms.u, degree)
+
+    def _touching(self, body: Conduction) -> list[tuple[Any, Any, np.ndarray]]:
+        """(touch, contact, conductance where it touches) of the tools that take heat."""
+        contacts = [c for c in self._problem.contacts if self._cooling.conducts(c.contact)]
+        return [(touch, contact, touch.conductance.copy())
+                for touch, contact in zip(body.touches, contacts, strict=True)]
+
+    def errors_in_space(self, states: Sequence[Any]) -> np.ndarray:
+        """The largest errors of temperatures in states that are due to the mesh, estimated, degrees; collective."""
+        finer, power, found = self._conduction(degree=3), self._body.power, []
+        estimate, touches = SpaceError(self._body, finer), self._touching(finer)
+        try:
+            for state in states:
+                with self._problem.at(state):
+                    self._body.power = 0.0                  # of both, or of none
+                    for body, touching in ((self._body, self._touches), (finer, touches)):
+                        _look_where_it_touches(body, touching, state.control)
+                        body.update()
+                    found.append(estimate.of(self._state, self._time))
+        finally:
+            self._body.power = power
+            estimate.destroy()
+        return np.array(found)
 
     def start(self) -> None:
         """See `History`."""
@@ -160,10 +188,7 @@ class CoolingHistory:
             self._body.power, self._power = (self._power + power) / 2, power
         if until <= self._time:
             return
-        u = self._body.displacements()
-        for touch, contact, conductance in self._touches:
-            depth = contact.contact.tool.signed_distance(touch.points + u[touch.dofs] - contact.travelled(control))
-            touch.conductance[:] = conductance * (contact.present & (depth > -_NEAR * contact.thickness))
+        _look_where_it_touches(self._body, self._touches, control)
         self._before = self._time, self._state[0]
         if start is not None:
             self._problem.place((start[: len(x)] + x) / 2)
@@ -249,6 +274,33 @@ class CoolingHistory:
                 earlier.x.scatter_forward()
                 field.time_before, field.before = before[0], earlier.x.array
             self._problem.take_temperature()
+
+
+def _look_where_it_touches(body: Conduction, touches: Sequence[tuple[Any, Any, np.ndarray]], control: float) -> None:
+    """Let heat through to tools where they touch the body as it stands."""
+    u = body.displacements()
+    for touch, contact, conductance in touches:
+        depth = contact.contact.tool.signed_distance(touch.points + u[touch.dofs] - contact.travelled(control))
+        touch.conductance[:] = conductance * (contact.present & (depth > -_NEAR * contact.thickness))
+
+
+def doubts(problem: Any, states: Sequence[Any]) -> list[tuple[str, str]]:
+    """(how bad, what), as of a verdict, of the temperatures in states: where the mesh is too coarse for them."""
+    history = next((h for h in problem.forms.histories if isinstance(h, CoolingHistory)), None)
+    states = [state for state in states if state.time > 0]
+    if history is None or not states:
+        return []
+    begun = [k + 1 for k, (a, b) in enumerate(zip(states, states[1:])) if a.stage != b.stage]
+    looked = sorted({*np.linspace(0, len(states) - 1, _LOOKS).astype(int).tolist(), *(k - 1 for k in begun)})
+    errors = history.errors_in_space([states[k] for k in looked])
+    temperatures = [states[k].memory[-1].temperature for k in looked]              # that of the heat is last
+    ends = problem.comm.allgather([float(f(T)) for T in temperatures for f in (np.min, np.max) if len(T)])
+    worst, span = int(np.argmax(errors)), np.ptp(np.concatenate(ends))
+    if errors[worst] <= max(problem.scene.heat.tolerance, _WARNS * span):
+        return []
+    return [("serious", f"The error of the temperature in space is about {errors[worst]:.2g} degrees at time"
+                        f" {states[looked[worst]].time:.4g}: thinner layers of elements at faces that touch or lose"
+                        f" heat, as elements=(n, [1, 2, 4]).")]
 
 
 def _equal(a: Any, b: Any) -> bool:

@@ -126,8 +126,7 @@ def _content(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
     """The volume within the inner one of the two faces, as far as strips between nodes belong to the part."""
     found = []
     for face in (wall.profile.bottom, wall.profile.top):
-        (r, z), (s, w) = fine(face)[:-1].T, fine(face)[1:].T
-        slices = np.pi / 3 * (r * r + r * s + s * s) * (w - z) if axisymmetric else (r + s) / 2 * (w - z)
+        slices = _up_to(fine(face)[:-1], fine(face)[1:], axisymmetric)
         found.append(abs(float((_sums(slices, len(wall.r)) * inside).sum())))
     return min(found)
 
@@ -136,9 +135,15 @@ def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool) -> np.ndarr
     """Volumes between successive pairs of points of two lines, shape (m - 1,): of polygons, turned about the axis."""
     corners = [bottom[:-1], bottom[1:], top[1:], top[:-1]]
     total = np.zeros(len(bottom) - 1)
-    for (r, z), (s, w) in ((a.T, b.T) for a, b in zip(corners, corners[1:] + corners[:1])):
-        total += np.pi / 3 * (r * r + r * s + s * s) * (w - z) if axisymmetric else (r + s) / 2 * (w - z)
+    for a, b in zip(corners, corners[1:] + corners[:1]):
+        total += _up_to(a, b, axisymmetric)
     return np.abs(total)
+
+
+def _up_to(a: np.ndarray, b: np.ndarray, axisymmetric: bool) -> np.ndarray:
+    """Volumes between the axis and lines from a to b, shape (n, 2), going up, shape (n,)."""
+    (r, z), (s, w) = a.T, b.T
+    return np.pi / 3 * (r * r + r * s + s * s) * (w - z) if axisymmetric else (r + s) / 2 * (w - z)
 
 
 def _surface(line: np.ndarray, axisymmetric: bool) -> np.ndarray:
