@@ -8,6 +8,7 @@ from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, block, draw_grids, force, press, where
 
 import formingx as fx
+from formingx.discrete.contact import resultants
 from formingx.results import files
 from formingx.results.show import plots
 
@@ -25,7 +26,7 @@ def plate_stress(path, state):
     found = []
     for contact in path.problem.contacts:
         with path.problem.at(state):
-            points, traction = contact.traction(state.x, state.control)
+            points, traction = resultants.traction(contact, state.x, state.control)
         moved = where(path, state, points)
         order = np.argsort(points @ (1, -1))                 # along the top outwards, then down the side
         moved, traction, points = moved[order], traction[order, 0], points[order]

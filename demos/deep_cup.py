@@ -10,6 +10,7 @@ from common import parser, say, summarise
 from moulding import at_pressures, cost, filled_at, first_touch, name_of, write
 
 import formingx as fx
+from formingx.discrete.contact import resultants
 from formingx.results import files
 
 RADIUS, THICKNESS = 10.0, 0.3
@@ -35,7 +36,7 @@ def key_numbers(path, mould):
     fillet = corner.centre + corner.radius * np.column_stack([np.cos(angles), np.sin(angles)])
     touch = first_touch(path)
     with path.problem.at(touch) as problem:
-        points, traction = problem.contacts[0].traction(touch.x, touch.control)
+        points, traction = resultants.traction(problem.contacts[0], touch.x, touch.control)
     touching = np.flatnonzero(traction[:-1, 0] > 0)
     return {
         **at_pressures(path, PRESSURES, "psi"),

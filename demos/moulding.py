@@ -4,6 +4,7 @@ import numpy as np
 from common import COMM, save, say
 
 import formingx as fx
+from formingx.discrete.contact import resultants
 from formingx.results import files
 from formingx.results.evaluate.profile import distance_to_line
 from formingx.results.show import plots
@@ -111,7 +112,7 @@ def draw_forming(path, states, tool, name: str, unit: str = "psi", side: str = "
 def contact_pressure(path, state, profile, side: str = "top") -> tuple[np.ndarray, np.ndarray]:
     """(reference arc length, contact pressure per current area) at the nodes of the facing side at a state."""
     with path.problem.at(state) as problem:
-        points, traction = problem.contacts[0].traction(state.x, state.control)
+        points, traction = resultants.traction(problem.contacts[0], state.x, state.control)
     rest, now = getattr(profile, f"rest_{side}"), getattr(profile, side)
     nearest = np.hypot(*np.moveaxis(points[:, None] - rest, -1, 0)).argmin(1)
     order = np.argsort(nearest)

@@ -10,6 +10,7 @@ from common import parser, say, summarise
 from moulding import cost, filled_at, first_touch, name_of, write
 
 import formingx as fx
+from formingx.discrete.contact import resultants
 from formingx.results import files
 
 RADIUS, WALL, LENGTH, PRESSURE = 1.1, 0.3, 10.6, 200.0
@@ -66,7 +67,7 @@ def key_numbers(path, mould, room):
 def touching(path, state):
     """Reference Z of the nodes that touch."""
     with path.problem.at(state) as problem:
-        points, traction = problem.contacts[0].traction(state.x, state.control)
+        points, traction = resultants.traction(problem.contacts[0], state.x, state.control)
     found = points[traction[:, 0] > 0, 1]
     return found if len(found) else [None]
 

@@ -7,6 +7,7 @@ from test_admissible import displaced
 from test_contact import cup
 
 import formingx as fx
+from formingx.discrete.contact import resultants
 from formingx.discrete.probes import probe
 from formingx.discrete.problem import Problem
 from formingx.io import csv_files
@@ -148,10 +149,10 @@ def test_uneven_tractions_add_up_to_the_force(points):
     path = compressed("stick", points)
     with path.problem.at(path.last) as problem:
         contact, = problem.contacts
-        _, traction = contact.traction(problem.x.array_r, problem.control)
+        _, traction = resultants.traction(contact, problem.x.array_r, problem.control)
     assert np.ptp(traction[:, 0]) > 0.2 * traction[:, 0].mean()
     order = np.lexsort((contact.points[:, 1], contact.points[:, 0]))
-    assert contact.lumped[order] @ traction[:, 0] == pytest.approx(path["tool_force"][-1], rel=1e-9)
+    assert contact.rule.lumped[order] @ traction[:, 0] == pytest.approx(path["tool_force"][-1], rel=1e-9)
 
 
 def test_tool_force_resists(formed):

@@ -5,6 +5,7 @@ import pytest
 from test_process import air, end, plug, plugged, run
 
 import formingx as fx
+from formingx.discrete.contact import resultants
 
 STAGES = [plug("down", 1.6), air("press", 0.02), plug("up", 1.0)]
 
@@ -62,7 +63,7 @@ def test_states_are_compared_by_identity(path):
 
 def test_a_column_of_ones_own(path):
     again = run(plugged(0.3, (10, 1)), plug("down", 0.5), record={
-        "push": lambda problem: problem.contacts[0].force(problem.x.array_r, problem.control)[1],
+        "push": lambda problem: resultants.force(problem.contacts[0], problem.x.array_r, problem.control)[1],
         "under": fx.displacement(0.0, at=(0.0, 0.0))})
     assert again.columns[-2:] == ["push", "under"] and again["under"][-1] == pytest.approx(-0.5, abs=0.05)
     assert np.array_equal(again["push"], again["tool_force"]) and again["push"][-1] > 0

@@ -10,7 +10,7 @@ def read(file):
     with open(file) as stream:
         lines = [line.split("#")[0].split() for line in stream]
     lines = [words for words in lines if words]
-    assert lines[:2] == [["six-node", "triangles", "1"], ["numbering", "corners"]]
+    assert lines[:2] == [["six-node", "triangles", "2"], ["numbering", "corners"]] and lines.pop() == ["end"]
     nodes, triangles, boundaries, k = {}, [], {}, 2
     while k < len(lines):
         kind, count, rows = lines[k][0], int(lines[k][1]), lines[k + 1:k + 1 + int(lines[k][1])]
