@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..materials.constants import OfTemperature
+from ..materials.sets import Sets
 from ..scene.scene import Scene
 
 _RISES = 2.0               # modulus of the coldest over that of the hottest body
@@ -23,6 +24,8 @@ def springs_back(scene: Scene) -> Iterator[tuple[str, str]]:
         return
     low, high = scene.heat.extremes(scene)
     for layer, material in scene.materials.items() if np.isfinite([low, high]).all() else ():
+        if isinstance(material, Sets):                      # what it adds as it cools is free of stress
+            continue
         relaxed = getattr(material, "equilibrium", material)
         for name, value in {} if relaxed is None else relaxed.constants().items():
             if not isinstance(value, OfTemperature):
@@ -35,5 +38,4 @@ def springs_back(scene: Scene) -> Iterator[tuple[str, str]]:
                 yield f"layer {layer!r}", (
                     f"{name}, of what is left when all has relaxed, is {cold / hot:.3g} times as large at {low:.4g}"
                     f" degrees as at {high:.4g}: as it cools, a stretched body pulls back with so much more, as if it"
-                    f" had not set. What sets keeps its shape: give Viscoelastic a stiff branch with a relaxation time"
-                    f" that is short when hot and endless when cold (shift=...), see docs/heat.md")
+                    f" had not set. What sets keeps its shape: see fx.Sets, docs/heat.md")
