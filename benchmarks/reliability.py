@@ -154,7 +154,7 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
              "speed": optional, "duration": optional, "hold": ("optional table", None),
              "at_fold": ("optional word", None)}
     table = {"follow": {"air": [(0.0, 0.0), (1.0, 0.1)]}}
-    kept = {"record": ("optional thing", None), "resume": ("flag", False)}
+    kept = {"record": ("optional thing", None), "resume": ("flag", False), "beyond": ("flag", False)}
     process = {"stages": ("several", [fx.Stage("up", drive="air", until=fx.pressure(0.1))]),
                "step": ("optional thing", None), "tolerances": ("optional thing", None),
                "max_steps": ("count or None", 200), "progress": ("flag", False), "start": ("optional thing", None),
@@ -164,7 +164,7 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
         *materials, *boundary, *targets, *tools,
         Call("Ogden", fx.Ogden, {"mu": ("terms", (1.0,)), "alpha": ("terms", (2.0,))},
              lambda m: _scene(materials=m)),
-        Call("Symmetry", fx.Symmetry, {"on": ("word", "axis"), "normal": ("word", "r")},
+        Call("Symmetry", fx.Symmetry, {"on": ("word", "axis"), "normal": ("word", "r"), "mirror": ("flag", False)},
              lambda s: _run(_scene(supports=[s, fx.Clamped("rim")]))),
         Call("Displaced", fx.Displaced, {"on": word, "component": ("word", "z"), "name": name},
              lambda s: _run(_scene(loads=[], supports=[fx.Symmetry("axis"), fx.Clamped("rim"), s]))),
@@ -212,9 +212,10 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
         Call("load", fx.load, {"folder": ("file", saved), "scene": ("thing", made), "state": ("state", None)}),
         Call("solve", fx.solve, {"scene": ("thing", _scene()), "to": number, "increments": ("count", 1),
                                  "tolerances": ("optional thing", None), "record": ("optional thing", None),
-                                 "max_steps": ("count", 1000)}),
+                                 "max_steps": ("count", 1000), "beyond": ("flag", False)}),
         *_time_and_heat(),
-        Call("doctor", fx.doctor, {"scene": ("thing", _scene()), "targets": ("several", ())}),
+        Call("doctor", fx.doctor, {"scene": ("thing", _scene()), "targets": ("several", ()), "stages": ("several", ()),
+                                   "units": ("optional thing", None)}),
     ]
 
 

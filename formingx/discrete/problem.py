@@ -228,14 +228,14 @@ class Problem(Units):
         state: anything with x (own part), control, setting (a `Setting` as plain data, or empty) and memory.
         """
         fields, control, clock = self.forms.w.x.array.copy(), self.control, self.forms.clock
-        stage, memory, x = self._stage, self.memory, self.x.array_r.copy()
+        stage, memory, x, foretold = self._stage, self.memory, self.x.array_r.copy(), self._foretold
         try:
             self.stand(state)
             self.x.array_w[:] = state.x
             self.set_state(self.x, state.control)
             yield self
         finally:
-            self.memory = memory
+            self.memory, self._foretold = memory, foretold
             self._take(stage)
             self.forms.clock = clock
             self.x.array_w[:] = x

@@ -38,7 +38,7 @@ class Path:
     """The states of a run, from the unloaded body to the target.
 
     Attributes:
-        record: what the solver keeps of the run (`formingx.solve.state.Record`).
+        record: what the solver keeps of the run (`formingx.solve.record.Record`).
     """
 
     def __init__(self, record: Record, timed: bool = False, columns: Mapping[str, Any] | None = None):
