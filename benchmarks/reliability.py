@@ -215,7 +215,7 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
                                  "max_steps": ("count", 1000), "beyond": ("flag", False)}),
         *_time_and_heat(),
         Call("doctor", fx.doctor, {"scene": ("thing", _scene()), "targets": ("several", ()), "stages": ("several", ()),
-                                   "units": ("optional thing", None)}),
+                                   "units": ("thing", fx.Units())}),
     ]
 
 
