@@ -4,6 +4,8 @@ from . import _interrupts, mesh, tools
 from .calibration.data import treloar1944
 from .calibration.fit import Fit, fit
 from .calibration.fit_in_time import TimedTest
+from .design.design import Design
+from .design.parameters import along
 from .doctor.doctor import doctor
 from .errors import ConvergenceError, InputError, Interrupted
 from .heat.boundaries import Absorption, Convection, FixedTemperature, HeatFlux, Radiation, ThermalProperties

@@ -16,6 +16,28 @@ if tuple(int(n) for n in dolfinx.__version__.split(".")[:2]) < (0, 9):
 # The compiler waits for another process that compiles the same form; its own limit of 10 s is short for that.
 JIT_OPTIONS = {"timeout": 120}
 
+_compiled: dict[str, Any] = {}
+"""What the compiler gave for forms of this process, by their signatures."""
+
+
+def compile_form(form: Any) -> Any:
+    """A compiled form. One on a single rank is looked for in the compiler's folder once: that is slow to list."""
+    from dolfinx import fem, jit
+    compiler = jit.ffcx_jit
+
+    def once(comm: Any, what: Any, **options: Any) -> Any:
+        if comm.size > 1:                                    # ranks compile together, or none does
+            return compiler(comm, what, **options)
+        key = what.signature()
+        if key not in _compiled:
+            _compiled[key] = compiler(comm, what, **options)
+        return _compiled[key]
+    jit.ffcx_jit = once
+    try:
+        return fem.form(form, jit_options=JIT_OPTIONS)
+    finally:
+        jit.ffcx_jit = compiler
+
 
 def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges: Any, edge_tags: Any) -> tuple:
     """(mesh, cell tags, facet tags), distributed, of arrays on rank 0 (elsewhere: of length 0).

@@ -227,7 +227,7 @@ class Formulation(ABC):
     def compile(self, form: Any) -> Any:
         """A compiled form."""
         try:
-            return fem.form(form, jit_options=_compat.JIT_OPTIONS)
+            return _compat.compile_form(form)
         except TimeoutError as error:
             raise TimeoutError(
                 f"a form is being compiled by another process for more than {_compat.JIT_OPTIONS['timeout']} s, or a"

@@ -1,0 +1,88 @@
+"""What a sheet must be so that its wall, blown up, is even; and how soft, so that a uniform sheet is.
+
+A round sheet of radius 1 and thickness 1/100, hinged at its rim, neo-Hookean, as a membrane and as a solid. (a) Its
+thickness h0(R) for an even wall h at a stretch of the pole l. (b) Its constant C(R) (`c10`) for an even wall t h0 where
+h0 is uniform. The logarithms of the profiles are cubic splines, found by Gauss and Newton's method with exact derivatives; thickness and C
+are over those of the pole, which have no effect on the shape.
+"""
+
+import numpy as np
+from common import parser, save, say, summarise
+
+import formingx as fx
+from formingx.figures import figure
+from formingx.results import files
+
+THICKNESS, C = 0.01, 0.5
+RADII = (0.0, 0.25, 0.5, 0.75, 0.9, 1.0)
+STRETCHES, WALLS = (1.25, 1.5, 2.0), (0.7, 0.5, 0.3)
+MODELS = {"membrane": fx.Membrane, "solid": fx.MixedPressure}
+
+
+def relative(profile, R):
+    """A profile, whose logarithms are given, over its value at the pole."""
+    return np.exp(profile(R) - profile(0.0))
+
+
+def sheet(model, elements, stretch, h0=None, c=None):
+    """The scene of a sheet with profiles of thickness or constant, and its target."""
+    mesh = fx.mesh.disc(radius=1.0, elements=elements,
+                        thickness=THICKNESS if h0 is None else lambda R: THICKNESS * relative(h0, R))
+    c10 = C if c is None else lambda R, Z: C * relative(c, R)
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=c10), model=MODELS[model](),
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")])
+    return scene, fx.pole_stretch(stretch)
+
+
+def search(model, elements, knots, stretch, of):
+    """The answer of one case: `of` is "h0" or "c"."""
+    design = fx.Design(lambda profile: sheet(model, elements, stretch, **{of: profile}),
+                       {"profile": fx.along(knots, start=0.0, low=-4.0, high=4.0, smooth=True)})
+    return design.fit(even=True, volume=None, runs=8, good=1e-4)
+
+
+def numbers(answer, name):
+    """What the summary holds of one answer."""
+    profile, wall = answer.values["profile"], answer.best.wall
+    over = {"h0_over_h": THICKNESS / wall.mean(), "C_over_C0": 1.0}[name]
+    pressure = answer.best.path.last.measures["pressure"]
+    scale = {"p_R0_over_C_h": C * wall.mean(), "p_R0_over_C0_h0": C * THICKNESS}
+    key = "p_R0_over_C_h" if name == "h0_over_h" else "p_R0_over_C0_h0"
+    return {name: {f"{R:g}": float(over * relative(profile, R)) for R in RADII}, key: pressure / scale[key],
+            "spread": float(np.ptp(wall) / wall.mean()), "paths": answer.paths}
+
+
+def main():
+    options = parser("even_disc", __doc__.splitlines()[0])
+    options.add_argument("--elements", type=int, default=80, help="elements along the radius")
+    options.add_argument("--knots", type=int, default=21, help="of the splines")
+    args = options.parse_args()
+    elements, knots = ((20, 1), 7) if args.quick else ((args.elements, 1), args.knots)
+    stretches, walls = (STRETCHES[:1], WALLS[:1]) if args.quick else (STRETCHES, WALLS)
+    summary = {"thickness": {}, "constant": {}, "knots": knots, "elements_along": elements[0],
+               "versions": files.versions()}
+    drawing, axes = figure(2)
+    for model, style in (("membrane", "--"), ("solid", "-")):
+        for part, cases, of, name in (("thickness", stretches, "h0", "h0_over_h"),
+                                      ("constant", walls, "c", "C_over_C0")):
+            for k, case in enumerate(cases):
+                answer = search(model, elements, knots, case if of == "h0" else case**-0.5, of)
+                found = numbers(answer, name)
+                summary[part].setdefault(model, {})[f"{case:g}"] = found
+                say(f"{part}, {model}, {case:g}: {answer.paths} runs, spread {found['spread']:.2e}, "
+                    + ", ".join(f"{v:.5f}" for v in found[name].values()))
+                R = np.linspace(0, 1, 101)
+                label = f"stretch of the pole {case:g}" if of == "h0" else f"wall {case:g} h0"
+                axes[int(part == "constant")].plot(R, found[name]["0"] * relative(answer.values["profile"], R), style,
+                                              color=f"C{k}", label=label if model == "solid" else None)
+    axes[0].set_ylabel("thickness at rest over that of the even wall")
+    axes[1].set_ylabel("constant over that at the pole")
+    for one in axes:
+        one.set_xlabel("R / R0")
+        one.legend(title="solid (lines), membrane (dashed)")
+    save(drawing, args.out / "even_disc.png")
+    summarise(args.out, summary)
+
+
+if __name__ == "__main__":
+    main()

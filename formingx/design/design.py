@@ -1,0 +1,246 @@
+"""The search for what should be made: an even or a wanted wall, the least weight, by exact derivatives of runs."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import ConvergenceError, InputError, count, finite, instance, pair, positive
+from ..measures.targets import Target
+from ..runs import Process, trace
+from ..scene.scene import Scene
+from ..solve.newton import Tolerances
+from ..solve.stage import Stage
+from ..solve.stepping import StepControl
+from .answer import Answer
+from .parameters import Parameters
+from .run import DesignRun
+
+log = logging.getLogger("formingx")
+
+_HELD = 1e2
+"""Weight of the volume that is held, relative, beside relative walls."""
+
+_DAMPED = 1e-6
+"""Of what has most effect: smaller effects count as none."""
+
+_SHORTEST = 1 / 64
+"""Part of a step of a search below which nothing better is looked for."""
+
+
+class Design:
+    """What may be changed in a run, and the search for the best of it.
+
+    Args:
+        build: a function of the parameters, by name, that returns (scene, target) or (scene, stages), as `trace` or
+            `Process.run` want them. It is called beside a design, too, for derivatives: it must give the same mesh but
+            for the places of its nodes.
+        parameters: {name: (start, low, high), a number to start from, or `along(...)`: a profile, which `build` gets as
+            a function of a length from 0 to 1}.
+        step, tolerances, max_steps: of the runs, see `trace`.
+
+    Raises:
+        InputError: an argument that is not allowed.
+    """
+
+    def __init__(self, build: Callable[..., Any], parameters: Mapping[str, Any], *, step: StepControl | None = None,
+                 tolerances: Tolerances | None = None, max_steps: int | None = None):
+        if not callable(build):
+            raise InputError(f"Design: build = {build!r}: must be a function of the parameters that returns a scene and"
+                             f" its target or stages")
+        self._build, self.parameters = build, Parameters(parameters)
+        self._step, self._tolerances, self._most = step, tolerances, max_steps
+        self.paths = 0                                       # taken so far
+
+    def run(self, values: Mapping[str, Any] | None = None) -> DesignRun:
+        """Run it with some values, the other parameters at their start.
+
+        Raises:
+            InputError: what `build` returns is no scene with an end, or the scene is not allowed.
+            ConvergenceError: see `trace`.
+        """
+        return self._run(self.parameters.vector(values or {}))
+
+    def _make(self, vector: np.ndarray) -> tuple[Any, Any]:
+        made = self._build(**self.parameters.values(vector))
+        if not isinstance(made, tuple) or len(made) != 2 or not isinstance(made[0], Scene):
+            raise InputError("Design: build must return (scene, target) or (scene, stages)")
+        scene, end = made
+        if not isinstance(end, Target):
+            end = list(end) if isinstance(end, Sequence) else end
+            if not isinstance(end, list) or not end or not all(isinstance(stage, Stage) for stage in end):
+                raise InputError(f"Design: build returns the end {made[1]!r}: must be a target, such as pressure(1), or"
+                                 f" stages")
+        return scene, end
+
+    def _run(self, vector: np.ndarray) -> DesignRun:
+        scene, end = self._make(vector)
+        self.paths += 1
+        options: dict[str, Any] = {"step": self._step, "tolerances": self._tolerances, "max_steps": self._most,
+                                   "progress": False}
+        path = trace(scene, until=end, **options) if isinstance(end, Target) else Process(scene).run(end, **options)
+        return DesignRun(self._make, self.parameters, vector, path, end, self._tolerances)
+
+    def fit(self, *, wall: Any = None, even: bool = False, within: tuple[float, float] | None = None,
+            volume: str | float | None = "kept", runs: int = 10, good: float = 1e-4,
+            start: Mapping[str, Any] | None = None) -> Answer:
+        """Search for a wall: Gauss and Newton's method with bounds, each step tried by a run of its own.
+
+        Args:
+            wall: the wanted thickness, length: a number, or a function of the reference length; or
+            even: True: as even as can be; least standard deviation over mean.
+            within: reference lengths (of the middle line, from the axis) that count; default all.
+            volume: "kept": the body's at rest stays that of the start; a number: it is that, length^3; None: free.
+            runs: at most so many.
+            good: relative change of the wall, in the mean square, that is foretold and not worth another run.
+            start: values to start from, by name.
+
+        Raises:
+            InputError: nothing to fit, or nothing has an effect.
+            ConvergenceError: the first run.
+        """
+        if (wall is None) == (not instance("fit: even", even, bool, "True or False")):
+            raise InputError("fit: nothing to fit: give it wall=..., a wanted thickness, or even=True")
+        most, good = count("fit: runs", runs), positive("fit: good", good)
+        if isinstance(volume, str) and volume != "kept" or isinstance(volume, bool):
+            raise InputError(f"fit: volume = {volume!r}: must be 'kept', a number or None")
+        first = self._run(self.parameters.vector(start or {}))
+        held = first.volume if volume == "kept" else None if volume is None else positive("fit: volume", volume)
+        aim = _Aim(first, wall, within, held)
+        return self._search(first, aim, most, good)
+
+    def _search(self, first: DesignRun, aim: _Aim, most: int, good: float) -> Answer:
+        """Gauss-Newton steps from the best run so far, halved where a run is worse or fails."""
+        from scipy.optimize import lsq_linear
+        low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
+        best, taken, notes, foretold = first, [first], [], first.wall
+        why = f"{most} runs were taken"
+        while len(taken) + len(notes) < most:
+            left, by = aim.residual(best)
+            if not np.any(np.abs(by * size) > 1e-9):
+                raise InputError("fit: no parameter has an effect on what is fitted")
+            held = _DAMPED * np.linalg.norm(by * size, 2) * np.eye(len(size))     # what has no effect stays
+            step = lsq_linear(np.vstack([by * size, held]), np.append(-left, 0 * size), tol=1e-12,
+                              bounds=((low - best.vector) / size, (high - best.vector) / size)).x * size
+            gain = np.sqrt(np.mean((by @ step) ** 2))
+            if gain < good:
+                why = f"the next step would change the wall by {gain:.1e}"
+                break
+            share, new = 1.0, None
+            while share >= _SHORTEST and len(taken) + len(notes) < most:
+                try:
+                    new = self._run(np.clip(best.vector + share * step, low, high))
+                    taken.append(new)
+                    if aim.cost(new) < aim.cost(best):
+                        break
+                except (InputError, ConvergenceError) as error:
+                    notes.append(str(error).splitlines()[0])
+                share, new = share / 2, None
+            if new is None:
+                why = "no shorter step is better" if share < _SHORTEST else why
+                break
+            foretold = best.wall + share * (best.derivative("wall")[1] @ step)
+            best = new
+            log.info("design: run %d, cost %.3g", len(taken), aim.cost(best))
+        return Answer(first, best, taken, notes, aim.inside, why, foretold)
+
+    def least_weight(self, least_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
+        """Search for the least volume of the body with a wall nowhere less than so much (SciPy's SLSQP).
+
+        Each iteration minimises the volume along its derivative with the wall as its derivatives foretell it.
+
+        Args:
+            least_wall: length; within: reference lengths that count; runs: at most so many.
+
+        Raises:
+            InputError, ConvergenceError: as `fit`.
+        """
+        from scipy.optimize import linprog
+        least, most = positive("least_weight: least_wall", least_wall), count("least_weight: runs", runs)
+        low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
+        first = self._run(self.parameters.start.copy())
+        inside = _inside(first, within)
+        best, taken, notes, reach, why = first, [first], [], 0.25, f"{most} runs were taken"
+        foretold = first.wall
+
+        def cost(run: DesignRun) -> float:
+            return run.volume / first.volume + 10 * max(least - run.wall[inside].min(), 0.0) / least
+        while len(taken) + len(notes) < most:
+            wall, by = best.derivative("wall")
+            grows = best.derivative("volume")[1][0] / first.volume
+            n = len(size)
+            # the wall's lack, in parts of the least wall, is one more unknown: there is a solution at any rate
+            rows = np.column_stack([-by[inside] * size, -np.full(inside.sum(), least)])
+            room = [(max((a - v) / s, -reach), min((b - v) / s, reach))
+                    for a, b, v, s in zip(low, high, best.vector, size)]
+            found = linprog(np.append(grows * size, 10.0), A_ub=rows, b_ub=wall[inside] - least,
+                            bounds=[*room, (0, None)])
+            step = found.x[:n] * size
+            gain = cost(best) - (best.volume / first.volume + found.fun)
+            if gain < 1e-5:
+                why = f"the next step would save {max(gain, 0.0):.1e} of the volume"
+                break
+            try:
+                new = self._run(np.clip(best.vector + step, low, high))
+                taken.append(new)
+                if cost(new) < cost(best):
+                    foretold, best, reach = wall + by @ step, new, min(2 * reach, 1.0)
+                    continue
+            except (InputError, ConvergenceError) as error:
+                notes.append(str(error).splitlines()[0])
+            reach /= 4
+            if reach < 1e-4:
+                why = "no shorter step is better"
+                break
+        return Answer(first, best, taken, notes, inside, why, foretold)
+
+
+class _Aim:
+    """A wanted wall as least squares: relative deviations, and that of the volume where it is held."""
+
+    def __init__(self, run: DesignRun, wall: Any, within: tuple[float, float] | None, held: float | None):
+        self.inside, self._held = _inside(run, within), held
+        self._even = wall is None
+        if not self._even:
+            s = run.profile.reference_length[self.inside]
+            given = wall(s) if callable(wall) else np.full(len(s), finite("fit: wall", wall))
+            self._wanted = np.asarray(given, dtype=float)
+            if self._wanted.shape != s.shape or not np.all(self._wanted > 0):
+                raise InputError("fit: wall: must be greater than 0 at all reference lengths")
+
+    def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
+        """Shape (m,), and its derivatives, (m, n)."""
+        by = run.derivative("wall")[1][self.inside]
+        wall = run.wall[self.inside]
+        wanted = wall.mean() if self._even else self._wanted
+        left = wall / wanted - 1
+        slopes = by / np.reshape(wanted, (-1, 1))
+        if self._even:
+            slopes -= np.outer(wall / wanted**2, by.mean(0))
+        if self._held is not None:
+            grows = run.derivative("volume")[1][0] / self._held
+            weight = _HELD * np.sqrt(len(left))
+            left = np.append(left, weight * (run.volume / self._held - 1))
+            slopes = np.vstack([slopes, weight * grows])
+        return left, slopes
+
+    def cost(self, run: DesignRun) -> float:
+        """Mean square of the relative deviations, and of the volume's."""
+        wall = run.wall[self.inside]
+        left = np.mean((wall / (wall.mean() if self._even else self._wanted) - 1) ** 2)
+        return float(left + (0.0 if self._held is None else (run.volume / self._held - 1) ** 2))
+
+
+def _inside(run: DesignRun, within: tuple[float, float] | None) -> np.ndarray:
+    s = run.profile.reference_length
+    if within is None:
+        return np.ones(len(s), dtype=bool)
+    low, high = pair("within", within)
+    inside = (s >= low) & (s <= high)
+    if inside.sum() < 2:
+        raise InputError(f"within = {within!r}: has fewer than two places of the sheet, whose reference length goes from"
+                         f" 0 to {s[-1]:.6g}")
+    return inside

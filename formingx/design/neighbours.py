@@ -1,0 +1,120 @@
+"""The neighbours of a run: the same with one parameter a little more, or less, carried along with its factors.
+
+Each neighbour is a problem of its own, made of what the user's function builds: whatever a parameter changes (nodes,
+constants, tools, friction, targets, temperatures) is changed in it. At a state of the run with dF/dx = K, a neighbour
+solves its own F = 0 and its own constraint by iterations with the factors of K, which are near its own,
+
+    K dx + F_c dc = -F',    c_x dx + c_c dc = -c',
+
+and whatever is measured at two neighbours has their difference over 2 dp for its derivative: of second order in dp.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..discrete.problem import Problem
+from ..errors import InputError
+from ..solve.newton import Failure
+from ..solve.state import State
+
+_ENOUGH, _GOOD, _MOST = 1e-7, 1e-4, 12
+"""Corrections over the distance of a neighbour at which it is solved for; which must be reached; iterations."""
+
+_NONE = 1e-14
+"""Distances, over the unknowns, that are none."""
+
+
+class Neighbour:
+    """One problem beside that of a run, and its state.
+
+    Args:
+        scene, end: as the parameter makes them; base: the `Problem` of the run; name: of the parameter.
+
+    Raises:
+        InputError: the mesh has other elements.
+    """
+
+    def __init__(self, scene: Any, end: Any, base: Problem, name: str):
+        self.name, self.end = name, end
+        self.path: Any = None
+        mine, its = (s.mesh.domain.geometry.dofmap for s in (scene, base.scene))
+        if mine.shape != its.shape or not np.array_equal(mine, its) or len(scene.things) != len(base.scene.things):
+            raise InputError(f"Design: {name} changes the elements of the mesh, or how many things there are: only what"
+                             f" moves nodes or changes numbers has a derivative")
+        self.problem = Problem(scene)
+        if self.problem.x.getSize() != base.x.getSize():
+            raise InputError(f"Design: {name} changes the number of unknowns: that has no derivative")
+        self.F, self.gradient = self.problem.x.duplicate(), self.problem.x.duplicate()
+        self.x, self.control, self.memory = np.zeros(0), 0.0, self.problem.memory
+
+    def state(self, like: State) -> State:
+        """Its state beside one of the run."""
+        return State(self.x, self.control, like.direction, like.slope, memory=self.memory, stage=like.stage,
+                     kind=like.kind, time=self.problem.time_at(self.control))
+
+    def residual(self) -> np.ndarray:
+        """F at its state, own part, shape (n,)."""
+        self.problem.x.array_w[:] = self.x
+        self.problem.residual(self.problem.x, self.control, self.F)
+        return self.F.array_r.copy()
+
+    def constraint(self, equation: Any) -> float:
+        """What is left over of an equation at its state."""
+        self.problem.x.array_w[:] = self.x
+        return float(equation(self.problem.x, self.control, self.gradient)[0])
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        self.F.destroy()
+        self.gradient.destroy()
+        self.problem.destroy()
+
+
+def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: Any, equations: Sequence[Any]) -> None:
+    """Solve for the neighbours beside a state of the run, at which its problem stands.
+
+    equation: the constraint of the run's state; equations: of the neighbours.
+
+    Raises:
+        Failure: one is not found near it.
+    """
+    problem, newton = curve.problem, curve.newton
+    problem.x.array_w[:] = state.x
+    if not newton.tangent(problem.x, state.control):
+        raise Failure("the tangent is singular at a state of the run", [])
+    _, by_control = equation(problem.x, state.control, newton.gradient)
+    g, b = newton.gradient.array_r.copy(), newton.b.array_r.copy()
+    slope = problem.comm.allreduce(float(g @ b)) + by_control
+    if abs(slope) < 1e-300:
+        raise Failure("what ends the run does not change along its path there", [])
+    open_ = list(range(len(neighbours)))
+    size = _norm(problem, state.x) + abs(state.control)
+    for iteration in range(_MOST):
+        rows = np.column_stack([neighbours[k].residual() for k in open_])
+        left = np.array([neighbours[k].constraint(equations[k]) for k in open_])
+        dx = -newton.solver.solve_all(rows)
+        steps = -(left + problem.comm.allreduce(g @ dx)) / slope
+        dx += np.outer(b, steps)
+        still = []
+        for j, k in enumerate(open_):
+            one = neighbours[k]
+            one.x, one.control = one.x + dx[:, j], one.control + steps[j]
+            correction = _norm(problem, dx[:, j]) + abs(steps[j])
+            away = _norm(problem, one.x - state.x) + abs(one.control - state.control)
+            if not np.isfinite(correction):
+                raise Failure(f"beside {one.name} there is no state near", [])
+            if correction > max(_ENOUGH * away, _NONE * size):
+                still.append(k)
+                if iteration == _MOST - 1 and correction > max(_GOOD * away, 100 * _NONE * size):
+                    raise Failure(f"with {one.name} a little changed no state is found near", [])
+        open_ = still
+        if not open_:
+            return
+
+
+def _norm(problem: Any, x: np.ndarray) -> float:
+    return float(np.sqrt(problem.comm.allreduce(float(x @ x))))

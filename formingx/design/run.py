@@ -1,0 +1,163 @@
+"""One run of a design, and the derivatives of what it came to by all parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..results.evaluate.profile import Profile, Profiles
+from ..results.path import Path
+from ..solve.arc_length import Curve
+from ..solve.newton import Failure, Tolerances
+from ..solve.record import Record
+from .carry import carry
+from .neighbours import Neighbour
+from .parameters import Parameters
+
+_SMOOTH, _KINKS = 1e-5, 1e-8
+"""Changes of parameters, over their size, to the neighbours: of a scene without contact, and with it, which acts within
+a thin ramp."""
+
+
+@dataclass(frozen=True)
+class Effects:
+    """Derivatives of one measure: of shape (m,) by n parameters.
+
+    names: of the parameters; places: what the rows are at (a length, or nothing); value: shape (m,); by: (m, n).
+    """
+
+    measure: str
+    names: list[str]
+    places: np.ndarray
+    value: np.ndarray
+    by: np.ndarray
+
+    def __str__(self) -> str:
+        rows = np.unique(np.linspace(0, len(self.value) - 1, min(len(self.value), 12)).round().astype(int))
+        lines = ["".join([f"{'at':>10}{self.measure[:10]:>12}", *(f"{name[:11]:>12}" for name in self.names)])]
+        lines += ["".join([f"{self.places[k]:10.4g}{self.value[k]:12.5g}", *(f"{d:12.4g}" for d in self.by[k])])
+                  for k in rows]
+        return "\n".join(lines)
+
+
+class DesignRun:
+    """A run of what the user's function makes of some values.
+
+    Attributes:
+        vector: the numbers of the parameters, shape (n,); values: the same by name; path: the `Path`.
+    """
+
+    def __init__(self, make: Callable[[np.ndarray], tuple[Any, Any]], parameters: Parameters, vector: np.ndarray,
+                 path: Path, end: Any, tolerances: Tolerances | None):
+        self._make, self._parameters, self.vector, self.path, self._end = make, parameters, vector, path, end
+        self._tolerances = tolerances or Tolerances()
+        self.values = parameters.values(vector)
+
+    @cached_property
+    def profile(self) -> Profile:
+        """Of the last state."""
+        return self.path.profile()
+
+    @property
+    def wall(self) -> np.ndarray:
+        """Thickness of the last state at the nodes of the bottom face, shape (k,), length."""
+        return self.profile.thickness
+
+    @property
+    def volume(self) -> float:
+        """Of the whole body at rest."""
+        return float(self.path.problem.forms.volume)
+
+    @cached_property
+    def _pairs(self) -> list[tuple[Neighbour, Neighbour]]:
+        """For each parameter the neighbours above and below, solved for to the last state."""
+        problem = self.path.problem
+        step = (_KINKS if problem.contacts else _SMOOTH) * self._parameters.size
+        made = []
+        for k, name in enumerate(self._parameters.names):
+            sides = []
+            for sign in (1.0, -1.0):
+                moved = self.vector.copy()
+                moved[k] += sign * step[k]
+                try:
+                    sides.append(Neighbour(*self._make(moved), problem, name))
+                except InputError as error:
+                    raise InputError(f"Design: no derivative by {name}: beside {self.vector[k]:.6g} it makes no scene:"
+                                     f" {error}") from None
+            made.append((sides[0], sides[1]))
+        try:
+            carry(self.path, self._end, [one for pair in made for one in pair])
+        except Failure as failure:
+            raise InputError(f"Design: this run has no derivative: {failure.reason}") from None
+        self._step = step
+        return made
+
+    def derivative(self, measure: Any) -> tuple[np.ndarray, np.ndarray]:
+        """A measure of the last state, shape (m,), and its derivatives by the parameters, shape (m, n).
+
+        Args:
+            measure: "wall" (thickness at the nodes of the bottom face), "volume" (of the body at rest), a column of the path, or a function of a path that looks at its last state.
+
+        Raises:
+            InputError: the run has no derivative, or the measure looks at more than the last state.
+        """
+        values = [[np.atleast_1d(of) for of in (self._at(one, measure) for one in pair)] for pair in self._pairs]
+        by = [(above - below) / (2 * h) for (above, below), h in zip(values, self._step)]
+        return self._here(measure), np.stack(by, axis=-1)
+
+    def sensitivities(self, measure: Any = "wall") -> Effects:
+        """`derivative` as a table, of the wall over the reference length."""
+        value, by = self.derivative(measure)
+        places = self.profile.reference_length if measure == "wall" else np.arange(float(len(value)))
+        name = measure if isinstance(measure, str) else getattr(measure, "__name__", "measure")
+        return Effects(name, self._parameters.names, places, value, by)
+
+    def spread(self, deviations: Mapping[str, float], measure: Any = "wall") -> np.ndarray:
+        """Standard deviation of a measure, to first order, where parameters scatter independently, shape (m,).
+
+        deviations: {parameter: its standard deviation}; of a profile that of every knot.
+        """
+        by = self.derivative(measure)[1]
+        sizes = np.zeros(len(self._parameters))
+        for name, size in deviations.items():
+            mine = [k for k, one in enumerate(self._parameters.names) if one == name or one.startswith(f"{name}[")]
+            if not mine:
+                raise InputError(f"spread: parameter {name!r} is not known; known: {', '.join(self.values)}")
+            sizes[mine] = size
+        return np.sqrt((by**2) @ sizes**2)
+
+    def _here(self, measure: Any) -> np.ndarray:
+        if isinstance(measure, str):
+            if measure in ("wall", "volume"):
+                return np.atleast_1d(getattr(self, measure))
+            return self.path[measure][-1:]
+        whole = np.atleast_1d(np.asarray(measure(self.path), dtype=float))
+        short = _of_one(self.path.last, Record(self.path.problem, self.path.record.curve))
+        if not np.allclose(whole, measure(short), rtol=1e-9, atol=0):
+            raise InputError("Design: a measure must be one of the last state alone: this function of the path looks at"
+                             " earlier states too, whose derivatives are not kept")
+        return whole
+
+    def _at(self, one: Neighbour, measure: Any) -> Any:
+        if measure == "volume":
+            return one.problem.forms.volume
+        state = one.state(self.path.last)
+        if measure == "wall":
+            return Profiles(one.problem).of(state).thickness
+        if one.path is None:
+            one.path = _of_one(state, Record(one.problem, Curve(one.problem, self._tolerances)))
+        return one.path[measure] if isinstance(measure, str) else np.asarray(measure(one.path), dtype=float)
+
+
+def _of_one(state: Any, record: Record) -> Path:
+    """A path of one state."""
+    path = Path(record)
+    record.segments[-1].states.append(state)
+    for told in record.on_state:
+        told(state)
+    return path
