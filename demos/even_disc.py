@@ -2,8 +2,8 @@
 
 A round sheet of radius 1 and thickness 1/100, hinged at its rim, neo-Hookean, as a membrane and as a solid. (a) Its
 thickness h0(R) for an even wall h at a stretch of the pole l. (b) Its constant C(R) (`c10`) for an even wall t h0 where
-h0 is uniform. The logarithms of the profiles are cubic splines, found by Gauss and Newton's method with exact derivatives; thickness and C
-are over those of the pole, which have no effect on the shape.
+h0 is uniform. The logarithms of the profiles are cubic splines, found by Gauss and Newton's method with exact
+derivatives; thickness and C are over those of the pole, which have no effect on the shape.
 """
 
 import numpy as np

@@ -4,8 +4,8 @@ A round sheet of radius 1 and thickness 1/100, hinged at its rim, neo-Hookean, b
 membrane and as a solid: derivatives by b of its constant C = c10 = 0.5 (1 + b R^2) or (1 + b R^4) and of its thickness
 (1 + b R^2)/100, at b = 0, of the pressure p R0/(C(0) h0(0)) and of the wall over that at rest at R = 0 and 0.5.
 
-The cup: a sheet of thickness 0.03 is blown into a cup, 0.7 deep, on which it sticks; C = 0.5 (1 + b (R^2 - 0.5)). When a
-node touches moves with b: so the derivative of a run is not that of its steps as they were.
+The cup: a sheet of thickness 0.03 is blown into a cup, 0.7 deep, on which it sticks; C = 0.5 (1 + b (R^2 - 0.5)). When
+a node touches moves with b: so the derivative of a run is not that of its steps as they were.
 """
 
 import numpy as np

@@ -32,11 +32,11 @@ def highest_pressure(path):
 def test_derivatives_are_those_of_whole_runs():
     """Of the material, of the shape and of the target, of the pressure and of the wall."""
     design = fx.Design(disc, {"c": (0.0, -1, 1), "h": (0.05, 0.01, 0.1), "height": (0.6, 0.1, 1.0)})
-    run = design.run()
+    run, at = design.run(), {"c": 0.0, "h": 0.05, "height": 0.6}
     for measure, of in (("pressure", lambda run: run.path["pressure"][-1:]), ("wall", lambda run: run.wall)):
         by = run.derivative(measure)[1]
         for k, (name, dp) in enumerate({"c": 1e-3, "h": 1e-5, "height": 1e-4}.items()):
-            above, below = (of(design.run({name: {"c": 0.0, "h": 0.05, "height": 0.6}[name] + s * dp})) for s in (1, -1))
+            above, below = (of(design.run({name: at[name] + s * dp})) for s in (1, -1))
             assert by[:, k] == pytest.approx((above - below) / (2 * dp), rel=2e-5, abs=1e-7)
     assert run.derivative(pole_wall)[1][0] == pytest.approx(run.derivative("wall")[1][0], rel=1e-12)
     volume, by = run.derivative("volume")
@@ -54,7 +54,7 @@ def test_taylor():
 
 
 def test_an_even_wall():
-    """Its thickness at the pole is the wall over that stretch squared: so the spread and the profile are known there."""
+    """Its thickness at the pole is the wall over that stretch squared."""
     answer = fx.Design(programmed, {"h": fx.along(6, start=0.0, low=-2, high=2, smooth=True)}).fit(even=True, good=1e-3)
     assert answer.paths <= 4 and answer.cv[0] > 0.03 and answer.cv[1] < 1e-3
     assert np.exp(answer.values["h"](0.0)) / 50 == pytest.approx(1.2**2 * answer.best.wall.mean(), rel=2e-3)
@@ -79,6 +79,7 @@ def test_bad_input_is_told_in_words():
         fx.Design(lambda c: disc()[0], {"c": 0.0}).run()
     with pytest.raises(fx.InputError, match="looks at earlier states"):
         fx.Design(disc, {"height": 1.4}).run().derivative(highest_pressure)
-    for wrong, words in (((1, 2, 3), "must be from 2 to 3"), ((1, 2), "must be a number"), ((1, 3, 0), "below the second")):
+    for wrong, words in (((1, 2, 3), "must be from 2 to 3"), ((1, 2), "must be a number"),
+                         ((1, 3, 0), "below the second")):
         with pytest.raises(fx.InputError, match=words):
             fx.Design(disc, {"c": wrong})

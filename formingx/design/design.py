@@ -116,7 +116,8 @@ class Design:
         """Gauss-Newton steps from the best run so far, halved where a run is worse or fails."""
         from scipy.optimize import lsq_linear
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
-        best, taken, notes, foretold = first, [first], [], first.wall
+        best, taken, foretold = first, [first], first.wall
+        notes: list[str] = []
         why = f"{most} runs were taken"
         while len(taken) + len(notes) < most:
             left, by = aim.residual(best)
@@ -163,8 +164,8 @@ class Design:
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
         first = self._run(self.parameters.start.copy())
         inside = _inside(first, within)
-        best, taken, notes, reach, why = first, [first], [], 0.25, f"{most} runs were taken"
-        foretold = first.wall
+        best, taken, foretold, reach, why = first, [first], first.wall, 0.25, f"{most} runs were taken"
+        notes: list[str] = []
 
         def cost(run: DesignRun) -> float:
             return run.volume / first.volume + 10 * max(least - run.wall[inside].min(), 0.0) / least
@@ -241,6 +242,6 @@ def _inside(run: DesignRun, within: tuple[float, float] | None) -> np.ndarray:
     low, high = pair("within", within)
     inside = (s >= low) & (s <= high)
     if inside.sum() < 2:
-        raise InputError(f"within = {within!r}: has fewer than two places of the sheet, whose reference length goes from"
-                         f" 0 to {s[-1]:.6g}")
+        raise InputError(f"within = {within!r}: has fewer than two places of the sheet, whose reference length goes"
+                         f" from 0 to {s[-1]:.6g}")
     return inside

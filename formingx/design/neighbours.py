@@ -49,7 +49,8 @@ class Neighbour:
         if self.problem.x.getSize() != base.x.getSize():
             raise InputError(f"Design: {name} changes the number of unknowns: that has no derivative")
         self.F, self.gradient = self.problem.x.duplicate(), self.problem.x.duplicate()
-        self.x, self.control, self.memory = np.zeros(0), 0.0, self.problem.memory
+        self.x: Any = None                                   # own part, shape (n,)
+        self.control, self.memory = 0.0, self.problem.memory
 
     def state(self, like: State) -> State:
         """Its state beside one of the run."""

@@ -40,12 +40,13 @@ class Knots:
 
 @dataclass(frozen=True)
 class Along:
-    """See `along`. start: at the knots, shape (k,)."""
+    """See `along`. start: at the knots, shape (k,); profile: False if it is one number."""
 
     start: np.ndarray
     low: float
     high: float
-    smooth: bool
+    smooth: bool = False
+    profile: bool = True
 
 
 def along(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, smooth: bool = False) -> Along:
@@ -87,21 +88,17 @@ class Parameters:
     def __init__(self, given: Mapping[str, Any]):
         if not isinstance(given, Mapping) or not given:
             raise InputError("Design: parameters: must be {name: (start, low, high) or fx.along(...)}, at least one")
-        self._given, self.names = dict(given), []
-        start, low, high = [], [], []
+        self._given: dict[str, Along] = {}
+        self.names: list[str] = []
         for name, one in given.items():
             if not isinstance(name, str):
                 raise InputError(f"Design: parameter {name!r}: must be a name")
-            one = one if isinstance(one, Along) else _number(name, one)
-            self._given[name] = one
-            several_ = isinstance(one, Along)
-            first = one.start if several_ else np.array([one[0]])
-            bounds = (one.low, one.high) if several_ else one[1:]
-            self.names += [f"{name}[{k}]" for k in range(len(first))] if several_ else [name]
-            start.append(first)
-            low.append(np.full(len(first), bounds[0]))
-            high.append(np.full(len(first), bounds[1]))
-        self.start, self.low, self.high = map(np.concatenate, (start, low, high))
+            self._given[name] = one = one if isinstance(one, Along) else _number(name, one)
+            self.names += [f"{name}[{k}]" for k in range(len(one.start))] if one.profile else [name]
+        all_of = list(self._given.values())
+        self.start = np.concatenate([one.start for one in all_of])
+        self.low = np.concatenate([np.full(len(one.start), one.low) for one in all_of])
+        self.high = np.concatenate([np.full(len(one.start), one.high) for one in all_of])
         width = self.high - self.low
         self.size = np.where(np.isfinite(width) & (width > 0), width, np.where(self.start != 0, abs(self.start), 1.0))
 
@@ -110,15 +107,9 @@ class Parameters:
 
     def values(self, vector: np.ndarray) -> dict[str, Any]:
         """What the user's function is called with."""
-        found, first = {}, 0
-        for name, one in self._given.items():
-            if isinstance(one, Along):
-                found[name] = Knots(vector[first: first + len(one.start)], one.smooth)
-                first += len(one.start)
-            else:
-                found[name] = float(vector[first])
-                first += 1
-        return found
+        parts = np.split(vector, np.cumsum([len(one.start) for one in self._given.values()])[:-1])
+        return {name: Knots(part, one.smooth) if one.profile else float(part[0])
+                for (name, one), part in zip(self._given.items(), parts)}
 
     def vector(self, values: Mapping[str, Any]) -> np.ndarray:
         """The numbers of some parameters, the others at their start, shape (n,)."""
@@ -127,7 +118,7 @@ class Parameters:
             if name not in self._given:
                 raise InputError(f"Design: parameter {name!r} is not known; known: {', '.join(self._given)}")
         for name, one in self._given.items():
-            n = len(one.start) if isinstance(one, Along) else 1
+            n = len(one.start)
             if name in values:
                 given = values[name]
                 given = given.values if isinstance(given, Knots) else np.atleast_1d(np.asarray(given, dtype=float))
@@ -138,13 +129,13 @@ class Parameters:
         return found
 
 
-def _number(name: str, given: Any) -> tuple[float, float, float]:
+def _number(name: str, given: Any) -> Along:
     parts: Sequence[Any] = (given, -np.inf, np.inf) if np.ndim(given) == 0 else tuple(given)
     if len(parts) != 3:
         raise InputError(f"Design: {name} = {given!r}: must be a number, (start, low, high) or fx.along(...)")
-    start = finite(f"Design: {name}: start", parts[0])
-    _check_bounds(f"Design: {name}", np.array([start]), parts[1], parts[2])
-    return start, float(parts[1]), float(parts[2])
+    start = np.array([finite(f"Design: {name}: start", parts[0])])
+    _check_bounds(f"Design: {name}", start, parts[1], parts[2])
+    return Along(start, float(parts[1]), float(parts[2]), profile=False)
 
 
 def _check_bounds(who: str, start: np.ndarray, low: Any, high: Any) -> None:

@@ -101,7 +101,8 @@ class DesignRun:
         """A measure of the last state, shape (m,), and its derivatives by the parameters, shape (m, n).
 
         Args:
-            measure: "wall" (thickness at the nodes of the bottom face), "volume" (of the body at rest), a column of the path, or a function of a path that looks at its last state.
+            measure: "wall" (thickness at the nodes of the bottom face), "volume" (of the body at rest), a column of the
+                path, or a function of a path that looks at its last state.
 
         Raises:
             InputError: the run has no derivative, or the measure looks at more than the last state.
