@@ -1,6 +1,8 @@
 """formingx: how polymers are formed, simulated with finite elements on FEniCSx."""
 
-from . import _interrupts, mesh, tools
+import sys as _sys
+
+from . import _calls, _interrupts, mesh, tools
 from .calibration.data import treloar1944
 from .calibration.fit import Fit, fit
 from .calibration.fit_in_time import TimedTest
@@ -50,4 +52,6 @@ from .values.temperature import WLF, Arrhenius
 
 __version__ = "0.1.0"
 
+for _module in (mesh, tools, _sys.modules[__name__]):
+    _calls.explain(_module)
 _interrupts.imported()

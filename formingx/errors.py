@@ -124,6 +124,17 @@ def pair(name: str, values: Any) -> tuple[float, float]:
     return finite(name, found[0]), finite(name, found[1])
 
 
+def as_points(name: str, values: Any) -> np.ndarray:
+    """`values`, of shape (..., 2), as an array of shape (n, 2), or an InputError unless they are points (R, Z)."""
+    try:
+        found = np.asarray(values, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        found = np.zeros(1)
+    if found.size and found.shape[-1:] != (2,):
+        raise InputError(f"{name} = {values!r}: must be points (R, Z)")
+    return found.reshape(-1, 2)
+
+
 def values(name: str, function: Callable, at: Mapping[str, np.ndarray]) -> np.ndarray:
     """A user's function of arrays of one shape, by name, as floats of that shape; an InputError unless all are finite.
 

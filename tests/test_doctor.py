@@ -147,6 +147,18 @@ def test_a_parison_in_mm_in_a_mould_in_cm():
         bottle(fx.Gent(mu=0.8, Jm=30.0), 3.0, length=10.0)
 
 
+@pytest.mark.parametrize("unit, words", [
+    (1.0, None), (0.5, None), (2.0, None), (0.1, "the mould reaches to R = 9 mm, the sheet to 45 mm.*mm and cm"),
+    (10.0, "the mould is 150 mm away, and reaches to R = 900 mm, the sheet to 45 mm.*mm and cm")])
+def test_a_disc_in_mm_over_a_mould_in_cm(unit, words):
+    mould = fx.tools.cup(radius=45.0 * unit, depth=15.0 * unit, mouth=2.0, fillet=6.0 * unit)
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=45.0, thickness=2.0, elements=(30, 1)), loads=[fx.Pressure("bottom")],
+                     materials=fx.Gent(mu=0.8, Jm=30.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", mould, "stick")])
+    found = [str(f) for f in fx.doctor(scene, targets=[fx.pressure(0.5)], units=MM).findings if "mould" in str(f)]
+    assert [bool(re.search(words or "-", one)) for one in found] == ([True] if words else [])
+
+
 def sharp(along, through, friction="none"):
     """Williams' sheet (Song 1993, section 6.2) under a plug with a sharp edge."""
     return fx.Scene(mesh=fx.mesh.disc(radius=8.89, thickness=0.6985, elements=(along, through)),

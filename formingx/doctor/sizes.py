@@ -26,6 +26,7 @@ _BEYOND = 1.1              # of the largest pressure of a cap, which is 3 % belo
 _LEFT = 0.8                # of a tube's largest pressure, at the mould: see tests/test_doctor.py
 _BLOWN = 8.0               # blow ratio that no bottle has
 _DEEP = 0.5                # of the opening: a wall beyond it that high is a mould's, not a grip's
+_WIDER = 4.0               # times wider than the other: of a sheet and its mould one is in another unit
 _SHARP = 10.0              # degrees that a profile turns at a corner
 _LOOKS = 400               # places of a tool on its way
 _STIFFENS = "a material that stiffens (Gent, ArrudaBoyce, Yeoh, Ogden with an exponent above 2) does"
@@ -236,6 +237,22 @@ def _across(pushed: Pushed, points: np.ndarray) -> np.ndarray:
     return np.array([0.0, np.sign(away[1])]) if not pushed.tall else np.array([1.0, 0.0])
 
 
+def _mould_sizes(body: Body) -> Found:
+    """A sheet beside a mould that stays, many times wider or narrower than what it is to be formed into."""
+    for contact in body.scene.contacts:
+        face, outline = body.scene.mesh.nodes_of(contact.on), contact.tool.outline()
+        wide, reach = float(np.abs(face[:, 0]).max()), np.abs(outline[:, 0])
+        if contact.moves is not None or np.ptp(face[:, 1]) > 0.1 * wide:
+            continue
+        bottom, flange = outline[[np.argmin(reach), np.argmax(reach)], 1] - face[:, 1].mean()
+        gap = float(-contact.tool.signed_distance(face).max())
+        narrow = reach.max() < wide / _WIDER
+        if abs(bottom) > abs(flange) and (narrow or reach.max() > _WIDER * wide and wide < gap < 20 * wide):
+            what = "reaches to" if narrow else f"is {body.say(gap, 'travel')} away, and reaches to"
+            yield repr(contact), (f"the mould {what} R = {body.say(float(reach.max()), 'travel')}, the sheet to"
+                                  f" {body.say(wide, 'travel')}: are the units of length the same (mm and cm)?")
+
+
 def _ways(body: Body) -> Found:
     """A tool that moves away from its face, or past it."""
     for i, tool in enumerate(body.scene.things):
@@ -293,4 +310,5 @@ def _names(body: Body) -> str:
     return ", ".join(dict.fromkeys(str(m) for m in body.scene.materials.values()))
 
 
-CHECKS: Sequence[Callable[[Body], Found]] = (_pressures, _bears, _blow_ratio, _closing, _ways, _sharp_edges)
+CHECKS: Sequence[Callable[[Body], Found]] = (_pressures, _bears, _blow_ratio, _closing, _mould_sizes, _ways,
+                                                 _sharp_edges)

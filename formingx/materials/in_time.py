@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError, positive
 
@@ -14,7 +15,7 @@ class HistoryTests:
 
     stress: Any
 
-    def relaxation(self, mode: str, stretch: float, times: Any) -> np.ndarray:
+    def relaxation(self, mode: str, stretch: float, times: ArrayLike) -> np.ndarray:
         """Nominal stress at times (any shape, at least 0) after a stretch was put on at once, and held; stress."""
         t = np.asarray(times, float)
         if not np.all(t >= 0):
@@ -23,7 +24,7 @@ class HistoryTests:
         held = np.full(len(ordered), positive(f"{self}: relaxation: stretch", stretch))
         return self.stress(mode, held, times=ordered)[back[1:]].reshape(t.shape)[()]
 
-    def constant_rate(self, mode: str, rate: float, stretches: Any) -> np.ndarray:
+    def constant_rate(self, mode: str, rate: float, stretches: ArrayLike) -> np.ndarray:
         """Nominal stress at stretches, shape (n,), all above or all below 1, met at a constant Hencky rate; stress.
 
         Args:

@@ -14,6 +14,7 @@ import copy
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError, instance, known, positive, several
 from . import branches
@@ -143,7 +144,7 @@ class KBKZ(HistoryTests, Material):
         """As `step_energy` where no time passes: its derivative is the stress; its value means nothing."""
         return self.step_energy(F, internal, 0.0, **constants)
 
-    def relaxation_modulus(self, times: Any) -> np.ndarray:
+    def relaxation_modulus(self, times: ArrayLike) -> np.ndarray:
         """G(t) = G_equilibrium + sum G exp(-t/tau) of small shear, at times of any shape; stress."""
         rest = 0.0 if (left := self.equilibrium) is None else left.shear_modulus
         return rest + self._modulus(times)
@@ -153,7 +154,8 @@ class KBKZ(HistoryTests, Material):
         t = np.asarray(times, float)
         return sum((G * np.exp(-t / tau) for G, tau in self.spectrum), np.zeros(t.shape))
 
-    def stress(self, mode: str, stretches: Any, times: Any = None, between: str = "stretch") -> np.ndarray:
+    def stress(self, mode: str, stretches: ArrayLike, times: ArrayLike | None = None,
+               between: str = "stretch") -> np.ndarray:
         """Nominal stress, force over reference area, of a test; stress. Error below 1e-8 of it.
 
         Args:

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import copy
 import functools
-import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import ufl
+from numpy.typing import ArrayLike
 
 from ..errors import InputError, finite, known, positive
 from ..figures import figure
@@ -51,11 +51,6 @@ class Material:
     integral: Any = None
     stores_energy: Any = True
     symmetric: Any = True
-
-    def __init_subclass__(cls, **options: Any):
-        super().__init_subclass__(**options)
-        if "__init__" in vars(cls):
-            setattr(cls, "__init__", _by_name(cls.__init__))  # noqa: B010  mypy does not let it be assigned
 
     def strain_energy(self, F: Any, *args: Any, **constants: Any) -> Any:
         """Energy per reference volume of F, shape (3, 3); a UFL scalar, zero at F = I.
@@ -162,7 +157,7 @@ class Material:
         """The energy's derivatives by the principal stretches, for any constants."""
         return Response(self.strain_energy, list(self.parameters))
 
-    def stress(self, mode: str, stretches: Any) -> np.ndarray:
+    def stress(self, mode: str, stretches: ArrayLike) -> np.ndarray:
         """Nominal stress, force over reference area, of a test. Unit: stress.
 
         P = dW/dl / n along the test, with n = 1 direction pulled, or 2.
@@ -176,10 +171,7 @@ class Material:
             InputError: unknown mode, a stretch that is not positive or beyond the material's limit.
         """
         known(f"{self}: stress: mode", mode, MODES)
-        try:
-            l = np.asarray(stretches, dtype=float)
-        except (TypeError, ValueError):
-            raise InputError(f"{self}: stress: stretches = {stretches!r}: must be numbers") from None
+        l = np.asarray(stretches, dtype=float)
         flat = l.ravel()
         for bad in flat[~((flat > 0) & np.isfinite(flat))][:1]:
             raise InputError(f"{self}: a stretch of {bad:.6g}: must be finite and greater than 0")
@@ -269,11 +261,11 @@ class Material:
         """[(value, lowest, highest)]: what a fit varies. All constants within are admissible."""
         return [(float(value), -math.inf, math.inf) for value in self._numbers()]
 
-    def constants_at(self, coordinates: Any) -> list[float]:
+    def constants_at(self, coordinates: Sequence[float] | np.ndarray) -> list[float]:
         """The constants at coordinates."""
         return list(coordinates)
 
-    def with_constants(self, constants: Any) -> Material:
+    def with_constants(self, constants: Sequence[Any]) -> Material:
         """The same kind of material with other constants, in the order of `parameters`."""
         other = copy.copy(self)                             # with its `response`, which holds for any constants
         other.parameters = dict(zip(self.parameters, map(float, constants), strict=True))
@@ -312,23 +304,6 @@ class Material:
 
     def __str__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{k}={brief(v)}' for k, v in self.parameters.items())})"
-
-
-def _by_name(make: Callable) -> Callable:
-    """An `__init__` that says in words how its arguments are given, where they are not."""
-    signature = inspect.signature(make)
-
-    @functools.wraps(make)
-    def checked(self: Material, *args: Any, **constants: Any) -> None:
-        try:
-            signature.bind(self, *args, **constants)
-        except TypeError as error:
-            name, parameters = type(self).__name__, list(signature.parameters.values())[1:]
-            words = ", ".join(f"{p.name}=..." if p.kind is p.KEYWORD_ONLY else str(p).partition(":")[0]
-                              for p in parameters)
-            raise InputError(f"{name}: {error}: must be {name}({words})") from None
-        make(self, *args, **constants)
-    return checked
 
 
 def brief(value: Any) -> str:

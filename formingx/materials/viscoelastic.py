@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import ufl
+from numpy.typing import ArrayLike
 
 from ..errors import InputError, instance, known, positive, several
 from ..figures import figure
@@ -182,13 +183,14 @@ class RelaxingMaterial(HistoryTests, Material):
             after[name] = self._advanced(C, before, _entries(internal[name]), time_step / tau)
         return {name: ufl.as_vector(entries) for name, entries in after.items()}
 
-    def relaxation_modulus(self, times: Any) -> np.ndarray:
+    def relaxation_modulus(self, times: ArrayLike) -> np.ndarray:
         """G(t) = G_equilibrium + sum mu exp(-t/tau) of small shear, at times of any shape; stress."""
         t = np.asarray(times, float)
         modulus: Any = 0.0 if (rest := self.equilibrium) is None else rest.shear_modulus
         return modulus + sum(mu * np.exp(-t / tau) for mu, tau in self.branches)
 
-    def stress(self, mode: str, stretches: Any, times: Any = None, between: str = "stretch") -> np.ndarray:
+    def stress(self, mode: str, stretches: ArrayLike, times: ArrayLike | None = None,
+               between: str = "stretch") -> np.ndarray:
         """Nominal stress, force over reference area, of a test; stress.
 
         Args:

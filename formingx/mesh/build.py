@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ..errors import InputError, count, finite, known, non_negative, positive
+from ..errors import InputError, as_points, count, finite, known, non_negative, positive
 from .grid import Grid, to_mesh
 from .mesh import Mesh
 
@@ -259,11 +259,8 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
 
 
 def _points(name: str, points: Any) -> np.ndarray:
-    try:
-        found = np.array(points, dtype=float)
-    except (TypeError, ValueError):
-        found = np.zeros(0)
-    if found.ndim != 2 or found.shape[1] != 2 or len(found) < 2 or not np.all(np.isfinite(found)):
+    found = np.array(as_points(name, points))
+    if len(found) < 2 or not np.all(np.isfinite(found)):
         raise InputError(f"{name} = {points!r}: must be at least two points (R, Z) of finite numbers")
     return found
 

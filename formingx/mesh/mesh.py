@@ -64,6 +64,7 @@ class Mesh:
 
     def facets_of(self, boundary: str) -> np.ndarray:
         """Local facet indices of a boundary, sorted, shape (n,), ghosts included."""
+        known("Mesh: boundary", boundary, self.boundaries)
         return np.sort(np.concatenate([self.facets.find(tag) for tag in self.boundaries[boundary]]))
 
     def with_part(self, name: str, of: str, within: tuple[float, float], along: str = "r") -> Mesh:

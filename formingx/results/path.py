@@ -9,8 +9,9 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..errors import ConvergenceError, InputError, finite, known
+from ..errors import ConvergenceError, InputError, as_points, finite, known
 from ..measures import columns as standard_columns
 from ..measures.targets import Bound, Target, is_met, process_time
 from ..solve import predictor
@@ -481,12 +482,12 @@ class Path:
         from .evaluate.contact_face import ContactFace, contact_of
         return ContactFace(self, contact_of(self, tool, "contact")[0]).of(state or self.last)
 
-    def temperature(self, points: Any, state: State | None = None) -> np.ndarray:
+    def temperature(self, points: ArrayLike, state: State | None = None) -> np.ndarray:
         """Of the body in a state (default: the last) at reference points (R, Z), shape (n, 2), length: shape (n,)."""
         if self.problem.temperature is None:
             raise InputError("temperature: the scene has none: give Scene a temperature=...")
         with self.problem.at(state or self.last) as problem:
-            return problem.temperature.at(points)
+            return problem.temperature.at(as_points("Path.temperature: points", points))
 
     def tool_forces(self) -> dict[str, np.ndarray]:
         """{tool: its force at all states}: positive when it resists its travel; of a tool that stays, along Z."""

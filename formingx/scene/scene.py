@@ -228,6 +228,7 @@ class Scene:
 
     def shear_modulus(self, layer: str) -> float:
         """Modulus of small shear of a layer, stress; of constants that vary the largest in it, all ranks."""
+        known("Scene: layer", layer, self._moduli)
         return self._moduli[layer]
 
     def _check_boundaries(self) -> None:

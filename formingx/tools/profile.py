@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, finite, instance, non_negative, pair, positive, several
+from ..errors import InputError, as_points, finite, instance, non_negative, pair, positive, several
 from ..mesh.boxes import overlapping
 
 _FLAT = 1e-9          # radians: a joint that turns less is smooth
@@ -163,7 +163,7 @@ class Tool:
 
     def nearest(self, x: np.ndarray) -> Nearest:
         """Signed distance of points x, shape (n, 2), its gradient and its curvature."""
-        x = np.asarray(x, dtype=float).reshape(-1, 2)
+        x = as_points("Tool: x", x)
         rel, arcs = x[:, None] - self._origin, self._arcs
         at, d = (np.einsum("ijk,jk->ij", rel, way) for way in (self._along, self._left))
         across, up = rel[:, arcs, 0], rel[:, arcs, 1]

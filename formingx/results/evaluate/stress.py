@@ -25,10 +25,11 @@ import ufl
 from dolfinx import fem, la
 from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
+from numpy.typing import ArrayLike
 from petsc4py import PETSc
 
 from ... import _compat
-from ...errors import InputError, known, pair
+from ...errors import InputError, as_points, known, pair
 from ...mesh.locate import Place, locate
 from .patches import Patches
 from .stress_error import Fitted, StressError, StressPeak
@@ -114,7 +115,7 @@ class StressField:
         self._recovery, self._state = recovery, state
         self._nodes = recovery.project(state)
 
-    def at(self, points: Any, layer: str | None = None) -> Stress:
+    def at(self, points: ArrayLike, layer: str | None = None) -> Stress:
         """Projected stresses at reference points (R, Z), shape (n, 2), the same on all ranks; collective.
 
         Args:
@@ -125,15 +126,15 @@ class StressField:
         """
         recovery = self._recovery
         layer = recovery.layer(layer)
-        points = np.atleast_2d(np.asarray(points, dtype=float))
-        comm, place = recovery.problem.comm, recovery.locate(points, layer)
-        values = np.zeros((len(points), _COUNT))
+        at = as_points("Stress: points", points)
+        comm, place = recovery.problem.comm, recovery.locate(at, layer)
+        values = np.zeros((len(at), _COUNT))
         if len(place.mine):
             shapes: Any = recovery.element.tabulate(0, place.reference)
             dofs = recovery.space.dofmap.list[place.cells]
             column = list(recovery.cells).index(layer)
             values[place.mine] = np.einsum("nk,nkc->nc", shapes[0], self._nodes[dofs, column])
-        return _unpack(points, comm.allreduce(values, MPI.SUM))
+        return _unpack(at, comm.allreduce(values, MPI.SUM))
 
     def in_cells(self, reference: np.ndarray) -> Stress:
         """Projected stresses at places (k, 2) of the reference cell in each of this rank's m cells: of m k points.

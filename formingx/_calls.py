@@ -1,0 +1,190 @@
+"""Public calls with arguments of another kind, or number, than they take: an InputError that says what they take.
+
+A call that fails is explained: its arguments are held against its signature, and against its annotations. What an
+argument's value may be, each function checks itself (`errors.py`).
+"""
+
+from __future__ import annotations
+
+import collections.abc
+import functools
+import inspect
+import os
+import sys
+import types
+import typing
+from collections.abc import Callable, Iterable, Mapping
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .errors import ConvergenceError, InputError
+
+_SAID = (InputError, ConvergenceError, OSError)              # in words already
+_WORDS = {float: "a number", int: "a whole number", str: "a word", bool: "True or False", type(None): "None"}
+
+
+_PACKAGE = __name__.partition(".")[0]
+_seen: set[type] = set()
+
+
+def explain(module: types.ModuleType) -> None:
+    """Explain the calls that fail of all that a module of the package exports: functions, classes and their methods."""
+    for name, thing in list(vars(module).items()):
+        if name.startswith("_") or not getattr(thing, "__module__", "").startswith(_PACKAGE):
+            continue
+        if isinstance(thing, type) and not issubclass(thing, BaseException):
+            _explain_class(thing)
+        elif isinstance(thing, types.FunctionType):
+            known = _explained(thing, thing.__name__, skip=0)
+            setattr(sys.modules[thing.__module__], thing.__name__, known)    # where pickle looks for it
+            setattr(module, name, known)
+
+
+def _explain_class(cls: type) -> None:
+    """The public methods of a class and of its bases; those of what they return when they do."""
+    _seen.add(cls)
+    for base in cls.__mro__:
+        if base.__module__.startswith(_PACKAGE):
+            _explain_methods(base)
+
+
+def _explain_methods(cls: type) -> None:
+    for name, method in list(vars(cls).items()):
+        makes = name in ("__init__", "__new__")
+        if name.startswith("_") and not makes:
+            continue
+        known = cls.__name__ if makes else f"{cls.__name__}.{name}"
+        if isinstance(method, types.FunctionType):
+            setattr(cls, name, _explained(method, known, skip=1))
+        elif isinstance(method, classmethod | staticmethod):
+            bound = makes or isinstance(method, classmethod)
+            setattr(cls, name, type(method)(_explained(method.__func__, known, skip=int(bound))))
+
+
+def _explained(call: Callable, name: str, skip: int) -> Callable:
+    """`call`, whose first `skip` arguments are the object's own."""
+    if getattr(call, "_is_explained", False) or inspect.isgeneratorfunction(call):
+        return call
+
+    @functools.wraps(call)
+    def known(*args: Any, **given: Any) -> Any:
+        try:
+            result = call(*args, **given)
+        except _SAID:
+            raise
+        except Exception as error:
+            why = _wrong(call, name, skip, args, given)
+            if why is None:
+                raise
+            raise InputError(why) from error
+        if type(result) not in _seen:
+            _explain_class(type(result))
+        return result
+    known._is_explained = True                               # type: ignore[attr-defined]
+    return known
+
+
+def _wrong(call: Callable, name: str, skip: int, args: tuple, given: dict[str, Any]) -> str | None:
+    """What is wrong with the arguments of a call, in words; None: nothing that its signature tells."""
+    signature = inspect.signature(call)
+    try:
+        bound = signature.bind(*args, **given).arguments
+    except TypeError as error:
+        takes = ", ".join(map(_parameter, list(signature.parameters.values())[skip:]))
+        return f"{name}: {error}: must be {name}({takes})"
+    try:
+        kinds = typing.get_type_hints(call)
+    except Exception:  # noqa: BLE001  of a user's own class: names that are known to a type checker alone
+        return None
+    for parameter, value in list(bound.items())[skip:]:
+        how, kind = signature.parameters[parameter].kind, kinds.get(parameter, Any)
+        values = (value if how is inspect.Parameter.VAR_POSITIONAL else
+                  value.values() if how is inspect.Parameter.VAR_KEYWORD else [value])
+        for one in values:
+            if not _is(one, kind):
+                return f"{name}: {parameter} = {_short(one)}: must be {_said(kind)}"
+    return None
+
+
+def _parameter(p: inspect.Parameter) -> str:
+    if p.kind in (p.VAR_POSITIONAL, p.VAR_KEYWORD):
+        return str(p.replace(annotation=p.empty))
+    if p.default is p.empty:
+        return f"{p.name}=..." if p.kind is p.KEYWORD_ONLY else p.name
+    return f"{p.name}={p.default!r}" if len(repr(p.default)) < 20 else f"{p.name}=..."
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) < 100 else text[:97] + "..."
+
+
+def _is(value: Any, kind: Any) -> bool:
+    """Whether a value is of the kind that an annotation names; where that cannot be told, it is."""
+    origin, of = typing.get_origin(kind) or kind, typing.get_args(kind)
+    if kind is Any or isinstance(kind, typing.TypeVar):
+        return True
+    if kind is np.ndarray or kind == ArrayLike:
+        return _numbers(value)
+    if origin in (typing.Union, types.UnionType):
+        return any(_is(value, one) for one in of)
+    if origin is typing.Literal:
+        return any(value is one or value == one for one in of if type(value) is type(one))
+    if kind is float or kind is int:
+        number = Real if kind is float else Integral
+        return isinstance(value, number) and not isinstance(value, bool) and _numbers(value)
+    if kind is bool:
+        return isinstance(value, bool | np.bool_)
+    if kind is None or kind is type(None):
+        return value is None
+    if origin is collections.abc.Callable:
+        return callable(value)
+    if not isinstance(origin, type) or getattr(origin, "_is_protocol", False):
+        return True
+    if origin in (os.PathLike, Path):
+        return isinstance(value, os.PathLike)
+    if not isinstance(value, origin) or isinstance(value, str | bytes) and of:      # a word is no list of words
+        return False
+    entries: Any = value
+    if issubclass(origin, Mapping) and len(of) == 2:
+        return all(_is(k, of[0]) and _is(v, of[1]) for k, v in entries.items())
+    if isinstance(value, list | tuple) and of:
+        if origin is tuple and of[-1] is not Ellipsis:
+            return len(value) == len(of) and all(map(_is, value, of))
+        return all(_is(one, of[0]) for one in value)
+    return True
+
+
+def _numbers(value: Any) -> bool:
+    try:
+        return not isinstance(value, str | bytes) and np.asarray(value, float) is not None
+    except (TypeError, ValueError, OverflowError):
+        return False
+
+
+def _said(kind: Any) -> str:
+    """An annotation in words."""
+    origin, of = typing.get_origin(kind) or kind, [k for k in typing.get_args(kind) if k is not Ellipsis]
+    if kind is np.ndarray or kind == ArrayLike:
+        return "numbers"
+    if origin in (typing.Union, types.UnionType):
+        return " or ".join(dict.fromkeys(map(_said, of)))
+    if origin is typing.Literal:
+        return " or ".join(map(repr, of))
+    if kind in _WORDS:
+        return _WORDS[kind]
+    if origin is collections.abc.Callable:
+        return "a function"
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        return "a dict" + (f" of {_said(of[0])}: {_said(of[1])}" if len(of) == 2 else "")
+    if origin in (os.PathLike, Path):
+        return "a path"
+    if origin is tuple and of and Ellipsis not in typing.get_args(kind):
+        return f"({', '.join(map(_said, of))})"
+    if isinstance(origin, type) and issubclass(origin, Iterable) and of:
+        return f"a list of {_said(of[0])}"
+    return f"a {getattr(origin, '__name__', origin)}"

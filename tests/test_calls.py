@@ -1,0 +1,56 @@
+"""Calls with arguments of another kind, or number, than they take: errors in words, by one mechanism for all."""
+
+import inspect
+import pickle
+
+import numpy as np
+import pytest
+from conftest import treloar
+
+import formingx as fx
+
+
+@pytest.fixture(scope="module")
+def path():
+    return fx.trace(treloar(elements=(8, 1)), until=fx.pole_height(0.2), progress=False)
+
+
+@pytest.mark.parametrize("call, words", [
+    (lambda p: fx.mesh.disc(1.0, 0.1), r"disc: too many positional .*: must be disc\(radius=\.\.\., thickness=\.\.\."),
+    (lambda p: fx.mesh.disc(radius=1.0, thicknes=0.1), r"disc: missing .* 'thickness'"),
+    (lambda p: fx.StepControl(lenght=0.1), r"unexpected .* 'lenght': must be StepControl\(length=0.1, target=4"),
+    (lambda p: fx.Pressure("bottom", 1.0, None, 3), r"must be Pressure\(on, value=None, name=None\)"),
+    (lambda p: fx.SimplySupported(of="rim"), r"must be SimplySupported\(on, weight="),
+    (lambda p: fx.trace(p.problem.scene, fx.pole_height(0.1), 3), "trace: too many positional"),
+    (lambda p: fx.tools.cup(1, 2), "cup: too many positional"),
+    (lambda p: fx.tools.plane(1.0).moved(up=3), r"Tool.moved: .*'up': must be Tool.moved\(r=0.0, z=0.0\)"),
+    (lambda p: p.plot("pole_height"), r"must be Path.plot\(y, x, axes=None, \*\*style\)"),
+    (lambda p: p.view3d("there.png", 3), "state = 3: must be a State or None"),
+    (lambda p: p.at(0.4), "Path.at: target = 0.4: must be a Target"),
+    (lambda p: p.stress().at("pole"), "Stress: points = 'pole': must be points"),
+    (lambda p: p.profile().thickness_ratio_at("rim"), "radius = 'rim': must be "),
+    (lambda p: p.wall().at_height(), r"Wall.at_height: missing"),
+    (lambda p: p.problem.scene.mesh.nodes_of("side"), "boundary 'side' is not known; known: 'axis', 'rim'"),
+    (lambda p: p.problem.scene.shear_modulus("skin"), "layer 'skin' is not known; known: 'sheet'"),
+    (lambda p: fx.NeoHookean(c10=1.0).stress("uniaxial", {}), r"Material.stress: stretches = {}: must be numbers"),
+    (lambda p: fx.tools.plane(1.0).signed_distance([1, 2, 3]), r"must be points \(R, Z\)"),
+])
+def test_wrong_calls(path, call, words):
+    with pytest.raises(fx.InputError, match=words):
+        call(path)
+
+
+def test_a_fault_of_its_own_is_not_hidden():
+    """What is raised though all arguments are of the right kind, as by a script's function, goes through."""
+    def radius(energy):
+        return energy.no_such_thing
+    with pytest.raises(AttributeError, match="no_such_thing"):
+        fx.trace(treloar(elements=(8, 1)), until=fx.pole_height(0.2), progress=False, record={"r": radius})
+
+
+def test_calls_stay_what_they_are():
+    assert list(inspect.signature(fx.mesh.disc).parameters)[:2] == ["radius", "thickness"]
+    assert "Treloar" in fx.treloar1944.__doc__ and fx.mesh.disc.__name__ == "disc"
+    assert pickle.loads(pickle.dumps(fx.mesh.disc)) is fx.mesh.disc
+    assert pickle.loads(pickle.dumps(fx.pressure)) is fx.pressure
+    assert np.array_equal(fx.tools.plane(1.0).signed_distance([0.5, 3.0]), [2.0])
