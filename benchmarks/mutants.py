@@ -136,7 +136,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("results/evaluate/work.py", "f.at(s) * y.slope(s)", "f.at(1) * y.slope(s)", "ledger"),
     ("results/evaluate/work.py", "+ _friction_of(c, b, problem)) / 2 * slid", "+ 0) / 2 * slid", "ledger"),
     ("results/evaluate/work.py", "temperature._replace(before=None)", "temperature", "ledger"),
-    ("results/path.py", "history.advance(x, control)", "pass", "ledger"),
+    ("results/states.py", "history.advance(x, control)", "pass", "ledger"),
     ("results/evaluate/tension.py", "- F[1, 1] * P[1, 1])", "+ F[1, 1] * P[1, 1])", "membrane"),
     ("results/evaluate/part.py", "(r * r + r * s + s * s) * (w - z)", "(r * r + s * s) * 1.5 * (w - z)", "details"),
     ("results/evaluate/contact_face.py", "(traction / ratio).T", "traction.T", "answers"),

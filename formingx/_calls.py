@@ -57,7 +57,7 @@ def _explain_methods(cls: type) -> None:
         makes = name in ("__init__", "__new__")
         if name.startswith("_") and not makes:
             continue
-        known = cls.__name__ if makes else f"{cls.__name__}.{name}"
+        known = cls.__name__ if makes else name
         if isinstance(method, types.FunctionType):
             setattr(cls, name, _explained(method, known, skip=1))
         elif isinstance(method, classmethod | staticmethod):
@@ -66,7 +66,7 @@ def _explain_methods(cls: type) -> None:
 
 
 def _explained(call: Callable, name: str, skip: int) -> Callable:
-    """`call`, whose first `skip` arguments are the object's own."""
+    """`call`, whose first `skip` arguments are the object's own, or its class's."""
     if getattr(call, "_is_explained", False) or inspect.isgeneratorfunction(call):
         return call
 
@@ -77,7 +77,9 @@ def _explained(call: Callable, name: str, skip: int) -> Callable:
         except _SAID:
             raise
         except Exception as error:
-            why = _wrong(call, name, skip, args, given)
+            makes = call.__name__ in ("__init__", "__new__")
+            owner = None if makes or not skip else args[0] if isinstance(args[0], type) else type(args[0])
+            why = _wrong(call, f"{owner.__name__}.{name}" if owner else name, skip, args, given)
             if why is None:
                 raise
             raise InputError(why) from error

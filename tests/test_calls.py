@@ -32,7 +32,7 @@ def path():
     (lambda p: p.wall().at_height(), r"Wall.at_height: missing"),
     (lambda p: p.problem.scene.mesh.nodes_of("side"), "boundary 'side' is not known; known: 'axis', 'rim'"),
     (lambda p: p.problem.scene.shear_modulus("skin"), "layer 'skin' is not known; known: 'sheet'"),
-    (lambda p: fx.NeoHookean(c10=1.0).stress("uniaxial", {}), r"Material.stress: stretches = {}: must be numbers"),
+    (lambda p: fx.NeoHookean(c10=1.0).stress("uniaxial", {}), r"NeoHookean.stress: stretches = {}: must be numbers"),
     (lambda p: fx.tools.plane(1.0).signed_distance([1, 2, 3]), r"must be points \(R, Z\)"),
 ])
 def test_wrong_calls(path, call, words):
