@@ -67,6 +67,9 @@ class Flow(Run):
             except Cutback as cut:
                 self.step.length = cut.part * dt / self._duration
                 self._failed(str(cut), self.step.length)
+                if self.step.length < self.step.smallest:
+                    self._give_up(f"the step in time became shorter than {self.step.smallest * self._duration:.3g}:"
+                                  f" {cut}")
             except Failure as failure:
                 self.step.length = dt / self._duration
                 good = self.step.failed()

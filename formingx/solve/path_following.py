@@ -22,7 +22,7 @@ from . import predictor
 from .arc_length import Predictor
 from .diagnose import Diagnosis, diagnose
 from .equations import Array, Attempt, Measure
-from .newton import Failure, tangents
+from .newton import Failure, fixed, tangents
 from .progress import Aim, Progress
 from .record import Record, Unusable
 from .snap_through import NoEquilibrium, SnapThrough, at_limit_points, snap_through, snaps, was_passed
@@ -212,6 +212,7 @@ class Run:
         a history: slip in a step is predicted along the tangent, which at rest knows no contact yet.)
         """
         first, failed, most, limit = self.step.length, 0, np.inf, self.problem.limit
+        held: float | None = None                           # a control, where the error in time has cut a step short
         lengths, last = [*self.settings.snap_through.lengths, 0.0], self.settings.snap_through.lengths[-1]
         if snaps(self.curve, old, self._at_fold, self._sense):
             return self._snap(old)
@@ -222,13 +223,15 @@ class Run:
             if length < self.step.length:
                 self._limited("contact arriving", length)
             try:
-                return self._take(old, length, target, bound, reach)
+                return self._take(old, length, target, bound, reach, held)
             except Cutback as cut:
-                most = cut.part * reach
+                most, held = cut.part * reach, cut.control
                 self.step.length = most if cut.lasts else self.step.length
                 self._failed(str(cut), most)
+                if most < self.step.smallest:
+                    self._give_up(f"the step became shorter than {self.step.smallest:g}: {cut}")
             except Failure as failure:
-                self.step.length = length
+                self.step.length, held = length, None
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good = self.step.failed()
                 self._failed(failure.reason, self.step.length)
@@ -256,14 +259,20 @@ class Run:
         self._progress.limited(why, length)
 
     def _take(self, old: State, length: float, target: Target | None, bound: Measure | None,
-              reach: float) -> list[State]:
-        """One step of a length, or to a target that is within reach; raises `Failure` or `Cutback`."""
+              reach: float, held: float | None = None) -> list[State]:
+        """One step of a length, or to a target that is within reach; raises `Failure` or `Cutback`.
+
+        held: the control at its end, in place of the length.
+        """
         limit = self.problem.limit
         if limit:
             limit.prepare(Way(old.x, old.control, old.direction, old.slope, reach), ends=True)
         behind = None if self.problem.has_kinks else predictor.behind(self.states, reach, self.curve.distance)
         with self.curve.newton.in_a_hurry(length > self.settings.snap_through.lengths[0]):
-            if target is None or bound is None:
+            if (target is None or bound is None) and held is not None:
+                new = self.curve.step_to(old, reach, fixed(held), self._predictor, behind)
+                new.kind = "step"
+            elif target is None or bound is None:
                 new = self.curve.step(old, length, self._predictor, behind)
             else:
                 new = self.curve.step_to(old, reach, bound.equation(target.value), self._predictor, behind)
@@ -300,7 +309,9 @@ class Run:
             return 0.0
         error = self._time_error.of(self.states, new.x, new.control)
         if error > self.settings.inaccurate:
-            raise Cutback("the error in time", max(0.8 * error ** (-1 / 3), 0.1), lasts=True)
+            part = max(0.8 * error ** (-1 / 3), 0.1)
+            past = self.states[-1].control
+            raise Cutback("the error in time", part, lasts=True, control=past + part * (new.control - past))
         return error
 
     def _snap(self, old: State) -> list[State]:
@@ -440,11 +451,15 @@ class Run:
 
 
 class Cutback(Exception):
-    """A step is too long; part: of its length, that will do. lasts: of the steps after it, too."""
+    """A step is too long; part: of its length, that will do. lasts: of the steps after it, too.
 
-    def __init__(self, why: str, part: float, lasts: bool = False):
+    control: to hold at the end of the shorter step, in place of its length. Along the path a step in time may be far
+    from short in time where the body moves at once as a step begins.
+    """
+
+    def __init__(self, why: str, part: float, lasts: bool = False, control: float | None = None):
         super().__init__(why)
-        self.part, self.lasts = part, lasts
+        self.part, self.lasts, self.control = part, lasts, control
 
 
 class _Astray(Failure):
