@@ -212,7 +212,7 @@ class Run:
         a history: slip in a step is predicted along the tangent, which at rest knows no contact yet.)
         """
         first, failed, most, limit = self.step.length, 0, np.inf, self.problem.limit
-        held: float | None = None                           # a control, where the error in time has cut a step short
+        held: float | None = None                           # a control, where shorter steps do not reduce the error
         lengths, last = [*self.settings.snap_through.lengths, 0.0], self.settings.snap_through.lengths[-1]
         if snaps(self.curve, old, self._at_fold, self._sense):
             return self._snap(old)
@@ -225,7 +225,7 @@ class Run:
             try:
                 return self._take(old, length, target, bound, reach, held)
             except Cutback as cut:
-                most, held = cut.part * reach, cut.control
+                most, held = cut.part * reach, cut.control if cut.lasts and most < np.inf else None
                 self.step.length = most if cut.lasts else self.step.length
                 self._failed(str(cut), most)
                 if most < self.step.smallest:
