@@ -15,6 +15,7 @@ from .errors import ConvergenceError, InputError, Interrupted, count, finite, in
 from .heat import cooling
 from .measures.columns import Measure
 from .measures.targets import Amplitude, Target
+from .mesh.adapted import adapted, of_columns
 from .physics.contact import Contact
 from .results.evaluate import edges, snaps, tension, volume
 from .results.files.checkpoint import Checkpoint, holds_states, read
@@ -38,7 +39,8 @@ log = logging.getLogger("formingx")
 def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: StepControl | None = None,
           tolerances: Tolerances | None = None, max_steps: int | None = None, progress: bool = True,
           start: Path | None = None, checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
-          at_fold: str | None = None, resume: bool = False, beyond: bool = False) -> Path:
+          at_fold: str | None = None, resume: bool = False, beyond: bool = False,
+          pilot: bool | Mapping[str, float] = False) -> Path:
     """Follow the equilibrium path from the unloaded body until a target is reached, through limit points.
 
     Args:
@@ -64,6 +66,9 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
         resume: go on from what the checkpoint holds, which must be of this scene; if it holds nothing, begin.
         beyond: go on, with a warning, where a state is none that a body can have: folded, inside a tool, elements
             inside out. (`State.verdict` says so; by default the run ends there.)
+        pilot: run twice: on the scene's mesh, which may be coarse, and from rest again on `mesh.adapted(path)`, which
+            has columns of elements as the first run asks for. True, or arguments of that, such as {"error": 0.02}.
+            `Path.pilot` is the first run; a first run that did not reach the target counts as far as it came.
 
     Raises:
         InputError: nothing is driven, a target needs something that the scene does not have or cannot be met (it is
@@ -80,6 +85,10 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     (1, 12.0)
     """
     instance("trace: scene", scene, Scene, "a formingx.Scene")
+    if pilot is not False:
+        return _after_pilot("trace", pilot, start, resume, scene, checkpoint, lambda scene, checkpoint: trace(
+            scene, until=until, through=through, step=step, tolerances=tolerances, max_steps=max_steps,
+            progress=progress, checkpoint=checkpoint, record=record, at_fold=at_fold, beyond=beyond))
     through = several("trace: through", through, "targets, such as pole_stretch(3)")
     for target in (until, *through):
         instance("trace: target", target, Target, "a target, such as pole_stretch(3)")
@@ -170,7 +179,8 @@ class Process:
     def run(self, stages: Sequence[Stage], *, step: StepControl | None = None, tolerances: Tolerances | None = None,
             max_steps: int | None = None, progress: bool = True, start: Path | State | None = None,
             checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
-            accuracy: str | float = "standard", resume: bool = False, beyond: bool = False) -> Path:
+            accuracy: str | float = "standard", resume: bool = False, beyond: bool = False,
+            pilot: bool | Mapping[str, float] = False) -> Path:
         """Run the stages; one path holds the states of all of them, every stage from a state of kind "start" on.
 
         Args:
@@ -187,7 +197,7 @@ class Process:
             accuracy: of the steps in time of a material that relaxes, "draft", "standard" or "fine" (1, 0.2, 0.03 % of
                 stress and thickness), or such an error as a number.
             resume: go on from what the checkpoint holds, which must be of this process; if it holds nothing, begin.
-            beyond: see `trace`.
+            beyond, pilot: see `trace`.
 
         Raises:
             InputError: a stage drives or leaves out something that the scene does not have, leaves the body free to
@@ -197,6 +207,11 @@ class Process:
             OSError: the checkpoint cannot be written; the states in it are kept.
         """
         stages = self._checked(stages)
+        if pilot is not False:
+            return _after_pilot("Process", pilot, start, resume, self.scene, checkpoint, lambda scene, checkpoint:
+                                Process(scene).run(stages, step=step, tolerances=tolerances, max_steps=max_steps,
+                                                   progress=progress, checkpoint=checkpoint, record=record,
+                                                   accuracy=accuracy, beyond=beyond))
         instance("Process: step", step, StepControl | None, "a StepControl or None")
         instance("Process: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
         instance("Process: progress", progress, bool, "True or False")
@@ -250,6 +265,34 @@ def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
             differs.
     """
     return Path(read(folder, scene, state))
+
+
+def _after_pilot(who: str, pilot: Any, start: Any, resume: bool, scene: Scene, checkpoint: Any,
+                 run: Callable[[Scene, Any], Path]) -> Path:
+    """The path of a run on the mesh that a first run asks for."""
+    if start is not None or resume:
+        raise InputError(f"{who}: pilot={pilot!r}: the run begins at rest; with start or resume it goes on with the"
+                         f" mesh that it has: give one of them")
+    if pilot is not True and not isinstance(pilot, Mapping):
+        raise InputError(f"{who}: pilot = {pilot!r}: must be True, False or arguments of mesh.adapted, such as"
+                         f" {{'error': 0.02}}")
+    options = {} if pilot is True else dict(pilot)
+    for name in options:
+        known(f"{who}: pilot", name, ("share", "error"))
+    before = len(of_columns(scene.mesh).ends) - 1
+    try:
+        first = run(scene, None)
+    except ConvergenceError as error:
+        if error.path is None or len(error.path) < 3:
+            raise
+        first = error.path
+        log.warning("the pilot run ended early, at %s; the mesh is made by what it has", first.describe(first.last))
+    made = adapted(first, **options)
+    log.info("pilot run: %d states on %d columns of elements; adapted: %d", len(first), before,
+             len(of_columns(made).ends) - 1)
+    path = run(scene.with_mesh(made), checkpoint)
+    path.pilot = first
+    return path
 
 
 def _check_start(state: State, stages: list[Stage], problem: Problem) -> None:

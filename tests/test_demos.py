@@ -202,6 +202,48 @@ def test_throne_plug_quick(tmp_path):
 
 
 @pytest.mark.slow
+def test_plug_adapted_quick(tmp_path):
+    found = summary("plug_adapted", tmp_path, "--quick")["mu_0.3"]
+    assert found["columns_of_pilots"] == [30] and 30 < found["columns"] < 60 and found["jumps"] == 0
+    assert found["force_N"]["2"] == pytest.approx(found["uniform"]["force_N"]["2"], rel=5e-3)
+    assert found["force_N"]["4"] == pytest.approx(357, rel=5e-3)
+    assert drawn(tmp_path / "plug_adapted.png")
+
+
+@pytest.mark.slow
+def test_plug_adapted(tmp_path):
+    """Pilots at half the columns are as near to the membrane, which knows no bending, as uniform ones."""
+    found = summary("plug_adapted", tmp_path)
+    for mu, force in (("0.1", 861), ("0.3", 1057), ("0.5", 1183), ("1", 1350)):
+        numbers = found[f"mu_{mu}"]
+        assert numbers["force_N"]["8"] == pytest.approx(force, rel=0.015)
+        assert numbers["force_N"]["12"] == pytest.approx(numbers["membrane_force_N"]["12"], rel=0.05)
+    assert found["fillet_h0/8"]["force_N"]["8"] == pytest.approx(1153, rel=0.05)
+
+
+def test_cup_adapted_quick(tmp_path):
+    found = summary("cup_adapted", tmp_path, "--quick")
+    (uniform, adapted) = (found[name]["largest_error"] for name in ("uniform", "adapted"))
+    assert min(adapted.values()) < uniform["20"]
+    assert drawn(tmp_path / "cup_adapted.png")
+
+
+@pytest.mark.slow
+def test_cup_adapted(tmp_path):
+    """Adapted columns at less than half as many are as good as columns of one size."""
+    found = summary("cup_adapted", tmp_path)
+    uniform, adapted = ({int(n): e for n, e in found[name]["largest_error"].items()} for name in ("uniform", "adapted"))
+    assert len(adapted) == 3
+    for n, error in adapted.items():
+        assert error < min(e for m, e in uniform.items() if m <= 2 * n + 8)
+
+
+def test_compression_extreme_frictionless(tmp_path):
+    found = summary("compression_extreme", tmp_path, "--quick")["frictionless"]
+    for over in (found["force_over_exact"], *(grid["force_over_exact"] for grid in found["grids"].values())):
+        assert set(over) == {"5", "10", "20"} and all(abs(v - 1) < 1e-3 for v in over.values())
+
+
 def test_plug_friction_quick(tmp_path):
     found = summary("plug_friction", tmp_path, "--quick")["mu_0.3"]
     force, membrane = found["force_N_at_travel_cm"], found["membrane_force_N_at_travel_cm"]

@@ -82,7 +82,7 @@ class Problem(Units):
         self.contacts = [FaceContact(forms, contact, self.assemble) for contact in scene.contacts]
         if scene.heat is not None:                              # after the materials, which heat it
             forms.histories.append(scene.heat.history(self))
-        remembering = (contact for contact in self.contacts if contact.law.remembers)
+        remembering = (contact for contact in self.contacts if contact.remembers)
         self.histories: list[History] = [*remembering, *forms.histories]
         self.limit = StepLimit(self)
         self._admissible = Admissible(forms)

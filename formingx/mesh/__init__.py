@@ -1,5 +1,6 @@
 """Meshes of six-node triangles: discs, spheres, parisons, and meshes read from files."""
 
+from .adapted import adapted
 from .build import ACCURACY, disc, from_lines, parison, sphere
 from .files import read, write
 from .grid import Grid, to_grid

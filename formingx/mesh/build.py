@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from mpi4py import MPI
 
 from ..errors import InputError, as_points, count, finite, known, non_negative, positive
 from .grid import Grid, to_mesh
-from .mesh import Mesh
+from .mesh import Columns, Mesh
 
 ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
 """Elements of a disc (along the radius, usual number through each layer): docs/choosing.md says what each promises."""
@@ -79,9 +80,11 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
         raise InputError(f"disc: grading = {grading!r} and concentrate = {concentrate!r}: give one of them")
     joints = (_concentrated(inner_radius, radius, along, sizes) if sizes
               else inner_radius + (radius - inner_radius) * _graded(along, grading))
-    R = _with_middles(joints)
-    Z = _levels(layers, through, R)
-    return _mesh("disc", np.stack([np.broadcast_to(R, Z.shape), Z], axis=-1), list(layers), through, sides, comm)
+
+    def points(R: np.ndarray) -> np.ndarray:
+        Z = _levels(layers, through, R)
+        return np.stack([np.broadcast_to(R, Z.shape), Z], axis=-1)
+    return _mesh("disc", points, joints, list(sizes or ()), list(layers), through, sides, comm)
 
 
 def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[int, list[int]]:
@@ -155,10 +158,12 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
     inner_radius = positive("sphere: inner_radius", inner_radius)
     layers = _layers("sphere", thickness, "wall", "")
     along, through = _counts("sphere", "meridian", elements, len(layers))
-    angle = _with_middles(np.pi / 2 * _graded(along, _grading("sphere", grading)))
-    radius = inner_radius + _levels(layers, through, angle)
-    points = np.stack([radius * np.sin(angle), radius * np.sin(np.pi / 2 - angle)], axis=-1)
-    return _mesh("sphere", points, list(layers), through, ("axis", "equator", "inner", "outer"), comm)
+
+    def points(angle: np.ndarray) -> np.ndarray:
+        radius = inner_radius + _levels(layers, through, angle)
+        return np.stack([radius * np.sin(angle), radius * np.sin(np.pi / 2 - angle)], axis=-1)
+    ends = np.pi / 2 * _graded(along, _grading("sphere", grading))
+    return _mesh("sphere", points, ends, [], list(layers), through, ("axis", "equator", "inner", "outer"), comm)
 
 
 def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thickness], length: float,
@@ -197,12 +202,14 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
     wall = float(sum(thickness_at(np.zeros(1))[0] for thickness_at in layers.values()))
     joint = length / (length + np.pi / 2 * (inner_radius + wall / 2))
     node = joints[1 + np.argmin(np.abs(joints[1:-1] - joint))]
-    from_neck = _with_middles(joints)
-    z = length * np.maximum(1 - from_neck / node, 0.0)
-    angle = np.pi / 2 * np.maximum((from_neck - node) / (1 - node), 0.0)
-    radius = inner_radius + _levels(layers, through, z - inner_radius * np.sin(angle))
-    points = np.stack([radius * np.sin(np.pi / 2 - angle), z - radius * np.sin(angle)], axis=-1)
-    return _mesh("parison", points, list(layers), through, ("neck", "axis", "inner", "outer"), comm)
+
+    def points(from_neck: np.ndarray) -> np.ndarray:
+        z = length * np.maximum(1 - from_neck / node, 0.0)
+        angle = np.pi / 2 * np.maximum((from_neck - node) / (1 - node), 0.0)
+        radius = inner_radius + _levels(layers, through, z - inner_radius * np.sin(angle))
+        return np.stack([radius * np.sin(np.pi / 2 - angle), z - radius * np.sin(angle)], axis=-1)
+    sides = ("neck", "axis", "inner", "outer")
+    return _mesh("parison", points, joints, [node], list(layers), through, sides, comm)
 
 
 def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapping[str, float] | None = None,
@@ -244,18 +251,21 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
         raise InputError(f"from_lines: elements between points = {given!r}: {pieces} pieces need as many counts")
     _, through = _counts("from_lines", "lines", (sum(along), elements[1]), len(parts))
     ends = np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(along))])
-    at = _with_middles(ends)
-    first, second = (np.stack([np.interp(at, np.arange(pieces + 1), line[:, i]) for i in (0, 1)], axis=-1)
-                     for line in lines)
     level = _levels(parts, through, np.zeros(1))
-    points = first + (level / level[-1])[:, :, None] * (second - first)
     around = np.concatenate([lines[0], lines[1][::-1]])
     names = ["axis" if all(line[k, 0] == 0 for line in lines) else name for k, name in ((0, "start"), (-1, "end"))]
     if names[0] == names[1]:
         names = ["start", "end"]
     if np.sum(around[:, 0] * np.roll(around[:, 1], -1) - np.roll(around[:, 0], -1) * around[:, 1]) < 0:
-        points, names = points[:, ::-1], names[::-1]         # the body lies to the left of `inner`
-    return _mesh("from_lines", points, list(parts), through, (*names, "inner", "outer"), comm)
+        lines, names, ends = [line[::-1] for line in lines], names[::-1], pieces - ends[::-1]
+        # the body lies to the left of `inner`
+
+    def between(at: np.ndarray) -> np.ndarray:
+        first, second = (np.stack([np.interp(at, np.arange(pieces + 1), line[:, i]) for i in (0, 1)], axis=-1)
+                         for line in lines)
+        return first + (level / level[-1])[:, :, None] * (second - first)
+    return _mesh("from_lines", between, ends, np.arange(1, pieces), list(parts), through, (*names, "inner", "outer"),
+                 comm)
 
 
 def _points(name: str, points: Any) -> np.ndarray:
@@ -367,12 +377,13 @@ def _levels(layers: Mapping[str, Callable], through: list[np.ndarray], coordinat
     return np.array(rows)
 
 
-def _mesh(kind: str, points: np.ndarray, layers: list[str], through: list[np.ndarray], sides: tuple,
-          comm: MPI.Comm) -> Mesh:
-    """Triangles on rows and columns of nodes, shape (rows, columns, 2); `sides`: names of left, right, bottom, top.
+def _mesh(kind: str, place: Callable[[np.ndarray], np.ndarray], ends: np.ndarray, fixed: Any, layers: list[str],
+          through: list[np.ndarray], sides: tuple, comm: MPI.Comm) -> Mesh:
+    """Triangles on rows and columns of nodes; `sides`: names of left, right, bottom, top.
 
-    Diagonals alternate, as a chessboard's fields in each layer.
+    Diagonals alternate, as a chessboard's fields in each layer. place, ends, fixed: see `Columns`.
     """
+    points = place(_with_middles(ends))
     number = np.arange(points.shape[0] * points.shape[1]).reshape(points.shape[:2])
     triangles, first = {}, 0
     halves = np.array([[[(0, 0), (1, 0), (1, 1)], [(1, 1), (0, 1), (0, 0)]],          # (column, row) of corners
@@ -386,4 +397,6 @@ def _mesh(kind: str, points: np.ndarray, layers: list[str], through: list[np.nda
     lines = (number[:, 0][::-1], number[:, -1], number[0], number[-1][::-1])
     boundaries = {name: np.stack([line[:-2:2], line[2::2], line[1::2]], axis=1) for name, line in zip(sides, lines)}
     flat = points.reshape(-1, 2)
-    return to_mesh(lambda: Grid(flat, np.arange(1, len(flat) + 1), triangles, boundaries), comm, kind)
+    made = to_mesh(lambda: Grid(flat, np.arange(1, len(flat) + 1), triangles, boundaries), comm, kind)
+    return replace(made, columns=Columns(ends, np.asarray(fixed, dtype=float), sides[2:], place, lambda ends: _mesh(
+        kind, place, ends, fixed, layers, through, sides, comm)))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -12,6 +13,23 @@ from .. import _compat
 from ..errors import InputError, known, pair
 from ..ranks import gathered
 from .check import check_elements
+
+
+class Columns(NamedTuple):
+    """The columns of elements side by side along a sheet, and how to make the same body of others.
+
+    Attributes:
+        ends: where they end, by a coordinate along the sheet, shape (n + 1,); fixed: ends that must stay, shape (m,).
+        faces: names of the boundaries along the sheet: those of the first and the last row of nodes.
+        place: at coordinates, shape (k,): the nodes of all rows there, shape (rows, k, 2), length.
+        make: the mesh with other ends.
+    """
+
+    ends: np.ndarray
+    fixed: np.ndarray
+    faces: tuple[str, str]
+    place: Callable[[np.ndarray], np.ndarray]
+    make: Callable[[np.ndarray], Mesh]
 
 
 @dataclass(frozen=True)
@@ -25,6 +43,7 @@ class Mesh:
         boundaries: name to the tags of its facets: one, or several where a part has a name of its own (`with_part`).
         comm: the communicator that it was made on. (What mpi4py hangs on `domain.comm`, a copy, when objects are
             passed there is freed with it; inside an exception that would lock up Python's end.)
+        columns: of a disc, a sphere, a parison, or what is `from_lines`; None of others.
     """
 
     domain: Any
@@ -33,6 +52,7 @@ class Mesh:
     layers: dict[str, int]
     boundaries: dict[str, tuple[int, ...]]
     comm: MPI.Comm
+    columns: Columns | None = None
 
     def __str__(self) -> str:
         """What is there; edges and sizes only of a mesh on one rank: it is not collective."""
@@ -117,7 +137,18 @@ class Mesh:
         new = {tag: first + k for k, tag in enumerate(old)}
         boundaries = {key: (*tags, *(new[tag] for tag in tags if tag in new)) for key, tags in self.boundaries.items()}
         return replace(self, facets=meshtags(domain, 1, self.facets.indices, values),
-                       boundaries=boundaries | {name: tuple(new.values())})
+                       boundaries=boundaries | {name: tuple(new.values())},
+                       columns=self._columns_with((low, high), axis, near, (name, of, within, along)))
+
+    def _columns_with(self, limits: tuple, axis: int, near: float, part: tuple) -> Columns | None:
+        """The columns of the mesh with one more part, which ends between two of them."""
+        if self.columns is None:
+            return None
+        columns, make = self.columns, self.columns.make
+        x = columns.place(columns.ends)[[0, -1], :, axis]
+        limit = (np.abs(x[..., None] - np.array(limits)) < near).any((0, 2))
+        return columns._replace(fixed=np.union1d(columns.fixed, columns.ends[limit]),
+                                make=lambda ends: make(ends).with_part(*part))
 
     def nodes_of(self, boundary: str) -> np.ndarray:
         """Coordinates of all geometry nodes of a boundary, sorted by R, then Z, shape (n, 2); same on all ranks."""

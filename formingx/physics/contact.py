@@ -72,6 +72,9 @@ class Contact(Part):
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge).
             What sticks or gives off heat depends on when it touched: with 4, a run takes half the iterations, and
             thickness changes by some 0.1 % of itself.
+        present_area: the penalty is per area and over the wall as they are at the beginning of a step, not at rest:
+            what is drawn or pressed 20 times thinner is held as well as at rest. Without friction. (Then a state
+            depends, by its penetration, on the steps on the way to it.)
         points: where it acts: at the "nodes" of the face, or at so many Gauss points of each facet, which let go one by
             one: smoother where a sheet slides over an edge.
         moves: (r, z) of the tool's motion per unit of travel: the tool is what the run controls; None: it stays.
@@ -88,7 +91,7 @@ class Contact(Part):
     def __init__(self, on: str, tool: Tool, friction: Any = "stick", *, penalty: float | None = None,
                  ramp: float | None = None, elastic_slip: float = _ELASTIC_SLIP, separates: bool = True,
                  nodes_per_step: int = 1, points: str | int = "nodes",
-                 moves: tuple[float, float] | None = None, name: str | None = None):
+                 present_area: bool = False, moves: tuple[float, float] | None = None, name: str | None = None):
         self.name, name = name, f"Contact({on!r})"
         if not isinstance(tool, Tool):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
@@ -104,6 +107,10 @@ class Contact(Part):
                              f" Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = count(f"{name}: nodes_per_step", nodes_per_step)
         self.points = _points(f"{name}: points", points)
+        self.present_area = instance(f"{name}: present_area", present_area, bool, "True or False")
+        if present_area and (self.friction_by_temperature or self.mu > 0 or not self.separates):
+            raise InputError(f"{name}: friction = {friction!r}, separates = {separates!r} with present_area=True: what"
+                             f" a point holds on to would change with its penalty; use 'none', or a larger penalty")
         self.moves = None if moves is None else pair(f"{name}: moves", moves)
         if self.moves == (0.0, 0.0):
             raise InputError(f"{name}: moves = (0, 0): must name a direction, or be None")
@@ -154,8 +161,9 @@ class Contact(Part):
                              f" least 0")
         return mu
 
-    def law(self, k: float, thickness: float, points: np.ndarray, temperature: np.ndarray | None = None) -> ContactLaw:
-        """Tractions for a penalty k (stress/length) on a sheet of this thickness, at points, shape (n, 2).
+    def law(self, k: np.ndarray | float, thickness: float, points: np.ndarray,
+            temperature: np.ndarray | None = None) -> ContactLaw:
+        """Tractions for a penalty k (stress/length, shape () or (n,)) on a sheet of this thickness, at points, (n, 2).
 
         temperature: of the body there, shape (n,), if friction depends on it.
         """
@@ -198,15 +206,17 @@ def _points(name: str, points: Any) -> str | int:
 class Law:
     """The `ContactLaw` of this module: a penalty with a ramp, and friction.
 
-    mu: of friction, a number, or one for each point, shape (n,). elastic_slip: g_s, length, not used by stick.
+    mu, k: of friction, of the penalty, a number, or one for each point, shape (n,). elastic_slip: g_s, length, not used
+    by stick.
     shear_limit: (pressure, shape (n,), mu): see `Contact.shear_limit`.
 
     Distances are less by `shift`, shape (n,), length: a point that touches from the start begins at the foot of the
     ramp, free of stress.
     """
 
-    def __init__(self, tool: RigidTool, mu: np.ndarray | float, k: float, theta: float, elastic_slip: float,
-                 shift: np.ndarray | float = 0.0, separates: bool = True, shear_limit: Callable | None = None):
+    def __init__(self, tool: RigidTool, mu: np.ndarray | float, k: np.ndarray | float, theta: float,
+                 elastic_slip: float, shift: np.ndarray | float = 0.0, separates: bool = True,
+                 shear_limit: Callable | None = None):
         self.shear_limit = shear_limit or (lambda pressure, mu: (mu * pressure, mu))
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
         self.tool, self.mu, self.k, self.theta, self.elastic_slip = tool, mu, k, theta, elastic_slip
@@ -217,8 +227,8 @@ class Law:
     def part(self, points: np.ndarray | slice) -> Law:
         """The law of some of its points."""
         shift = self.shift[points] if isinstance(self.shift, np.ndarray) else self.shift
-        mu = self.mu[points] if isinstance(self.mu, np.ndarray) else self.mu
-        return Law(self.tool, mu, self.k, self.theta, self.elastic_slip, shift, self.separates, self.shear_limit)
+        mu, k = (value[points] if isinstance(value, np.ndarray) else value for value in (self.mu, self.k))
+        return Law(self.tool, mu, k, self.theta, self.elastic_slip, shift, self.separates, self.shear_limit)
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
         """The same law with other coefficients of friction."""

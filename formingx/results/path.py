@@ -21,7 +21,10 @@ class Path(States):
 
     Attributes:
         record: what the solver keeps of the run (`formingx.solve.record.Record`).
+        pilot: the path of the run that its mesh was made by (`trace(..., pilot=True)`); else None.
     """
+
+    pilot: Path | None = None
 
     def doubts(self) -> list[tuple[str, str]]:
         """(how bad: "serious" or "minor"; what) of contact in the last state; collective."""
@@ -137,6 +140,11 @@ class Path(States):
         """The body of a state (default: the last) as a new `Mesh`, free of stress; an InputError if it is none."""
         from .formed import formed
         return formed(self._segment(state or self.last).problem, state or self.last)
+
+    def column_factors(self, share: float | None, error: float | None) -> np.ndarray:
+        """Wanted over present length of the mesh's columns, shape (n,), by which `formingx.mesh.adapted` goes."""
+        from .evaluate.column_factors import column_factors
+        return column_factors(self, share, error)
 
     def wall(self, state: State | None = None) -> Any:
         """The wall of the part at a state (default: the last), place by place (`Wall`): to_csv, to_excel."""

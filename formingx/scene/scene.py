@@ -106,6 +106,13 @@ class Scene:
     heat: Any = None
     expansion: Mapping[str, ThermalExpansion] = MappingProxyType({})
 
+    def with_mesh(self, mesh: Mesh) -> Scene:
+        """The same scene on another mesh of the body: with the same names of layers and boundaries."""
+        return Scene(mesh=mesh, materials=self.materials, supports=self.supports, loads=self.loads,
+                     contacts=self.contacts, model=self.model, kinematics=self.kinematics,
+                     quadrature_degree=self.quadrature_degree, heat=self.heat, expansion=self.expansion or None,
+                     temperature=None if self.temperature is None else self.temperature.given)
+
     @property
     def things(self) -> list[Part]:
         """Loads, supports and contacts, in order."""

@@ -20,6 +20,7 @@ class GivenTemperature:
         mesh: of the scene.
 
     Attributes:
+        given: as it was given.
         T: the DOLFINx `Function` (P2), never changed: what changes is `formingx.discrete.temperature.Temperature`.
 
     Raises:
@@ -27,7 +28,7 @@ class GivenTemperature:
     """
 
     def __init__(self, given: Any, mesh: Mesh):
-        self._text = "a function" if callable(given) and not hasattr(given, "check") else repr(given)
+        self.given, self._text = given, "a function" if callable(given) and not hasattr(given, "check") else repr(given)
         self.mesh = mesh
         self.T = fem.Function(fem.functionspace(mesh.domain, ("Lagrange", 2)), name="temperature")
         points = self.T.function_space.tabulate_dof_coordinates()[:, :2]

@@ -21,10 +21,12 @@ class Memory(NamedTuple):
     """What the points of a face remember of the last accepted state.
 
     touch: of the law of friction; arrived: which points came into contact in the step that ended there, shape (n,).
+    penalty: over that at rest, which the state was found with, shape (n,) (`Contact.present_area`).
     """
 
     touch: Touch
     arrived: np.ndarray
+    penalty: np.ndarray
 
 
 class FaceContact:
@@ -46,8 +48,8 @@ class FaceContact:
                            else Gauss(solid, contact.on, int(contact.points)))
         self.points, self.thickness = self.rule.points, solid.thickness(contact.on)
         self._warm = solid.temperature.nodes(self.rule.nodes) if contact.friction_by_temperature else None
-        self.law = contact.law(contact.penalty * solid.stress / self.thickness, self.thickness, self.points,
-                               self._temperatures())
+        self._penalty = np.ones(len(self.points))
+        self.law = self._law(1.0)
         self._scale = solid.length / (solid.stress * solid.volume) * self.rule.area
         self._way = solid.length * np.array(contact.moves or np.zeros(self.points.shape[1]))
         self.enter(0.0, float(contact.driven), True)
@@ -109,7 +111,9 @@ class FaceContact:
         self.rule.add(values, forces)
 
     def begin(self, old: np.ndarray | None, control: float = 0.0) -> None:
-        """Newton's method begins ahead of a state (owned unknowns; None: of none)."""
+        """Newton's method begins ahead of a state (owned unknowns; None: of none); collective."""
+        if self.contact.present_area and old is not None:   # of a sheet: the wall is thinner by as much as it is wider
+            self._harden(np.maximum(self.rule.area_ratio(old), 1.0) ** 2)
         self.increment = Increment(self.law, self.touch, None if old is None else self.positions(old, control))
 
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
@@ -164,7 +168,21 @@ class FaceContact:
     def _of_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
         return self.rule.between_unknowns((self._scale * self._length)[:, None, None] * stiffness)
 
+    def _law(self, penalty: np.ndarray | float) -> Any:
+        k = self.contact.penalty * self._solid.stress / self.thickness
+        return self.contact.law(k * penalty, self.thickness, self.points, self._temperatures())
+
+    def _harden(self, penalty: np.ndarray) -> None:
+        """The penalty is so many times that at rest, shape (n,)."""
+        if not np.array_equal(penalty, self._penalty):
+            self._penalty, self.law = penalty, self._law(penalty)
+
     # history
+
+    @property
+    def remembers(self) -> bool:
+        """True if forces depend on what points remember."""
+        return self.law.remembers or self.contact.present_area
 
     @property
     def touch(self) -> Touch | None:
@@ -180,7 +198,7 @@ class FaceContact:
         self._start_at(self.positions(fields, control))
 
     def _start_at(self, x: np.ndarray) -> None:
-        self._take(Memory(self.law.start(x), np.zeros(len(x), dtype=bool)) if self.law.remembers else None)
+        self._take(Memory(self.law.start(x), np.zeros(len(x), dtype=bool), np.ones(len(x))) if self.remembers else None)
 
     def expect_arrivals(self, arrival: np.ndarray) -> None:
         """Where points will be when they touch in the step ahead (`Touch.arrival`)."""
@@ -193,7 +211,8 @@ class FaceContact:
             return
         before, theta = self._memory.touch.distance, self.law.theta
         touch = self.law.tractions(self.positions(x, control), self._memory.touch).touch
-        self._take(Memory(touch, (before <= -theta) & (touch.distance > -theta)))
+        penalty = self._penalty if self.contact.present_area else self._memory.penalty
+        self._take(Memory(touch, (before <= -theta) & (touch.distance > -theta), penalty))
 
     def get(self) -> Memory | None:
         """See `History`; None without friction."""
@@ -206,12 +225,14 @@ class FaceContact:
 
     def _take(self, memory: Memory | None) -> None:
         self._memory = memory
+        if self.contact.present_area and memory is not None:
+            self._harden(memory.penalty)
         self.increment = Increment(self.law, self.touch)
 
     def save(self, memory: Memory) -> dict[str, np.ndarray]:
         """See `History`: point by point with its reference position."""
-        parts = self.comm.allgather((self.points, *memory.touch, memory.arrived))
-        names = ("points", *memory.touch._fields, "arrived")
+        parts = self.comm.allgather((self.points, *memory.touch, memory.arrived, memory.penalty))
+        names = ("points", *memory.touch._fields, "arrived", "penalty")
         return {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True))}
 
     def load(self, data: dict[str, Any]) -> Memory:
@@ -223,16 +244,18 @@ class FaceContact:
         like = self.law.start(self.points)
         touch = Touch(*(np.array(data[name], dtype=float)[rows].reshape(getattr(like, name).shape)
                         for name in Touch._fields))
-        return Memory(touch, np.array(data["arrived"], dtype=bool)[rows])
+        penalty = np.array(data["penalty"], dtype=float)[rows] if "penalty" in data else np.ones(len(rows))
+        return Memory(touch, np.array(data["arrived"], dtype=bool)[rows], penalty)
 
     def carry(self, source: FaceContact, memory: Memory | None, x: np.ndarray, control: float) -> Memory | None:
         """See `History`: where its nearest point touched a point touches, and slipped as that did."""
         if memory is None:
             return None
         carrier, touch, theta = Carrier(self.comm, source.points, self.points), memory.touch, self.law.theta
-        distance, arrived = (carrier.all(values)[carrier.nearest] for values in (touch.distance, memory.arrived))
+        distance, arrived, penalty = (carrier.all(values)[carrier.nearest] for values in
+                                      (touch.distance, memory.arrived, memory.penalty))
         touched, position = distance > -source.law.theta, self.positions(x, control)
         free = np.minimum(self.law.distance(position), -(1 + 1e-9) * theta)
         slip = np.where(touched, carrier.fitted(touch.slip), 0.0)
         return Memory(Touch(position, np.where(touched, distance * theta / source.law.theta, free), slip, position),
-                      arrived)
+                      arrived, penalty)

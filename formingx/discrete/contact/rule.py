@@ -5,6 +5,7 @@ Gauss-Lobatto's points are the nodes of six-node triangles; at Gauss points a fa
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,10 @@ class Rule:
         """Values at the points, shape (n,), of those at `nodes`."""
         raise NotImplementedError
 
+    def area_ratio(self, fields: np.ndarray) -> np.ndarray:
+        """Deformed over reference area at the points, shape (n,); `fields`: owned unknowns; collective."""
+        raise NotImplementedError
+
 
 class Lobatto(Rule):
     """The nodes of the face. `lumped`, exact for what is cubic along a facet, gives the node on the axis no area."""
@@ -62,6 +67,9 @@ class Lobatto(Rule):
         self.lumped = self.lengths * kinematics.weight(self.points.T)
         self.area = self.lumped.copy()
         self._spread_to_axis(kinematics, solid.comm)
+        self._comm, self._length, self._weight = solid.comm, solid.length, kinematics.weight
+        self._vectors, self._X = vectors, vectors.tabulate_dof_coordinates()[:, :kinematics.components]
+        self._facets = _own_facets(solid.scene.mesh, on)
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
         return values[self.dofs]
@@ -74,6 +82,27 @@ class Lobatto(Rule):
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
         return values
+
+    def area_ratio(self, fields: np.ndarray) -> np.ndarray:
+        """The mean of what the edges on both sides of a node say; on the axis the stretch is the same both ways."""
+        now = gathered(self._comm, self.points + self._length * self.displacement(fields))
+        rest, edges = gathered(self._comm, self.points), self._edges
+        ratio = np.linalg.norm(_along(now[edges]), axis=-1) / np.linalg.norm(_along(rest[edges]), axis=-1)
+        weight, wider = (np.broadcast_to(np.transpose(self._weight(x[edges].T)), ratio.shape) for x in (rest, now))
+        ratio *= np.divide(wider, weight, out=ratio.copy(), where=weight > 1e-9 * weight.max())
+        count = np.maximum(np.bincount(edges.ravel(), minlength=len(rest)), 1)
+        first = sum(self._comm.allgather(len(self.points))[:self._comm.rank])
+        return (np.bincount(edges.ravel(), ratio.ravel(), len(rest)) / count)[first:][:len(self.points)]
+
+    @cached_property
+    def _edges(self) -> np.ndarray:
+        """Two ends and the middle of each edge of the face, all ranks', as rows of all ranks' points, shape (m, 3)."""
+        from scipy.spatial import cKDTree
+        own = [self._X[ends_first(fem.locate_dofs_topological(self._vectors, 1, np.array([f], dtype=np.int32),
+                                                              remote=False), self._X)] for f in self._facets]
+        X = gathered(self._comm, np.array(own).reshape(-1, 3, self.points.shape[1]))
+        found = cKDTree(gathered(self._comm, self.points)).query(X.reshape(-1, X.shape[2]))[1]
+        return np.asarray(found).reshape(-1, 3)
 
     def _spread_to_axis(self, kinematics: Any, comm: Any) -> None:
         """Give the node on the axis some area of its facet's, so that something holds it.
@@ -136,7 +165,6 @@ class Gauss(Rule):
         return values[:, 0] + np.einsum("na,na->n", self.shapes[:, 1:], values[:, 1:] - values[:, :1])
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
-        """Deformed over reference area at the points, shape (n,); `fields`: owned unknowns; collective."""
         along = self._along + self._length * np.einsum("na,nai->ni", self._slopes, self._at_nodes(fields))
         weight, now = self._kinematics.weight, self.points + self._length * self.displacement(fields)
         grown = np.linalg.norm(along, axis=1) / np.linalg.norm(self._along, axis=1)
@@ -152,6 +180,12 @@ class Gauss(Rule):
     @property
     def _owned(self) -> int:
         return self._unknowns.index_map.size_local
+
+
+def _along(edges: np.ndarray) -> np.ndarray:
+    """dx/ds at the two ends and the middle of edges, shape (m, 3, components)."""
+    a, b, m = edges.transpose(1, 0, 2)
+    return np.stack([4 * m - 3 * a - b, a - 4 * m + 3 * b, b - a], axis=1)
 
 
 def without_area(lumped: np.ndarray, lengths: np.ndarray) -> np.ndarray:

@@ -1,0 +1,119 @@
+"""Williams' plug on meshes that pilot runs make (Song 1993, recommendation 2): force at 8 to 20 cm under friction.
+
+The sheet and the plug of `plug_friction`, but no formula for the elements: a run on 30 columns of one size to 8 cm says
+how long columns are where they lie on the plug's edge (`fx.mesh.adapted`), a run on those goes to 12 cm and says it
+again, and a third one is the result. Beside it a membrane that slides over the same edge (it knows neither bending nor
+shear), and uniform columns, twice as many, to 8 cm. Then an edge of an eighth of the thickness. Lengths in cm, forces
+in N.
+"""
+
+import numpy as np
+import plugs
+from common import parser, save, say, summarise, sweep
+from mpi4py import MPI
+from plug_friction import ROUGH, THROUGH, membrane_curve
+from williams_plug import C10, PLUG, RADIUS, THICKNESS
+
+import formingx as fx
+from formingx.results import files
+from formingx.results.show import plots
+
+FILLET, SHARP = 0.35, THICKNESS / 8
+TRAVELS, SHARP_TRAVELS = (8.0, 12.0, 16.0, 20.0), (8.0, 10.0)
+FRICTIONS = (1.0, 0.1, 0.5, 0.3)            # begun in this order, two processes are busy to the end
+FIRST, SHARE = 30, 1 / 3
+
+
+def main():
+    args = parser("plug_adapted", __doc__.splitlines()[0]).parse_args()
+    args.out.mkdir(parents=True, exist_ok=True)
+    cases = [(mu, FILLET, TRAVELS) for mu in FRICTIONS] + [(0.3, SHARP, SHARP_TRAVELS)]
+    if args.quick:
+        cases = [(0.3, FILLET, (2.0, 4.0))]
+    found = list(map(run, cases)) if args.quick else sweep(run, cases)
+    summary: dict = {}
+    for (mu, fillet, _), (numbers, _) in sorted(zip(cases, found), key=lambda case: (-case[0][1], case[0][0])):
+        summary["fillet_h0/8" if fillet == SHARP else f"mu_{mu:g}"] = numbers
+        tell(mu, fillet, numbers)
+    save(draw(cases, found), args.out / "plug_adapted.png")
+    summarise(args.out, {**summary, "share": SHARE, "versions": files.versions()})
+
+
+def sheet(columns, mu):
+    """Columns of one size; friction shears the face, and elements there are flat."""
+    through = THROUGH if mu >= ROUGH else (1,)
+    return fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=(columns, through), comm=MPI.COMM_SELF)
+
+
+def push(mesh, mu, fillet, travels):
+    """(path, how it ended) of a sheet under the plug, pushed through the travels."""
+    scene = fx.Scene(
+        mesh=mesh, materials=fx.NeoHookean(c10=C10), model=fx.MixedPressure(space="P1"),
+        supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+        contacts=[fx.Contact("top", plugs.plug(PLUG, THICKNESS, fillet), mu, moves=(0, -1), points=4,
+                             nodes_per_step=16, penalty=2e5, ramp=2e-2, elastic_slip=5e-3)])
+    return plugs.push(scene, travels, smallest=1e-3, progress=False, beyond=True)
+
+
+def run(case):
+    """Pilots and the run of one coefficient of friction: its numbers, and what is drawn of it."""
+    mu, fillet, travels = case
+    pilots = [travels[:1]] if len(travels) < 3 else [travels[:1], travels[:2], travels]
+    mesh, columns = sheet(FIRST, mu), []
+    for on_the_way in pilots:
+        path, _ = push(mesh, mu, fillet, on_the_way)
+        mesh = fx.mesh.adapted(path, share=SHARE)
+        columns.append(len(path.problem.scene.mesh.columns.ends) - 1)
+    path, end = push(mesh, mu, fillet, travels)
+    n = len(mesh.columns.ends) - 1
+    membrane = membrane_curve(mu, fillet, travels[-1])
+    numbers = {
+        "force_N": forces(path, travels),
+        "membrane_force_N": {f"{t:g}": float(np.interp(t, membrane.travel, membrane.force)) for t in travels},
+        "columns": n, "columns_of_pilots": columns, "jumps": len(path.jumps), "ended": end,
+        "reached_travel_cm": float(path["travel"].max()),
+        "first_verdict": next((f"{s.measures['travel']:.4g} cm: {s.verdict}" for s in path.states if s.verdict), ""),
+        **plugs.cost(path)}
+    uniform, end = push(sheet(2 * n, mu), mu, fillet, travels[:1])
+    numbers["uniform"] = {"force_N": forces(uniform, travels[:1]), "columns": 2 * n, "jumps": len(uniform.jumps),
+                          "ended": end, **plugs.cost(uniform)}
+    return numbers, (path["travel"], plugs.NEWTON * path["tool_force"], *membrane[:2], mesh.columns.ends)
+
+
+def forces(path, travels) -> dict:
+    """{travel as text: force, N} at those that a path met."""
+    met = {f"{t:g}": path.met(fx.travel(t)) for t in travels}
+    return {t: plugs.force(state) for t, state in met.items() if state is not None}
+
+
+def tell(mu, fillet, n) -> None:
+    """The numbers of one run."""
+    uniform = n["uniform"]
+    say(f"mu = {mu:g}, edge {fillet:.3g} cm: {n['columns']} columns (pilots {n['columns_of_pilots']}), {n['jumps']}"
+        f" jumps, {n['steps']} states, {n['solve_seconds']:.1f} s; force (membrane), N: " + ", ".join(
+            f"{t} cm {f:.1f} ({n['membrane_force_N'][t]:.0f})" for t, f in n["force_N"].items()),
+        f"  {uniform['columns']} uniform columns: {uniform['force_N']}, {uniform['jumps']} jumps,"
+        f" {uniform['solve_seconds']:.1f} s",
+        *(f"  ended before its target: {end[:200]} ..." for end in (n["ended"], uniform["ended"]) if end != "done"))
+
+
+def draw(cases, found):
+    """Force over travel, the membrane dashed, and the columns that the pilots made."""
+    figure, (left, right) = plots.figure(2, width=5.0)
+    for k, ((mu, fillet, _), (_, (travel, force, at, membrane, ends))) in enumerate(zip(cases, found)):
+        label = f"$\\mu$ = {mu:g}" + (", edge $h_0/8$" if fillet == SHARP else "")
+        left.plot(travel, force, color=f"C{k}", label=label)
+        left.plot(at, membrane, "--", color=f"C{k}", linewidth=1)
+        right.stairs(np.diff(ends), ends, baseline=None, color=f"C{k}", label=f"{label}: {len(ends) - 1} columns")
+    left.set(xlabel="travel, cm", ylabel="force on the plug, N", title="force (dashed: membrane)", xlim=(0, None),
+             ylim=(0, None))
+    right.set(xlabel="reference radius R, cm", ylabel="length of a column at rest, cm", title="meshes", yscale="log")
+    right.axvline(PLUG, color="0.7", linewidth=1)
+    for axes in (left, right):
+        axes.grid(alpha=0.3)
+        axes.legend(frameon=False, fontsize="small")
+    return figure
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,103 @@
+"""Meshes whose columns a pilot run asks for."""
+
+import numpy as np
+import pytest
+
+import formingx as fx
+
+PLUG = fx.tools.male(radius=3.0, height=60.0, base=-60.0, fillet=0.5).mirrored().moved(z=0.5)
+
+
+def plugged(mesh, **options):
+    """A sheet under a plug, pushed 3 lengths."""
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", PLUG, moves=(0, -1))])
+    return fx.trace(scene, until=fx.travel(3.0), progress=False, **options)
+
+
+def disc(elements, **options):
+    return fx.mesh.disc(radius=10.0, thickness=0.5, elements=elements, **options)
+
+
+def test_pilot_puts_columns_on_the_edge():
+    """The run on adapted columns: they fit the edge, others stay long; the force is that of a finer mesh."""
+    path = plugged(disc((20, 1)), pilot={"share": 0.5})
+    ends = path.problem.scene.mesh.columns.ends
+    sizes = np.diff(ends)
+    assert path.pilot is not None and len(path.pilot.problem.scene.mesh.columns.ends) == 21
+    assert 20 < len(sizes) < 45 and sizes.max() == pytest.approx(0.5, rel=0.15)
+    assert 2.4 < ends[np.argmin(sizes)] < 4.0 and sizes.min() < 0.3
+    assert np.all(sizes[1:] / sizes[:-1] < 1.4) and np.all(sizes[:-1] / sizes[1:] < 1.4)
+    fine = plugged(disc((100, 1))).last.measures["tool_force"]
+    pilot = path.pilot.last.measures["tool_force"]
+    assert abs(path.last.measures["tool_force"] / fine - 1) < max(2e-3, 0.5 * abs(pilot / fine - 1))
+
+
+def test_an_error_of_the_stress_is_met():
+    """Columns that share the error: fewer than uniform ones of the same error, which is near what was asked for."""
+    def inflated(mesh):
+        scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
+                         supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+        return fx.trace(scene, until=fx.pole_height(6.0), progress=False)
+    pilot = inflated(disc((8, 4)))
+    first = pilot.stress().error().relative
+    mesh = fx.mesh.adapted(pilot, share=None, error=first / 3)
+    columns = len(mesh.columns.ends) - 1
+    found, uniform = (inflated(m).stress().error().relative for m in (mesh, disc((columns, 4))))
+    assert found < min(first / 2, uniform) and columns < 24
+
+
+def test_layers_parts_and_bodies_of_all_kinds_keep_their_shape():
+    """Every builder's mesh made again: the same volume, names and interfaces; ends that must stay do."""
+    layers = {"core": {0.0: 0.4, 10.0: 0.2}, "skin": 0.1}
+    line = [(0, 0), (20, 0), (30, 40)]
+    meshes = [fx.mesh.disc(radius=10.0, thickness=layers, elements=(9, (1, 2)), concentrate={4.0: 0.5}).with_part(
+                  "plug", "bottom", (0, 4.0)),
+              fx.mesh.sphere(inner_radius=1.0, thickness=0.2, elements=(8, 2)),
+              fx.mesh.parison(inner_radius=1.0, thickness=0.2, length=5.0, elements=(12, 2)),
+              fx.mesh.from_lines(line, [(0, -2), (21, -2), (32, 40)], elements=([4, 6], 2)),
+              fx.mesh.from_lines(line[::-1], [(32, 40), (21, -2), (0, -2)], elements=([6, 4], 2))]
+    for mesh in meshes:
+        ends = mesh.columns.ends
+        fine = mesh.columns.make(np.unique(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2])))
+        assert list(fine.boundaries) == list(mesh.boundaries) and list(fine.layers) == list(mesh.layers)
+        for name in mesh.boundaries:
+            a, b = mesh.nodes_of(name), fine.nodes_of(name)
+            assert len(b) >= len(a)
+            away = np.linalg.norm(a[:, None] - b[None], axis=2).min(1)
+            assert away.max() < 1e-12 * np.abs(a).max()
+        assert len(fine.columns.ends) == 2 * len(ends) - 1
+        assert set(mesh.columns.fixed) <= set(ends)
+
+
+def test_present_area_holds_what_is_pressed_flat():
+    """A block 20 times flatter: the force is exact to 1e-3 where the penalty of the block at rest is off by 1e-2."""
+    def pressed(**options):
+        block = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(2, 2))
+        scene = fx.Scene(mesh=block, materials=fx.NeoHookean(c10=1.0),
+                         supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")],
+                         contacts=[fx.Contact("top", fx.tools.plane(1.0), "none", moves=(0, -1), **options)])
+        return fx.trace(scene, until=fx.travel(0.95), progress=False, beyond=True)
+    exact = 2 * np.pi * (400 - 1 / 20)
+    path = pressed(present_area=True)
+    assert path.last.measures["tool_force"] == pytest.approx(exact, rel=1e-3)
+    assert path["penetration"][-1] < 1e-3 * 0.05 and path.problem.symmetric
+    assert abs(pressed().last.measures["tool_force"] / exact - 1) > 1e-2
+    assert path.value("tool_force", path.states[-2]) == pytest.approx(path.states[-2].measures["tool_force"], rel=1e-12)
+
+
+def test_refusals():
+    mesh = disc((4, 1))
+    with pytest.raises(fx.InputError, match="adapted: share = 0"):
+        fx.mesh.adapted(None, share=0)
+    with pytest.raises(fx.InputError, match="pilot 'sizes'"):
+        plugged(mesh, pilot={"sizes": 1})
+    with pytest.raises(fx.InputError, match="pilot = 3"):
+        plugged(mesh, pilot=3)
+    with pytest.raises(fx.InputError, match="pilot=True: the run begins at rest"):
+        plugged(mesh, pilot=True, resume=True, checkpoint="nowhere")
+    mesh.domain.geometry.x[:, 1] *= 1.01
+    with pytest.raises(fx.InputError, match="were moved"):
+        plugged(mesh, pilot=True)
+    with pytest.raises(fx.InputError, match="present_area"):
+        fx.Contact("top", PLUG, 0.3, present_area=True)
