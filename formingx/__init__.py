@@ -25,7 +25,16 @@ from .materials.published import Published, published
 from .materials.sets import Sets
 from .materials.viscoelastic import TransientNetwork, Viscoelastic
 from .measures.forces import force
-from .measures.targets import displacement, enclosed_volume, pole_height, pole_stretch, pressure, process_time, travel
+from .measures.targets import (
+    displacement,
+    enclosed_volume,
+    pole_height,
+    pole_stretch,
+    pressure,
+    process_time,
+    sag,
+    travel,
+)
 from .physics.contact import Contact
 from .physics.kinematics import Axisymmetric, PlaneStrain
 from .physics.loads import Gravity, Load, Pressure, Spin

@@ -5,7 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import ufl
+from dolfinx import fem
 
+from .. import _compat
 from ..ranks import gathered
 
 _NEIGHBOURS = 12
@@ -46,11 +49,67 @@ class Carrier:
         return gathered(self._comm, values)
 
 
+def take_fields(source: Any, state: Any, problem: Any) -> None:
+    """Put the fields that a problem of a solid has in a state to another of the same scales of a part of its mesh.
+
+    Exact, cell by cell: a displacement is quadratic with a bubble, a pressure linear. Collective.
+    """
+    there, here = source.forms, problem.forms
+    domain, cells = there.domain, np.arange(there.domain.topology.index_map(2).size_local, dtype=np.int32)
+    with source.at(state):
+        fields = [there.u / here.length] + [there.stress / here.stress * p for p in ufl.split(there.w)[1:]]
+        known = [_at_nodes(f, domain, cells) for f in fields]
+    corners = gathered(source.comm, domain.geometry.x[_compat.cell_nodes(domain)[cells, :3], :2])
+    rows = {key: k for k, key in enumerate(map(_key, corners))}
+    known = [gathered(source.comm, values) for values in known]
+    mine = here.domain.geometry.x[_compat.cell_nodes(here.domain)[:, :3], :2]
+    found = np.array([rows[_key(c)] for c in mine], dtype=int)
+    order = np.array([[np.flatnonzero(np.all(c == corner, axis=1))[0] for corner in corners[k]]
+                      for c, k in zip(mine, found, strict=True)], dtype=int).reshape(-1, 3)
+    for number, values in enumerate(known):
+        space, dofs = here.space.sub(number).collapse()
+        places = _compat.interpolation_points(space)
+        by = np.column_stack([1 - places.sum(1), places])[:, order].transpose(1, 0, 2)     # (cells, points, 3)
+        shapes = _shapes(by)
+        all_values = np.einsum("cpk,ckd->cpd", shapes, values[found])
+        f = fem.Function(space)
+        f.interpolate(lambda x, v=all_values: v.reshape(-1, v.shape[-1]).T)
+        here.w.x.array[dofs] = f.x.array
+    here.w.x.scatter_forward()
+
+
+_PLACES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0], [1 / 3, 1 / 3]])
+"""Corners, middles of the edges opposite to them, centre of a cell."""
+
+
+def _at_nodes(field: Any, domain: Any, cells: np.ndarray) -> np.ndarray:
+    """A field in cells at `_PLACES`, shape (cells, 7, components)."""
+    found = fem.Expression(field, _PLACES, jit_options=_compat.JIT_OPTIONS)
+    return found.eval(domain, cells).reshape(len(cells), len(_PLACES), -1) if len(cells) else np.zeros(
+        (0, len(_PLACES), int(np.prod(field.ufl_shape, dtype=int))))
+
+
+def _shapes(by: np.ndarray) -> np.ndarray:
+    """Shape functions of `_PLACES`, shape (..., 7), at barycentric coordinates, shape (..., 3)."""
+    a, b, c = np.moveaxis(by, -1, 0)
+    bubble = 27 * a * b * c
+    corners = [s * (2 * s - 1) + bubble / 9 for s in (a, b, c)]
+    middles = [4 * s * t - 4 * bubble / 9 for s, t in ((b, c), (a, c), (a, b))]
+    return np.stack([*corners, *middles, bubble], axis=-1)
+
+
+def _key(corners: np.ndarray) -> frozenset[tuple[float, float]]:
+    return frozenset((float(r), float(z)) for r, z in corners)
+
+
 def carry(source: Any, memory: list[Any], problem: Any, x: np.ndarray, control: float) -> None:
     """Let a problem remember what one of the same body on another mesh does (`State.memory`); collective.
+
+    Where it has not the same contacts, what these remember is left out.
 
     x, control: the state of it that this belongs to, own part.
     """
     problem.look_at(x, control)
-    for mine, other, kept in zip(problem.histories, source.histories, memory, strict=True):
+    n = len(problem.histories) if len(problem.histories) == len(source.histories) else len(problem.forms.histories)
+    for mine, other, kept in zip(problem.histories[-n:], source.histories[-n:], memory[-n:], strict=True) if n else ():
         mine.put(mine.carry(other, kept, x[: problem.n_owned], control))

@@ -249,8 +249,9 @@ class CoolingHistory:
         """See `History`; the materials have been carried."""
         comm, before = self._problem.comm, memory.before
         to_body = Carrier(comm, source._body.points, self._body.points).fitted
-        lines = [Carrier(comm, other.points, touch.points).fitted(kept) for touch, other, kept in
-                 zip(self._body.touches, source._body.touches, memory.lines, strict=True)]
+        there = zip(source._body.touches, memory.lines, strict=True) if self._body.touches else ()
+        lines = [Carrier(comm, other.points, touch.points).fitted(kept)        # what is let go touches nothing
+                 for touch, (other, kept) in zip(self._body.touches, there, strict=True)]
         power = None if memory.power is None else self._cooling.work_to_heat * self._body.assembled(self._dissipated)
         return Memory(memory.time, to_body(memory.temperature), lines, memory.step, power,
                       before and (before[0], to_body(before[1])))

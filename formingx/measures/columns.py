@@ -8,9 +8,10 @@ from typing import Any
 from ..discrete.contact import resultants
 from ..discrete.tooling import Tooling
 from ..errors import InputError
+from ..physics.loads import Gravity
 from .forces import resisting
 from .relaxed import PoleStressRatio
-from .targets import Amplitude, Bound, Target, bind_pole_height, bind_pole_stretch, bind_volume
+from .targets import Amplitude, Bound, Sag, Target, bind_pole_height, bind_pole_stretch, bind_volume
 
 Measure = Target | Callable[[Any], float]
 """What a user's own column records, see `formingx.trace`."""
@@ -109,15 +110,15 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     pressure (or travel: a length), pole_height (length), pole_stretch, enclosed_volume (length^3), strain_energy
     (stress length^3), mass_error (volume over its original value, minus 1), volume_error (root mean square of J - 1),
     both over what thermal expansion makes of the volume. Pole and volume are there where the scene has an axis and a
-    driven pressure. With contacts: contact_length (reference length in touch), penetration (of the deepest node,
-    length) and the force of the body on each tool: along its travel, positive when it resists; of a tool that stays
-    along Z, positive when the body pushes it up. It is plug_force for one named "plug" (tool_1_force for one without a
-    name), and tool_force where there is one tool. With a driven support: support_force (of the body on it, along its
-    component). Where several things can be driven each has its column, plug_travel for one named "plug"
-    (`Scene.column`), a support plug_force. `timed`: process_time too. With materials that relax: dissipated_power
-    (stress length^3 over time), and from it, in a run, dissipated_energy (stress length^3); with an axis and a known
-    equilibrium, pole_stress_ratio: the Mises stress at the pole over the one in equilibrium (`PoleStressRatio`). With
-    a rate-independent history: damage_energy (stress length^3).
+    driven pressure. With `Gravity`: sag, the largest downward displacement (length). With contacts: contact_length
+    (reference length in touch), penetration (of the deepest node, length) and the force of the body on each tool: along
+    its travel, positive when it resists; of a tool that stays along Z, positive when the body pushes it up. It is
+    plug_force for one named "plug" (tool_1_force for one without a name), and tool_force where there is one tool. With
+    a driven support: support_force (of the body on it, along its component). Where several things can be driven each
+    has its column, plug_travel for one named "plug" (`Scene.column`), a support plug_force. `timed`: process_time too.
+    With materials that relax: dissipated_power (stress length^3 over time), and from it, in a run, dissipated_energy
+    (stress length^3); with an axis and a known equilibrium, pole_stress_ratio: the Mises stress at the pole over the
+    one in equilibrium (`PoleStressRatio`). With a rate-independent history: damage_energy (stress length^3).
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
     found: dict[str, Bound] = {"process_time": Amplitude(problem, -1)} if timed else {}
@@ -129,6 +130,8 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     if "axis" in scene.mesh.boundaries:
         found["pole_height"] = bind_pole_height(problem)
         found["pole_stretch"] = bind_pole_stretch(problem)
+    if any(isinstance(load, Gravity) for load in scene.loads):
+        found["sag"] = Sag(problem)
     if any(thing.quantity == "pressure" for thing in scene.drivable):
         found["enclosed_volume"] = bind_volume(problem)
     change = forms.J - 1

@@ -120,6 +120,38 @@ class _Form(Bound):
         return c
 
 
+class Sag(Bound):
+    """See `sag`: that of the node that has sunk the most, the first of several."""
+
+    smooth = False
+
+    def __init__(self, problem: Any):
+        forms = problem.forms
+        nodes = [dof for dim in forms.displacement_element.entity_dofs[:2] for entity in dim for dof in entity]
+        dofs = np.unique(forms.space.sub(0).sub(1).dofmap.list[:, nodes])
+        self._problem, self._dofs = problem, dofs[dofs < problem.n_owned]
+        self.size = self._scale = forms.length
+
+    def _deepest(self, x: Any) -> tuple[float, int]:
+        """(sag over the length, rank where that is)."""
+        mine = -x.array_r[self._dofs].min(initial=0.0)
+        found = self._problem.comm.allgather(float(mine))
+        return max(found), int(np.argmax(found))
+
+    def value(self, x, control):
+        return self._scale * self._deepest(x)[0]
+
+    def equation(self, target):
+        def c(x, control, gradient):
+            depth, rank = self._deepest(x)
+            row = np.zeros(self._problem.n_owned)
+            if self._problem.comm.rank == rank and len(self._dofs):
+                row[self._dofs[np.argmin(x.array_r[self._dofs])]] = -1.0
+            self._problem.fill(gradient, row)
+            return depth - target / self._scale, 0.0
+        return c
+
+
 class Target(NamedTuple):
     """What a run aims at: a measure (by name), its value, and whether it changes sign with the control."""
 
@@ -200,6 +232,11 @@ def displacement(value: float, *, at: tuple[float, float], component: str = "z")
     def bind(problem):
         return _displacement(problem, [at], [[1.0, 0.0] if component == "r" else [0.0, 1.0]])
     return Target(f"u_{component}_at_{at[0]:g}_{at[1]:g}", finite("displacement", value), bind)
+
+
+def sag(value: float) -> Target:
+    """The largest downward displacement (along -Z) of the body reaches `value` (a length above 0)."""
+    return Target("sag", positive("sag", value), Sag)
 
 
 def bind_pole_height(problem: Any) -> Bound:

@@ -173,6 +173,31 @@ class Path(States):
         axisymmetric = self.problem.scene.kinematics.axisymmetric
         return part(self.wall(state), axisymmetric, density, trim, heights, units or NONE)
 
+    def released(self, temperature: float | None = None, *, trim: Any = None, boundaries: Any = None,
+                 duration: float | None = None, state: State | None = None, accuracy: str | float = "standard",
+                 units: Any = None) -> Any:
+        """The part let go (`Released`; print it): springback, shrinkage, warpage; its own run is `Released.path`.
+
+        Tools and loads are away; it is trimmed; of supports only `Symmetry` is left; then, where heat or materials take
+        time, it cools. At first it is in balance with what held it, which then fades.
+
+        Args:
+            temperature: to which its two faces are brought, at once; of a scene with `heat=Cooling(...)` only.
+            trim: as in `part`: it is cut along the line of nodes next to that.
+            boundaries: instead of a temperature, where it loses heat, as those of `Cooling`, for a duration.
+            duration: time that it is given; default with a temperature wall^2/diffusivity, else none.
+            state: of which the part is; default the last. accuracy: see `Process.run`. units: a `formingx.Units`.
+
+        Raises:
+            InputError: a membrane; arguments that do not fit the scene; the part does not reach the trim.
+            ConvergenceError: no state of the free part was found; it carries the path so far.
+        """
+        from .released import released
+        state = state or self.last
+        make = lambda record: Path(record, True)                           # noqa: E731
+        return released(self, self._segment(state).problem, make, state, temperature, trim, boundaries, duration,
+                        accuracy, units)
+
     def filling(self, tool: Any = None) -> Any:
         """The gap that is left in each corner of a tool, state by state (`Filling`), and the pressure to fill it.
 

@@ -59,17 +59,18 @@ class Run:
             "stop"; None: as `at_limit_points` says.
         accuracy: the error in time that is allowed, relative.
         label: what is said before the target beside a progress bar.
+        wanted: one of the targets that ends the run as the last does, or None.
     """
 
     settings = PathFollowing()
 
     def __init__(self, record: Record, targets: Sequence[tuple[Target, Measure]], step: StepControl | None = None,
-                 at_fold: str | None = None, accuracy: float = 2e-3, label: str = ""):
+                 at_fold: str | None = None, accuracy: float = 2e-3, label: str = "", wanted: Target | None = None):
         self.record, self._label, self.curve, self.problem = record, label, record.curve, record.equations
         self._at_fold = at_fold or ""
         self._accuracy = accuracy
         self._time_error = TimeError(self.problem, accuracy) if self.problem.relaxes else None
-        self.aim = Aim(self.curve, targets)
+        self.aim = Aim(self.curve, targets, wanted)
         self._step, self._began = step, time.perf_counter()
         self._ahead = self.settings.snap_through.ahead      # by how much the control goes on in a jump
         self._no_rest_at = np.nan                           # control from which a body that jumped came to rest nowhere

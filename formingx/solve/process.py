@@ -87,12 +87,12 @@ class Execution:
                 break
 
     def _bind(self, plan: Plan) -> list[tuple[Target, Measure]]:
-        """The targets of a stage and their measures; where it drives one thing the last is `until`."""
+        """The targets of a stage and their measures; where it drives one thing, or waits, the last is `until`."""
         stage, moving = plan.stage, {*plan.numbers, *(i for i, _ in plan.tables)}
         rate = [float(i in moving) for i in range(len(self._still.rate) - 1)] + [float(stage.timed)]
         self.problem.enter(replace(self._still, rate=rate, off=plan.off), self._rest, 0.0)
         found = []
-        for target in (*stage.through, *([stage.until] if plan.numbers and stage.until else [])):
+        for target in (*stage.through, *([stage.until] if stage.until and (plan.numbers or stage.waits) else [])):
             try:
                 bound = target.bind(self.problem)
             except InputError as error:
@@ -131,12 +131,15 @@ class Execution:
         self.record.accept(state)
         self.record.complete_step(StepControl(), changed())
 
-    def _trace(self, targets: _Targets, control: float | None) -> _Targets:
-        """Follow the path from a control (None: on from the last state); returns the targets that are still open."""
+    def _trace(self, targets: _Targets, control: float | None, wanted: Target | None = None) -> _Targets:
+        """Follow the path from a control (None: on from the last state); returns the targets that are still open.
+
+        wanted: one that ends it as the last of them does.
+        """
         step = self._stage.step or self._step
         if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
             step = step or _IN_TIME                          # a piece that has begun goes on with its own steps
-        run = Run(self.record, targets, step, self._stage.at_fold, self._accuracy, self._label)
+        run = Run(self.record, targets, step, self._stage.at_fold, self._accuracy, self._label, wanted)
         start = None if control is None else self._resumed(control)
         run.follow(self._max_steps, self._progress, start)
         return run.aim.open
@@ -267,8 +270,15 @@ class Execution:
             if self.record.last.control < 1.0:
                 self._take_up(replace(self.record.last, control=1.0, kind="target", measures={}, history=[]))
             return through
-        target = process_time(then)
-        return self._trace([*through, (target, target.bind(self.problem))], None if begun else 0.0)
+        target, wanted = process_time(then), self._stage.until if self._stage.waits else None
+        left = self._trace([*through, (target, target.bind(self.problem))], None if begun else 0.0, wanted)
+        for waited, bound in left:
+            if waited is wanted:
+                last = self.record.last
+                raise ConvergenceError(f"{self._stage.who}: {waited} was not reached within its duration of"
+                                       f" {self._stage.duration:g}: it is"
+                                       f" {self.curve.value(bound, last.x, last.control):.6g} then: give it longer")
+        return left
 
     def _check_beginning(self, tables: list[tuple[int, Array]], now: float, end: float) -> None:
         who = self._stage.who

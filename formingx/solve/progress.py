@@ -28,10 +28,11 @@ class Aim:
 
     patience = 500
 
-    def __init__(self, curve: Curve, targets: Sequence[tuple[Target, Measure]]):
+    def __init__(self, curve: Curve, targets: Sequence[tuple[Target, Measure]], wanted: Target | None = None):
         self._curve, self.open, self._best = curve, list(targets), 0.0
         self.until, self.measure = self.open[-1]
         self.values: list[float] = []
+        self._ends = [target for target in (self.until, wanted) if target is not None]
 
     @property
     def of_control(self) -> bool:
@@ -39,8 +40,8 @@ class Aim:
         return isinstance(self.measure, Amplitude)
 
     def is_open(self) -> bool:
-        """True until the last target is met."""
-        return any(target is self.until for target, _ in self.open)
+        """True until the last target, or the one that is wanted, is met."""
+        return all(any(target is end for target, _ in self.open) for end in self._ends)
 
     def gained(self, value: float | None = None) -> float:
         """How far a value, by default the last, has come from that of the first state (0) to the target (1)."""

@@ -27,7 +27,8 @@ class Stage:
         name: of the stage, in the record.
         drive: the load, support or contact to drive, itself or its name.
         until: the target that ends the stage, hit exactly, from either side, e.g. `travel(6.0)` (from the reference,
-            not from here); with `follow` a `process_time`, or None: the end of the tables.
+            not from here); with `follow` a `process_time`, or None: the end of the tables. With a
+            `duration`, while nothing is driven: what is waited for, such as `sag(30.0)`, within that time.
         through: more targets to hit exactly on the way; those that are not met are left out.
         without: what is not there during the stage, itself or its name: a support that is open, a tool that is away, a
             load that is off. A support takes hold of the body where it is when it comes back; a load comes back with
@@ -79,6 +80,11 @@ class Stage:
         """True if time goes by."""
         return bool(self.tables or self.flow or self.speed or self.duration)
 
+    @property
+    def waits(self) -> bool:
+        """True if it ends when `until` is met while time goes by and nothing is driven."""
+        return self.until is not None and self.drive is None and not self.tables
+
     def _check(self, follow: Any) -> None:
         who, until = self.who, self.until
         if self.hold is not None and (self.drive is None or self.duration is None or until or follow is not None):
@@ -93,8 +99,9 @@ class Stage:
         if self.drive is not None and self.duration and until and until.name.split("_")[-1] not in _OF_CONTROL:
             raise InputError(f"{who}: until = {until} with a duration: must be a target of what is driven; give a speed"
                              f" instead")
-        if self.drive is None and follow is None and until is not None:
-            raise InputError(f"{who}: has a target but drives nothing: give it drive=... or follow=...")
+        if self.drive is None and follow is None and until is not None and self.duration is None:
+            raise InputError(f"{who}: has a target but drives nothing: give it drive=..., follow=..., or duration=...,"
+                             f" the longest time that it is waited for")
         if self.drive is None and follow is None and self.duration is None and self.through:
             raise InputError(f"{who}: has targets but drives nothing: give it drive=..., follow=... or duration=...")
         if follow is not None and until is not None and until.name != "process_time":

@@ -85,7 +85,7 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     middle = _surface(fine(profile.middle), axisymmetric)
     rest = _surface(fine((profile.rest_bottom + profile.rest_top) / 2), axisymmetric)
     at_rest = _strips(fine(profile.rest_bottom), fine(profile.rest_top), axisymmetric)
-    inside = _inside(wall, trim)
+    inside = strips_within(wall, trim)
     volume, area, *before = (_sums(v, len(wall.r)) for v in (strips, middle, rest, at_rest))
     kept = [float((v * inside).sum()) for v in (volume, area, *before)]
     reached = np.append(inside > 0, False) | np.append(False, inside == 1)
@@ -105,7 +105,7 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
                 _content(wall, inside, axisymmetric), units)
 
 
-def _inside(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndarray:
+def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndarray:
     """How much of each of the n - 1 strips between nodes belongs to the part, 0 to 1."""
     inside = np.ones(len(wall.r) - 1)
     if trim is None:

@@ -1,0 +1,109 @@
+"""Parts that are let go: `Path.released`."""
+
+import json
+
+import numpy as np
+import pytest
+import ufl
+from conftest import drawn, run
+from dolfinx import fem
+from test_sets import BASE, air, balance, block, draw
+
+import formingx as fx
+from formingx.discrete.carry import take_fields
+from formingx.discrete.problem import Problem
+from formingx.mesh.part import part_along
+
+
+def blown(material, **more):
+    """A sheet that is blown against a plate in half a second."""
+    scene = fx.Scene(**{"mesh": fx.mesh.disc(radius=1.0, thickness=0.1, elements=(12, 2)), "materials": material,
+                        "supports": [fx.Symmetry("axis"), fx.SimplySupported("rim")],
+                        "loads": [fx.Pressure("bottom", name="air")],
+                        "contacts": [fx.Contact("top", fx.tools.plane(0.4), 0.2, name="stop")]} | more)
+    return fx.Process(scene).run([fx.Stage("blow", drive="air", until=fx.pressure(0.08), duration=0.5)],
+                                 progress=False, accuracy="draft")
+
+
+@pytest.fixture(scope="module")
+def path():
+    return blown(fx.Viscoelastic(fx.NeoHookean(c10=0.2), [(0.6, 0.5)]))
+
+
+@pytest.mark.parametrize("trim", [None, 0.7])
+def test_an_elastic_part_goes_back_to_rest(trim):
+    part = blown(fx.NeoHookean(c10=0.4)).released(trim=trim)
+    assert part.before.height.max() > 0.05 and part.height < 1e-7 and part.flange_angle > 10
+    F = part.path.stress().at_quadrature_points().deformation_gradient
+    assert np.abs(F - np.eye(3)).max() < 1e-6
+    assert abs(part.trimmed - (trim or 1.0)) < 0.06 and part.diameter < 2.001
+
+
+def test_a_relaxing_part_recovers_in_time(path):
+    """At once, and after more and more time; trimmed it is what the same material is without its rim."""
+    part = path.released(duration=0.3, accuracy="draft")
+    heights = [part.path.wall(s).height.max() for s in (part.path.states[0], part.path.state("let go"),
+                                                        part.path.state("cool"))]
+    assert heights[0] > heights[1] > heights[2] > 0.2 * heights[0]
+    assert heights[0] == pytest.approx(path.wall().height.max(), rel=1e-12)
+    assert part.path.last.time == pytest.approx(0.8)
+    assert "springback of the height" in str(part) and part.springback == pytest.approx(heights[0] - heights[2])
+    gone = path.released(duration=60.0, accuracy="draft")
+    assert gone.height < 1e-2 * heights[0]
+
+
+def test_fields_of_a_part_are_those_of_the_whole(path):
+    """Displacement, pressure, what the material remembers: to round-off."""
+    source, mesh = path.problem, path.problem.scene.mesh
+    line = np.column_stack([np.linspace(0, 1, 13), np.full(13, 0.05)])
+    here = Problem(fx.Scene(mesh=part_along(mesh, line, 9), materials=source.scene.materials,
+                            supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0)]))
+    take_fields(source, path.last, here)
+    assert set(here.scene.mesh.boundaries) == set(mesh.boundaries)
+    assert here.scene.mesh.nodes_of("rim")[:, 0] == pytest.approx(0.75)
+    both = []
+    with source.at(path.last):
+        for problem in (source, here):
+            cells = np.arange(len(problem.forms.cells_of(["sheet"])), dtype=np.int32)
+            F = problem.forms.F
+            values = fem.Expression(ufl.as_vector([F[0, 0], F[0, 1], F[1, 0], F[1, 1], F[2, 2], ufl.split(
+                problem.forms.w)[1] * problem.forms.stress, *problem.forms.X]), np.array([[0.2, 0.5], [0.6, 0.1]]))
+            both.append(values.eval(problem.forms.domain, cells).reshape(-1, 8))
+    found = both[1]
+    at = np.argmin(np.hypot(*(both[0][:, None, 6:] - found[None, :, 6:]).transpose(2, 0, 1)), axis=0)
+    same = np.hypot(*(both[0][at] - found)[:, 6:].T) < 1e-9      # a triangle may be numbered from another corner
+    assert np.sum(same) > 0.3 * len(found)
+    assert found[same] == pytest.approx(both[0][at][same], abs=1e-11)
+
+
+@pytest.mark.parametrize("trim", [None, 0.8e-3])
+def test_a_set_block_keeps_the_exact_stretch(trim):
+    """Drawn to 1.5, chilled in its grip, let go and trimmed: the balance of rubber and glass."""
+    scene = block(fx.Sets(BASE, modulus=200.0, between=(75, 85)), air(20.0))
+    path = fx.Process(scene).run([draw(0.5), fx.Stage("chill", duration=20.0)], progress=False)
+    part = path.released(20.0, trim=trim)
+    F = part.path.stress().at_quadrature_points().deformation_gradient
+    assert F[:, 0, 0] == pytest.approx(balance(200.0, 1.5), rel=1e-7)
+    assert part.shrinkage == pytest.approx(1 - balance(200.0, 1.5) / 1.5, rel=1e-5)
+
+
+def test_what_is_refused(path):
+    for words, arguments in (("does not change its temperature", {"temperature": 20.0}),
+                             ("the part goes from", {"trim": 7.0}), ("must be", {"duration": -1.0})):
+        with pytest.raises(fx.InputError, match=words):
+            path.released(**arguments)
+    membrane = fx.trace(fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1)), materials=BASE,
+                                 supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], model=fx.Membrane(),
+                                 loads=[fx.Pressure("bottom")]), until=fx.pole_height(0.3), progress=False)
+    with pytest.raises(fx.InputError, match="a membrane has no thickness"):
+        membrane.released()
+
+
+def test_setting_pot_quick(tmp_path):
+    """What sets keeps its shape and shrinks; the rubber goes back."""
+    run("demos/setting_pot.py", "--out", tmp_path, "--quick")
+    found = json.loads((tmp_path / "summary.json").read_text())
+    assert 0.1 < found["sets"]["shrinkage_percent"] < 0.6 and found["sets"]["springback"] < 0.1
+    assert found["neither"]["springback"] > 10 * found["sets"]["springback"]
+    assert found["sets"]["height"] > 6 and found["sets"]["least_wall"] > 0.03
+    assert drawn(tmp_path / "setting_pot.png")
