@@ -12,7 +12,7 @@ from ..errors import ConvergenceError, InputError, instance, known, positive, se
 from ..values.table import Table
 from ..values.temperature import ABSOLUTE_ZERO
 from . import stepping
-from .boundaries import ThermalProperties
+from .boundaries import FixedTemperature, ThermalProperties
 from .conduction import Conduction
 from .contact import ConductingTool, ContactWithTool
 from .run import checked_boundaries, checked_materials
@@ -88,6 +88,16 @@ class Cooling:
         zero = ABSOLUTE_ZERO[self.unit]
         checked_materials(scene.mesh, self.materials)
         checked_boundaries(scene.mesh, [*self.boundaries, *self._touches(scene)], zero)
+
+    def without_tools(self, boundaries: Any) -> Cooling:
+        """The same with other laws at its faces, or {boundary: temperature at which it is held}, and no tools."""
+        laws = [FixedTemperature(name, temperature=T) for name, T in boundaries.items()] if isinstance(
+            boundaries, Mapping) else boundaries
+        return Cooling(self.materials, laws, unit=self.unit, tolerance=self.tolerance, work_to_heat=self.work_to_heat)
+
+    def time_through(self, mesh: Any, thickness: float) -> float:
+        """thickness^2/diffusivity, of the slowest layer of a mesh, time."""
+        return thickness**2 / min(m.diffusivity for m in checked_materials(mesh, self.materials).values())
 
     def history(self, problem: Any) -> CoolingHistory:
         """What a problem remembers of the temperature (`formingx.discrete.history.History`)."""

@@ -11,9 +11,6 @@ from ..discrete.carry import carry, take_fields
 from ..discrete.problem import Problem
 from ..discrete.schedule import Setting
 from ..errors import ConvergenceError, InputError, finite, positive
-from ..heat.boundaries import FixedTemperature
-from ..heat.cooling import Cooling
-from ..heat.run import checked_materials
 from ..mesh.mesh import Mesh
 from ..mesh.part import part_along
 from ..physics.supports import Held, PinnedNode, Support, Symmetry
@@ -149,33 +146,27 @@ def _run(problem: Problem, x: np.ndarray, make_path: Any, cools: float, accuracy
     return Released(path, path.wall(path.states[0]), path.wall(), trimmed, units)
 
 
-def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration: Any,
-          wall: Wall) -> tuple[Cooling | None, float]:
-    """(how the part cools, how long)."""
+def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration: Any, wall: Wall) -> tuple[Any, float]:
+    """(how the part cools, or None; how long)."""
     if scene.heat is None:
         if temperature is not None or boundaries is not None:
             raise InputError("Path.released: temperature: the scene does not change its temperature: give it"
                              " heat=Cooling(...)")
         return None, 0.0 if duration is None else positive("Path.released: duration", duration)
-    given: Cooling = scene.heat
     if (temperature is None) == (boundaries is None):
         raise InputError("Path.released: give the temperature to which the part is cooled, or the boundaries= at which"
                          " it loses heat, and not both")
-    if boundaries is None:
-        cold = finite("Path.released: temperature", temperature)
-        boundaries = [FixedTemperature(name, temperature=cold) for name in
-                      next(pair for pair in FACES if all(face in mesh.boundaries for face in pair))]
-    elif duration is None:
+    if boundaries is not None and duration is None:
         raise InputError("Path.released: boundaries: for how long? give duration=...")
-    heat = Cooling(given.materials, boundaries, unit=given.unit, tolerance=given.tolerance,
-                   work_to_heat=given.work_to_heat)
+    faces = next(pair for pair in FACES if all(face in mesh.boundaries for face in pair))
+    heat = scene.heat.without_tools(boundaries if temperature is None else dict.fromkeys(
+        faces, finite("Path.released: temperature", temperature)))
     if duration is not None:
         return heat, positive("Path.released: duration", duration)
-    slowest = min(m.diffusivity for m in checked_materials(scene.mesh, given.materials).values())
-    return heat, float(_THROUGH * wall.wall.max()**2 / slowest)
+    return heat, _THROUGH * heat.time_through(scene.mesh, float(wall.wall.max()))
 
 
-def _scene(scene: Scene, mesh: Mesh, heat: Cooling | None) -> Scene:
+def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
     """The part alone: held on its planes and lines of symmetry, and against rigid motion."""
     symmetries = [s for s in scene.supports if isinstance(s, Symmetry) and len(mesh.nodes_of(str(s.on)))]
     supports: list[Support] = [*symmetries]
