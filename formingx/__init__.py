@@ -36,7 +36,7 @@ from .measures.targets import (
     travel,
 )
 from .physics.contact import Contact
-from .physics.kinematics import Axisymmetric, PlaneStrain
+from .physics.kinematics import Axisymmetric, PlaneStrain, ThreeD
 from .physics.loads import Gravity, Load, Pressure, Spin
 from .physics.models import DisplacementPenalty, Membrane, MixedPressure
 from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Support, Symmetry

@@ -44,12 +44,13 @@ def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges:
 
     Args:
         cells, edges: indices of points, shapes (m, 3 or 6) and (k, 2 or 3), as DOLFINx orders them; a tag for each.
-        points: shape (n, 2).
+        points: shape (n, 2), or in space (n, 3).
     """
     import basix.ufl
     from dolfinx import graph, mesh
     from dolfinx.io import distribute_entity_data
-    element = basix.ufl.element("Lagrange", "triangle", 1 if cells.shape[1] == 3 else 2, shape=(2,))
+    element = basix.ufl.element("Lagrange", "triangle", 1 if cells.shape[1] == 3 else 2,
+                                shape=(points.shape[1],))
     domain = mesh.create_mesh(comm, cells=cells, x=points, e=ufl.Mesh(element))
     marks = []
     for dim, entities, tags in ((2, cells, cell_tags), (1, edges, edge_tags)):

@@ -135,6 +135,14 @@ def as_points(name: str, values: Any) -> np.ndarray:
     return found.reshape(-1, 2)
 
 
+def triple(name: str, values: Any) -> tuple[float, float, float]:
+    """`values` as three floats, or an InputError unless they are three finite numbers."""
+    found = [finite(name, value) for value in several(name, values, "three numbers")]
+    if len(found) != 3:
+        raise InputError(f"{name} = {values!r}: must be three numbers")
+    return found[0], found[1], found[2]
+
+
 def values(name: str, function: Callable, at: Mapping[str, np.ndarray]) -> np.ndarray:
     """A user's function of arrays of one shape, by name, as floats of that shape; an InputError unless all are finite.
 

@@ -36,7 +36,7 @@ def body(problem: Any, x: Any, control: float) -> Body | None:
     """The elements of a solid at a state (None: a membrane has no elements across its thickness); collective."""
     forms = problem.forms
     domain = forms.domain
-    if domain.topology.dim != 2:
+    if domain.topology.dim != 2 or domain.geometry.dim != 2:
         return None
     problem.set_state(x, control)
     gauss = basix.make_quadrature(basix.CellType.triangle, problem.scene.quadrature_degree)[0]

@@ -21,6 +21,7 @@ from ufl.algorithms.analysis import extract_constants
 from .. import _compat
 from ..errors import together
 from ..physics import kinematics as kin
+from .admissible import Admissible
 from .free_stretch import FreeStretch
 from .history import History
 from .loaded_body import LoadedBody
@@ -204,6 +205,10 @@ class Formulation(ABC):
         """The cells of `mesh` in which some layers are, this rank's own and ghosts, ascending local numbers."""
         return np.sort(np.concatenate([self.mesh.cells.find(self.mesh.layers[name]) for name in layers]))
 
+    def admissible(self) -> Any:
+        """What tells whether the body has a shape."""
+        return Admissible(self)
+
     def probe(self, problem: Any, points: Any) -> Probe:
         """The displacement at reference points (R, Z), shape (n, 2)."""
         return Probe(problem, points)
@@ -249,7 +254,7 @@ class Formulation(ABC):
         """Linear form whose vector is the lumped mass of the displacement, over the volume."""
         v = ufl.split(self.test_function())[0]
         dx = ufl.dx(self.domain, metadata={"quadrature_degree": 4})
-        return (v[0] + v[1]) * self.weight / self.constant(self.volume) * dx
+        return sum(v[i] for i in range(self.domain.geometry.dim)) * self.weight / self.constant(self.volume) * dx
 
     def viscosity(self) -> Any:
         """Bilinear form of a viscous stress, P = dF/dt, as the residual is scaled: dF : dF over the volume."""

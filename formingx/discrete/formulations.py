@@ -8,6 +8,7 @@ from ..physics.models import DisplacementPenalty, Membrane, MixedPressure, Model
 from .formulation import Formulation
 from .membrane import MidSurface
 from .solid import Solid
+from .surface import Surface
 
 FORMULATIONS: dict[type[Model], type[Formulation]] = {MixedPressure: Solid, DisplacementPenalty: Solid,
                                                       Membrane: MidSurface}
@@ -16,4 +17,6 @@ FORMULATIONS: dict[type[Model], type[Formulation]] = {MixedPressure: Solid, Disp
 
 def formulate(scene: Any) -> Formulation:
     """The forms of a scene."""
+    if scene.kinematics.components == 3:
+        return Surface(scene)
     return next(FORMULATIONS[kind] for kind in type(scene.model).__mro__ if kind in FORMULATIONS)(scene)

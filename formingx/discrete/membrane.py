@@ -25,7 +25,7 @@ from ..ranks import gathered
 from .formulation import Formulation
 from .probes import MidSurfaceProbe
 
-_FIRST_STRETCH = 1e-6
+FIRST_STRETCH = 1e-6
 """Stretch at which the first direction of a path is taken (a direction only: no state is solved for there)."""
 
 
@@ -100,7 +100,7 @@ class MidSurface(Formulation):
 
     def set_stiff(self) -> None:
         """A small stretch in all directions."""
-        self.w.sub(0).interpolate(lambda X: _FIRST_STRETCH / self.length * X[:2])
+        self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X[:2])
 
     def _make_mesh(self) -> Mesh:
         """The line halfway between the two faces, with a node wherever the lower face has one."""

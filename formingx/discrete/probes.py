@@ -19,7 +19,7 @@ class Probe:
 
     Args:
         problem: the `Problem`.
-        points: reference coordinates (R, Z), shape (n, 2), the same on all ranks.
+        points: reference coordinates (R, Z), in space (x, y), shape (n, 2), the same on all ranks.
 
     Raises:
         InputError: a point outside the mesh.
@@ -29,16 +29,17 @@ class Probe:
         points = np.atleast_2d(np.asarray(points, dtype=float))
         forms = problem.forms
         place = locate(forms.domain, forms.nearest(points), forms.length)
-        subs = [forms.space.sub(0).sub(i).dofmap for i in (0, 1)]
+        self._components = forms.scene.kinematics.components
+        subs = [forms.space.sub(0).sub(i).dofmap for i in range(self._components)]
         self._problem, self.points = problem, points
         self._mine, self._cells, self._reference = place
         dim = forms.displacement_element.dim
         self._dofs = np.array([[sub.cell_dofs(c) for sub in subs] for c in place.cells],
-                              dtype=np.int64).reshape(len(place.mine), 2, dim)
+                              dtype=np.int64).reshape(len(place.mine), self._components, dim)
         self._weights = _basis(forms.displacement_element, 0, self._reference)
 
     def displacement(self, x: Any) -> np.ndarray:
-        """u at the points in the user's unit, shape (n, 2), all ranks."""
+        """u at the points in the user's unit, shape (n, components), all ranks."""
         self._problem.place(x.array_r)
         return self._read()
 
@@ -54,7 +55,7 @@ class Probe:
 
     def _read(self) -> np.ndarray:
         w = self._problem.forms.w.x.array
-        values = np.zeros((len(self.points), 2))
+        values = np.zeros((len(self.points), self._components))
         values[self._mine] = self._problem.forms.length * self._local(w[self._dofs])
         return self._problem.comm.allreduce(values, MPI.SUM)
 
@@ -65,7 +66,7 @@ class Probe:
         return row, -0.5 if self._problem.scene.kinematics.axisymmetric else -1.0
 
     def row(self, factors: np.ndarray) -> np.ndarray:
-        """c with c . x = sum over points and components of factors (n, 2) times u over length; owned unknowns."""
+        """c with c . x = sum over points and components of factors (n, c) times u over length; owned unknowns."""
         return self._row(factors, self._weights)
 
     def _local(self, values: np.ndarray) -> np.ndarray:
@@ -77,7 +78,7 @@ class Probe:
         index_map = problem.forms.space.dofmap.index_map
         triples: list[list] = [[], []]
         for k, i in enumerate(self._mine):
-            for component in (0, 1):
+            for component in range(self._components):
                 triples[0].append(index_map.local_to_global(self._dofs[k, component].astype(np.int32)))
                 triples[1].append(factors[i, component] * point_weights[k])
         dofs = np.concatenate(triples[0]) if triples[0] else np.zeros(0, dtype=np.int64)

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 
 from ..errors import InputError, together
 from ..scene.scene import Scene
-from .admissible import Admissible, Least
+from .admissible import Least
 from .constraints import Active, Constraints
 from .contact.face import FaceContact
 from .contact.resultants import penetration
@@ -85,7 +85,7 @@ class Problem(Units):
         remembering = (contact for contact in self.contacts if contact.remembers)
         self.histories: list[History] = [*remembering, *forms.histories]
         self.limit = StepLimit(self)
-        self._admissible = Admissible(forms)
+        self._admissible = forms.admissible()
         self._constraints = Constraints(forms, self.assemble)
         self._by_motion = self._lift = None
         self._movable = [k for k, thing in enumerate(scene.things) if thing in scene.supports and thing.driven]

@@ -42,7 +42,7 @@ class StepLimit:
         for face in problem.contacts:
             timed = face.law.remembers or heat is not None and heat.conducts(face.contact)
             # where it does not matter when they come, the convergence of the contact limits them
-            self._all.append(Approach(face, face.contact.nodes_per_step * (1 if timed else 10)))
+            self._all.append(Approach(face, face.points_per_step * (1 if timed else 10)))
 
     @property
     def _present(self) -> list[Approach]:

@@ -15,7 +15,8 @@ from .targets import Bound, Target
 
 def resisting(contact: Any) -> np.ndarray:
     """Unit vector (r, z) along which the force of the body on a tool counts: against its travel, or +Z if it stays."""
-    return np.array([0.0, 1.0]) if contact.moves is None else -np.array(contact.moves) / np.hypot(*contact.moves)
+    up = np.eye(contact.tool.components)[-1]
+    return up if contact.moves is None else -np.array(contact.moves) / np.linalg.norm(contact.moves)
 
 
 def force(value: float, *, of: str | None = None) -> Target:
@@ -94,7 +95,7 @@ class _ToolForce(Bound):
             for contact in self._contacts:
                 by_control = np.zeros(problem.n_owned)
                 blocks = contact.stiffness(x.array_r, control)
-                way = np.tile(self._way, blocks.shape[1] // 2)
+                way = np.tile(self._way, blocks.shape[1] // len(self._way))
                 np.add.at(values, contact.rule.dofs, np.einsum("i,nij->nj", way, blocks))
                 contact.add_control_derivative(by_control, x.array_r, control)
                 slope += float(np.sum(by_control[contact.rule.dofs] @ self._way))

@@ -224,13 +224,18 @@ def enclosed_volume(value: float) -> Target:
 
 
 def displacement(value: float, *, at: tuple[float, float], component: str = "z") -> Target:
-    """The displacement component ("r" or "z") of the reference point `at` = (R, Z) reaches `value` (a length)."""
+    """The displacement component ("r" or "z") of the reference point `at` = (R, Z) reaches `value` (a length).
+
+    Of a sheet in space "x", "y" or "z", `at` = (x, y).
+    """
     at = pair("displacement: at", at)
-    if not isinstance(component, str) or component not in ("r", "z"):
-        raise InputError(f"displacement: component = {component!r}: must be 'r' or 'z'")
+    if not isinstance(component, str) or component not in ("r", "z", "x", "y"):
+        raise InputError(f"displacement: component = {component!r}: must be 'r' or 'z' (in space 'x', 'y' or 'z')")
 
     def bind(problem):
-        return _displacement(problem, [at], [[1.0, 0.0] if component == "r" else [0.0, 1.0]])
+        axes = problem.scene.kinematics.axes
+        known("displacement: component", component, axes)
+        return _displacement(problem, [at], [[float(axis == component) for axis in axes]])
     return Target(f"u_{component}_at_{at[0]:g}_{at[1]:g}", finite("displacement", value), bind)
 
 

@@ -22,7 +22,7 @@ class Grid(NamedTuple):
     """A mesh on one rank; rows of `layers` and `boundaries` hold indices of `points`.
 
     Attributes:
-        points: (R, Z) of the nodes, shape (n, 2), unit of length of the mesh.
+        points: (R, Z) of the nodes, shape (n, 2), unit of length of the mesh; of a sheet in space (x, y, 0).
         numbers: their numbers in a file, shape (n,).
         layers: {name: triangles, shape (m, 6)}: corners counter-clockwise, then middles of edges 01, 12, 20 (of a
             first-order mesh: shape (m, 3)).
@@ -91,15 +91,15 @@ def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
         try:
             grid = make()
             cells, points, cell_tags, edges, edge_tags, layers, boundaries = _tagged(grid, what)
-            shape = cells.shape[1], edges.shape[1], layers, boundaries
+            shape = cells.shape[1], edges.shape[1], points.shape[1], layers, boundaries
         except InputError as e:
             error = e
     error, shape = comm.bcast((error, shape), root=0)
     if error is not None:
         raise error
-    nodes, ends, layers, boundaries = shape
+    nodes, ends, dim, layers, boundaries = shape
     if comm.rank != 0:
-        cells, points, cell_tags = np.empty((0, nodes), np.int64), np.empty((0, 2)), np.empty(0, np.int32)
+        cells, points, cell_tags = np.empty((0, nodes), np.int64), np.empty((0, dim)), np.empty(0, np.int32)
         edges, edge_tags = np.empty((0, ends), np.int64), np.empty(0, np.int32)
     domain, cell_marks, facet_marks = _compat.mesh_of_triangles(comm, cells, points, cell_tags, edges, edge_tags)
     return Mesh(domain, cell_marks, facet_marks, layers, boundaries, comm)
@@ -119,7 +119,7 @@ def _tagged(grid: Grid, what: str) -> tuple:
     if np.any(same > 1):
         raise InputError(f"{what}: {np.sum(same > 1)} elements belong to more than one layer, or are there twice;"
                          f" layers are {', '.join(map(repr, grid.layers))}")
-    check_elements(points, triangles, what)
+    check_elements(points[:, :2], triangles, what)
     layers = {name: tag for tag, name in enumerate(grid.layers, 1)}
     cell_tags = np.repeat(np.arange(1, len(layers) + 1), [len(rows) for rows in grid.layers.values()])
     width = 3 if triangles.shape[1] == 6 else 2

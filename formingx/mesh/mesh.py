@@ -151,13 +151,14 @@ class Mesh:
                                 make=lambda ends: make(ends).with_part(*part))
 
     def nodes_of(self, boundary: str) -> np.ndarray:
-        """Coordinates of all geometry nodes of a boundary, sorted by R, then Z, shape (n, 2); same on all ranks."""
+        """Coordinates of all geometry nodes of a boundary, sorted by R, then Z, shape (n, 2) (in space (n, 3))."""
         from dolfinx.mesh import entities_to_geometry
         domain = self.domain
         facets = self.facets_of(boundary)
         domain.topology.create_connectivity(1, 2)
         nodes = np.unique(entities_to_geometry(domain, 1, facets)) if len(facets) else np.zeros(0, dtype=np.int64)
-        local = domain.geometry.x[nodes, :2].reshape(-1, 2)
+        dim = domain.geometry.dim
+        local = domain.geometry.x[nodes, :dim].reshape(-1, dim)
         points = gathered(self.comm, local)
         scale = np.ptp(points, axis=0).max() if len(points) else 1.0
         keys = np.round(points / (scale or 1.0), 12)

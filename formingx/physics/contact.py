@@ -30,12 +30,14 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, count, instance, non_negative, pair, positive
+from ..errors import InputError, count, instance, non_negative, pair, positive, triple
 from ..tools.shapes import Nearest, Tool
+from ..tools.solid import SolidTool
 from ..tools.tool import RigidTool
 from ..values.table import Table
 from ..values.temperature import FunctionOfTemperature
 from .contact_law import ContactLaw, Motion, Touch, Tractions
+from .lagged_stick import LaggedStick
 from .part import Part
 
 _STICKS = 100.0
@@ -60,7 +62,7 @@ class Contact(Part):
 
     Args:
         on: name of the boundary that faces the tool.
-        tool: a `Tool`, see `formingx.tools`.
+        tool: a `Tool`, see `formingx.tools`; of a sheet in space `solid`, `box`, `revolved` or `extruded` there.
         friction: "stick" (a point that touches stays where it touched), "none", or the coefficient mu of Coulomb's
             law (5.9), from 0 (none). One that depends on the temperature of the body where it touches: a `table`
             {T: mu}, or what `of_temperature` returns; it is that of the last accepted state.
@@ -69,7 +71,8 @@ class Contact(Part):
         elastic_slip: g_s over thickness of the sheet: how far a point goes under Coulomb's law before it slides.
         separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
             start); with "stick" or "none".
-        nodes_per_step: so many nodes are to come into contact in a step (two to an element edge).
+        nodes_per_step: so many nodes are to come into contact in a step (two to an element edge); in space so many
+            hundredths of all nodes.
             What sticks or gives off heat depends on when it touched: with 4, a run takes half the iterations, and
             thickness changes by some 0.1 % of itself.
         present_area: the penalty is per area and over the wall as they are at the beginning of a step, not at rest:
@@ -77,7 +80,8 @@ class Contact(Part):
             depends, by its penetration, on the steps on the way to it.)
         points: where it acts: at the "nodes" of the face, or at so many Gauss points of each facet, which let go one by
             one: smoother where a sheet slides over an edge.
-        moves: (r, z) of the tool's motion per unit of travel: the tool is what the run controls; None: it stays.
+        moves: (r, z), in space (x, y, z), of the tool's motion per unit of travel: the tool is what the run controls;
+            None: it stays.
         name: what it is called in a process and in its columns.
 
     Raises:
@@ -86,19 +90,20 @@ class Contact(Part):
 
     quantity = "travel"
     on: str
+    tool: Any
     mu: Any
 
-    def __init__(self, on: str, tool: Tool, friction: Any = "stick", *, penalty: float | None = None,
+    def __init__(self, on: str, tool: Tool | SolidTool, friction: Any = "stick", *, penalty: float | None = None,
                  ramp: float | None = None, elastic_slip: float = _ELASTIC_SLIP, separates: bool = True,
                  nodes_per_step: int = 1, points: str | int = "nodes",
-                 present_area: bool = False, moves: tuple[float, float] | None = None, name: str | None = None):
+                 present_area: bool = False, moves: tuple[float, ...] | None = None, name: str | None = None):
         self.name, name = name, f"Contact({on!r})"
-        if not isinstance(tool, Tool):
+        if not isinstance(tool, Tool | SolidTool):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
         self.on, self.tool, self.friction = instance("Contact: on", on, str, "the name of a boundary"), tool, friction
         self.mu = _coefficient(f"{name}: friction", friction)
         self.separates = instance(f"{name}: separates", separates, bool, "True or False")
-        usual = _HELD if not separates else _STICK if self.sticks else _SLIDES
+        usual = _HELD if not separates or tool.components == 3 else _STICK if self.sticks else _SLIDES
         self.penalty = positive(f"{name}: penalty", usual[0] if penalty is None else penalty)
         self.ramp = positive(f"{name}: ramp", usual[1] if ramp is None else ramp)
         self.elastic_slip = positive(f"{name}: elastic_slip", elastic_slip)
@@ -111,9 +116,10 @@ class Contact(Part):
         if present_area and (self.friction_by_temperature or self.mu > 0 or not self.separates):
             raise InputError(f"{name}: friction = {friction!r}, separates = {separates!r} with present_area=True: what"
                              f" a point holds on to would change with its penalty; use 'none', or a larger penalty")
-        self.moves = None if moves is None else pair(f"{name}: moves", moves)
-        if self.moves == (0.0, 0.0):
-            raise InputError(f"{name}: moves = (0, 0): must name a direction, or be None")
+        numbers: Callable = pair if tool.components == 2 else triple
+        self.moves = None if moves is None else numbers(f"{name}: moves", moves)
+        if self.moves is not None and not any(self.moves):
+            raise InputError(f"{name}: moves = {moves!r}: must name a direction, or be None")
 
     @property
     def driven(self) -> bool:
@@ -168,6 +174,8 @@ class Contact(Part):
         temperature: of the body there, shape (n,), if friction depends on it.
         """
         theta, elastic_slip = self.ramp * thickness, self.elastic_slip * thickness
+        if self.tool.components == 3:
+            return LaggedStick(self.tool, k, theta, thickness, self.separates)
         foot = (1 - _AT_FOOT * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)
         return Law(self.tool, self.friction_at(temperature), k, theta, elastic_slip, shift, self.separates,

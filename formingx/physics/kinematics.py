@@ -13,19 +13,38 @@ import ufl
 from ufl.constantvalue import Zero
 from ufl.tensors import ListTensor
 
+from ..errors import InputError
+from .supports import Held
+
+_Y = 2
+"""Number of a component along y where supports name them: r, z, y, x."""
+
 
 class Kinematics:
     """What the motion of a section of the body means in space.
 
     Attributes:
-        components: of a displacement and of a position.
+        axes: names of the coordinates; components: of a displacement and of a position.
         axisymmetric: True if the section turns about R = 0.
         dimension_of_volume: 3; of a volume per unit depth 2.
     """
 
+    axes: tuple[str, ...] = ("r", "z")
     components = 2
     axisymmetric = False
     dimension_of_volume = 3
+
+    def in_axes(self, support: Any, items: list[Any]) -> list[Any]:
+        """What a support holds (`Held`, `MeanHeld`), its components as the coordinates are numbered.
+
+        Raises:
+            InputError: a component that the body does not have.
+        """
+        for item in items:
+            if item.component >= _Y:
+                raise InputError(f"{support!r}: a section has no component {'yx'[item.component - _Y]!r}: must be 'r' or"
+                                 f" 'z'")
+        return items
 
     def deformation_gradient(self, u: Any, X: Any) -> Any:
         """F, shape (3, 3), of the displacement u at the reference point X, both shape (2,)."""
@@ -119,6 +138,37 @@ class PlaneStrain(Kinematics):
         """Translations and the rotation in the plane, of a mode that is the same all along."""
         plane = [lambda x, f=f: np.column_stack([f(x), 0 * x[:, 0]]) for f in self.rigid_motions().values()]
         return [] if number else [*plane, lambda x: np.column_stack([0 * x, 1 + 0 * x[:, 0]])]
+
+
+class ThreeD(Kinematics):
+    """A sheet in space, coordinates (x, y, z): a surface with a thickness.
+
+    The gradient of a displacement is that along the surface; the normal goes with it unstretched in I + grad u, whose
+    cofactor so gives the area vector, and `Surface` puts the thickness there.
+    """
+
+    axes = ("x", "y", "z")
+    components = 3
+
+    def in_axes(self, support, items):
+        """A hinge holds all nodes of its rim, along y too."""
+        if {item.component for item in items} == {0, 1}:
+            items = [*items, items[0]._replace(component=_Y)]
+        return [Held(self.axes.index("xzyx"[h.component]), on=h.on, driven=h.driven) for h in items]
+
+    def deformation_gradient(self, u, X):
+        return ufl.Identity(3) + ufl.grad(u)
+
+    def weight(self, X):
+        return 1
+
+    def area_vector(self, u, X, N):
+        return ufl.cofac(self.deformation_gradient(u, X)) * N
+
+    def rigid_motions(self):
+        """Out of its plane a flat sheet may turn about a rim that is straight: what holds it is its tension."""
+        return {**{f"translation along {a}": lambda X, k=k: 0 * X + np.eye(3)[k] for k, a in enumerate(self.axes)},
+                "rotation about z": lambda X: np.stack([-X[:, 1], X[:, 0], 0 * X[:, 0]], 1)}
 
 
 def _along_z(X):

@@ -114,7 +114,7 @@ class Gravity(Load):
         self.density = _density("Gravity", density)
 
     def virtual_work(self, body, value):
-        return -value * _weighed(body, self.density, body.du[1])
+        return -value * _weighed(body, self.density, body.du[body.kinematics.components - 1])
 
     def mode_work(self, body, value):
         return None

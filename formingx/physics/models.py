@@ -52,18 +52,32 @@ class Membrane(Model):
 
     The stretch through the thickness is 1/(l1 l2), so the volume is kept exactly; layers are bonded and their energies
     add up. It has no bending, so a rim cannot be clamped, and knows no stress through the thickness.
+
+    Args:
+        wrinkles: in space: the part of the stiffness, up to 1, that is left where the membrane wrinkles (tension-field
+            theory, see `formingx.discrete.surface`), 0.01 for one; None: all of it.
     """
 
     solid = False
+    wrinkles: float | None = None
+
+    def __init__(self, wrinkles: float | None = None):
+        if wrinkles is not None:
+            self.wrinkles = positive("Membrane: wrinkles", wrinkles)
+            if self.wrinkles > 1:
+                raise InputError(f"Membrane: wrinkles = {wrinkles!r}: must be at most 1")
 
     def check(self, scene):
         for support in scene.supports:
-            if support.holds_rotation:
+            if support.holds_rotation and scene.kinematics.components == 2:
                 raise InputError(f"Scene: {support!r} with model=Membrane(): a membrane has no bending stiffness, its"
                                  f" rim cannot be clamped; use SimplySupported({support.on!r}), or a solid model")
         if scene.expansion:
             raise InputError("Scene: expansion: a membrane keeps its volume: use a solid model, MixedPressure()")
-        if scene.contacts:
+        if self.wrinkles is not None and scene.kinematics.components == 2:
+            raise InputError("Scene: Membrane(wrinkles=...): is for a sheet in space; a section has no wrinkles along"
+                             " its hoop: use a solid model")
+        if scene.contacts and scene.kinematics.components == 2:
             raise InputError(f"Scene: {scene.contacts[0]!r}: a membrane has no contact yet: use a solid model,"
                              f" MixedPressure() for one")
 

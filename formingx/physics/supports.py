@@ -161,6 +161,7 @@ class Displaced(Support):
 
 
 def _component(name: str, value: str) -> int:
-    if not isinstance(value, str) or value not in ("r", "z"):
-        raise InputError(f"{name} = {value!r}: must be 'r' or 'z'")
-    return R if value == "r" else Z
+    """0 of r, 1 of z, in space 2 of y, 3 of x: `Kinematics.in_axes` puts them in order."""
+    if not isinstance(value, str) or value not in ("r", "z", "x", "y"):
+        raise InputError(f"{name} = {value!r}: must be 'r' or 'z' (in space 'x', 'y' or 'z')")
+    return {"r": R, "z": Z, "y": 2, "x": 3}[value]

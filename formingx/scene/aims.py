@@ -79,10 +79,10 @@ def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:
     component, place = name.removeprefix("u_").split("_at_")
     point, near = np.array([float(x) for x in place.split("_")]), _NEAR * max(scene.extent)
     for support in supports:
-        for held in support.constraints():
-            if isinstance(held, Held) and not held.driven and "rz"[held.component] == component:
+        for held in scene.kinematics.in_axes(support, support.constraints()):
+            if isinstance(held, Held) and not held.driven and scene.kinematics.axes[held.component] == component:
                 nodes = np.array([held.point]) if held.on is None else scene.mesh.nodes_of(held.on)
-                if np.hypot(*(nodes - point).T).min() < near:
+                if np.hypot(*(nodes[:, :2] - point).T).min() < near:
                     return support
     return None
 

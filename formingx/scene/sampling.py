@@ -22,6 +22,6 @@ def sample(mesh: Mesh, layer: str, degree: int, temperature: GivenTemperature | 
     places: Any = basix.make_quadrature(basix.CellType.triangle, degree)[0]
     geometry = basix.ufl.element("Lagrange", "triangle", _compat.coordinate_map(domain).degree)
     shapes: Any = geometry.tabulate(0, places)
-    nodes = domain.geometry.x[_compat.cell_nodes(domain)[cells], :2]
+    nodes = domain.geometry.x[_compat.cell_nodes(domain)[cells], :2]      # in space (x, y)
     T = None if temperature is None else temperature.in_cells(cells, places).ravel()
     return Sample(np.einsum("qk,nkd->nqd", shapes[0], nodes).reshape(-1, 2), cells, places, domain, T)

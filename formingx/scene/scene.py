@@ -15,13 +15,13 @@ from ..materials.expansion import ThermalExpansion
 from ..materials.hyperelastic import Material
 from ..mesh.mesh import Mesh
 from ..physics.contact import Contact
-from ..physics.kinematics import Axisymmetric, Kinematics
+from ..physics.kinematics import Axisymmetric, Kinematics, ThreeD
 from ..physics.loads import Load
-from ..physics.models import MixedPressure, Model
+from ..physics.models import Membrane, MixedPressure, Model
 from ..physics.part import Part
 from ..physics.supports import Held, Support
 from ..ranks import gathered
-from . import tool_width
+from . import space, tool_width
 from .sampling import sample
 from .summary import summary
 from .temperature import GivenTemperature
@@ -46,8 +46,9 @@ class Scene:
             (Contacts of one tool with several faces, of the same `moves` and name, count as one.)
         contacts: faces of the body that rigid tools stop, see `formingx.Contact`.
         model: how the scene is modelled: `MixedPressure()` (default) or `DisplacementPenalty()`, a solid; `Membrane()`.
-        kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
-        quadrature_degree: of the energy, at most 30; 5 (seven points) is the thesis' rule.
+        kinematics: `Axisymmetric()` (default) or `PlaneStrain()`; of a sheet in space `ThreeD()`.
+        quadrature_degree: of the energy, at most 30; default 5 (seven points), the thesis' rule; in space 1.
+        thickness: of a sheet in space: a length, a function of arrays (x, y), or {layer: either of them}.
         temperature: of the body, which constants of materials may depend on: a number, a `table` over R, a function of
             arrays (R, Z), a CSV file with columns R, Z, T, what `formingx.heat` returned, or a DOLFINx Function.
         heat: `Cooling(...)`: the temperature changes as time goes by.
@@ -60,7 +61,8 @@ class Scene:
 
     def __init__(self, *, mesh: Mesh, materials: Material | Mapping[str, Material], supports: Sequence[Any],
                  loads: Sequence[Any] = (), contacts: Sequence[Contact] = (), model: Any = None, kinematics: Any = None,
-                 quadrature_degree: int = 5, temperature: Any = None, heat: Any = None, expansion: Any = None):
+                 quadrature_degree: int | None = None, temperature: Any = None, heat: Any = None,
+                 expansion: Any = None, thickness: Any = None):
         if not isinstance(mesh, Mesh):
             raise InputError(f"Scene: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")
         if isinstance(materials, Material):
@@ -74,19 +76,28 @@ class Scene:
         self.supports = _all_of(Support, "supports", supports, "supports, such as Clamped('rim')")
         self.loads = _all_of(Load, "loads", loads, "loads, such as Pressure('bottom')")
         self.contacts = _all_of(Contact, "contacts", contacts, "Contact(...)")
-        self.model = model if model is not None else MixedPressure()
+        in_space = mesh.domain.geometry.dim == 3
+        self.model: Any = model if model is not None else Membrane() if in_space else MixedPressure()
         if not isinstance(self.model, Model):
             raise InputError(f"Scene: model = {model!r}: must be a MixedPressure, a DisplacementPenalty or a Membrane")
-        self.kinematics = kinematics if kinematics is not None else Axisymmetric()
-        if not isinstance(self.kinematics, Kinematics):
-            raise InputError(f"Scene: kinematics = {kinematics!r}: must be Axisymmetric() or PlaneStrain()")
-        self.quadrature_degree = count("Scene: quadrature_degree", quadrature_degree)
+        self.kinematics = kinematics if kinematics is not None else ThreeD() if in_space else Axisymmetric()
+        if not isinstance(self.kinematics, Kinematics) or (self.kinematics.components == 3) != in_space:
+            raise InputError(f"Scene: kinematics = {kinematics!r}: must be Axisymmetric() or PlaneStrain(), of a sheet"
+                             f" in space ThreeD()")
+        usual = 1 if in_space else 5
+        self.quadrature_degree = count("Scene: quadrature_degree",
+                                       usual if quadrature_degree is None else quadrature_degree)
         if self.quadrature_degree > _HIGHEST:
             raise InputError(f"Scene: quadrature_degree = {quadrature_degree!r}: must be at most {_HIGHEST}")
         if temperature is not None:
             self.temperature = GivenTemperature(temperature, mesh)
         if expansion is not None:
             self.expansion = self._checked_expansion(expansion)
+        if in_space:
+            self.thickness = space.thicknesses(self, thickness)
+            space.refuse(self, heat)
+        elif thickness is not None:
+            raise InputError(f"Scene: thickness = {thickness!r}: is for a sheet in space; a section has one already")
         self._check_names()
         self._check_materials()
         self._check_boundaries()
@@ -254,6 +265,12 @@ class Scene:
         """
         contact.friction_at(None if self.temperature is None else self.temperature.on(contact.on))
         mesh, near = self.mesh, 1e-6 * max(self.extent)
+        if self.kinematics.components != contact.tool.components:
+            raise InputError(f"{contact!r}: a section takes tools drawn in its plane, a sheet in space those of"
+                             f" fx.tools.solid, box, revolved or extruded")
+        if contact.tool.components == 3:
+            space.check_contact(self, contact)
+            return
         if self.kinematics.axisymmetric and contact.moves and contact.moves[0] \
                 and contact.tool.bounds[0, 0] <= near:
             raise InputError(f"{contact!r}: it moves along R, but its tool covers the axis: no rigid tool of revolution"
@@ -318,7 +335,7 @@ class Scene:
         gram = np.zeros((len(modes), len(modes)))
         size = max(self.extent)
         for support in supports:
-            for held in support.held():
+            for held in self.kinematics.in_axes(support, support.held()):
                 X = (np.array([held.point]) if held.point is not None else self.mesh.nodes_of(held.on)) / size
                 rows = np.stack([mode(X)[:, held.component] for mode in modes], 1)
                 if not isinstance(held, Held):

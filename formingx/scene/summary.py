@@ -15,8 +15,9 @@ from ..values.temperature import FunctionOfTemperature
 def summary(scene: Any) -> dict[str, str]:
     """{part: one line for people} of a scene; not collective."""
     mesh, extent = scene.mesh, scene.extent
-    lines = {"mesh": f"{mesh.domain.topology.index_map(2).size_global} six-node triangles, {extent[0]:.6g} by"
-                     f" {extent[1]:.6g} (R, Z); layers: {', '.join(mesh.layers)}"
+    kind, axes = ("six-node ", "(R, Z)") if scene.kinematics.components == 2 else ("", "(x, y)")
+    lines = {"mesh": f"{mesh.domain.topology.index_map(2).size_global} {kind}triangles, {extent[0]:.6g} by"
+                     f" {extent[1]:.6g} {axes}; layers: {', '.join(mesh.layers)}"
                      f"; boundaries: {', '.join(mesh.boundaries)}"}
     for name, material in scene.materials.items():
         lines[f"material of {name}"] = _material(material, _temperatures(scene))

@@ -108,6 +108,8 @@ class Tool:
     [0.1, -0.3]
     """
 
+    components = 2
+
     def __init__(self, points: Sequence[Sequence[float]], fillets: float | Sequence[float] = 0.0, closed: bool = False):
         instance("Tool: closed", closed, bool, "True or False")
         corners = np.array([pair("Tool: points", p) for p in several("Tool: points", points, "points (R, Z)")])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+from ...physics.lagged_stick import LaggedStick
 from ...ranks import gathered
 from .face import FaceContact
 
@@ -16,6 +17,9 @@ _AT_END = 0.95
 
 _SLIDES = 1e-2
 """How far (over the length of face that is its own) a point may slide so."""
+
+_NEARER = 0.7
+"""Part of its distance from the tool that a point may move in a step of lagged contact, beside its length of face."""
 
 _CUT_OFF, _MOST_PLACES = 0.5, 4000
 """How deep the way of a point in a step may lead through a tool, over the length of face that is its own; at how many
@@ -42,6 +46,11 @@ class Approach:
         face = self.face
         start, velocity = face.positions(fields, control), face.moved(direction, slope)
         free = ~face.law.touching(start, face.touch)
+        if isinstance(face.law, LaggedStick):               # a tangent of a long step foretells no arrivals
+            most = _NEARER * np.maximum(-face.law.distance(start), 0.0) + face.rule.lengths
+            speed = np.linalg.norm(velocity, axis=1)
+            most = np.divide(most, speed, out=np.full(len(speed), length), where=free & (speed > 0))
+            length = self._comm.allreduce(float(most.min(initial=length)), MPI.MIN)
         times = self._arrivals(start, velocity, length)
         ahead = (times > 0.02 * length) & (times < length)         # nearer ones are as good as in touch
         times = np.sort(gathered(self._comm, times[ahead]))
@@ -60,6 +69,8 @@ class Approach:
         times = self._arrivals(start, velocity, length)
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         at_end = ends & face.contact.sticks & (times >= _AT_END * length)
+        if isinstance(face.law, LaggedStick):               # it asks for no place of arrival
+            return
         face.expect_arrivals(np.where(at_end[:, None], np.nan, start + times[:, None] * velocity))
 
     def _arrivals(self, start: np.ndarray, velocity: np.ndarray, length: float) -> np.ndarray:
@@ -77,12 +88,18 @@ class Approach:
         return times
 
     def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
-        """More than twice the new points that a step is meant, or foreseen, to bring into contact."""
+        """More than twice the new points that a step is meant, or foreseen, to bring into contact.
+
+        Of lagged contact: one that is further inside its tool than twice the length of face that is its own.
+        """
         face, theta = self.face, self.face.law.theta
         if face.touch is None:
             return False
         a, b = (face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control)))
         found = int(np.sum((a <= -theta - _NEAR * face.thickness) & (b > -theta)))
+        if isinstance(face.law, LaggedStick):
+            deep = np.where(face.law.touching(a, face.touch), 0.0, b - 2 * face.rule.lengths)
+            return bool(self._comm.allreduce(float(deep.max(initial=0.0)), MPI.MAX) > 0)
         return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self._allowed, self._foreseen) + 2)
 
     def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:

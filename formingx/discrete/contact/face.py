@@ -11,7 +11,7 @@ from ...physics.contact import Contact
 from ...physics.contact_law import Touch, Tractions
 from ..carry import Carrier
 from .increment import Increment
-from .rule import Gauss, Lobatto, Rule
+from .rule import Gauss, Lobatto, Rule, Vertices
 
 _SAME_STIFFNESS = 1e-3
 """Of the stiffness of a point: what it may differ by to count as the same in the tangent ahead."""
@@ -39,13 +39,17 @@ class FaceContact:
         rule: where the points are (`Rule`); points: their reference positions, shape (n, components), length.
         law: at the points; thickness: of the body behind the face, length.
         increment: the `Increment` that goes on.
-        present: it takes part in the stage.
+        present: it takes part in the stage; points_per_step: so many are to come into contact in a step.
     """
 
     def __init__(self, solid: Any, contact: Contact, assemble: Any):
         self.contact, self.comm, self._solid, self._length = contact, solid.comm, solid, solid.length
-        self.rule: Rule = (Lobatto(solid, contact.on, assemble) if contact.points == "nodes"
-                           else Gauss(solid, contact.on, int(contact.points)))
+        in_space = contact.tool.components == 3
+        self.rule: Rule = (Vertices(solid, assemble) if in_space else
+                           Lobatto(solid, contact.on, assemble) if contact.points == "nodes" else
+                           Gauss(solid, contact.on, int(contact.points)))
+        share = self.comm.allreduce(len(self.rule.points)) // 100 if in_space else 1
+        self.points_per_step = contact.nodes_per_step * max(share, 1)
         self.points, self.thickness = self.rule.points, solid.thickness(contact.on)
         self._warm = solid.temperature.nodes(self.rule.nodes) if contact.friction_by_temperature else None
         self._penalty = np.ones(len(self.points))
@@ -98,6 +102,12 @@ class FaceContact:
     def touching(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Which points touch, or are held, shape (n,)."""
         return self.law.touching(self.positions(fields, control), self.touch)
+
+    @property
+    def area(self) -> np.ndarray:
+        """That forces act on, shape (n,). (In space none of points that have just arrived: they are held from now.)"""
+        late = self._memory is not None and isinstance(self.rule, Vertices)
+        return np.where(self._memory.arrived, 0.0, self.rule.area) if late and self._memory else self.rule.area
 
     # equations
 

@@ -17,8 +17,8 @@ def penetration(face: FaceContact, fields: np.ndarray, control: float) -> float:
 
 
 def length(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """Reference length of the face that is in touch."""
-    return _sum(face, face.rule.lengths[face.touching(fields, control)])
+    """Reference length of the face that is in touch; in space its area."""
+    return _sum(face, face.rule.extent[face.touching(fields, control)])
 
 
 def force(face: FaceContact, fields: np.ndarray, control: float) -> np.ndarray:
@@ -26,13 +26,13 @@ def force(face: FaceContact, fields: np.ndarray, control: float) -> np.ndarray:
 
     Axisymmetric: the r entry is the radial traction summed around, not a resultant (which is 0).
     """
-    total = (face.rule.area[:, None] * face.tractions(fields, control).force).sum(0)
+    total = (face.area[:, None] * face.tractions(fields, control).force).sum(0)
     return np.asarray(face.comm.allreduce(total, MPI.SUM))
 
 
 def pressing(face: FaceContact, fields: np.ndarray, control: float) -> float:
     """Sum of the normal forces at the points, in the units of `force`."""
-    return _sum(face, face.rule.area * face.tractions(fields, control).normal)
+    return _sum(face, face.area * face.tractions(fields, control).normal)
 
 
 def energy(face: FaceContact, fields: np.ndarray, control: float) -> float:

@@ -33,6 +33,11 @@ class Rule:
     lumped: np.ndarray
     area: np.ndarray
 
+    @property
+    def extent(self) -> np.ndarray:
+        """Of the face that belongs to each point, as `contact_length` counts it, shape (n,); in space an area."""
+        return self.lengths
+
     def displacement(self, values: np.ndarray) -> np.ndarray:
         """Of the points, shape (n, components), for owned unknowns, in their units; collective."""
         raise NotImplementedError
@@ -117,6 +122,22 @@ class Lobatto(Rule):
             whole = kinematics.weight(at) * length / 24
             for place, share in ((0.0, 1), (0.5, -2), (1.0, 1)):
                 self.area[np.abs(away - place) < 0.1] += share * whole
+
+
+class Vertices(Lobatto):
+    """The nodes of a sheet in space, each with its third of the triangles around it; `lengths`: the root of that."""
+
+    def __init__(self, surface: Any, assemble: Any):
+        vectors, numbers = _displacements(surface)
+        own = np.flatnonzero(numbers[:, 0] < surface.space.dofmap.index_map.size_local)
+        self.dofs = numbers[own]
+        self.points = self.nodes = vectors.tabulate_dof_coordinates()[own].copy()
+        self.area = self.lumped = assemble(surface.compile(surface.area_row()))[self.dofs[:, 0]]
+        self.lengths = np.sqrt(self.area)
+
+    @property
+    def extent(self) -> np.ndarray:
+        return self.area
 
 
 class Gauss(Rule):

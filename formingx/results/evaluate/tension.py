@@ -70,7 +70,9 @@ def first_compression(path: Any) -> tuple[int, Resultant] | None:
     """(number of the first state of a path in which a membrane is compressed, where) or None; collective."""
     k = 0
     for segment in path.segments:
-        tension = Tension(segment.problem) if isinstance(segment.problem.scene.model, Membrane) else None
+        scene = segment.problem.scene
+        line = isinstance(scene.model, Membrane) and scene.kinematics.components == 2
+        tension = Tension(segment.problem) if line else None
         for state in segment.states:
             if tension is not None and (least := tension.least(state)).compressed:
                 return k, least

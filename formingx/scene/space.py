@@ -1,0 +1,105 @@
+"""What a scene in space may have, and what is not proven there and so refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, finite, known, positive, together, values
+from ..mesh.sheet import Sheet
+from ..physics.loads import Pressure
+from ..physics.supports import PinnedNode
+from ..ranks import gathered
+
+_LARGER = 9.0
+"""Sheet over tool, or tool over sheet, that looks like another unit of length. (The sheet may be a quarter.)"""
+
+
+def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
+    """{layer: its thickness, a function of arrays (x, y)}, above 0 at all nodes; collective."""
+    mesh = scene.mesh
+    if not isinstance(mesh, Sheet):
+        raise InputError("Scene: mesh: one in space must come from fx.mesh.sheet")
+    if given is None:
+        raise InputError("Scene: a sheet in space needs a thickness=...: a length, a function of (x, y), or {layer: "
+                         "...}")
+    each = given if isinstance(given, Mapping) else dict.fromkeys(mesh.layers, given)
+    for name in each:
+        known("Scene: thickness: layer", name, mesh.layers)
+    for name in mesh.layers:
+        if name not in each:
+            raise InputError(f"Scene: thickness: layer {name!r} has none")
+    if not isinstance(given, Mapping) and len(mesh.layers) > 1:
+        raise InputError(f"Scene: thickness = {given!r}: the sheet has several layers, {', '.join(mesh.layers)}: must "
+                         f"be {{layer: its thickness}}")
+    X = mesh.domain.geometry.x
+    found: dict[str, Callable] = {}
+    for name, h in each.items():
+        if callable(h):
+            found[name] = h
+            together(mesh.comm, [partial(_check, name, h, X)])
+        else:
+            found[name] = _Constant(positive(f"Scene: thickness of {name!r}", h))
+    return found
+
+
+class _Constant:
+    """A thickness that is the same everywhere."""
+
+    def __init__(self, value: float):
+        self.value = value
+
+    def __call__(self, x: Any, y: Any) -> Any:
+        return self.value + 0 * x
+
+
+def _check(name: str, function: Callable, X: np.ndarray) -> None:
+    found = values(f"Scene: thickness of {name!r}", function, {"x": X[:, 0], "y": X[:, 1]})
+    if len(found) and found.min() <= 0:
+        k = int(np.argmin(found))
+        raise InputError(f"Scene: thickness of {name!r} = {found[k]:.6g} at ({X[k, 0]:.6g}, {X[k, 1]:.6g}): must be"
+                         f" greater than 0")
+
+
+def refuse(scene: Any, heat: Any) -> None:
+    """An InputError for what is not proven in space."""
+    if scene.model.solid:
+        raise InputError(f"Scene: model = {scene.model!r}: a sheet in space is a Membrane(): solids in space are not"
+                         f" there yet")
+    if heat is not None:
+        raise InputError("Scene: heat: in space there is no conduction yet: give a temperature=... that stays")
+    for load in scene.loads:
+        if type(load).__name__ == "Spin":
+            raise InputError(f"Scene: {load!r}: it turns about the axis of a round body: not in space")
+        if isinstance(load, Pressure) and load.on not in ("bottom", "top"):
+            raise InputError(f"Scene: {load!r}: a sheet in space takes a pressure on its 'bottom' or its 'top'")
+    for support in scene.supports:
+        if isinstance(support, PinnedNode):
+            raise InputError(f"Scene: {support!r}: of a sheet in space the boundaries are held, not nodes")
+
+
+def check_contact(scene: Any, contact: Any) -> None:
+    """The sheet starts outside the tool, on which it sticks, in the same unit of length; collective."""
+    mesh, tool = scene.mesh, contact.tool
+    if contact.on not in ("bottom", "top"):
+        raise InputError(f"{contact!r}: a sheet in space touches with its 'bottom' or its 'top'")
+    if not contact.sticks:
+        raise InputError(f"{contact!r}: in space a sheet sticks where it touches: must be 'stick'; sliding, with"
+                         f" friction or without, is not proven there")
+    if contact.points != "nodes":
+        raise InputError(f"{contact!r}: points = {contact.points!r}: in space contact acts at 'nodes'")
+    size, length = float(np.ptp(tool.bounds, axis=0).max()), float(max(scene.extent))
+    if np.isfinite(size) and not 1 / _LARGER < length / size < _LARGER:
+        raise InputError(f"{contact!r}: the tool is {size:.4g} large, the sheet {length:.4g}: are the units of length"
+                         f" the same (mm, cm, inches)?")
+    points = gathered(mesh.comm, mesh.domain.geometry.x)
+    depth = tool.signed_distance(points)
+    k = int(np.argmax(depth))
+    finite(f"{contact!r}: distance to the tool", float(depth[k]))
+    if depth[k] > 1e-6 * length:
+        at = ", ".join(f"{v:.6g}" for v in points[k])
+        raise InputError(f"{contact!r}: the sheet starts inside the tool: {depth[k]:.6g} deep at (x, y, z) = ({at}):"
+                         f" move the tool, or is its solid on the other side (tool.reversed())?")
