@@ -147,7 +147,8 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     if forms.damage_energy is not None:
         found["damage_energy"] = _Scalar(problem, forms.damage_energy, lambda v: v * forms.stress * volume)
     if problem.contacts:
-        found["contact_length"] = _Nodal(problem, resultants.length, sum)
+        of_face = "contact_length" if scene.kinematics.components == 2 else "contact_area"
+        found[of_face] = _Nodal(problem, resultants.length, sum)
         found["penetration"] = _Nodal(problem, resultants.penetration, max)
         tooling = Tooling.of_problem(problem)
         tools = {name: [c for c, tool in zip(problem.contacts, tooling.names, strict=True) if tool == name]
