@@ -128,7 +128,7 @@ class Sag(Bound):
     def __init__(self, problem: Any):
         forms = problem.forms
         nodes = [dof for dim in forms.displacement_element.entity_dofs[:2] for entity in dim for dof in entity]
-        dofs = np.unique(forms.space.sub(0).sub(1).dofmap.list[:, nodes])
+        dofs = np.unique(forms.space.sub(0).sub(forms.scene.kinematics.components - 1).dofmap.list[:, nodes])
         self._problem, self._dofs = problem, dofs[dofs < problem.n_owned]
         self.size = self._scale = forms.length
 

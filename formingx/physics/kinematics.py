@@ -42,8 +42,8 @@ class Kinematics:
         """
         for item in items:
             if item.component >= _Y:
-                raise InputError(f"{support!r}: a section has no component {'yx'[item.component - _Y]!r}: must be 'r' or"
-                                 f" 'z'")
+                raise InputError(f"{support!r}: a section has no component {'yx'[item.component - _Y]!r}: must be"
+                                 f" 'r' or 'z'")
         return items
 
     def deformation_gradient(self, u: Any, X: Any) -> Any:
