@@ -103,7 +103,7 @@ def child(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> None:
     os.dup2(2, 1)                              # what the libraries print goes nowhere
     warnings.simplefilter("ignore")
     import formingx as fx
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         makers = _itself() if kinds == ("itself",) else cases(Path(folder))
         names = [name for name in makers if not kinds or name.split()[0] in kinds]
         for number in range(first, last):
@@ -112,7 +112,9 @@ def child(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> None:
             out.write(json.dumps(name) + "\n")
             how, bad, text = "result", False, ""
             try:
-                makers[name](rng)
+                found = makers[name](rng)
+                if isinstance(found, float | np.ndarray) and bool(np.any(found != found)):
+                    how, bad = "not a number", True
             except (fx.InputError, fx.ConvergenceError, OSError) as error:
                 how = type(error).__name__
                 if not str(error):
@@ -223,7 +225,7 @@ def cases(folder: Path) -> dict[str, Callable[[random.Random], Any]]:
         elif call.name != "mesh.read":
             found[f"{_kind(call.name)} {call.name}"] = lambda rng, c=call, g=good: _used(c, _required(c, g, rng))
     found |= _of_files(folder) | _of_fits() | _of_answers() | _of_tools() | _of_meshes() | _of_runs(folder, made)
-    found |= fuzz_runs.cases()
+    found |= _of_methods(made) | fuzz_runs.cases()
     return found
 
 
@@ -340,6 +342,41 @@ def _of_answers() -> dict[str, Callable]:
         kind(*[rng.choice([1.0, [1.0], anything(rng)]) for _ in range(rng.randint(0, 3))],
              **{name: near(1.0, rng) for name in rng.sample(["c10", "c01", "mu", "alpha", "Jm", "branches"], 2)})
     return {"answers compare": compare, "answers doctor": doctor, "answers material": made}
+
+
+# what laws give the package: of UFL expressions, of a problem
+_LAWS = {"strain_energy", "step_energy", "stored_energy", "equilibrium_energy", "elastic_stretches", "damage_energy",
+         "dissipation", "updated", "step_error", "check_constants", "constants_at", "guesses", "bind", "shear_limit",
+         "check_driven", "check_held", "column", "in_cells", "together"}
+
+
+def _of_methods(made: Any) -> dict[str, Callable]:
+    """Methods of what a script has in its hands, and of what runs give back."""
+    import inspect
+
+    import formingx as fx
+    path = fx.trace(made, until=fx.pole_height(0.1), progress=False)
+    things = {type(thing).__name__: thing for thing in (
+        path, made, made.mesh, fx.MooneyRivlin(c10=1.0, c01=0.2), fx.KBKZ([(1.0, 1.0)]), fx.WLF(10.0, 100.0, 120.0),
+        fx.Viscoelastic(fx.NeoHookean(c10=1.0), branches=[(0.5, 1.0)]), fx.fit(fx.NeoHookean, fx.treloar1944()),
+        fx.tools.cup(radius=1.0, depth=0.5), path.profile(), path.stress(), path.part(), path.wall(), fx.Units("mm"),
+        fx.compare(path, path, columns=["pole_height", "pressure"]))}
+    good: list[Any] = [path, path.last, made, made.mesh, "pressure", fx.pressure(0.1), 0.5, 2, "top", (0.1, 0.4)]
+
+    def names_of(thing: Any) -> list[str]:
+        return [name for name in dir(thing) if name == "__call__" or not name.startswith("_") and name not in _LAWS
+                and name not in dir(tuple) and callable(getattr(thing, name))]
+
+    def one(thing: Any, names: list[str]) -> Callable:
+        def call(rng):
+            method = getattr(thing, rng.choice(names))
+            given = {p.name: rng.choice(good) if rng.random() < 0.4 else anything(rng)
+                     for p in inspect.signature(method).parameters.values()
+                     if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)
+                     and rng.random() < (0.95 if p.default is p.empty else 0.4)}
+            return method(**given)
+        return call
+    return {f"methods {name}": one(thing, names) for name, thing in things.items() if (names := names_of(thing))}
 
 
 def _of_tools() -> dict[str, Callable]:

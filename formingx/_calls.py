@@ -13,7 +13,7 @@ import os
 import sys
 import types
 import typing
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
@@ -55,7 +55,7 @@ def _explain_class(cls: type) -> None:
 def _explain_methods(cls: type) -> None:
     for name, method in list(vars(cls).items()):
         makes = name in ("__init__", "__new__")
-        if name.startswith("_") and not makes:
+        if name.startswith("_") and not makes and name != "__call__":
             continue
         known = cls.__name__ if makes else name
         if isinstance(method, types.FunctionType):
@@ -133,7 +133,7 @@ def _is(value: Any, kind: Any) -> bool:
     if kind is np.ndarray or kind == ArrayLike:
         return _numbers(value)
     if origin in (typing.Union, types.UnionType):
-        return any(_is(value, one) for one in of)
+        return any(_is(value, one) for one in _either(of))
     if origin is typing.Literal:
         return any(value is one or value == one for one in of if type(value) is type(one))
     if kind is float or kind is int:
@@ -145,7 +145,8 @@ def _is(value: Any, kind: Any) -> bool:
         return value is None
     if origin is collections.abc.Callable:
         return callable(value)
-    if not isinstance(origin, type) or getattr(origin, "_is_protocol", False):
+    if not isinstance(origin, type) or getattr(origin, "_is_protocol", False) > getattr(
+            origin, "_is_runtime_protocol", False):
         return True
     if origin in (os.PathLike, Path):
         return isinstance(value, os.PathLike)
@@ -154,11 +155,17 @@ def _is(value: Any, kind: Any) -> bool:
     entries: Any = value
     if issubclass(origin, Mapping) and len(of) == 2:
         return all(_is(k, of[0]) and _is(v, of[1]) for k, v in entries.items())
-    if isinstance(value, list | tuple) and of:
+    if isinstance(value, Sequence) and of:
         if origin is tuple and of[-1] is not Ellipsis:
             return len(value) == len(of) and all(map(_is, value, of))
         return all(_is(one, of[0]) for one in value)
     return True
+
+
+def _either(kinds: Sequence[Any]) -> list[Any]:
+    """The kinds of a union, in which `ArrayLike`, a union too, is one."""
+    array = set(typing.get_args(ArrayLike))
+    return [ArrayLike, *(k for k in kinds if k not in array)] if array <= set(kinds) else list(kinds)
 
 
 def _numbers(value: Any) -> bool:
@@ -174,7 +181,7 @@ def _said(kind: Any) -> str:
     if kind is np.ndarray or kind == ArrayLike:
         return "numbers"
     if origin in (typing.Union, types.UnionType):
-        return " or ".join(dict.fromkeys(map(_said, of)))
+        return " or ".join(dict.fromkeys(map(_said, _either(of))))
     if origin is typing.Literal:
         return " or ".join(map(repr, of))
     if kind in _WORDS:
@@ -189,4 +196,5 @@ def _said(kind: Any) -> str:
         return f"({', '.join(map(_said, of))})"
     if isinstance(origin, type) and issubclass(origin, Iterable) and of:
         return f"a list of {_said(of[0])}"
-    return f"a {getattr(origin, '__name__', origin)}"
+    name = getattr(origin, "__name__", str(origin))
+    return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"

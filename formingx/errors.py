@@ -124,6 +124,17 @@ def pair(name: str, values: Any) -> tuple[float, float]:
     return finite(name, found[0]), finite(name, found[1])
 
 
+def finite_array(name: str, values: Any) -> np.ndarray:
+    """`values` as an array of floats, of any shape, or an InputError unless all are finite numbers."""
+    try:
+        found = np.asarray(values, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        found = np.array(np.nan)
+    if not np.all(np.isfinite(found)):
+        raise InputError(f"{name} = {values!r}: must be finite numbers")
+    return found
+
+
 def as_points(name: str, values: Any) -> np.ndarray:
     """`values`, of shape (..., 2), as an array of shape (n, 2), or an InputError unless they are points (R, Z)."""
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from .errors import InputError, known
+from .errors import InputError, finite, known
 
 # in m, and in Pa; kg/cm2 is the technical atmosphere of the older literature (kgf/cm2)
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
@@ -74,6 +74,7 @@ class Units:
 
     def mass(self, volume: float, density: float) -> float:
         """Grams of a volume (length^3) of a density in g/cm3; a length that is not said is taken for cm."""
+        volume, density = finite("mass: volume", volume), finite("mass: density", density)
         return volume * (LENGTHS[self.length or "cm"] / LENGTHS["cm"]) ** 3 * density
 
     def of(self, column: str) -> str:

@@ -15,6 +15,12 @@ def test_random_calls_end_well():
     assert {"result", "InputError"} <= {e.how for e in endings}
 
 
+def test_random_calls_of_methods_end_well():
+    """Of paths, scenes, materials, tools and what they give back: no traceback, nothing that is not a number."""
+    endings = fuzz.run(150, 0, ("methods",))
+    assert len(endings) == 150 and not [e for e in endings if e.bad]
+
+
 def test_whole_runs_of_random_scenes_hold():
     """Six of them; `python3 benchmarks/fuzz.py --kinds processes` makes others."""
     endings = fuzz.run(6, 9, ("processes",))

@@ -246,6 +246,19 @@ def test_a_step_file_that_lost_what_moves_a_part(tmp_path):
         tools.read(file)
 
 
+@pytest.mark.parametrize("lost, words", [
+    (r"#\d+ = CONTEXT_DEPENDENT_SHAPE_REPRESENTATION\([^;]*;", "nothing refers to #.*, a transformation"),
+    (r"(?<=ASSIGNED_CONTEXT\()\s*\(#[^)]*\)\)\s*REPRESENTATION_CONTEXT\('Context #1',", "its units are lost")])
+def test_a_step_file_that_lost_a_line(tmp_path, lost, words):
+    file = solid(tmp_path, "step", lambda occ: (occ.addLine(*(occ.addPoint(x, 5, 0) for x in (0, 9))),
+                                               occ.addLine(*(occ.addPoint(x, 4, 0) for x in (9, 12)))))
+    text, times = re.subn(lost, "", file.read_text(), count=1)
+    assert times and len(tools.read(file, [1]).pieces) == 1
+    file.write_text(text)
+    with pytest.raises(fx.InputError, match=words):
+        tools.read(file, [1])
+
+
 def test_time_to_read_grows_with_a_file(tmp_path, monkeypatch):
     """A large one is not a damaged one."""
     (tmp_path / "reader.py").write_text("import sys; print('{\"error\": \"' + sys.argv[3] + '\"}')")

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import InputError, finite, known, place
+from ..figures import Axes
 from ..materials import homogeneous
 from ..materials.material import Material
 from ..materials.viscoelastic import RelaxingMaterial
@@ -45,13 +47,13 @@ class Fit(NamedTuple):
     def intervals(self, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
         """{constant: (lowest, highest)} by Student's t, as if the stresses were linear in the constants."""
         from scipy.stats import t
-        if not 0 < finite("intervals: confidence", confidence) < 1:
+        if not 0 < (confidence := finite("intervals: confidence", confidence)) < 1:
             raise InputError(f"intervals: confidence = {confidence!r}: must be between 0 and 1")
         width = t.ppf((1 + confidence) / 2, max(self.points - len(self.errors), 1))
         return {name: (value - width * self.errors[name], value + width * self.errors[name])
                 for name, value in self.material.parameters.items()}
 
-    def plot(self, axes: Any = None, unit: str = "", unit_of_time: str = "s") -> Any:
+    def plot(self, axes: Axes | Sequence[Axes] | None = None, unit: str = "", unit_of_time: str = "s") -> Any:
         """Draw the data and the material's nominal stress against stretch (held tests: time); returns the axes.
 
         With tests that are held and tests that are not, two axes are needed: `axes` is then a pair of them.

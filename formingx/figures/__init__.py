@@ -2,9 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+
+
+@runtime_checkable
+class Axes(Protocol):
+    """What is drawn into: axes of matplotlib, which is imported where something is drawn."""
+
+    def plot(self, *args: Any, **style: Any) -> Any:
+        """Draw a line."""
+
+    def set(self, **properties: Any) -> Any:
+        """Labels, titles, limits."""
 
 
 def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: Any = None,

@@ -35,6 +35,7 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
         ConvergenceError: the integration came to an end before.
     """
     from scipy.integrate import solve_ivp
+    known("elastic_strains: mode", mode, MODES)
     direction = np.array([1, MODES[mode], -1 - MODES[mode]])
     strain, tau = np.log(stretches), np.asarray(tau, float)[:, None]
     w = np.empty((len(times), len(tau), 3))

@@ -30,7 +30,8 @@ class HistoryTests:
         Args:
             rate: of the logarithmic strain in the direction pulled, 1/time, above 0 (pushed: of its size).
         """
-        t = np.abs(np.log(np.asarray(stretches, float))) / positive(f"{self}: constant_rate: rate", rate)
+        rate = positive(f"{self}: constant_rate: rate", rate)
+        t = np.abs(np.log(np.asarray(stretches, float))) / rate
         ordered, back = np.unique(np.append(0.0, t), return_inverse=True)
         l = np.exp(ordered * rate * np.sign(np.log(np.sum(stretches) / np.size(stretches))))
         if not np.allclose(l[back[1:]], stretches, rtol=1e-12):

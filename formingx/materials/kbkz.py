@@ -11,12 +11,13 @@ In a scene its stress is computed at each quadrature point from the past states 
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError, instance, known, positive, several
+from ..errors import InputError, finite_array, instance, known, positive, several
 from . import branches
 from .constants import OfTemperature, Sample
 from .damping import Damping
@@ -83,7 +84,7 @@ class KBKZ(HistoryTests, Material):
     stores_energy = False
 
     @classmethod
-    def of_viscosities(cls, spectrum: Any, *args: Any, **more: Any) -> KBKZ:
+    def of_viscosities(cls, spectrum: Sequence[tuple[float, float]], *args: Any, **more: Any) -> KBKZ:
         """The same from a card of viscosities and times, [(eta, lambda), ...]: G = eta/lambda."""
         return cls([(positive("KBKZ: eta", eta) / positive("KBKZ: lambda", time), time) for eta, time in spectrum],
                    *args, **more)
@@ -147,7 +148,7 @@ class KBKZ(HistoryTests, Material):
     def relaxation_modulus(self, times: ArrayLike) -> np.ndarray:
         """G(t) = G_equilibrium + sum G exp(-t/tau) of small shear, at times of any shape; stress."""
         rest = 0.0 if (left := self.equilibrium) is None else left.shear_modulus
-        return rest + self._modulus(times)
+        return rest + self._modulus(finite_array("relaxation_modulus: times", times))
 
     def _modulus(self, times: Any) -> np.ndarray:
         """`relaxation_modulus` without the equilibrium."""

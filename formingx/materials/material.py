@@ -19,7 +19,7 @@ import ufl
 from numpy.typing import ArrayLike
 
 from ..errors import InputError, finite, known, positive
-from ..figures import figure
+from ..figures import Axes, figure
 from . import homogeneous
 from .constants import OfTemperature, Sample, Varying, varying
 from .homogeneous import MODES, Response, Stability
@@ -208,7 +208,7 @@ class Material:
                 f"{self}: check_stability: stretches = {stretches!r}: must be a range such as (0.5, 6)") from None
         return homogeneous.stability(self.response, self._numbers(), min(low, 1.0), max(high, 1.0))
 
-    def plot(self, axes: Any = None, stretches: Any = None, unit: str = "") -> Any:
+    def plot(self, axes: Axes | None = None, stretches: ArrayLike | None = None, unit: str = "") -> Any:
         """Draw nominal stress against stretch of the three tests; returns the matplotlib axes.
 
         Args:
@@ -216,13 +216,13 @@ class Material:
             stretches: the stretches, shape (n,); default 1 to 6, and to 95 % of the limit where there is one.
             unit: the constants' unit of stress, for the label.
         """
-        axes = figure()[1] if axes is None else axes
+        drawn: Any = figure()[1] if axes is None else axes
         for mode in MODES:
             l = np.linspace(1, min(6.0, 0.95 * self.largest_stretch(mode)), 200) if stretches is None else stretches
-            axes.plot(l, self.stress(mode, l), label=mode.replace("_", " "))
-        axes.set(xlabel="stretch", ylabel="nominal stress" + f" ({unit})" * bool(unit), title=str(self))
-        axes.legend()
-        return axes
+            drawn.plot(l, self.stress(mode, l), label=mode.replace("_", " "))
+        drawn.set(xlabel="stretch", ylabel="nominal stress" + f" ({unit})" * bool(unit), title=str(self))
+        drawn.legend()
+        return drawn
 
     def check(self, sample: Sample | None = None) -> None:
         """Raise an InputError unless the constants are admissible: finite, with a positive stiffness at rest.
@@ -267,6 +267,8 @@ class Material:
 
     def with_constants(self, constants: Sequence[Any]) -> Material:
         """The same kind of material with other constants, in the order of `parameters`."""
+        if len(constants) != len(self.parameters):
+            raise InputError(f"{self}: with_constants: {len(constants)} numbers for {', '.join(self.parameters)}")
         other = copy.copy(self)                             # with its `response`, which holds for any constants
         other.parameters = dict(zip(self.parameters, map(float, constants), strict=True))
         other.check()

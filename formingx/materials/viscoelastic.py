@@ -20,8 +20,8 @@ import numpy as np
 import ufl
 from numpy.typing import ArrayLike
 
-from ..errors import InputError, instance, known, positive, several
-from ..figures import figure
+from ..errors import InputError, finite_array, instance, known, positive, several
+from ..figures import Axes, figure
 from ..physics import kinematics
 from . import branches as tests
 from .constants import OfTemperature, Sample
@@ -185,7 +185,7 @@ class RelaxingMaterial(HistoryTests, Material):
 
     def relaxation_modulus(self, times: ArrayLike) -> np.ndarray:
         """G(t) = G_equilibrium + sum mu exp(-t/tau) of small shear, at times of any shape; stress."""
-        t = np.asarray(times, float)
+        t = finite_array("relaxation_modulus: times", times)
         modulus: Any = 0.0 if (rest := self.equilibrium) is None else rest.shear_modulus
         return modulus + sum(mu * np.exp(-t / tau) for mu, tau in self.branches)
 
@@ -218,8 +218,8 @@ class RelaxingMaterial(HistoryTests, Material):
         w = tests.elastic_strains(cls._flow, tau, mode, times, stretches, between, accuracy)
         return (np.exp(2 * w[..., 0]) - np.exp(2 * w[..., 2])) / stretches[:, None]
 
-    def plot(self, axes: Any = None, stretches: Any = None, unit: str = "", mode: str = "uniaxial",
-             rates: Any = None, unit_of_time: str = "s") -> Any:
+    def plot(self, axes: Axes | None = None, stretches: ArrayLike | None = None, unit: str = "",
+             mode: str = "uniaxial", rates: ArrayLike | None = None, unit_of_time: str = "s") -> Any:
         """Draw nominal stress against stretch at constant Hencky rates, at once and relaxed; returns the axes.
 
         Args:
@@ -228,20 +228,21 @@ class RelaxingMaterial(HistoryTests, Material):
             rates: 1/time; default from 0.1 over the longest tau to 10 over the shortest, by decades.
         """
         known(f"{self}: plot: mode", mode, MODES)
-        axes = figure()[1] if axes is None else axes
-        l = np.linspace(1, min(6.0, 0.95 * self.largest_stretch(mode)), 200) if stretches is None else stretches
+        drawn: Any = figure()[1] if axes is None else axes
+        l = np.linspace(1, min(6.0, 0.95 * self.largest_stretch(mode)), 200) if stretches is None else np.asarray(
+            stretches, dtype=float)
         if rates is None:
             tau = [tau for _, tau in self.branches]
             rates = 10.0 ** np.arange(math.floor(-math.log10(max(tau))) - 1, math.ceil(-math.log10(min(tau))) + 2)
-        axes.plot(l, self.stress(mode, l), "k", label="at once")
-        for rate in sorted(rates, reverse=True):
-            axes.plot(l, self.constant_rate(mode, rate, l), label=f"{rate:g}/{unit_of_time}")
+        drawn.plot(l, self.stress(mode, l), "k", label="at once")
+        for rate in sorted(np.atleast_1d(np.asarray(rates, dtype=float)), reverse=True):
+            drawn.plot(l, self.constant_rate(mode, rate, l), label=f"{rate:g}/{unit_of_time}")
         if (rest := self.equilibrium) is not None:
-            axes.plot(l, rest.stress(mode, l), "k--", label="relaxed")
-        axes.set(xlabel="stretch", ylabel="nominal stress" + f" ({unit})" * bool(unit),
+            drawn.plot(l, rest.stress(mode, l), "k--", label="relaxed")
+        drawn.set(xlabel="stretch", ylabel="nominal stress" + f" ({unit})" * bool(unit),
                  title=f"{mode.replace('_', ' ')} tension at constant Hencky rates")
-        axes.legend()
-        return axes
+        drawn.legend()
+        return drawn
 
     def coordinates(self):
         """Those of the equilibrium energy, then the logarithms of mu and tau."""

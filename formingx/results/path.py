@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError, as_points
+from ..figures import Axes
 from ..solve.state import State
+from ..units import NONE, Units
 from .evaluate.profile import Profile
 from .evaluate.stress import StressField
 from .show.picture import Picture
@@ -70,7 +72,7 @@ class Path(States):
         from .files import fields
         fields.to_xdmf(self, file, states)
 
-    def animate(self, file: Any, frames: int = 60, seconds: float = 5.0, *, units: Any = None) -> Picture:
+    def animate(self, file: Any, frames: int = 60, seconds: float = 5.0, *, units: Units | None = None) -> Picture:
         """Draw the forming as a moving picture, a GIF or an MP4: the sheet's section and the loading curve (rank 0).
 
         Returns the file, which a notebook shows. units: a `formingx.Units`, for the labels.
@@ -82,12 +84,11 @@ class Path(States):
             InputError: the name ends neither in .gif nor in .mp4, there is no ffmpeg to make an MP4, a number is not
                 allowed, or the mesh is no sheet.
         """
-        from ..units import NONE
         from .show import animation
         animation.animate(self, file, frames, seconds, units or NONE)
         return Picture(file)
 
-    def report(self, file: Any = "report.html", title: str = "", failure: Any = None, *, units: Any = None,
+    def report(self, file: Any = "report.html", title: str = "", failure: Any = None, *, units: Units | None = None,
                density: float | None = None, trim: Any = None) -> FilePath:
         """Write one HTML file that shows the run: the part, the process, curves, inputs, warnings (rank 0 writes).
 
@@ -102,16 +103,15 @@ class Path(States):
             InputError: plotly is not installed.
             OSError: the file cannot be written.
         """
-        from ..units import NONE
         from .show import report
         return report.write(report.of_path(self), file, title, failure, self.problem.comm, units or NONE, density, trim)
 
-    def plot(self, y: str, x: str, axes: Any = None, **style: Any) -> Any:
+    def plot(self, y: str, x: str, axes: Axes | None = None, **style: Any) -> Any:
         """Draw column `y` over column `x`; returns the matplotlib axes."""
         from .show import plots
         return plots.curve(self, y, x, axes, **style)
 
-    def plot_convergence(self, axes: Any = None) -> Any:
+    def plot_convergence(self, axes: Axes | None = None) -> Any:
         """Draw the correction (3.5.1) of every Newton iteration of every state; returns the matplotlib axes."""
         from .show import plots
         return plots.convergence(self, axes)
@@ -153,7 +153,7 @@ class Path(States):
         return self._walls.of(state or self.last)
 
     def part(self, state: State | None = None, *, density: float | None = None, trim: Any = None, heights: Any = (),
-             units: Any = None) -> Any:
+             units: Units | None = None) -> Any:
         """The formed part in numbers (`Part`): volume, weight, area, least wall and where, evenness; print it.
 
         Args:
@@ -168,7 +168,6 @@ class Path(States):
         Raises:
             InputError: the mesh is no sheet, or the part does not reach the trim or a height.
         """
-        from ..units import NONE
         from .evaluate.part import part
         axisymmetric = self.problem.scene.kinematics.axisymmetric
         return part(self.wall(state), axisymmetric, density, trim, heights, units or NONE)

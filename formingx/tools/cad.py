@@ -122,11 +122,13 @@ def _check_references(file: str) -> None:
         if record.count("(") != record.count(")") or record.count("=") > 1 or _names_twice(record):
             raise InputError(f"tool file {file!r} cannot be read: the record {' '.join(record.split())[:60]!r} is not"
                              f" whole: it is damaged")
+    if re.search(r"\bGLOBAL_UNIT_ASSIGNED_CONTEXT\s*\((?!\s*\(\s*#)", text):
+        raise InputError(f"tool file {file!r} cannot be read: its units are lost: it is damaged")
     defined = re.findall(r"#(\d+)\s*=", text)
     used = set(re.findall(r"#(\d+)(?!\d|\s*=)", text))
     missing = used - set(defined)
-    unused = set(re.findall(r"#(\d+)\s*=\s*ITEM_DEFINED_TRANSFORMATION\b", text)) - used
-    if unused:
+    places = r"#(\d+)\s*=\s*(?:\([^;]*\bREPRESENTATION_RELATIONSHIP_WITH_|ITEM_DEFINED_)TRANSFORMATION\b"
+    if unused := set(re.findall(places, text)) - used:
         raise InputError(f"tool file {file!r} cannot be read: nothing refers to #{min(unused, key=int)}, a"
                          f" transformation: what it moves has lost it, or is lost")
     if missing or len(set(defined)) < len(defined):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import ufl
+from numpy.typing import ArrayLike
 
 from ..errors import InputError, finite, known, positive, values
 from .table import Table
@@ -29,7 +30,7 @@ class FunctionOfTemperature:
         self._words = words or (repr(function) if isinstance(function, Table)
                                 else f"of_temperature({getattr(function, '__qualname__', repr(function))})")
 
-    def __call__(self, temperature: Any) -> np.ndarray:
+    def __call__(self, temperature: ArrayLike) -> np.ndarray:
         """Values at temperatures, of their shape, all finite."""
         T = np.asarray(temperature, dtype=float)
         if isinstance(self.function, Table):
@@ -60,7 +61,7 @@ class WLF:
         self.c1, self.c2 = positive("WLF: c1", c1), positive("WLF: c2", c2)
         self.reference = finite("WLF: reference", reference)
 
-    def __call__(self, temperature: Any) -> Any:
+    def __call__(self, temperature: ArrayLike) -> Any:
         """aT.
 
         Raises:
@@ -88,7 +89,7 @@ class Arrhenius:
         self.reference = finite("Arrhenius: reference", reference)
         _above(self, self.reference, ABSOLUTE_ZERO[unit], "absolute zero")
 
-    def __call__(self, temperature: Any) -> Any:
+    def __call__(self, temperature: ArrayLike) -> Any:
         """aT.
 
         Raises:
@@ -107,9 +108,10 @@ def _above(shift: Any, temperature: Any, limit: float, what: str) -> Any:
     if isinstance(temperature, ufl.core.expr.Expr):
         return temperature - limit
     temperature = np.asarray(temperature, dtype=float)
-    wrong = ~(temperature > limit)
+    wrong = ~((temperature > limit) & np.isfinite(temperature))
     if np.any(wrong):
-        raise InputError(f"{shift!r}: temperature = {temperature[wrong].flat[0]:.6g}: must be above {what}, {limit:g}")
+        raise InputError(f"{shift!r}: temperature = {temperature[wrong].flat[0]:.6g}: must be above {what},"
+                         f" {limit:g}, and finite")
     return temperature - limit
 
 

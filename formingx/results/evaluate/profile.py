@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...discrete.probes import Probe, probe
-from ...errors import InputError
+from ...errors import InputError, finite
 
 FACES = (("bottom", "top"), ("inner", "outer"))
 """Names of the two faces of a sheet or of a wall."""
@@ -76,7 +76,10 @@ class Profile:
         return _length_along(self.middle)
 
     def thickness_ratio_at(self, radius: float) -> float:
-        """Thickness ratio at a reference radius, linear between the nodes."""
+        """Thickness ratio at a reference radius, linear between the nodes; an InputError if it is not of the sheet."""
+        least, most = self.reference_radius[[0, -1]]
+        if not abs(finite("thickness_ratio_at: radius", radius) - (least + most) / 2) <= (0.5 + 1e-9) * (most - least):
+            raise InputError(f"thickness_ratio_at: radius = {radius:g}: must be from {least:g} to {most:g}")
         return float(np.interp(radius, self.reference_radius, self.thickness_ratio))
 
 

@@ -115,7 +115,10 @@ class Fitted(NamedTuple):
         if exact is not None:
             if not callable(exact):
                 raise InputError(f"stress error: exact = {exact!r}: must be a function of points, shape (n, 2)")
-            better = np.asarray(exact(self.points.reshape(-1, 2)), dtype=float)
+            try:
+                better = np.asarray(exact(self.points.reshape(-1, 2)), dtype=float)
+            except (TypeError, ValueError) as error:
+                raise InputError(f"stress error: exact: the function of points fails: {error}") from error
             if better.shape != (self.volume.size, 3, 3):
                 raise InputError(f"stress error: exact gives an array of shape {better.shape} at {self.volume.size}"
                                  f" points: must be {(self.volume.size, 3, 3)}")
