@@ -338,3 +338,12 @@ def test_top_load_quick(tmp_path):
     found = summary("top_load", tmp_path, "--quick")
     assert found["first_n"] == 4 and found["n_4"]["force_N"] == pytest.approx(1326, rel=2e-2)
     assert drawn(tmp_path / "top_load.png")
+
+
+def test_bottle_3_to_1_quick(tmp_path):
+    """The one that stiffens has no pressure maximum and a more even wall than the neo-Hookean one."""
+    found = summary("bottle_3_to_1", tmp_path, "--quick")
+    gent, neo = found["gent"], found["neo_hooke"]
+    assert gent["blow_ratio"] > 3.2 and not gent["limit_pressure_MPa"] and len(neo["limit_pressure_MPa"]) == 1
+    assert neo["least_wall_mm"] < 0.9 * gent["least_wall_mm"] and gent["evenness"] > 0.5
+    assert drawn(tmp_path / "bottle_3_to_1.png")
