@@ -21,7 +21,7 @@ from ..errors import InputError
 from ..solve.newton import Failure
 from ..solve.state import State
 
-_ENOUGH, _GOOD, _MOST = 1e-7, 1e-4, 12
+_ENOUGH, _GOOD, _MOST = 1e-5, 1e-3, 12
 """Corrections over the distance of a neighbour at which it is solved for; which must be reached; iterations."""
 
 _NONE = 1e-14
@@ -51,6 +51,8 @@ class Neighbour:
         self.F, self.gradient = self.problem.x.duplicate(), self.problem.x.duplicate()
         self.x: Any = None                                   # own part, shape (n,)
         self.control, self.memory = 0.0, self.problem.memory
+        self.plans: list[Any] = []
+        self.then = 0.0
 
     def state(self, like: State) -> State:
         """Its state beside one of the run."""
@@ -78,7 +80,8 @@ class Neighbour:
 def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: Any, equations: Sequence[Any]) -> None:
     """Solve for the neighbours beside a state of the run, at which its problem stands.
 
-    equation: the constraint of the run's state; equations: of the neighbours.
+    equation: the constraint of the run's state; None: the neighbours are in the plane normal to its path; equations: of
+    the neighbours.
 
     Raises:
         Failure: one is not found near it.
@@ -87,16 +90,32 @@ def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: 
     problem.x.array_w[:] = state.x
     if not newton.tangent(problem.x, state.control):
         raise Failure("the tangent is singular at a state of the run", [])
-    _, by_control = equation(problem.x, state.control, newton.gradient)
-    g, b = newton.gradient.array_r.copy(), newton.b.array_r.copy()
+    b = newton.b.array_r.copy()
+    if equation is None:
+        problem.metric_times(newton.b, newton.gradient)
+        kept, by_control = 0.0, curve.control_weight
+    else:
+        problem.x.array_w[:] = state.x
+        kept, by_control = equation(problem.x, state.control, newton.gradient)
+    g = newton.gradient.array_r.copy()
     slope = problem.comm.allreduce(float(g @ b)) + by_control
-    if abs(slope) < 1e-300:
+    if not abs(slope) > 1e-300:
         raise Failure("what ends the run does not change along its path there", [])
+    problem.x.array_w[:] = state.x
+    problem.residual(problem.x, state.control, newton.F)
+    left_over = newton.F.array_r.copy()                      # round-off, and the forces of points that are left out
+
+    def constraint(k: int) -> float:
+        one = neighbours[k]
+        if equation is None:
+            return float(problem.comm.allreduce(float(g @ (one.x - state.x))) + by_control * (
+                one.control - state.control))
+        return one.constraint(equations[k]) - kept
     open_ = list(range(len(neighbours)))
     size = _norm(problem, state.x) + abs(state.control)
     for iteration in range(_MOST):
-        rows = np.column_stack([neighbours[k].residual() for k in open_])
-        left = np.array([neighbours[k].constraint(equations[k]) for k in open_])
+        rows = np.column_stack([neighbours[k].residual() - left_over for k in open_])
+        left = np.array([constraint(k) for k in open_])
         dx = -newton.solver.solve_all(rows)
         steps = -(left + problem.comm.allreduce(g @ dx)) / slope
         dx += np.outer(b, steps)

@@ -50,6 +50,9 @@ _SLIDES, _STICK, _HELD = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
 """Penalty and ramp of what slides, of what sticks until pulled off, and of what never lets go, where stiffer costs
 iterations."""
 
+_FAR = 1e30
+"""A length beyond all others, which may still be multiplied with 0."""
+
 _MOST_POINTS = 100
 """Gauss points on a facet."""
 
@@ -241,6 +244,11 @@ class Law:
     def with_friction(self, mu: np.ndarray | float) -> Law:
         """The same law with other coefficients of friction."""
         return Law(self.tool, mu, self.k, self.theta, self.elastic_slip, self.shift, self.separates, self.shear_limit)
+
+    def without(self, points: np.ndarray) -> Law:
+        """The same law, of which some points (a mask, shape (n,)) are far away."""
+        return Law(self.tool, self.mu, self.k, self.theta, self.elastic_slip, self.shift + np.where(points, _FAR, 0.0),
+                   self.separates, self.shear_limit)
 
     @property
     def remembers(self) -> bool:

@@ -8,7 +8,7 @@ yet) leaves forces without balance: they are taken away gradually, which is one 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -24,7 +24,7 @@ from .measure_control import Flow
 from .newton import Failure, relative
 from .path_following import Run
 from .record import Record
-from .stage import Plan
+from .stage import Plan, Stage
 from .state import State
 from .stepping import StepControl
 
@@ -175,19 +175,7 @@ class Execution:
 
     def _enter_driving(self, numbers: list[int], clocked: bool = True) -> float:
         """Make the amplitude of one thing the control; `clocked`: time goes by as it moves. The control now."""
-        base = self._amplitudes()
-        rate, control, scale = [0.0] * len(base), base[numbers[0]], self.problem.scales[numbers[0]]
-        for number in numbers:
-            base[number], rate[number] = 0.0, 1.0
-        stage, until = self._stage, self._stage.until
-        if clocked and until is not None and (stage.speed or stage.duration):
-            there = until.value / scale if until.name.endswith(("pressure", "travel")) else np.inf
-            way = there - control
-            if way and stage.speed:
-                rate[-1] = np.sign(way) * scale / stage.speed
-            elif way and stage.duration:
-                rate[-1] = stage.duration / way
-            base[-1] -= rate[-1] * control
+        base, rate, control = driving(self._amplitudes(), self.problem.scales, numbers, self._stage, clocked)
         self._enter(base, rate, 1, control)
         return control
 
@@ -232,13 +220,12 @@ class Execution:
         before, _, control = self._standing()
         stage, through = self._stage, self._targets[self._k]
         now = before.base[-1] if piece else self.problem.time_at(control)
-        end = now + stage.duration if stage.duration else stage.until.value if stage.until else max(
-            table[-1, 0] for _, table in tables)
+        end = end_of(stage, tables, now)
         if not piece:
             self._check_beginning(tables, now, end)
         begun = piece > 0
         while begun or now < end - _SAME * abs(end):
-            then = min([t for _, table in tables for t in table[:, 0] if now + _SAME * abs(t) < t < end] + [end])
+            then = next_knot(tables, now, end)
             if not begun:
                 piece += 1
                 self._enter_line(tables, now, then, piece)
@@ -247,20 +234,8 @@ class Execution:
 
     def _enter_line(self, tables: list[tuple[int, Array]], now: float, then: float, piece: int) -> None:
         """All tables are straight between these times; the control is the time, scaled: no amplitude is faster."""
-        before, _, control = self._standing()
-        base, scales = self._amplitudes(), self.problem.scales
-        change = [0.0] * len(base)
-        for i, table in tables:
-            first, value = table[0]
-            if now < first - _SAME * abs(first):            # still on the way from where it stands to its first knot
-                part = min((then - now) / (first - now), 1.0)
-                change[i] = part * (value / scales[i] - base[i])
-            else:                                           # a hold has no round-off of the ramp before it to drive
-                base[i], ahead = (float(np.interp(t, *table.T)) / scales[i] for t in (now, then))
-                change[i] = ahead - base[i]
-        most = max(map(abs, change))
-        base[-1], change[-1] = now, then - now
-        self._enter(base, [c / (most or 1.0) for c in change], piece, 0.0)
+        base, rate = straight(self._amplitudes(), self.problem.scales, tables, now, then)
+        self._enter(base, rate, piece, 0.0)
 
     def _line(self, then: float, through: _Targets, begun: bool) -> _Targets:
         """Go to the end of a piece of the tables; returns the targets that are still open."""
@@ -295,6 +270,53 @@ class Execution:
             if first[0] <= now + _SAME * abs(now) and abs(stands - first[1]) > 1e-9 * size:
                 raise InputError(f"{who}: the table of {name} begins with {first[1]:g} at time {first[0]:g}, but it"
                                  f" stands at {stands:g} then")
+
+
+def driving(amplitudes: list[float], scales: Sequence[float], numbers: list[int], stage: Stage,
+            clocked: bool = True) -> tuple[list[float], list[float], float]:
+    """(base, rate, control now) of a setting that makes the amplitude of one thing, by its numbers, the control."""
+    base, rate = list(amplitudes), [0.0] * len(amplitudes)
+    control, scale = base[numbers[0]], scales[numbers[0]]
+    for number in numbers:
+        base[number], rate[number] = 0.0, 1.0
+    until = stage.until
+    if clocked and until is not None and (stage.speed or stage.duration):
+        there = until.value / scale if until.name.endswith(("pressure", "travel")) else np.inf
+        way = there - control
+        if way and stage.speed:
+            rate[-1] = np.sign(way) * scale / stage.speed
+        elif way and stage.duration:
+            rate[-1] = stage.duration / way
+        base[-1] -= rate[-1] * control
+    return base, rate, control
+
+
+def straight(amplitudes: list[float], scales: Sequence[float], tables: list[tuple[int, Array]], now: float,
+             then: float) -> tuple[list[float], list[float]]:
+    """(base, rate) of a setting between two times where tables are straight; the control is the time, scaled."""
+    base, change = list(amplitudes), [0.0] * len(amplitudes)
+    for i, table in tables:
+        first, value = table[0]
+        if now < first - _SAME * abs(first):                # still on the way from where it stands to its first knot
+            part = min((then - now) / (first - now), 1.0)
+            change[i] = part * (value / scales[i] - base[i])
+        else:                                               # a hold has no round-off of the ramp before it to drive
+            base[i], ahead = (float(np.interp(t, *table.T)) / scales[i] for t in (now, then))
+            change[i] = ahead - base[i]
+    most = max(map(abs, change))
+    base[-1], change[-1] = now, then - now
+    return base, [c / (most or 1.0) for c in change]
+
+
+def end_of(stage: Stage, tables: list[tuple[int, Array]], now: float) -> float:
+    """The time at which a stage that follows tables, or waits, ends."""
+    return now + stage.duration if stage.duration else stage.until.value if stage.until else max(
+        table[-1, 0] for _, table in tables)
+
+
+def next_knot(tables: list[tuple[int, Array]], now: float, end: float) -> float:
+    """The first time after now at which tables have a corner, or the end."""
+    return min([t for _, table in tables for t in table[:, 0] if now + _SAME * abs(t) < t < end] + [end])
 
 
 def begin(curve: Curve) -> State:

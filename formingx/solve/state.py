@@ -23,7 +23,8 @@ class State:
         jump: of a "jump": {"dissipated": energy that was lost (stress length^3), "moved": how far the body moved from
             the state before, mean over its volume (length)}.
         met: the target that it hits, or None.
-        memory: what each history of the problem remembers from here on (`Problem.histories`).
+        memory: what each history of the problem remembers from here on (`Problem.histories`); before: what it did while
+            the state was solved for; empty if that is not known.
         stage: name of the stage of a process; setting: what the stage had set, as plain data (`Setting`).
         stepping: what a run goes on with: its next step, its counts and its target; empty inside a step.
         time: process time.
@@ -39,6 +40,7 @@ class State:
     kind: str = "step"
     met: Target | None = None
     memory: list[Any] = field(default_factory=list)
+    before: list[Any] = field(default_factory=list)
     stage: str = ""
     setting: dict[str, Any] = field(default_factory=dict)
     stepping: dict[str, Any] = field(default_factory=dict)

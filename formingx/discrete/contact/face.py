@@ -126,6 +126,10 @@ class FaceContact:
             self._harden(np.maximum(self.rule.area_ratio(old), 1.0) ** 2)
         self.increment = Increment(self.law, self.touch, None if old is None else self.positions(old, control))
 
+    def leave_out(self, points: np.ndarray) -> None:
+        """Some points (a mask, shape (n,)) touch nothing, until another increment begins."""
+        self.increment = Increment(self.law.without(points), self.touch)
+
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Add the forces to the owned residual."""
         self.add(values, self._scale[:, None] * self.tractions(fields, control).force)
