@@ -5,20 +5,29 @@ membrane and as a solid: derivatives by b of its constant C = c10 = 0.5 (1 + b R
 (1 + b R^2)/100, at b = 0, of the pressure p R0/(C(0) h0(0)) and of the wall over that at rest at R = 0 and 0.5.
 
 The cup: a sheet of thickness 0.03 is blown into a cup, 0.7 deep, on which it sticks; C = 0.5 (1 + b (R^2 - 0.5)). When
-a node touches moves with b: so the derivative of a run is not that of its steps as they were.
+a node touches moves with b: so the derivative of a run is not that of its steps as they were. Differences of whole runs
+scatter by some 0.001, as steps change with b.
+
+The pot: a plug pushes a clamped sheet, with Coulomb friction, into a mould on which it sticks, and air at a low pressure
+follows; an elastic sheet and one that relaxes. Derivatives of the wall by friction, travel and nose radius of the plug,
+and by the constant of the sheet; of the cup by its fillet.
 """
 
 import numpy as np
-from common import parser, say, summarise
+from common import parser, save, say, summarise
 
 import formingx as fx
+from formingx.figures import figure
 from formingx.results import files
 
 THICKNESS, C = 0.01, 0.5
 MODELS = {"membrane": fx.Membrane, "solid": fx.MixedPressure}
 CONSTANTS = {"C_R2": lambda R: R**2, "C_R4": lambda R: R**4}
 HEIGHTS = (0.8, 1.0)
+CUP_SHEET, POT_SHEET = 0.03, 0.1
 RADII = np.arange(1, 10) / 10                                 # of the cup's sheet
+POT = {"mu": 0.3, "travel": 2.3, "nose": 0.8, "c10": 1.0}
+POT_RADII = (0.25, 0.75, 1.25, 1.75, 2.25, 2.75)
 
 
 def inflated(kind, model, height, elements):
@@ -31,6 +40,42 @@ def inflated(kind, model, height, elements):
                          supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")])
         return scene, fx.pole_height(height)
     return build
+
+
+def cup(b, fillet, elements=(30, 1)):
+    """A sheet that sticks to a cup."""
+    mesh = fx.mesh.disc(radius=1.0, thickness=CUP_SHEET, elements=elements)
+    mould = fx.tools.cup(radius=1.0, depth=0.7, mouth=CUP_SHEET, draft=10.0, fillet=fillet)
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=lambda R, Z: C * (1 + b * (R**2 - 0.5))),
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")],
+                     contacts=[fx.Contact("top", mould, "stick")])
+    return scene, fx.pressure(0.25)
+
+
+def pot(mu, travel, nose, c10, relaxing=False, elements=(24, 1)):
+    """A plug, then a little air."""
+    mesh = fx.mesh.disc(radius=3.0, thickness=POT_SHEET, elements=elements)
+    mould = fx.tools.cup(radius=3.0, depth=2.6, mouth=POT_SHEET, draft=8.0, fillet=0.6, lip=0.15)
+    plug = fx.tools.male(radius=1.5, height=8.0, base=-8.0, draft=3.0, fillet=nose)
+    sheet = fx.NeoHookean(c10=c10)
+    if relaxing:
+        sheet = fx.Viscoelastic(fx.NeoHookean(c10=0.5 * c10), branches=[(c10, 2.0)])
+    scene = fx.Scene(mesh=mesh, materials=sheet, supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     loads=[fx.Pressure("bottom", name="air")],
+                     contacts=[fx.Contact("top", mould, "stick", separates=False, name="mould"),
+                               fx.Contact("bottom", plug, mu, moves=(0, 1), name="plug")])
+    return scene, [fx.Stage("plug", drive="plug", until=fx.travel(travel), speed=4.0 if relaxing else None),
+                   fx.Stage("air", drive="air", until=fx.pressure(0.05), duration=0.5 if relaxing else None)]
+
+
+def beside(design, values, name, step, radii, thickness):
+    """d(wall/thickness)/d(parameter) at some reference radii, exact and by differences of whole runs."""
+    run = design.run(values)
+    R = run.profile.reference_radius
+    exact = run.derivative("wall")[1][:, list(values).index(name)]
+    above, below = (design.run({**values, name: values[name] + sign * step}).wall for sign in (1, -1))
+    found = [np.interp(radii, R, d / thickness).tolist() for d in (exact, (above - below) / (2 * step))]
+    return [{f"{R:g}": d for R, d in zip(radii, one)} for one in found]
 
 
 def ratios(path):
@@ -54,6 +99,29 @@ def main():
                 summary.setdefault(kind, {}).setdefault(model, {})[f"w_{height:g}"] = {
                     "dp": dp, "dpole": pole, "dhalf": half}
                 say(f"{kind}, {model}, height {height:g}: dp {dp:.7f}, dpole {pole:.6f}, dhalf {half:.6f}")
+    design, step = fx.Design(cup, {"b": (0.0, -1.0, 1.0), "fillet": (0.2, 0.1, 0.4)}), 0.02
+    summary["fillet"] = dict(zip(("exact", "by_differences"), beside(
+        design, {"b": 0.0, "fillet": 0.2}, "fillet", 0.01, RADII, CUP_SHEET)))
+    exact, whole = beside(design, {"b": 0.0, "fillet": 0.2}, "b", step, RADII, CUP_SHEET)
+    summary["cup"], summary["cup_by_differences"] = exact, whole
+    say(f"cup, by its fillet: {summary['fillet']}", "cup:             " + ", ".join(f"{d:8.4f}" for d in exact.values()),
+        "  by differences " + ", ".join(f"{d:8.4f}" for d in whole.values()))
+    drawing, axes = figure()
+    axes.plot(RADII, list(exact.values()), "C0", label="exact")
+    axes.plot(RADII, list(whole.values()), "ko", mfc="none", label=f"differences of runs, b = {step:g} and -{step:g}")
+    axes.set_xlabel("R / R0")
+    axes.set_ylabel("d(wall / h) / db")
+    axes.legend()
+    save(drawing, args.out / "cup.png")
+    summary["pot"] = {}
+    for sheet in ("elastic",) if args.quick else ("elastic", "relaxing"):
+        design = fx.Design(lambda relaxing=sheet == "relaxing", **values: pot(**values, relaxing=relaxing), {
+            name: (value, 0.5 * value, 2 * value) for name, value in POT.items()}, step=fx.StepControl(target=8))
+        for name in list(POT)[: 1 if args.quick else None]:
+            exact, whole = beside(design, POT, name, 0.01, POT_RADII, POT_SHEET)
+            summary["pot"].setdefault(sheet, {})[name] = {"exact": exact, "by_differences": whole}
+            say(f"pot, {sheet}, by {name:8}" + ", ".join(f"{d:8.4f}" for d in exact.values()),
+                "   by differences      " + ", ".join(f"{d:8.4f}" for d in whole.values()))
     summarise(args.out, {**summary, "elements_along": elements[0], "versions": files.versions()})
 
 

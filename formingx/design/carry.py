@@ -71,7 +71,9 @@ class _Carrier:
                 self._enter(Setting(**state.setting))
             if before is None:
                 self._begin(state)
-            elif state.kind != "start" and (last or history):
+            elif state.kind == "start":
+                self._beside = state
+            elif last or history:
                 self._settle(state, before, last)
             if history:
                 for one in self.neighbours:
@@ -86,6 +88,7 @@ class _Carrier:
         for one in self.neighbours:
             one.x, one.control = state.x.copy(), state.control
         self._late: list[np.ndarray] = []
+        self._beside = state
         if np.any(state.x):
             with self.problem.at(replace(state, memory=state.before)):
                 constraint = fixed(state.control)
@@ -125,9 +128,11 @@ class _Carrier:
                 self._late.append(self._arrivals(number, face, state, before))
             self._leave_out(state)
             for one in self.neighbours:                      # they go on as the run did
-                one.x, one.control = state.x + (one.x - before.x), state.control + (one.control - before.control)
+                one.x = state.x + (one.x - self._beside.x)
+                one.control = state.control + (one.control - self._beside.control)
             equation, equations = self._equations(state, last)
             settle(self.curve, state, self.neighbours, equation, equations)
+            self._beside = state
             b = self.curve.newton.b.array_r
             self._velocity = [face.moved(b, 1.0) for face in self.problem.contacts]
 

@@ -24,6 +24,9 @@ log = logging.getLogger("formingx")
 _HELD = 1e2
 """Weight of the volume that is held, relative, beside relative walls."""
 
+_SPARE = 1e-6
+"""Part of the volume by which what is kept stays below it."""
+
 _DAMPED = 1e-6
 """Of what has most effect: smaller effects count as none."""
 
@@ -86,7 +89,7 @@ class Design:
 
     def fit(self, *, wall: Any = None, even: bool = False, within: tuple[float, float] | None = None,
             volume: str | float | None = "kept", runs: int = 10, good: float = 1e-4,
-            start: Mapping[str, Any] | None = None) -> Answer:
+            start: Mapping[str, Any] | DesignRun | None = None) -> Answer:
         """Search for a wall: Gauss and Newton's method with bounds, each step tried by a run of its own.
 
         Args:
@@ -96,7 +99,7 @@ class Design:
             volume: "kept": the body's at rest stays that of the start; a number: it is that, length^3; None: free.
             runs: at most so many.
             good: relative change of the wall, in the mean square, that is foretold and not worth another run.
-            start: values to start from, by name.
+            start: values to start from, by name, or a run of this design.
 
         Raises:
             InputError: nothing to fit, or nothing has an effect.
@@ -107,8 +110,8 @@ class Design:
         most, good = count("fit: runs", runs), positive("fit: good", good)
         if isinstance(volume, str) and volume != "kept" or isinstance(volume, bool):
             raise InputError(f"fit: volume = {volume!r}: must be 'kept', a number or None")
-        first = self._run(self.parameters.vector(start or {}))
-        held = first.volume if volume == "kept" else None if volume is None else positive("fit: volume", volume)
+        first = start if isinstance(start, DesignRun) else self._run(self.parameters.vector(start or {}))
+        held = first.volume * (1 - _SPARE) if volume == "kept" else None if volume is None else positive("fit: volume", volume)
         aim = _Aim(first, wall, within, held)
         return self._search(first, aim, most, good)
 

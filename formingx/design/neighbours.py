@@ -21,11 +21,11 @@ from ..errors import InputError
 from ..solve.newton import Failure
 from ..solve.state import State
 
-_ENOUGH, _GOOD, _MOST = 1e-5, 1e-3, 12
+_ENOUGH, _ENOUGH_IN_CONTACT, _GOOD, _MOST = 1e-9, 1e-5, 1e-3, 12
 """Corrections over the distance of a neighbour at which it is solved for; which must be reached; iterations."""
 
-_NONE = 1e-14
-"""Distances, over the unknowns, that are none."""
+_NONE = 2e-13
+"""Corrections, over the unknowns, that are round-off."""
 
 
 class Neighbour:
@@ -111,29 +111,31 @@ def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: 
             return float(problem.comm.allreduce(float(g @ (one.x - state.x))) + by_control * (
                 one.control - state.control))
         return one.constraint(equations[k]) - kept
-    open_ = list(range(len(neighbours)))
-    size = _norm(problem, state.x) + abs(state.control)
+    size, enough = _norm(problem, state.x) + abs(state.control), _ENOUGH_IN_CONTACT if problem.has_kinks else _ENOUGH
+    todo, first = list(range(len(neighbours))), np.full(len(neighbours), np.inf)
     for iteration in range(_MOST):
-        rows = np.column_stack([neighbours[k].residual() - left_over for k in open_])
-        left = np.array([constraint(k) for k in open_])
+        rows = np.column_stack([neighbours[k].residual() - left_over for k in todo])
+        left = np.array([constraint(k) for k in todo])
         dx = -newton.solver.solve_all(rows)
         steps = -(left + problem.comm.allreduce(g @ dx)) / slope
         dx += np.outer(b, steps)
-        still = []
-        for j, k in enumerate(open_):
+        good = True
+        for j, k in enumerate(todo):
             one = neighbours[k]
-            one.x, one.control = one.x + dx[:, j], one.control + steps[j]
             correction = _norm(problem, dx[:, j]) + abs(steps[j])
+            if iteration != 1:                               # there it is but a sample: all are treated alike
+                one.x, one.control = one.x + dx[:, j], one.control + steps[j]
             away = _norm(problem, one.x - state.x) + abs(one.control - state.control)
             if not np.isfinite(correction):
                 raise Failure(f"beside {one.name} there is no state near", [])
-            if correction > max(_ENOUGH * away, _NONE * size):
-                still.append(k)
-                if iteration == _MOST - 1 and correction > max(_GOOD * away, 100 * _NONE * size):
-                    raise Failure(f"with {one.name} a little changed no state is found near", [])
-        open_ = still
-        if not open_:
+            first[k] = correction if iteration == 0 else first[k]
+            good &= correction <= max(enough * away, _NONE * size)
+            if iteration == _MOST - 1 and correction > max(_GOOD * away, 10 * _NONE * size):
+                raise Failure(f"with {one.name} a little changed no state is found near", [])
+        if good:
             return
+        # what is left is of second order: if nothing is of the one that was corrected most, the others are solved for
+        todo = [int(np.argmax(first))] if iteration == 0 else list(range(len(neighbours)))
 
 
 def _norm(problem: Any, x: np.ndarray) -> float:

@@ -74,28 +74,26 @@ class DesignRun:
         return float(self.path.problem.forms.volume)
 
     @cached_property
-    def _pairs(self) -> list[tuple[Neighbour, Neighbour]]:
-        """For each parameter the neighbours above and below, solved for to the last state."""
+    def _pairs(self) -> list[tuple[Neighbour, Neighbour, float]]:
+        """For each parameter a neighbour above and one below, solved for to the last state, and how far they are apart."""
         problem = self.path.problem
-        step = (_KINKS if problem.contacts else _SMOOTH) * self._parameters.size
-        made = []
-        for k, name in enumerate(self._parameters.names):
-            sides = []
-            for sign in (1.0, -1.0):
-                moved = self.vector.copy()
-                moved[k] += sign * step[k]
-                try:
-                    sides.append(Neighbour(*self._make(moved), problem, name))
-                except InputError as error:
-                    raise InputError(f"Design: no derivative by {name}: beside {self.vector[k]:.6g} it makes no scene:"
-                                     f" {error}") from None
-            made.append((sides[0], sides[1]))
+        steps = (_KINKS if problem.contacts else _SMOOTH) * self._parameters.size
+        made = [(self._beside(k, step), self._beside(k, -step), 2 * step) for k, step in enumerate(steps)]
         try:
-            carry(self.path, self._end, [one for pair in made for one in pair])
+            carry(self.path, self._end, [one for *pair, _ in made for one in pair])
         except Failure as failure:
             raise InputError(f"Design: this run has no derivative: {failure.reason}") from None
-        self._step = step
         return made
+
+    def _beside(self, k: int, step: float) -> Neighbour:
+        """A neighbour, one parameter changed; not solved for."""
+        moved, name = self.vector.copy(), self._parameters.names[k]
+        moved[k] += step
+        try:
+            return Neighbour(*self._make(moved), self.path.problem, name)
+        except InputError as error:
+            raise InputError(f"Design: no derivative by {name}: beside {self.vector[k]:.6g} it makes no scene:"
+                             f" {error}") from None
 
     def derivative(self, measure: Any) -> tuple[np.ndarray, np.ndarray]:
         """A measure of the last state, shape (m,), and its derivatives by the parameters, shape (m, n).
@@ -107,8 +105,9 @@ class DesignRun:
         Raises:
             InputError: the run has no derivative, or the measure looks at more than the last state.
         """
-        values = [[np.atleast_1d(of) for of in (self._at(one, measure) for one in pair)] for pair in self._pairs]
-        by = [(above - below) / (2 * h) for (above, below), h in zip(values, self._step)]
+        found = {one: np.atleast_1d(self._at(one, measure))
+                 for *pair, _ in self._pairs for one in pair}
+        by = [(found[above] - found[below]) / apart for above, below, apart in self._pairs]
         return self._here(measure), np.stack(by, axis=-1)
 
     def sensitivities(self, measure: Any = "wall") -> Effects:
