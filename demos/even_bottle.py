@@ -1,7 +1,7 @@
 """Which wall a parison must have so that the bottle blown of it is even.
 
-Parison, mould, material and pressure of demos/parison.py; what touches sticks. The wall of the parison is a programme of
-14 knots, equidistant on its inner meridian, linear between them, added to its outside. Wanted is the least standard
+Parison, mould, material and pressure of demos/parison.py; what touches sticks. The wall of the parison is a programme
+of 14 knots, equidistant on its inner meridian, linear between them, added to its outside. Wanted is the least standard
 deviation over mean (cv) of the bottle's wall, without the last 7 % at the neck, with no more material than at first.
 Lengths in cm, stresses in psi.
 """

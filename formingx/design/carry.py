@@ -48,7 +48,7 @@ class _Carrier:
         self._single = isinstance(end, Target)
         self._plans = [] if self._single else [plan(self.problem.scene, stage) for stage in end]
         self._end = end
-        self._until: dict[int, tuple[Any, list[Any]]] = {}
+        self._until: dict[tuple[int, int], tuple[Any, list[Any]]] = {}
         for one in neighbours:
             one.plans = [] if self._single else [plan(one.problem.scene, stage) for stage in one.end]
             if [_kind(p) for p in one.plans] != [_kind(p) for p in self._plans]:
@@ -181,6 +181,7 @@ class _Carrier:
             for one in self.neighbours:
                 mine = one.problem.contacts[number]
                 memory = mine.get()
+                assert memory is not None
                 touch = memory.touch._replace(distance=run.touch.distance,
                                               slip=np.where(free | late, run.touch.slip, memory.touch.slip))
                 if np.any(late):
