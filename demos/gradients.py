@@ -8,9 +8,9 @@ The cup: a sheet of thickness 0.03 is blown into a cup, 0.7 deep, on which it st
 a node touches moves with b: so the derivative of a run is not that of its steps as they were. Differences of whole runs
 scatter by some 0.001, as steps change with b.
 
-The pot: a plug pushes a clamped sheet, with Coulomb friction, into a mould on which it sticks, and air at a low pressure
-follows; an elastic sheet and one that relaxes. Derivatives of the wall by friction, travel and nose radius of the plug,
-and by the constant of the sheet; of the cup by its fillet.
+The pot: a plug pushes a clamped sheet, with Coulomb friction, into a mould on which it sticks, and air at a low
+pressure follows; an elastic sheet and one that relaxes. Derivatives of the wall by friction, travel and nose radius of
+the plug, and by the constant of the sheet; of the cup by its fillet.
 """
 
 import numpy as np
@@ -104,8 +104,9 @@ def main():
         design, {"b": 0.0, "fillet": 0.2}, "fillet", 0.01, RADII, CUP_SHEET)))
     exact, whole = beside(design, {"b": 0.0, "fillet": 0.2}, "b", step, RADII, CUP_SHEET)
     summary["cup"], summary["cup_by_differences"] = exact, whole
-    say(f"cup, by its fillet: {summary['fillet']}", "cup:             " + ", ".join(f"{d:8.4f}" for d in exact.values()),
-        "  by differences " + ", ".join(f"{d:8.4f}" for d in whole.values()))
+    for name, (a, b) in {"b": (exact, whole), "fillet": summary["fillet"].values()}.items():
+        say(f"cup, by {name:7}" + ", ".join(f"{d:8.4f}" for d in a.values()),
+            " differences  " + ", ".join(f"{d:8.4f}" for d in b.values()))
     drawing, axes = figure()
     axes.plot(RADII, list(exact.values()), "C0", label="exact")
     axes.plot(RADII, list(whole.values()), "ko", mfc="none", label=f"differences of runs, b = {step:g} and -{step:g}")

@@ -43,6 +43,8 @@ class _Carrier:
             raise Failure("it changed its mesh on the way", [])
         if path.ended:
             raise Failure(path.ended, [])
+        if not all(hasattr(face.law, "without") for face in path.problem.contacts):
+            raise Failure("contact in space is not carried along", [])
         self.path, self.neighbours = path, neighbours
         self.problem, self.curve = path.problem, path.record.curve
         self._single = isinstance(end, Target)
@@ -169,8 +171,8 @@ class _Carrier:
         return late
 
     def _put_on_tools(self, state: State) -> None:
-        """Neighbours' points touch where the run's do; those that arrived at the end of the step as its path brings them
-        to their tools."""
+        """Neighbours' points touch where the run's do; those that arrived at the end of the step are where its velocity
+        brings them to their tools."""
         n = self.problem.n_owned
         for number, face in enumerate(self.problem.contacts):
             if not face.law.remembers or not face.present:

@@ -111,7 +111,8 @@ class Design:
         if isinstance(volume, str) and volume != "kept" or isinstance(volume, bool):
             raise InputError(f"fit: volume = {volume!r}: must be 'kept', a number or None")
         first = start if isinstance(start, DesignRun) else self._run(self.parameters.vector(start or {}))
-        held = first.volume * (1 - _SPARE) if volume == "kept" else None if volume is None else positive("fit: volume", volume)
+        held = None if volume is None else (
+            first.volume * (1 - _SPARE) if volume == "kept" else positive("fit: volume", volume))
         aim = _Aim(first, wall, within, held)
         return self._search(first, aim, most, good)
 

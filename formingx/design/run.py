@@ -75,7 +75,7 @@ class DesignRun:
 
     @cached_property
     def _pairs(self) -> list[tuple[Neighbour, Neighbour, float]]:
-        """For each parameter a neighbour above and one below, solved for to the last state, and how far they are apart."""
+        """For each parameter a neighbour above and one below, solved for to the last state; how far apart they are."""
         problem = self.path.problem
         steps = (_KINKS if problem.contacts else _SMOOTH) * self._parameters.size
         made = [(self._beside(k, step), self._beside(k, -step), 2 * step) for k, step in enumerate(steps)]

@@ -133,8 +133,5 @@ class ContactLaw(Protocol):
     def part(self, points: np.ndarray | slice) -> ContactLaw:
         """The law of some of the points."""
 
-    def without(self, points: np.ndarray) -> ContactLaw:
-        """The same law, of which some points (a mask, shape (n,)) touch nothing."""
-
     def with_friction(self, mu: np.ndarray | float) -> ContactLaw:
         """The same law with other coefficients of friction."""
