@@ -199,7 +199,8 @@ def main():
     off = [max(abs(found / reference - 1), 1e-12) for _, found, reference in rows]
     axes.semilogx(off, range(len(rows)), "o")
     axes.set(yticks=range(len(rows)), xlabel="difference from the exact bifurcation, relative")
-    axes.set_yticklabels([name for name, *_ in rows], fontsize=5)
+    axes.set_yticklabels([name.replace("/inner_radius_ratio", " ratio").replace("/pressure_over_mu", " pressure")
+                          for name, *_ in rows], fontsize=5)
     save(drawing, out / "accuracy.png")
     if not quick:
         for name in ("cylinder_nu_0.5_n_1", "tube_0.8_n_3"):

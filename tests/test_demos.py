@@ -334,6 +334,16 @@ def test_stability_quick(tmp_path):
     assert drawn(tmp_path / "accuracy.png")
 
 
+def test_flange_quick(tmp_path):
+    found = summary("flange", tmp_path, "--quick")
+    thick, thin = found["h_0.3"], found["h_0.1"]
+    assert thick["alarms"] == 0 and thin["alarms"] == 3 and thin["first_n"] == 8
+    assert thin["first_travel"] == pytest.approx(1.6371, rel=1e-2)          # on 200 x 2 elements
+    for numbers in (thick, thin):                                       # compressed alike, whether it wrinkles or not
+        assert -0.2 < numbers["hoop_compressed"]["least_at_end_over_mu_h"] < -0.15
+    assert drawn(tmp_path / "flange.png")
+
+
 def test_top_load_quick(tmp_path):
     found = summary("top_load", tmp_path, "--quick")
     assert found["first_n"] == 4 and found["n_4"]["force_N"] == pytest.approx(1326, rel=2e-2)

@@ -248,6 +248,46 @@ def test_solids_are_closed_and_hold_the_volume(formed, tmp_path):
         formed.to_stl("cup.obj")
 
 
+def test_shells_hold_the_volume(formed, tmp_path):
+    """An input file for CalculiX read back: area times wall is the part's volume, and the rim is all round."""
+    formed.to_inp(tmp_path / "cup.inp", parts=40)
+    blocks, lines = {}, (tmp_path / "cup.inp").read_text().splitlines()
+    for line in lines:
+        if line.startswith("**") or "formingx" in line:
+            continue
+        if line.startswith("*"):
+            rows = blocks.setdefault(line, [])
+        else:
+            rows.append([float(v) for v in line.split(",") if v.strip()])
+    nodes = np.array(blocks["*NODE, NSET=ALL"])
+    walls = np.array(blocks["*NODAL THICKNESS"])
+    assert np.array_equal(nodes[:, 0], np.arange(1, len(nodes) + 1)) and np.array_equal(walls[:, 0], nodes[:, 0])
+    volume, numbers, flux = 0.0, [], 0.0
+    for kind, n in (("S6", 3), ("S8R", 4)):
+        elements = np.array(blocks[f"*ELEMENT, TYPE={kind}, ELSET=WALL"], dtype=int)
+        numbers += elements[:, 0].tolist()
+        for row in elements[:, 1:] - 1:
+            round_it = row.reshape(2, n).T.ravel()                      # corner, middle of the edge behind it, ...
+            x = nodes[round_it, 1:]
+            area = np.cross(x, np.roll(x, -1, axis=0)).sum(0) / 2
+            volume += np.linalg.norm(area) * walls[round_it, 1].mean()
+            flux += area[2]
+    assert numbers == list(range(1, len(numbers) + 1)) and len(blocks["*NSET, NSET=RIM"]) == 80
+    assert volume == pytest.approx(formed.part().volume, rel=4e-3)
+    rim = formed.profile().middle[-1, 0]
+    assert abs(flux) == pytest.approx(np.pi * rim**2, rel=2e-3)              # all elements are turned the same way
+    with pytest.raises(fx.InputError, match="at least 3"):
+        formed.to_inp(tmp_path / "cup.inp", parts=2)
+
+
+def test_formed_as_a_mesh_file(formed, tmp_path):
+    formed.to_msh(tmp_path / "cup.msh")
+    mesh, old = fx.mesh.read(tmp_path / "cup.msh"), formed.formed()
+    assert mesh.layers.keys() == old.layers.keys() and mesh.boundaries.keys() == old.boundaries.keys()
+    for name in old.boundaries:
+        assert mesh.line_of(name) == pytest.approx(old.line_of(name), abs=1e-12)
+
+
 class Links(HTMLParser):
     """What a page would load or link to, and its text."""
 

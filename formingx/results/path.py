@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError, as_points
+from ..errors import InputError, as_points, count
 from ..figures import Axes
 from ..solve.state import State
 from ..units import NONE, Units
@@ -242,6 +242,24 @@ class Path(States):
         """Write the part at a state (default: the last) as a solid of triangles, STL (rank 0 writes)."""
         from .files.solid import to_stl
         to_stl(self.profile(state), self.problem.scene.kinematics.axisymmetric, file, self.problem.comm)
+
+    def to_msh(self, file: Any, state: State | None = None) -> None:
+        """Write `formed()` of a state (default: the last) as a gmsh file, with its names; on one rank."""
+        from ..mesh.files import write
+        write(self.formed(state), file)
+
+    def to_inp(self, file: Any, state: State | None = None, parts: int = 60) -> None:
+        """Write the part as shells, walls their section, for CalculiX (.inp), `parts` round the axis (rank 0 writes).
+
+        Elements S8R, S6 at the axis, on the middle surface; sets ALL, WALL, RIM; the material is for you to give.
+
+        Raises:
+            InputError: plane strain, fewer than 3 parts, or the mesh is no sheet.
+        """
+        from .files.shells import to_inp
+        if not self.problem.scene.kinematics.axisymmetric or count("to_inp: parts", parts) < 3:
+            raise InputError(f"to_inp: parts = {parts!r}: must be at least 3, of an axisymmetric body")
+        to_inp(self.profile(state), parts, file, self.problem.comm)
 
     def to_gltf(self, file: Any, state: State | None = None) -> None:
         """Write the part at a state (default: the last) as binary glTF (.glb), coloured by its wall (rank 0 writes)."""

@@ -52,7 +52,9 @@ def _draw(loss: Any, lines: list, file: str, scale: float) -> None:
         0, 2 * np.pi / loss.number if loss.number else np.ptp(everything, axis=0).max(), 61)
     FilePath(file).parent.mkdir(parents=True, exist_ok=True)
     with _screen():
-        plotter: Any = pyvista.Plotter(off_screen=True, window_size=(1000, 800))
+        high, wide = np.ptp(everything[:, 1]), 2 * everything[:, 0].max()
+        flat = high < 0.3 * wide
+        plotter: Any = pyvista.Plotter(off_screen=True, window_size=(1000, 500 if flat else 800))
         plotter.set_background("white")
         for points, mode in lines:
             U, W, V = mode.T[..., None] * size
@@ -66,10 +68,9 @@ def _draw(loss: Any, lines: list, file: str, scale: float) -> None:
             surface["mode"] = (most * np.cos(phase) / size).ravel(order="F")
             plotter.add_mesh(surface, scalars="mode", cmap="coolwarm", clim=(-1, 1), smooth_shading=True,
                              show_scalar_bar=False, ambient=0.4, diffuse=0.65, specular=0.2, split_sharp_edges=True)
-        high, wide = np.ptp(everything[:, 1]), 2 * everything[:, 0].max()
         plotter.camera_position = [(2.0, -3.4, 1.2 if high > wide else 1.9), (0, 0, 0), (0, 0, 1)]
         plotter.reset_camera()
-        plotter.camera.zoom(0.95 if high > wide else 1.25)
+        plotter.camera.zoom(0.95 if high > wide else 2.0 if flat else 1.25)
         plotter.enable_anti_aliasing("ssaa")
         try:
             plotter.screenshot(file)

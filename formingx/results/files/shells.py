@@ -1,0 +1,63 @@
+"""The part as shell elements with the wall as their thickness: an input file for CalculiX (and Abaqus).
+
+G. Dhondt, CalculiX CrunchiX User's Manual: S8R and S6 elements, *SHELL SECTION with *NODAL THICKNESS.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..evaluate.profile import distance_to_line, fine
+from . import tabular
+
+
+def shells(profile: Any, parts: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """(points, shape (n, 3), walls, (n,), elements S6, (m, 6), and S8R, (k, 8), numbers from 0) of a body turned round.
+
+    The middle surface: its nodes are half way between each node of the bottom face and the top one, and as many
+    elements as there are edges of faces go along it, `parts` round the axis.
+    """
+    wall = (distance_to_line(profile.bottom, fine(profile.top))
+            + distance_to_line(profile.top, fine(profile.bottom))) / 2
+    line = profile.middle
+    n, turn = len(line), np.linspace(0, 2 * np.pi, 2 * parts, endpoint=False)
+    points = np.stack([np.outer(np.cos(turn), line[:, 0]), np.outer(np.sin(turn), line[:, 0]),
+                       np.tile(line[:, 1], (2 * parts, 1))], axis=-1)
+    number = np.arange(2 * parts * n).reshape(2 * parts, n)
+    pole = line[0, 0] < 1e-9 * np.ptp(line)
+    if pole:
+        number[:, 0] = number[0, 0]
+    here, half, there = (np.roll(number, -k, axis=0)[::2] for k in range(3))
+    a, b = slice(0, -1, 2), slice(2, None, 2)
+    quads = np.stack([here[:, a], here[:, b], there[:, b], there[:, a], here[:, 1::2], half[:, b], there[:, 1::2],
+                      half[:, a]], axis=-1)
+    tips = quads[:, 0][:, [0, 1, 2, 4, 5, 6]] if pole else np.zeros((0, 6), dtype=int)
+    quads = quads[:, int(pole):].reshape(-1, 8)
+    used, new = np.unique(np.concatenate([tips.ravel(), quads.ravel()]), return_inverse=True)
+    new = new.ravel()
+    return (points.reshape(-1, 3)[used], np.tile(wall, 2 * parts)[used], new[: tips.size].reshape(-1, 6),
+            new[tips.size:].reshape(-1, 8))
+
+
+def to_inp(profile: Any, parts: int, file: Any, comm: Any) -> None:
+    """Write the nodes, elements and walls, a set for each end, its name ending in .inp (rank 0 writes)."""
+    file = tabular.named("to_inp", file, ".inp")
+    points, walls, tips, quads = shells(profile, parts)
+    lines = ["*HEADING", "formingx: middle surface of a formed part, turned about z; its walls as thickness",
+             "*NODE, NSET=ALL"]
+    lines += [f"{k}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(points.tolist(), 1)]
+    first = 1
+    for kind, elements in (("S6", tips), ("S8R", quads)):
+        if len(elements):
+            lines.append(f"*ELEMENT, TYPE={kind}, ELSET=WALL")
+            lines += [", ".join(map(str, [k, *row])) for k, row in enumerate((elements + 1).tolist(), first)]
+            first += len(elements)
+    rim = np.flatnonzero(np.hypot(*(np.column_stack([np.hypot(*points[:, :2].T), points[:, 2]]) - profile.middle[-1]).T)
+                         < 1e-9 * np.ptp(points)) + 1
+    lines += ["*NSET, NSET=RIM", *(f"{k}," for k in rim), "*NODAL THICKNESS"]
+    lines += [f"{k}, {wall!r}" for k, wall in enumerate(walls.tolist(), 1)]
+    lines += ["** give MATERIAL its constants, here or before: *MATERIAL, NAME=MATERIAL",
+              "*SHELL SECTION, ELSET=WALL, MATERIAL=MATERIAL, NODAL THICKNESS", repr(float(walls.mean()))]
+    tabular.on_root(comm, lambda: tabular.replace(file, lambda stream: stream.write("\n".join(lines) + "\n")))
