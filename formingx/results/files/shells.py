@@ -47,7 +47,7 @@ def to_inp(profile: Any, parts: int, file: Any, comm: Any) -> None:
     points, walls, tips, quads = shells(profile, parts)
     lines = ["*HEADING", "formingx: middle surface of a formed part, turned about z; its walls as thickness",
              "*NODE, NSET=ALL"]
-    lines += [f"{k}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(points.tolist(), 1)]
+    lines += [", ".join([str(k), *map(repr, map(float, x))]) for k, x in enumerate(points, 1)]
     first = 1
     for kind, elements in (("S6", tips), ("S8R", quads)):
         if len(elements):
