@@ -20,7 +20,7 @@ def draw(thickness, elements):
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0),
                      supports=[fx.Symmetry("axis"), fx.Symmetry("rim", normal="z")],
                      contacts=[fx.Contact("top", ball, "none", moves=(0, -1), points=4)])
-    through = [fx.travel(t) for t in np.arange(0.2, TRAVEL, 0.2)]              # short enough steps to solve between them
+    through = [fx.travel(t) for t in np.arange(0.2, TRAVEL, 0.2)]          # short enough steps to solve between them
     return fx.trace(scene, until=fx.travel(TRAVEL), through=through, progress=False)
 
 
