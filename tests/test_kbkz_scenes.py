@@ -245,3 +245,27 @@ def test_what_is_refused(make, words):
 def test_a_card_of_viscosities():
     assert fx.KBKZ.of_viscosities([(12.9, 1e-4), (94.8, 1e-3)]).spectrum == pytest.approx(
         [(129000, 1e-4), (94800, 1e-3)])
+
+
+def ruptures(volume):
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.01, elements=(8, 1)), model=fx.Membrane(),
+                     materials=fx.KBKZ([(0.1, 0.05), (0.05, 1.0)], fx.PSM(alpha=10.0, beta=0.05)),
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
+                     loads=[fx.Pressure("bottom", name="air")])
+    return scene, fx.Stage("blow", drive="air", follow={fx.enclosed_volume: [(0.0, 0.0), (0.5, volume)]})
+
+
+def test_a_damped_melt_that_ruptures_is_said():
+    """The run ends at the axis, in words; doctor has said so before; not of a mild draw, nor without damping."""
+    scene, stage = ruptures(3.5)
+    with pytest.raises(fx.ConvergenceError, match="the sheet thins without end at .R, Z.") as raised:
+        fx.Process(scene).run([stage], accuracy="draft", progress=False)
+    found = raised.value.diagnosis
+    assert found.ruptures.R < 0.2 and found.drawn[0] > found.drawn[1] == pytest.approx(1.79, abs=0.01)
+    assert "lies beyond it" not in str(found)              # of a flow the time is no limit of the pressure
+    assert "thins without end" in str(fx.doctor(scene, stages=[stage]))
+    assert "thins" not in str(fx.doctor(*[scene], stages=[ruptures(0.8)[1]]))
+    mould = fx.tools.cup(radius=1.0, depth=1.8, mouth=0.3, draft=5, fillet=0.2)
+    cup = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.03, elements=(20, 1)), materials=scene.materials["sheet"],
+                   supports=scene.supports, loads=scene.loads, contacts=[fx.Contact("top", mould, "stick")])
+    assert "Contact('top'" in str(fx.doctor(cup)) and "thins without end" in str(fx.doctor(cup))

@@ -158,6 +158,21 @@ class PastStates:
             rate = 1 / self._aT.eval(domain, self._own).ravel()
         return self._C.eval(domain, self._own).reshape(-1, 4).T.copy(), step * rate, rate
 
+    @property
+    def material(self) -> Any:
+        """The material that remembers."""
+        return self._terms.material
+
+    def thinnest(self) -> tuple[float, np.ndarray]:
+        """Least stretch at the fields that the forms hold now, and where (reference, length); collective."""
+        C = self._now()[0]
+        half, apart = (C[0] + C[1]) / 2, np.hypot((C[0] - C[1]) / 2, C[2])
+        least = np.minimum(half - apart, C[3])
+        k = int(np.argmin(least)) if len(least) else 0
+        mine = (float(least[k]), self.points[k].tolist()) if len(least) else (np.inf, [0.0, 0.0])
+        square, point = min(self._forms.comm.allgather(mine))
+        return float(np.sqrt(square)), np.array(point)
+
     def save(self, memory: Memory) -> dict[str, Any]:
         """See `History`."""
         gather = self._forms.comm.allgather

@@ -17,6 +17,7 @@ from ..scene.scene import Scene
 from ..solve.stage import Stage
 from ..tools.shapes import Tool
 from ..units import Units
+from . import rupture
 
 Found = Iterator[tuple[str, str]]
 
@@ -46,7 +47,7 @@ class Body(Triangles):
 
     Attributes:
         moduli: {layer: shear modulus}; natural: a pressure of its size, shear modulus x thickness / length, stress.
-        aims: pressures and travels that the run goes to.
+        aims: pressures and travels that the run goes to; targets: all that it aims at.
     """
 
     def __init__(self, scene: Scene, targets: Sequence[Target], stages: Sequence[Stage], units: Units):
@@ -56,6 +57,7 @@ class Body(Triangles):
         self.natural = max(self.moduli.values()) * self.thickness / self.length
         self.aims = [aim for target in targets for aim in self._aim(target, scene.driven)]
         self.goals = bool(targets or stages)
+        self.targets = [*targets, *(t for stage in stages for t in (*stage.through, stage.until, stage.highest) if t)]
         for stage in stages:
             drive = None if stage.drive is None else scene.things[scene.number(stage.who, stage.drive)]
             for target in (*stage.through, stage.until):
@@ -311,4 +313,4 @@ def _names(body: Body) -> str:
 
 
 CHECKS: Sequence[Callable[[Body], Found]] = (_pressures, _bears, _blow_ratio, _closing, _mould_sizes, _ways,
-                                                 _sharp_edges)
+                                                 _sharp_edges, rupture.check)

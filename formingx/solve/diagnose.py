@@ -36,6 +36,8 @@ class Diagnosis:
         failed_J, at_failed_J: the same in the failed attempt.
         shape: the worst shape of a deformed element of the last good state, over its shape at rest.
         I1, limit: (I1 - 3) / (limit - 3) of the point nearest to its material's limit, and where; None: no limit.
+        drawn: (equibiaxial stretch of the thinnest place of a damped melt, the one at which its stress in a step of
+            strain is largest), if it is beyond that; ruptures: where.
         turned: [(control before, after)] between which the determinant of the tangent changed its sign.
         limit_points: controls of the limit points on the path.
         limit_ahead: the control at which a limit point lies ahead, as the last slopes tell; or None.
@@ -60,6 +62,8 @@ class Diagnosis:
     shape: float | None = None
     I1: float | None = None
     limit: Place | None = None
+    drawn: tuple[float, float] | None = None
+    ruptures: Place | None = None
     turned: tuple[tuple[float, float], ...] = ()
     limit_points: tuple[float, ...] = ()
     limit_ahead: float | None = None
@@ -195,7 +199,7 @@ def _changes(states: Sequence[State], usable: Sequence[State],
 def _verdict(facts: dict[str, Any], fixed_control: bool, pace: str,
              target: float | None) -> tuple[list[str], list[str]]:
     """What the numbers prove or make likely, and what to try."""
-    found = [*_of_material(facts), *_of_elements(facts), *_of_limits(facts, fixed_control, target),
+    found = [*_of_rupture(facts), *_of_material(facts), *_of_elements(facts), *_of_limits(facts, fixed_control, target),
              *_of_branches(facts), *_of_numbers(facts)]
     if pace and not found:
         found.append((pace, "more max_steps"))
@@ -209,6 +213,16 @@ def _of_material(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
                f" allows at {facts['limit']}",
                "a target that needs less stretch there, a larger limit of the material, or shorter steps"
                " (StepControl(largest=...))")
+
+
+def _of_rupture(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """(cause, advice) of a damped melt that thins without end."""
+    if facts.get("drawn"):
+        drawn, most = facts["drawn"]
+        yield (f"the sheet thins without end at {facts['ruptures']}: it is drawn there as by {drawn:.3g} in all"
+               f" directions, and a step of strain bears most at {most:.3g}; the material has no state beyond",
+               "less draw, a slower or hotter run, or the damping: fitted to shear or uniaxial data it is often too"
+               " strong in equibiaxial extension")
 
 
 def _of_elements(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:

@@ -131,6 +131,11 @@ class Run:
         return self.problem.shown(0.0)[0]
 
     @property
+    def _aims_at_control(self) -> bool:
+        """True if what is aimed at is what the control stands for: not of a flow, which aims at a time."""
+        return self.aim.until.name != "process_time" or bool(self.problem.setting.rate[-1])
+
+    @property
     def _may_jump(self) -> bool:
         """True if the body may jump: at folds, or, if these are followed, where contact or friction ends the path."""
         may_end = self.problem.has_history or self.problem.has_kinks
@@ -434,7 +439,7 @@ class Run:
     def _give_up(self, why: str, attempt: Attempt | None = None, pace: str = "") -> None:
         self.record.counts.iterations += self.curve.spent()
         found = diagnose(self.curve, self.states, why, attempt, pace,
-                         self.aim.until.value if self.aim.of_control else None)
+                         self.aim.until.value if self.aim.of_control and self._aims_at_control else None)
         self.curve.spent()                                  # the diagnosis is not part of the run
         raise self._error(f"{why}.", found)
 

@@ -85,6 +85,13 @@ class Stage:
         """True if it ends when `until` is met while time goes by and nothing is driven."""
         return self.until is not None and self.drive is None and not self.tables
 
+    @property
+    def highest(self) -> Target | None:
+        """Of a flow along a table, the target with the largest value."""
+        if self.flow is None or callable(self.flow[1]):
+            return None
+        return self.flow[0](float(np.max(self.flow[1][:, 1])))
+
     def _check(self, follow: Any) -> None:
         who, until = self.who, self.until
         if self.hold is not None and (self.drive is None or self.duration is None or until or follow is not None):

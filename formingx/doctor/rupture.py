@@ -1,0 +1,58 @@
+"""What `doctor` says of damped melts: how far a part is drawn, against the stretch beyond which they bear no more."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+
+def check(body: Any) -> Iterator[tuple[str, str]]:
+    """(about, what) of each draw beyond the equibiaxial `rupture_stretch` of a material."""
+    for name, material in body.scene.materials.items():
+        melt = getattr(material, "base", material)
+        if not hasattr(melt, "rupture_stretch"):
+            continue
+        most = melt.rupture_stretch("equibiaxial")
+        for about, stretch in _draws(body):
+            if stretch > most:
+                yield f"materials[{name!r}]", (
+                    f"{about} draws it about {stretch:.3g}-fold in all directions, and a step of strain bears most at"
+                    f" {most:.3g}: drawn faster than it relaxes, it thins without end where it is thinnest. Draw less,"
+                    f" slower or hotter, or check the damping: fitted to shear or uniaxial data it is often too strong"
+                    f" in equibiaxial extension")
+
+
+def _draws(body: Any) -> Iterator[tuple[str, float]]:
+    """(what, stretch) of a flat sheet: at the pole of a free dome; in a mould the root of the areal draw ratio."""
+    for pushed in body.pushed:
+        if not pushed.flat or not pushed.round:
+            continue
+        for target in body.targets:
+            if (stretch := _of_cap(target, pushed.radius)) is not None:
+                yield str(target), stretch
+        if pushed.tools:
+            points, ends = pushed.ways
+            if np.all(np.isfinite(ends)) and len(ends) > 1:
+                yield repr(pushed.tools[0]), float(np.sqrt(_area(ends) / _area(points)))
+
+
+def _of_cap(target: Any, radius: float) -> float | None:
+    """Stretch at the pole of a flat disc that is blown to a cap of height h radii, about 1 + h^2: what a thin disc has
+    whose points go at right angles to the caps that they pass through."""
+    if target.name == "pole_stretch":
+        return float(target.value)
+    height = abs(target.value) / radius
+    if target.name == "enclosed_volume":                     # pi h (3 + h^2)/6 for a unit radius
+        volume = height / radius**2
+        root = np.roots([1.0, 0.0, 3.0, -6 * volume / np.pi])
+        height = float(root[np.abs(root.imag) < 1e-9].real.max())
+    elif target.name != "pole_height":
+        return None
+    return 1 + height**2
+
+
+def _area(line: np.ndarray) -> float:
+    """That a line, shape (n, 2), sweeps about the axis."""
+    return float(np.sum((line[1:, 0] + line[:-1, 0]) * np.hypot(*np.diff(line, axis=0).T)))
