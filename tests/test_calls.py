@@ -32,7 +32,7 @@ def path():
     (lambda p: p.profile().thickness_ratio_at(5.0), "radius = 5: must be from 0 to 1.25"),
     (lambda p: fx.WLF(10.0, 100.0, 120.0)(np.inf), "temperature = inf: must be above .*, and finite"),
     (lambda p: fx.Units("mm").mass(np.nan, 1.0), "volume = nan: must be a finite number"),
-    (lambda p: fx.NeoHookean(c10=1.0).plot(p), "NeoHookean.plot: axes = .*: must be an Axes or None"),
+    (lambda p: fx.NeoHookean(c10=1.0).plot("x"), "NeoHookean.plot: axes = .*: must be an Axes or None"),
     (lambda p: fx.KBKZ.of_viscosities(range(3)), "spectrum = .*: must be a list of"),
     (lambda p: p.wall().at_height(), r"Wall.at_height: missing"),
     (lambda p: p.problem.scene.mesh.nodes_of("side"), "boundary 'side' is not known; known: 'axis', 'rim'"),
