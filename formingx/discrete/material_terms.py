@@ -13,7 +13,7 @@ from dolfinx import fem
 
 from ..errors import InputError
 from ..materials.constants import Varying
-from ..materials.viscoelastic import _isochoric
+from ..materials.tensors import isochoric
 from .followed import Followed
 
 
@@ -118,7 +118,7 @@ class MaterialTerms:
         """
         if self.material.symmetric:
             return None
-        C = _isochoric(F)
+        C = isochoric(F)
         return self.material.integral.unsymmetric_work(C, [derivative(c) for c in C], self.held)
 
     def equilibrium_energy(self, F: Any) -> Any:

@@ -12,8 +12,7 @@ from mpi4py import MPI
 
 from .. import _compat
 from ..errors import InputError
-from ..materials.past import IDENTITY
-from ..materials.viscoelastic import _deviator_squared, _entries, _isochoric
+from ..materials.tensors import IDENTITY, deviator_squared, entries, isochoric
 from .carry import Carrier
 
 _NOTHING = 3e-6
@@ -52,7 +51,7 @@ class PastStates:
 
         def at_points(expression: Any) -> fem.Expression:
             return fem.Expression(expression, terms.places, jit_options=_compat.JIT_OPTIONS)
-        self._C = at_points(ufl.as_vector(_isochoric(forms.elastic_F)))
+        self._C = at_points(ufl.as_vector(isochoric(forms.elastic_F)))
         self._aT = at_points(ufl.as_vector([terms.constants["aT"]])) if self._law.shifted else None
         rows = {name: f.function_space.dofmap.list[self._own].ravel() for name, f in terms.held.items()}
         self._held = [(f.x.array.reshape(-1, int(np.prod(f.ufl_shape))), rows[name]) for name, f in terms.held.items()]
@@ -60,7 +59,7 @@ class PastStates:
 
     def start(self) -> None:
         """See `History`."""
-        rest = Past(np.zeros(self._n) if self._aT else 0.0, np.repeat(IDENTITY[:, None], self._n, axis=1))
+        rest = Past(np.zeros(self._n) if self._aT else 0.0, np.repeat(np.array(IDENTITY)[:, None], self._n, axis=1))
         self.put(Memory(0.0, (rest,), np.ones((1, self._n)) if self._law.irreversible else None))
 
     def get(self) -> Memory:
@@ -133,7 +132,7 @@ class PastStates:
         length = felt[2:] - felt[:-2]
         share = np.where(length > 0, (felt[1:-1] - felt[:-2]) / np.where(length > 0, length, 1), 0.0)[:, None]
         off = W[1:-1, None] * (g[1:-1] - (1 - share) * g[:-2] - share * g[2:])
-        off, total = (_deviator_squared(_entries(C), _entries(np.moveaxis(S, -2, 0)))
+        off, total = (deviator_squared(entries(C), entries(np.moveaxis(S, -2, 0)))
                       for S in (off, np.sum(W[:, None] * g, axis=0)))
         comm = self._forms.comm
         squares = comm.allreduce(np.array([*np.sum(off, axis=1), np.sum(total)]), MPI.SUM)

@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError, positive
+from .material import Material
 
 
 class HistoryTests:
-    """Tests of what has a nominal stress of a history, `stress(mode, stretches, times=, between=)`."""
+    """What is left of a material that relaxes, and tests of it, by `stress(mode, stretches, times=, between=)`."""
 
     stress: Any
+    parameters: dict[str, Any]
+    _equilibrium: Material | None
+
+    @property
+    def equilibrium(self) -> Material | None:
+        """The material that is left when all branches have relaxed, or None."""
+        if self._equilibrium is None:
+            return None
+        rest = copy.copy(self._equilibrium)
+        rest.parameters = {k: self.parameters[k] for k in self._equilibrium.parameters}
+        return rest
 
     def relaxation(self, mode: str, stretch: float, times: ArrayLike) -> np.ndarray:
         """Nominal stress at times (any shape, at least 0) after a stretch was put on at once, and held; stress."""

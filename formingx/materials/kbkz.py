@@ -10,7 +10,6 @@ In a scene its stress is computed at each quadrature point from the past states 
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from typing import Any
 
@@ -25,7 +24,7 @@ from .homogeneous import MODES
 from .in_time import HistoryTests
 from .material import Material
 from .past import Integral
-from .viscoelastic import _inner, _isochoric
+from .tensors import inner, isochoric
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 _PANELS = 1.5
@@ -95,15 +94,6 @@ class KBKZ(HistoryTests, Material):
         return self.damping is None or self.damping.of_I1_alone
 
     @property
-    def equilibrium(self) -> Material | None:
-        """The material that is left when all has relaxed, or None."""
-        if self._equilibrium is None:
-            return None
-        rest = copy.copy(self._equilibrium)
-        rest.parameters = {k: self.parameters[k] for k in self._equilibrium.parameters}
-        return rest
-
-    @property
     def shear_modulus(self):
         """That of the instantaneous response; stress."""
         return float(self.relaxation_modulus(0.0))
@@ -134,11 +124,11 @@ class KBKZ(HistoryTests, Material):
     def strain_energy(self, F, **constants):
         """That at once, of the network without damping: for moduli and stresses at rest."""
         G = sum(G for G, _ in self.spectrum)
-        return G / 2 * (_inner(_isochoric(F), (1, 1, 0, 1)) - 3) + (self.equilibrium_energy(F, **constants) or 0)
+        return G / 2 * (inner(isochoric(F), (1, 1, 0, 1)) - 3) + (self.equilibrium_energy(F, **constants) or 0)
 
     def step_energy(self, F, internal, time_step, **constants):
         """A UFL scalar whose derivative by F is the stress at the end of a step; no energy."""
-        return self.integral.potential(_isochoric(F), internal, time_step) + (
+        return self.integral.potential(isochoric(F), internal, time_step) + (
             self.equilibrium_energy(F, **constants) or 0)
 
     def stored_energy(self, F, internal, **constants):

@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from .tensors import cofactor, entries
+
 _COUNT = np.array([1.0, 1.0, 2.0, 1.0])[:, None]
 """How often an entry is in the tensor."""
-
-IDENTITY = np.array([1.0, 1.0, 0.0, 1.0])
 
 
 class Integral:
@@ -65,12 +65,12 @@ class Integral:
 
     def damped(self, C: np.ndarray, past: np.ndarray, least: np.ndarray | None = None) -> tuple[Any, ...]:
         """(C_k^-1, shape (K, 4, n), h, dh/dI1, dh/dI2, shape (K, n)) of past states, shape (K, 4, n), at C."""
-        inverse = cofactor(past)
+        inverse = _inverse(past)
         if self.damping is None:
             one = np.ones((len(past), C.shape[1]))
             return inverse, one, 0 * one, 0 * one
         I1 = np.sum(_COUNT * inverse * C, axis=1)
-        I2 = np.sum(_COUNT * past * cofactor(C), axis=1)
+        I2 = np.sum(_COUNT * past * _inverse(C), axis=1)
         h, h1, h2 = self.damping.derivatives(I1, I2)
         if least is not None:
             known = h > least
@@ -103,10 +103,9 @@ class Integral:
         return sum((D[i, j] - D[j, i]) * change[j] * dC[i] for i in range(4) for j in range(4)) / 4
 
 
-def cofactor(C: np.ndarray) -> np.ndarray:
-    """The inverse of tensors of determinant 1, shape (..., 4, n)."""
-    a, b, c, d = (C[..., i, :] for i in range(4))
-    return np.stack([b * d, a * d, -c * d, a * b - c**2], axis=-2)
+def _inverse(C: np.ndarray) -> np.ndarray:
+    """Of tensors of determinant 1, shape (..., 4, n)."""
+    return np.stack(cofactor(entries(np.moveaxis(C, -2, 0))), axis=-2)
 
 
 def _change(C: Any, held: dict[str, Any]) -> list[Any]:

@@ -12,7 +12,7 @@ from ..errors import InputError, finite, instance, positive, several
 from ..values.table import Table
 from .constants import OfTemperature, Sample
 from .material import Material, brief
-from .viscoelastic import _IDENTITY, _cofactor, _entries, _inner, _isochoric, _sum
+from .tensors import IDENTITY, cofactor, entries, inner, isochoric, plus
 
 _BEFORE, _LAST, _GLASS, _FRACTION = "C_before", "C_last", "A_glass", "fraction"
 
@@ -77,7 +77,7 @@ class Sets(Material):
 
         What sets in a step is known when the temperature at its end is: then, at the beginning of the next, A takes it.
         """
-        return {**self._base.internal, _BEFORE: _IDENTITY, _LAST: _IDENTITY, _GLASS: (0.0, 0.0, 0.0, 0.0),
+        return {**self._base.internal, _BEFORE: IDENTITY, _LAST: IDENTITY, _GLASS: (0.0, 0.0, 0.0, 0.0),
                 _FRACTION: 0.0}
 
     @property
@@ -93,26 +93,26 @@ class Sets(Material):
         """See `Material`: that of a body that was never strained until now."""
         phi = ufl.max_value(ufl.min_value(ufl.ln(constants["set_end"]), 1.0), 0.0)
         return self._base.strain_energy(F, **self._of_base(constants)) \
-            + constants["G_set"] / 2 * phi * (_inner(_isochoric(F), _IDENTITY) - 3)
+            + constants["G_set"] / 2 * phi * (inner(isochoric(F), IDENTITY) - 3)
 
     def step_energy(self, F, internal, time_step, **constants):
         """See `Material`. What sets in the step is born half in the shape at its beginning, half in that at its end."""
         A, begin, end = self._begin(internal, constants)
         born = ufl.max_value(end - begin, 0) / 2
-        M = _sum(tuple(_left(begin, end) * a for a in A), _cofactor(_entries(internal[_LAST])), born)
+        M = plus(tuple(_left(begin, end) * a for a in A), cofactor(entries(internal[_LAST])), born)
         return self._base.step_energy(F, self._of_base_internal(internal), time_step, **self._of_base(constants)) \
-            + constants["G_set"] / 2 * (_inner(_isochoric(F), M) - (M[0] + M[1] + M[3]))
+            + constants["G_set"] / 2 * (inner(isochoric(F), M) - (M[0] + M[1] + M[3]))
 
     def updated(self, F, internal, time_step, **constants):
         A, begin, _ = self._begin(internal, constants)
         return {**self._base.updated(F, self._of_base_internal(internal), time_step, **self._of_base(constants)),
-                _BEFORE: internal[_LAST], _LAST: ufl.as_vector(_isochoric(F)), _GLASS: ufl.as_vector(A),
+                _BEFORE: internal[_LAST], _LAST: ufl.as_vector(isochoric(F)), _GLASS: ufl.as_vector(A),
                 _FRACTION: begin}
 
     def stored_energy(self, F, internal, **constants):
         A, phi, _ = self._begin(internal, constants)
         return self._base.stored_energy(F, self._of_base_internal(internal), **self._of_base(constants)) \
-            + constants["G_set"] / 2 * (_inner(_isochoric(F), A) - 3 * phi)
+            + constants["G_set"] / 2 * (inner(isochoric(F), A) - 3 * phi)
 
     def equilibrium_energy(self, F, **constants):
         return None
@@ -128,9 +128,9 @@ class Sets(Material):
         end, before = ufl.ln(constants["set_end"]), internal[_FRACTION]
         begin, end = (ufl.max_value(ufl.min_value(phi, 1.0), 0.0)
                       for phi in (2 * ufl.ln(constants["set_middle"]) - end, end))
-        A = tuple(_left(before, begin) * a for a in _entries(internal[_GLASS]))
+        A = tuple(_left(before, begin) * a for a in entries(internal[_GLASS]))
         for shape in (_BEFORE, _LAST):
-            A = _sum(A, _cofactor(_entries(internal[shape])), ufl.max_value(begin - before, 0) / 2)
+            A = plus(A, cofactor(entries(internal[shape])), ufl.max_value(begin - before, 0) / 2)
         return A, begin, end
 
     def _of_base(self, constants: dict[str, Any]) -> dict[str, Any]:

@@ -11,7 +11,6 @@ A symmetric tensor with the block structure of F (`physics.kinematics`) is kept 
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -28,9 +27,7 @@ from .constants import OfTemperature, Sample
 from .homogeneous import MODES
 from .in_time import HistoryTests
 from .material import Material, brief
-
-Entries = tuple[Any, Any, Any, Any]
-_IDENTITY = (1.0, 1.0, 0.0, 1.0)
+from .tensors import IDENTITY, Entries, cofactor, determinant, deviator_squared, entries, inner, isochoric, plus
 
 
 class RelaxingMaterial(HistoryTests, Material):
@@ -85,15 +82,6 @@ class RelaxingMaterial(HistoryTests, Material):
             self._equilibrium.check_constants(**{k: constants[k] for k in self._equilibrium.parameters})
 
     @property
-    def equilibrium(self) -> Material | None:
-        """The material that is left when all branches have relaxed, or None."""
-        if self._equilibrium is None:
-            return None
-        rest = copy.copy(self._equilibrium)
-        rest.parameters = {k: self.parameters[k] for k in self._equilibrium.parameters}
-        return rest
-
-    @property
     def branches(self) -> list[tuple[float, float]]:
         """[(mu, tau), ...]."""
         return [(mu, tau) for _, mu, tau in self._branches(self.parameters)]
@@ -117,7 +105,7 @@ class RelaxingMaterial(HistoryTests, Material):
     def internal(self) -> dict[str, tuple]:  # type: ignore[override]  # read only here
         """{name: value at rest} of what the material remembers: entries (11, 22, 12, 33) of tensors."""
         names = ["C"] * self._remembers + [f"{self._tensor}_{k}" for k, *_ in self._branches(self.parameters)]
-        return dict.fromkeys(names, _IDENTITY)
+        return dict.fromkeys(names, IDENTITY)
 
     @property
     def of_flow(self) -> tuple[str, ...]:
@@ -132,7 +120,7 @@ class RelaxingMaterial(HistoryTests, Material):
         scale = kinematics.volume_ratio(F) ** (-2 / 3)
         found = []
         for k, *_ in self._branches(constants):
-            M = self._metric(_entries(internal[f"{self._tensor}_{k}"]))
+            M = self._metric(entries(internal[f"{self._tensor}_{k}"]))
             B = scale * F * ufl.as_tensor([[M[0], M[2], 0], [M[2], M[1], 0], [0, 0, M[3]]]) * F.T
             radius = ufl.sqrt((B[0, 0] - B[1, 1]) ** 2 + 4 * B[0, 1] ** 2)
             found.append(ufl.sqrt(ufl.max_value((B[0, 0] + B[1, 1] + radius) / 2, B[2, 2])))
@@ -141,19 +129,19 @@ class RelaxingMaterial(HistoryTests, Material):
     def strain_energy(self, F, **constants):
         """The energy of F before anything has flowed."""
         mu = sum(mu for _, mu, _ in self._branches(constants))
-        return self._relaxed_energy(F, constants) + mu / 2 * (_inner(_isochoric(F), _IDENTITY) - 3)
+        return self._relaxed_energy(F, constants) + mu / 2 * (inner(isochoric(F), IDENTITY) - 3)
 
     def stored_energy(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
         """Energy per reference volume of F in the state `internal`; a UFL scalar, stress."""
-        C = _isochoric(F)
+        C = isochoric(F)
         return self._relaxed_energy(F, constants) + sum(
-            mu / 2 * self._stored(C, _entries(internal[f"{self._tensor}_{k}"]))
+            mu / 2 * self._stored(C, entries(internal[f"{self._tensor}_{k}"]))
             for k, mu, _ in self._branches(constants))
 
     def dissipation(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
         """Energy dissipated per reference volume and time, at least 0; a UFL scalar, stress over time."""
-        C = _isochoric(F)
-        return sum(mu / (2 * tau) * ufl.max_value(self._dissipated(C, _entries(internal[f"{self._tensor}_{k}"])), 0)
+        C = isochoric(F)
+        return sum(mu / (2 * tau) * ufl.max_value(self._dissipated(C, entries(internal[f"{self._tensor}_{k}"])), 0)
                    for k, mu, tau in self._branches(constants))
 
     def step_energy(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
@@ -164,10 +152,10 @@ class RelaxingMaterial(HistoryTests, Material):
             internal: {name: its entries, shape (4,)}, names as in `internal`.
             time_step: of the user's unit of time, at least 0.
         """
-        C = _isochoric(F)
-        before = _entries(internal["C"]) if self._remembers else None
+        C = isochoric(F)
+        before = entries(internal["C"]) if self._remembers else None
         return self._relaxed_energy(F, constants) + sum(
-            mu / 2 * self._step(C, before, _entries(internal[f"{self._tensor}_{k}"]), time_step / tau)
+            mu / 2 * self._step(C, before, entries(internal[f"{self._tensor}_{k}"]), time_step / tau)
             for k, mu, tau in self._branches(constants))
 
     def updated(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> dict[str, Any]:
@@ -175,13 +163,13 @@ class RelaxingMaterial(HistoryTests, Material):
 
         To be called after steps of length 0, too: the next step begins with the C that is remembered.
         """
-        C = _isochoric(F)
-        before = _entries(internal["C"]) if self._remembers else None
+        C = isochoric(F)
+        before = entries(internal["C"]) if self._remembers else None
         after = {"C": C} if self._remembers else {}
         for k, _, tau in self._branches(constants):
             name = f"{self._tensor}_{k}"
-            after[name] = self._advanced(C, before, _entries(internal[name]), time_step / tau)
-        return {name: ufl.as_vector(entries) for name, entries in after.items()}
+            after[name] = self._advanced(C, before, entries(internal[name]), time_step / tau)
+        return {name: ufl.as_vector(values) for name, values in after.items()}
 
     def relaxation_modulus(self, times: ArrayLike) -> np.ndarray:
         """G(t) = G_equilibrium + sum mu exp(-t/tau) of small shear, at times of any shape; stress."""
@@ -328,40 +316,40 @@ class Viscoelastic(RelaxingMaterial):
 
         The norm of the deviator of the difference in Kirchhoff stress, for a choice of steps in time.
         """
-        C, difference = _isochoric(F), (0, 0, 0, 0)
+        C, difference = isochoric(F), (0, 0, 0, 0)
         for k, mu, tau in self._branches(constants):
-            Cv = _entries(internal[f"Cv_{k}"])
-            second = _cofactor(self._advanced(C, _entries(internal["C"]), Cv, time_step / tau))
-            first = _cofactor(self._advanced(C, None, Cv, time_step / tau))
-            difference = _sum(difference, _sum(second, first, -1), mu)
-        return ufl.sqrt(ufl.max_value(_deviator_squared(C, difference), 0))
+            Cv = entries(internal[f"Cv_{k}"])
+            second = cofactor(self._advanced(C, entries(internal["C"]), Cv, time_step / tau))
+            first = cofactor(self._advanced(C, None, Cv, time_step / tau))
+            difference = plus(difference, plus(second, first, -1), mu)
+        return ufl.sqrt(ufl.max_value(deviator_squared(C, difference), 0))
 
     def _metric(self, Cv):
-        return _cofactor(Cv)
+        return cofactor(Cv)
 
     def _stored(self, C, Cv):
-        return _inner(C, self._metric(Cv)) - 3
+        return inner(C, self._metric(Cv)) - 3
 
     def _dissipated(self, C, Cv):
-        return _deviator_squared(C, self._metric(Cv))
+        return deviator_squared(C, self._metric(Cv))
 
     def _step(self, C, before, Cv, x):
         G, x = self._start(before, Cv, x)
-        a, s = _determinant(G), _inner(_cofactor(G), C) + x * _inner(_cofactor(C), G) + x**2
+        a, s = determinant(G), inner(cofactor(G), C) + x * inner(cofactor(C), G) + x**2
         p, q = a ** (1 / 3), (a + x * s) ** (1 / 3)
         return 3 * s / (q**2 + p * q + p**2) - 3
 
     def _advanced(self, C, before, Cv, x):
         G, x = self._start(before, Cv, x)
-        grown = _sum(G, C, x)
-        scale = _determinant(grown) ** (-1 / 3)
+        grown = plus(G, C, x)
+        scale = determinant(grown) ** (-1 / 3)
         return tuple(scale * g for g in grown)
 
     def _start(self, before, Cv, x):
         """G and x'."""
         if before is None:
             return Cv, x
-        return _sum(Cv, before, x / 2), x / 2 * (1 + x / 3 * _inner(before, _cofactor(Cv)))
+        return plus(Cv, before, x / 2), x / 2 * (1 + x / 3 * inner(before, cofactor(Cv)))
 
     @staticmethod
     def _flow(w):
@@ -385,21 +373,21 @@ class TransientNetwork(RelaxingMaterial):
         return A
 
     def _stored(self, C, A):
-        return _inner(C, A) - 3 - ufl.ln(_determinant(A))
+        return inner(C, A) - 3 - ufl.ln(determinant(A))
 
     def _dissipated(self, C, A):
-        return _inner(C, A) + _inner(_cofactor(C), _cofactor(A)) / _determinant(A) - 6
+        return inner(C, A) + inner(cofactor(C), cofactor(A)) / determinant(A) - 6
 
     def _step(self, C, before, A, x):
-        return _inner(C, self._kept(before, A, x)) - 3
+        return inner(C, self._kept(before, A, x)) - 3
 
     def _advanced(self, C, before, A, x):
-        return _sum(self._kept(before, A, x), _cofactor(C), 1 - _mean_decay(x))
+        return plus(self._kept(before, A, x), cofactor(C), 1 - _mean_decay(x))
 
     def _kept(self, before, A, x):
         """M."""
         decay = ufl.exp(-x)
-        return tuple(decay * a + (_mean_decay(x) - decay) * c for a, c in zip(A, _cofactor(before)))
+        return tuple(decay * a + (_mean_decay(x) - decay) * c for a, c in zip(A, cofactor(before)))
 
     @staticmethod
     def _flow(w):
@@ -419,39 +407,3 @@ def _mean_decay(x: Any) -> Any:
     small = ufl.lt(x, 1e-2)
     y = ufl.conditional(small, 1, x)                            # the branch not taken must be finite too
     return ufl.conditional(small, 1 - x / 2 + x**2 / 6 - x**3 / 24 + x**4 / 120 - x**5 / 720, (1 - ufl.exp(-y)) / y)
-
-
-def _isochoric(F: Any) -> Entries:
-    """Entries of J^(-2/3) F^T F."""
-    C, scale = F.T * F, kinematics.volume_ratio(F) ** (-2 / 3)
-    return scale * C[0, 0], scale * C[1, 1], scale * C[0, 1], scale * C[2, 2]
-
-
-def _entries(vector: Any) -> Entries:
-    return vector[0], vector[1], vector[2], vector[3]
-
-
-def _sum(A: Entries, B: Entries, factor: Any) -> Entries:
-    """A + factor B."""
-    return tuple(a + factor * b for a, b in zip(A, B))              # type: ignore[return-value]
-
-
-def _inner(A: Entries, B: Entries) -> Any:
-    return A[0] * B[0] + A[1] * B[1] + 2 * A[2] * B[2] + A[3] * B[3]
-
-
-def _determinant(A: Entries) -> Any:
-    return A[3] * (A[0] * A[1] - A[2] ** 2)
-
-
-def _cofactor(A: Entries) -> Entries:
-    """The inverse, where the determinant is 1."""
-    return A[1] * A[3], A[0] * A[3], -A[2] * A[3], A[0] * A[1] - A[2] ** 2
-
-
-def _deviator_squared(C: Entries, B: Entries) -> Any:
-    """tr((C B)^2) - tr(C B)^2/3: the square of the norm of the deviator of F B F^T."""
-    t = C[0] * B[0] + C[1] * B[1] + 2 * C[2] * B[2]
-    d = (C[0] * C[1] - C[2] ** 2) * (B[0] * B[1] - B[2] ** 2)
-    third = C[3] * B[3]
-    return (t**2 - 4 * d) / 2 + (t - 2 * third) ** 2 / 6

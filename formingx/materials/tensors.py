@@ -1,0 +1,49 @@
+"""Symmetric tensors with one principal direction out of the plane, as their entries 11, 22, 12, 33 (UFL or NumPy)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..physics import kinematics
+
+Entries = tuple[Any, Any, Any, Any]
+IDENTITY = (1.0, 1.0, 0.0, 1.0)
+
+
+def isochoric(F: Any) -> Entries:
+    """Entries of J^(-2/3) F^T F."""
+    C, scale = F.T * F, kinematics.volume_ratio(F) ** (-2 / 3)
+    return scale * C[0, 0], scale * C[1, 1], scale * C[0, 1], scale * C[2, 2]
+
+
+def entries(vector: Any) -> Entries:
+    """Those of a vector."""
+    return vector[0], vector[1], vector[2], vector[3]
+
+
+def plus(A: Entries, B: Entries, factor: Any) -> Entries:
+    """A + factor B."""
+    return tuple(a + factor * b for a, b in zip(A, B))              # type: ignore[return-value]
+
+
+def inner(A: Entries, B: Entries) -> Any:
+    """A : B."""
+    return A[0] * B[0] + A[1] * B[1] + 2 * A[2] * B[2] + A[3] * B[3]
+
+
+def determinant(A: Entries) -> Any:
+    """Of A."""
+    return A[3] * (A[0] * A[1] - A[2] ** 2)
+
+
+def cofactor(A: Entries) -> Entries:
+    """The inverse, where the determinant is 1."""
+    return A[1] * A[3], A[0] * A[3], -A[2] * A[3], A[0] * A[1] - A[2] ** 2
+
+
+def deviator_squared(C: Entries, B: Entries) -> Any:
+    """tr((C B)^2) - tr(C B)^2/3: the square of the norm of the deviator of F B F^T."""
+    t = C[0] * B[0] + C[1] * B[1] + 2 * C[2] * B[2]
+    d = (C[0] * C[1] - C[2] ** 2) * (B[0] * B[1] - B[2] ** 2)
+    third = C[3] * B[3]
+    return (t**2 - 4 * d) / 2 + (t - 2 * third) ** 2 / 6
