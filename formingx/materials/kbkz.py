@@ -145,12 +145,14 @@ class KBKZ(HistoryTests, Material):
         t = np.asarray(times, float)
         return sum((G * np.exp(-t / tau) for G, tau in self.spectrum), np.zeros(t.shape))
 
-    def stress(self, mode: str, stretches: ArrayLike, times: ArrayLike | None = None,
-               between: str = "stretch") -> np.ndarray:
-        """Nominal stress, force over reference area, of a test; stress. Error below 1e-8 of it.
+    def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), times: ArrayLike | None = None,
+               between: str = "stretch", *, true: bool = False) -> np.ndarray:
+        """Nominal stress, force over reference area, of a test (`true`: over the area as it is); stress.
+
+        Error below 1e-8 of it.
 
         Args:
-            mode: "uniaxial", "pure_shear" or "equibiaxial".
+            mode: "uniaxial", "pure_shear" or "equibiaxial"; without times "biaxial", see `Material.stress`, too.
             stretches: of any shape without times, (n,) with them.
             times: when the stretches are met, shape (n,), not falling; a step from one stretch to another at the same
                 time is put on at once, and so is the first stretch. None: every stretch is put on at once.
@@ -161,11 +163,22 @@ class KBKZ(HistoryTests, Material):
         """
         if times is None:
             l = np.asarray(stretches, float)
+            if mode == "biaxial":
+                return self._biaxial(l) * (l if true else 1.0)
             branches.checked(f"{self}: stress", mode, np.zeros(l.size), l.ravel(), between)
-            return self._modulus(0.0) * self._strained(mode, l) / l + self._relaxed(mode, l)
+            return (self._modulus(0.0) * self._strained(mode, l) / l + self._relaxed(mode, l)) * (l if true else 1.0)
         t, l = branches.checked(f"{self}: stress", mode, times, stretches, between)
         found = np.array([self._at(mode, t[:n + 1], l[:n + 1], between) for n in range(len(t))]) / l
-        return found + self._relaxed(mode, l)
+        return (found + self._relaxed(mode, l)) * (l if true else 1.0)
+
+    def _biaxial(self, l: np.ndarray) -> np.ndarray:
+        """Nominal stresses of a step to (l1, l2), shape (2, ...)."""
+        if l.shape[:1] != (2,) or not np.all((l > 0) & np.isfinite(l)):
+            raise InputError(f"{self}: stress: stretches of a biaxial test must be (l1, l2), each above 0")
+        squares = np.stack([*l**2, 1 / (l[0] * l[1])**2])
+        h = 1.0 if self.damping is None else self.damping(squares.sum(0), (1 / squares).sum(0))
+        rest = 0.0 if (left := self.equilibrium) is None else left.stress("biaxial", l)
+        return self._modulus(0.0) * h * (squares[:2] - squares[2]) / l + rest
 
     def rupture_stretch(self, mode: str) -> float:
         """The stretch at which h (B_11 - B_33) of a step of strain is largest; infinity without a maximum up to 100.

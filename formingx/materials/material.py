@@ -157,29 +157,34 @@ class Material:
         """The energy's derivatives by the principal stretches, for any constants."""
         return Response(self.strain_energy, list(self.parameters))
 
-    def stress(self, mode: str, stretches: ArrayLike) -> np.ndarray:
-        """Nominal stress, force over reference area, of a test. Unit: stress.
+    def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), *, true: bool = False) -> np.ndarray:
+        """Nominal stress, force over reference area, of a test (`true`: over the area as it is). Unit: stress.
 
-        P = dW/dl / n along the test, with n = 1 direction pulled, or 2.
+        P = dW/dl / n along the test, with n = 1 direction pulled, or 2. The true stress is P l.
 
         Args:
             mode: "uniaxial" (l, l^-1/2, l^-1/2), "pure_shear" (l, 1, 1/l), also called planar tension, or
-                "equibiaxial" (l, l, l^-2).
-            stretches: l, any shape, each greater than 0; the result has this shape.
+                "equibiaxial" (l, l, l^-2); "biaxial": (l1, l2), any two, as in `stress(stretches=(l1, l2))`.
+            stretches: l, any shape, each greater than 0; the result has this shape. Of "biaxial" shape (2, ...).
 
         Raises:
             InputError: unknown mode, a stretch that is not positive or beyond the material's limit.
         """
-        known(f"{self}: stress: mode", mode, MODES)
+        known(f"{self}: stress: mode", mode, [*MODES, "biaxial"])
         l = np.asarray(stretches, dtype=float)
+        if mode == "biaxial" and l.shape[:1] != (2,):
+            raise InputError(f"{self}: stress: stretches of a biaxial test must be (l1, l2), the shape is {l.shape}")
         flat = l.ravel()
         for bad in flat[~((flat > 0) & np.isfinite(flat))][:1]:
             raise InputError(f"{self}: a stretch of {bad:.6g}: must be finite and greater than 0")
         self._check_isotropic()
-        P = self.response.stress(homogeneous.along(mode, flat), self._numbers())[0]
+        both = flat.reshape(2, -1) if mode == "biaxial" else homogeneous.along(mode, flat)
+        P = self.response.stress(both, self._numbers())[:2 if mode == "biaxial" else 1].ravel()
         for bad in flat[~np.isfinite(P)][:1]:
-            raise InputError(self._beyond(mode, bad))
-        return P.reshape(l.shape)[()]
+            raise InputError(self._beyond(mode, bad) if mode in MODES else
+                             f"{self}: biaxial stretches are beyond its limit: I1 must be less than"
+                             f" {self.largest_I1:.6g}")
+        return (P * flat if true else P).reshape(l.shape)[()]
 
     def largest_stretch(self, mode: str) -> float:
         """The stretch of a test at which the energy is infinite."""
@@ -223,6 +228,22 @@ class Material:
         drawn.set(xlabel="stretch", ylabel="nominal stress" + f" ({unit})" * bool(unit), title=str(self))
         drawn.legend()
         return drawn
+
+    def report(self, file: Any = "card.html", *, temperatures: Sequence[float] = (),
+               rates: Sequence[float] = (0.1, 1.0, 10.0), unit: str = "", unit_of_time: str = "s") -> Any:
+        """Write one HTML page that shows what the material does, and its limits; returns where it is.
+
+        Args:
+            temperatures: needed where constants or times depend on it, in the unit that theirs are in.
+            rates: Hencky rates of forming, 1/time, of a material that relaxes.
+            unit, unit_of_time: of the constants, for the labels.
+
+        Raises:
+            InputError: a constant depends on the position, or on a temperature that is not given.
+            OSError: the file cannot be written.
+        """
+        from .card import write
+        return write(self, file, temperatures, rates, unit, unit_of_time)
 
     def check(self, sample: Sample | None = None) -> None:
         """Raise an InputError unless the constants are admissible: finite, with a positive stiffness at rest.

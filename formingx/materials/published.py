@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from .damping import PSM
 from .hyperelastic import MooneyRivlin, NeoHookean
+from .kbkz import KBKZ
 from .material import Material
 
 
@@ -32,10 +34,11 @@ _KG_PER_CM2 = 0.0980665                                                         
 _SONG = "W. Song, PhD thesis, McMaster University, 1993"
 _THRONE = f"J. L. Throne, Adv. Polym. Technol. 9 (1989) 309-320, quoted by {_SONG}, section 6.4"
 _NOT_STATED = "not stated where quoted"
+_LDPE = [(129000, 1e-4), (94800, 1e-3), (58600, 0.01), (26700, 0.1), (9800, 1), (1890, 10), (180, 100), (1, 1000)]
 
 
 def published() -> dict[str, Published]:
-    """{name: constants that can be cited}, in MPa.
+    """{name: constants that can be cited}, in MPa, of melts in Pa and s.
 
     They hold for the stretches, temperatures and rates of their tests, which are given as far as the source states
     them. Quoted ones were not read in the original. Test data to fit to: `treloar1944`.
@@ -61,4 +64,10 @@ def published() -> dict[str, Published]:
         "natural rubber, 0.76 mm": Published(
             MooneyRivlin(c10=25.11 * _PSI, c01=0.581 * _PSI), "MPa", "sheet of natural rubber, room temperature", None,
             _NOT_STATED, _NOT_STATED, _THRONE),
+        "LDPE melt 150 C": Published(
+            KBKZ(_LDPE, PSM(alpha=14.38, beta=0.018)), "Pa", "low-density polyethylene, melt I", 150.0,
+            "relaxation times from 1e-4 to 1000 s",
+            "spectrum in small shear; damping in shear and uniaxial extension, not in equibiaxial",
+            "H. M. Laun, Rheol. Acta 17 (1978) 1-15 (spectrum); A. C. Papanastasiou, L. E. Scriven, C. W. Macosko,"
+            " J. Rheol. 27 (1983) 387-410 (damping); not read in the original"),
     }

@@ -177,12 +177,12 @@ class RelaxingMaterial(HistoryTests, Material):
         modulus: Any = 0.0 if (rest := self.equilibrium) is None else rest.shear_modulus
         return modulus + sum(mu * np.exp(-t / tau) for mu, tau in self.branches)
 
-    def stress(self, mode: str, stretches: ArrayLike, times: ArrayLike | None = None,
-               between: str = "stretch") -> np.ndarray:
-        """Nominal stress, force over reference area, of a test; stress.
+    def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), times: ArrayLike | None = None,
+               between: str = "stretch", *, true: bool = False) -> np.ndarray:
+        """Nominal stress, force over reference area, of a test (`true`: over the area as it is); stress.
 
         Args:
-            mode: "uniaxial", "pure_shear" or "equibiaxial".
+            mode: "uniaxial", "pure_shear" or "equibiaxial"; without times "biaxial" too.
             stretches: of any shape without times, (n,) with them.
             times: when the stretches are met, shape (n,), not falling; a step from one stretch to another at the same
                 time is put on at once, and so is the first stretch, to a body at rest. None: every stretch is put on
@@ -193,11 +193,12 @@ class RelaxingMaterial(HistoryTests, Material):
             InputError: as without times; times that fall or are not as many as the stretches.
         """
         if times is None:
-            return super().stress(mode, stretches)
+            return super().stress(mode, stretches, true=true)
         t, l = tests.checked(f"{self}: stress", mode, times, stretches, between)
         P = np.zeros(len(l)) if (rest := self.equilibrium) is None else rest.stress(mode, l)
         mu, tau = np.array(self.branches).T
-        return P + self.unit_stress(mode, tau, t, l, between) @ mu
+        P = P + self.unit_stress(mode, tau, t, l, between) @ mu
+        return P * l if true else P
 
     @classmethod
     def unit_stress(cls, mode: str, tau: Any, times: np.ndarray, stretches: np.ndarray,

@@ -1,0 +1,106 @@
+"""A material's card: a page with what it does in three tests, at rates and temperatures of forming, and its limits."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, place, positive, several
+from ..figures import figure
+from .constants import OfTemperature
+from .homogeneous import MODES
+
+_MOST = 6.0
+"""Stretch to which curves are drawn where there is no limit before."""
+_PART = 0.97
+"""Of a limit of the stretch, to which curves are drawn."""
+
+
+def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequence[float], unit: str,
+          unit_of_time: str) -> Path:
+    """See `Material.report`."""
+    who, path = f"{material}: report", place("report: file", file)
+    depends = [name for name, value in material.constants().items() if isinstance(value, OfTemperature)]
+    at = several(f"{who}: temperatures", temperatures, "temperatures")
+    if depends and not at:
+        raise InputError(f"{who}: {', '.join(depends)} depend on the temperature: give temperatures=[...]")
+    cases = [(f"{T:g}", material.at_temperature(T), _shift(material, T)) for T in at] if depends else [
+        ("", material, 1.0)]
+    rates = [positive(f"{who}: rates", rate) for rate in several(f"{who}: rates", rates, "rates")]
+    parts = [_limits(name, one, shift, unit, unit_of_time) for name, one, shift in cases]
+    picture = _picture(cases, rates if hasattr(material, "constant_rate") else [], unit, unit_of_time)
+    rows = "".join(f"<tr><td>{html.escape(a)}</td><td>{html.escape(b)}</td></tr>" for part in parts for a, b in part)
+    path.write_text(_PAGE.format(title=html.escape(type(material).__name__), card=html.escape(str(material)), rows=rows,
+                                 picture=picture), encoding="utf-8")
+    return path
+
+
+def _shift(material: Any, temperature: float) -> float:
+    """aT there: a rate there is as this many times itself at the reference."""
+    law = material.parameters.get("aT")
+    return float(law(temperature)) if isinstance(law, OfTemperature) else 1.0
+
+
+def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str) -> list[tuple[str, str]]:
+    """(what, value) at one temperature."""
+    def said(value: float, of: str = "") -> str:
+        return f"{value:.4g} {of}".rstrip()
+    rows = [(f"at {name}" if name else "", "")] if name else []
+    rows.append(("shear modulus at once", said(material.shear_modulus, unit)))
+    for mode in MODES:
+        largest = material.largest_stretch(mode)
+        if np.isfinite(largest):
+            rows.append((f"no state above a stretch, {mode}", said(largest)))
+    for mode in MODES if hasattr(material, "rupture_stretch") else ():
+        if np.isfinite(most := material.rupture_stretch(mode)):
+            rows.append((f"ruptures beyond a step of strain, {mode}", said(most)))
+    branches = getattr(material, "spectrum", getattr(material, "branches", []))
+    if branches:
+        times = [shift * tau for _, tau in branches]
+        rows.append(("relaxation times", f"{min(times):.3g} to {max(times):.3g} {unit_of_time}"))
+        rest = material.equilibrium
+        rows.append(("shear modulus when all has relaxed", said(rest.shear_modulus if rest else 0.0, unit)))
+    elif not material.internal and not hasattr(material, "constant_rate"):
+        stable = material.check_stability((0.5, min(_MOST, _PART * material.largest_stretch("equibiaxial"))))
+        low, high = stable.drucker["equibiaxial"]
+        rows.append(("stable (Drucker), equibiaxial", f"from {low:.3g} to {high:.3g} of the range that was looked at"))
+    return rows
+
+
+def _picture(cases: list[tuple[str, Any, float]], rates: list[float], unit: str, unit_of_time: str) -> str:
+    """True stress against stretch in the three tests, as an image for a page."""
+    drawn, axes = figure(3, width=4.2)
+    for axis, mode in zip(axes, MODES):
+        for k, (name, material, shift) in enumerate(cases):
+            l = np.linspace(1.0, min(_MOST, _PART * material.largest_stretch(mode)), 40)[1:]
+            label = f"{name}: " * bool(name)
+            if not rates:
+                axis.plot(l, material.stress(mode, l, true=True), color=f"C{k}", label=name)
+            for rate, style in zip(rates, ("-", "--", ":", "-.") * len(rates)):
+                axis.plot(l, l * material.constant_rate(mode, rate * shift, l), style, color=f"C{k}",
+                          label=f"{label}{rate:g}/{unit_of_time}")
+        axis.set(title=mode.replace("_", " "), xlabel="stretch", ylabel="true stress" + f", {unit}" * bool(unit),
+                 yscale="log" if rates else "linear")
+    if rates or len(cases) > 1:
+        axes[0].legend(frameon=False, fontsize="small")
+    out = io.BytesIO()
+    drawn.savefig(out, format="png", dpi=110)
+    return base64.b64encode(out.getvalue()).decode()
+
+
+_PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>
+<style>body {{font: 16px sans-serif; max-width: 72rem; margin: 2rem auto; padding: 0 1rem}}
+td {{padding: .2rem 1rem .2rem 0}} img {{max-width: 100%}} code {{overflow-wrap: anywhere}}</style>
+<h1>{title}</h1><p><code>{card}</code></p>
+<img alt="true stress against stretch in three tests" src="data:image/png;base64,{picture}">
+<h2>Limits</h2><table>{rows}</table>
+<p>Not modelled: crystallisation as it is drawn or cooled, anisotropy, changes of volume under pressure, damage and
+tearing. Beyond the stretches, rates and temperatures of the tests that its constants come from it is a guess; a damping
+that was fitted to shear or uniaxial data is not known in equibiaxial extension, which a sheet sees.</p></html>
+"""
