@@ -44,8 +44,10 @@ from .results.compare import Comparison, compare
 from .results.compare_nodes import NodalComparison, compare_nodes, write_nodes
 from .results.evaluate.profile import Profile
 from .results.evaluate.stress import Stress, StressField
+from .results.formed import imperfect
 from .results.path import Path
 from .results.show.report import report
+from .results.stability import unstable
 from .runs import Process, load, solve, trace
 from .scene.scene import Scene
 from .solve.newton import Tolerances
@@ -54,6 +56,7 @@ from .solve.state import State
 from .solve.stepping import StepControl
 from .study import Study, StudyRun, study
 from .tools import Tool
+from .top_load import TopLoad, top_load
 from .units import Units
 from .values.course import course
 from .values.table import table

@@ -20,6 +20,7 @@ from .physics.contact import Contact
 from .results.evaluate import edges, snaps, tension, volume
 from .results.files.checkpoint import Checkpoint, holds_states, read
 from .results.path import Path
+from .results.stability import Unstable
 from .scene import aims, clearance
 from .scene.scene import Scene
 from .solve.arc_length import Curve
@@ -40,7 +41,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
           tolerances: Tolerances | None = None, max_steps: int | None = None, progress: bool = True,
           start: Path | None = None, checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
           at_fold: str | None = None, resume: bool = False, beyond: bool = False,
-          pilot: bool | Mapping[str, float] = False) -> Path:
+          pilot: bool | Mapping[str, float] = False, stop_at: Unstable | None = None) -> Path:
     """Follow the equilibrium path from the unloaded body until a target is reached, through limit points.
 
     Args:
@@ -69,6 +70,8 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
         pilot: run twice: on the scene's mesh, which may be coarse, and from rest again on `mesh.adapted(path)`, which
             has columns of elements as the first run asks for. True, or arguments of that, such as {"error": 0.02}.
             `Path.pilot` is the first run; a first run that did not reach the target counts as far as it came.
+        stop_at: `unstable(modes=range(2, 9))`: end, as a result, once the body is unstable in one of these modes;
+            `Path.ended` says which.
 
     Raises:
         InputError: nothing is driven, a target needs something that the scene does not have or cannot be met (it is
@@ -88,7 +91,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     if pilot is not False:
         return _after_pilot("trace", pilot, start, resume, scene, checkpoint, lambda scene, checkpoint: trace(
             scene, until=until, through=through, step=step, tolerances=tolerances, max_steps=max_steps,
-            progress=progress, checkpoint=checkpoint, record=record, at_fold=at_fold, beyond=beyond))
+            progress=progress, checkpoint=checkpoint, record=record, at_fold=at_fold, beyond=beyond, stop_at=stop_at))
     through = several("trace: through", through, "targets, such as pole_stretch(3)")
     for target in (until, *through):
         instance("trace: target", target, Target, "a target, such as pole_stretch(3)")
@@ -97,6 +100,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     instance("trace: step", step, StepControl | None, "a StepControl or None")
     instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     instance("trace: progress", progress, bool, "True or False")
+    instance("trace: stop_at", stop_at, Unstable | None, "fx.unstable(modes=...) or None")
     max_steps = None if max_steps is None else count("trace: max_steps", max_steps)
     known("trace: at_fold =", at_fold, AT_FOLD)
     scene.only_driven("trace")
@@ -110,6 +114,8 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
         path = carried(_path(Curve(problem, tolerances or Tolerances()), start, record, beyond))
         targets = [(target, target.bind(problem)) for target in (*through, until)]
         _keep(path, checkpoint)
+        if stop_at is not None:
+            stop_at.watch(path)
         run = Run(path.record, targets, step, at_fold)
         run.follow(max_steps, progress, None if path.states else begin(path.record.curve), may_turn=True)
     return path

@@ -251,6 +251,61 @@ def test_formed_is_the_deformed_body():
     assert again.forms.volume == pytest.approx(path.problem.forms.volume, rel=1e-5)
 
 
+def inflate(mesh, ratio):
+    """A tube inflated at its length until its inner radius would be so much larger, were it even."""
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.5), loads=[fx.Pressure("inner")],
+                     supports=[fx.Symmetry("bottom", "z"), fx.Symmetry("top", "z")])
+    return fx.trace(scene, until=fx.enclosed_volume(np.pi**2 * 0.8**2 * (ratio**2 - 1)), progress=False,
+                    step=fx.StepControl(largest=0.03))
+
+
+def test_imperfections_knock_down():
+    """A tube that bulges from the start bears less, by the power 2/3 of its imperfection (Koiter, 1945)."""
+    mesh = fx.mesh.disc(radius=1.0, inner_radius=0.8, thickness=np.pi, elements=(2, 10))
+    path = inflate(mesh, 2.02)
+    loss = path.stability([0]).first
+    (before, behind), = path.branch_points
+    assert before is loss.left and behind is loss.right
+    bent = fx.imperfect(mesh, loss, 1e-2)
+    assert np.abs(bent.nodes_of("inner")[:, 0] - 0.8).max() == pytest.approx(
+        1e-2 * np.abs(loss.amplitudes[loss.points[:, 0] < 0.8 + 1e-9, 0]).max(), rel=1e-6)
+    drops = []
+    for amplitude in (2.5e-3, 5e-3, 1e-2):
+        path = inflate(fx.imperfect(mesh, loss, amplitude), 2.1)
+        drops.append(loss.control - max(limit.measures["pressure"] for limit in path.limit_points))
+    assert min(drops) > 0 and np.diff(np.log(drops)) / np.log(2) == pytest.approx([2 / 3] * 2, abs=0.05)
+    with pytest.raises(InputError, match="of another mesh"):
+        fx.imperfect(fx.mesh.disc(radius=1.0, thickness=0.3, elements=(3, 1)), loss, 0.1)
+
+
+def test_a_run_stops_where_it_is_unstable():
+    scene = column(1.0, elements=(4, 10))
+    path = fx.trace(scene, until=fx.travel(-2.0), stop_at=fx.unstable(modes=range(3)), progress=False)
+    assert "1 waves become unstable" in path.ended
+    before, last = (1 + state.measures["travel"] / np.pi for state in path.states[-2:])
+    assert last < exact.cylinder(1.0, 1) < before
+    with pytest.raises(InputError, match="stop_at"):
+        fx.trace(scene, until=fx.travel(-0.1), stop_at=[1], progress=False)
+
+
+def test_top_load_of_a_tube():
+    """A short tube on a plate: its force grows, it buckles where the path says, and what is asked for is there."""
+    mesh = fx.mesh.disc(radius=1.0, inner_radius=0.8, thickness=4.0, elements=(1, 12))
+    found = fx.top_load(mesh, material=fx.NeoHookean(c10=1.0), travel=0.8, neck="top", foot="bottom", modes=[1, 2],
+                        step=fx.StepControl(largest=0.1))
+    assert found.largest_force > 0 and str(found).startswith("top load, elastic")
+    for n in (1, 2):
+        pair, loss = found.buckling(n), found.of(n)
+        assert (pair is None) == (loss is None)
+        if pair is not None:
+            assert 0 < pair[1] <= 0.8
+            assert np.interp(pair[1], found.travel, found.force) == pytest.approx(pair[0], rel=2e-2)
+    whole = np.trapezoid(found.force, found.travel)
+    assert 0 < found.energy <= whole * (1 + 1e-12)
+    with pytest.raises(InputError, match="top_load: neck"):
+        fx.top_load(mesh, material=fx.NeoHookean(c10=1.0), travel=0.8, modes=[1])
+
+
 def test_branches_of_a_tube_are_images_of_each_other():
     """The two bulges of an inflated tube, one at each end, are as large at the same volume, and need less pressure."""
     ratio, length, critical = 0.8, np.pi, 1.98640828

@@ -8,8 +8,8 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from ..errors import InputError
-from ..mesh.grid import Grid, counter_clockwise, to_mesh
+from ..errors import InputError, finite, instance
+from ..mesh.grid import Grid, counter_clockwise, gathered, to_mesh
 from ..mesh.mesh import Mesh
 
 _NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
@@ -60,3 +60,32 @@ def formed(problem: Any, state: Any) -> Mesh:
                     {name: np.array([row for p in parts for row in p[3][name]], dtype=np.int64).reshape(-1, 3)
                      for name in mesh.boundaries})
     return to_mesh(grid, comm, "Path.formed: the deformed mesh")
+
+
+def imperfect(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
+    """The mesh with its nodes moved along a mode, free of stress there: an imperfection; collective.
+
+    Args:
+        mode: a `Loss` with n = 0 of a run on this mesh, or on one with the same nodes.
+        amplitude: the largest motion of a node, length; negative: against the mode.
+
+    Raises:
+        InputError: the mode varies round the body, or is of other nodes; the moved elements are no mesh.
+    """
+    from .stability import Loss
+    instance("imperfect: mesh", mesh, Mesh, "a mesh")
+    mode, amplitude = instance("imperfect: mode", mode, Loss, "a loss that Path.stability found"), finite(
+        "imperfect: amplitude", amplitude)
+    if mode.number or mode.flipped:
+        raise InputError(f"imperfect: mode: {mode!r}: varies round the body, or its image turns round: no mesh of a"
+                         " section has it; modes of n = 0 can be given")
+    grid = gathered(mesh)
+    keys, near = (np.round(points / (1e-7 * np.ptp(grid.points))).astype(np.int64) for points in (
+        mode.points, grid.points))
+    there = {tuple(key): k for k, key in enumerate(keys.tolist())}
+    found = [there.get(tuple(key), -1) for key in near.tolist()]
+    if min(found) < 0:
+        R, Z = grid.points[int(np.argmin(found))]
+        raise InputError(f"imperfect: mode: it has no node at (R, Z) = ({R:.6g}, {Z:.6g}): it is of another mesh")
+    moved = grid.points + amplitude * mode.amplitudes[found][:, :2]
+    return to_mesh(lambda: grid._replace(points=moved), mesh.comm, "imperfect: the moved mesh")

@@ -238,6 +238,40 @@ class Watch:
         return Loss(self._path, found, float(control), driven, fold, points, amplitudes)
 
 
+class Unstable:
+    """Ends a run where modes that were stable at its first state are not; see `unstable`."""
+
+    def __init__(self, modes: Any):
+        self.modes = modes
+
+    def watch(self, path: Any) -> None:
+        """From now on look at the last state whenever a step of the path is complete."""
+        watch, numbers = Watch(path), _numbers(path.problem, self.modes)
+        first: dict[Kind, int] = {}
+
+        def look() -> None:
+            state = path.last
+            modes = watch.of(path._segment(state))
+            for kind in (Kind(n, flipped) for n in numbers for flipped in (None, *modes.variation.mirrors)):
+                count = modes.count(state, kind)
+                if not (kind.number or kind.flipped):
+                    count -= state.slope * path.states[0].slope < 0      # a limit point is expected
+                if count > first.setdefault(kind, count):
+                    path.record.ended = (f"{kind.number:g} waves become unstable before {path.describe(state)}:"
+                                         f" path.stability(modes=[{kind.number:g}]) finds where")
+                    return
+        path.record.on_step.append(look)
+
+
+def unstable(modes: Iterable[float] = range(9)) -> Unstable:
+    """For `trace(stop_at=...)`: end the run, as a result, once a mode is unstable that was not at its first state.
+
+    modes: waves round the axis; in plane strain wave numbers along the depth. It costs about two iterations a mode and
+    state. `Path.ended` says which mode, `Path.stability` finds where.
+    """
+    return Unstable(modes)
+
+
 def _numbers(problem: Any, modes: Any) -> list[float]:
     try:
         numbers = [finite("stability: modes", n) for n in modes]

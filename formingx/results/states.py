@@ -13,6 +13,7 @@ from ..errors import ConvergenceError, InputError, finite, known
 from ..measures import columns as standard_columns
 from ..measures.targets import Bound, Target, is_met, process_time
 from ..solve import predictor
+from ..solve.diagnose import branch_points
 from ..solve.newton import Failure
 from ..solve.path_following import Run
 from ..solve.record import Counts, Record, Segment
@@ -85,6 +86,15 @@ class States:
     def limit_points(self) -> list[State]:
         """States at which the control has a maximum or a minimum along the path."""
         return [state for state in self.states if state.kind == "limit point"]
+
+    @property
+    def branch_points(self) -> list[tuple[State, State]]:
+        """Neighbours between which another path begins: the tangent's determinant changes its sign, no limit point.
+
+        Modes n = 0 alone, and an odd number of them; `Path.stability` sees all. Two factorisations a stretch between
+        limit points; none with a history.
+        """
+        return [pair for segment in self.segments for pair in branch_points(segment.curve, segment.states)]
 
     @property
     def jumps(self) -> list[State]:

@@ -133,6 +133,30 @@ def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attemp
     return Diagnosis(**facts, causes=tuple(causes), advice=tuple(advice), examined=examined)
 
 
+def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
+    """Neighbours between which the determinant of the tangent changes its sign without a limit point; collective.
+
+    An even number of changes between two limit points is not seen. With a history no other path begins: none.
+    """
+    problem = curve.problem
+    usable = [s for s in states[1 if problem.slack_at_rest else 0:] if s.kind != "limit point"]
+    if len(usable) < 2 or problem.has_history:
+        return []
+    solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
+    found = _changes(states, usable, _signs(problem, solver))
+    solver.destroy()
+    return found
+
+
+def _signs(problem: Any, solver: DirectSolver) -> Callable[[State], int]:
+    """The sign of the determinant of the tangent at a state, 0 if it has no factors."""
+    def sign(state: State) -> int:
+        with problem.at(state):
+            problem.tangent(problem.x, state.control)
+            return solver.sign() if solver.factorise() else 0
+    return sign
+
+
 def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     """Condition and signs of the determinant along the path, and the limit point that the last slopes point to.
 
@@ -142,12 +166,7 @@ def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     """
     problem = curve.problem
     solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
-
-    def sign(state: State) -> int:
-        with problem.at(state):
-            problem.tangent(problem.x, state.control)
-            return solver.sign() if solver.factorise() else 0
-
+    sign = _signs(problem, solver)
     limits = tuple(problem.shown(s.control)[1] for s in states if s.kind == "limit point")
     facts: dict[str, Any] = {"limit_points": limits}
     turned = []
