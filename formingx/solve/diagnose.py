@@ -143,13 +143,15 @@ def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, St
     if len(usable) < 2 or problem.has_history:
         return []
     solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
-    found = _changes(states, usable, _signs(problem, solver))
+    found = _changes(states, usable, _signs(curve, solver))
     solver.destroy()
     return found
 
 
-def _signs(problem: Any, solver: DirectSolver) -> Callable[[State], int]:
+def _signs(curve: Curve, solver: DirectSolver) -> Callable[[State], int]:
     """The sign of the determinant of the tangent at a state, 0 if it has no factors."""
+    problem = curve.problem
+
     def sign(state: State) -> int:
         with problem.at(state):
             problem.tangent(problem.x, state.control)
@@ -166,7 +168,7 @@ def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     """
     problem = curve.problem
     solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
-    sign = _signs(problem, solver)
+    sign = _signs(curve, solver)
     limits = tuple(problem.shown(s.control)[1] for s in states if s.kind == "limit point")
     facts: dict[str, Any] = {"limit_points": limits}
     turned = []
