@@ -152,9 +152,9 @@ def _with_gmsh(folder: Path) -> None:
         gmsh.finalize()
 
 
-def run(files: int, seed: int = 0, kinds: tuple[str, ...] = ()) -> dict[str, Counter]:
+def run(files: int, seed: int = 0, kinds: tuple[str, ...] = (), found: Any = None) -> dict[str, Counter]:
     """{kind: how many ended as what}; what must not be is printed: another ending, no end, another reading."""
-    found: dict[str, Counter] = {}
+    found = {} if found is None else found
     signal.signal(signal.SIGALRM, _too_long)
     with tempfile.TemporaryDirectory() as name, warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -217,7 +217,11 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--kinds", nargs="*", default=[])
     options = parser.parse_args()
-    found = run(options.files, options.seed, tuple(options.kinds))
+    found: dict[str, Counter] = {}
+    try:
+        run(options.files, options.seed, tuple(options.kinds), found)
+    except KeyboardInterrupt:                                    # what was found up to there is told
+        print({kind: dict(endings) for kind, endings in found.items()}, flush=True)
     return int(any(endings["bad"] for endings in found.values()))
 
 

@@ -49,10 +49,15 @@ class Ending(NamedTuple):
 
 def run(calls: int, seed: int = 0, kinds: tuple[str, ...] = ()) -> list[Ending]:
     """The endings of so many calls, each watched from outside."""
-    endings: list[Ending] = []
-    while len(endings) < calls:
-        endings += _watched(len(endings), calls, seed, kinds)
-    return endings
+    return list(_endings(calls, seed, kinds))
+
+
+def _endings(calls: int, seed: int, kinds: tuple[str, ...]) -> Iterator[Ending]:
+    done = 0
+    while done < calls:
+        for ending in _watched(done, calls, seed, kinds):
+            done += 1
+            yield ending
 
 
 def _watched(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> Iterator[Ending]:
@@ -473,13 +478,15 @@ def main() -> int:
     if calls:
         child(*calls, args.seed, tuple(args.kinds))
         return 0
-    endings = run(args.calls, args.seed, tuple(args.kinds))
-    for how, n in Counter(e.how for e in endings).most_common():
-        print(f"{n:6} {how}")
-    for e in endings:
-        if e.bad:
-            print(f"call {e.number} of seed {args.seed}: {e.call}: {e.how} {e.text}")
-    return int(any(e.bad for e in endings))
+    found: Counter = Counter()
+    with contextlib.suppress(KeyboardInterrupt):               # what was found up to there is told
+        for e in _endings(args.calls, args.seed, tuple(args.kinds)):
+            found[e.how] += 1
+            if e.bad:
+                found["bad"] += 1
+                print(f"call {e.number} of seed {args.seed}: {e.call}: {e.how} {e.text}", flush=True)
+    print(*(f"{n:6} {how}" for how, n in found.most_common()), sep="\n")
+    return int(found["bad"] > 0)
 
 
 if __name__ == "__main__":
