@@ -175,6 +175,8 @@ def test_units_that_are_not_stated(tmp_path):
     for file in (tmp_path / "cup.geo", none):
         with pytest.raises(fx.InputError, match="units = 'mm': .* does not state its own: give a factor"):
             tools.read(file, units="mm")
+    with pytest.raises(fx.InputError, match="units .of length, or a factor. = None"):
+        tools.read(none, units=fx.Units())
     assert tools.read(none, units=25.4).pieces[0].b == pytest.approx([25.4, 0])
     with pytest.raises(fx.InputError, match="units 'yard' is not known"):
         tools.read(none, units="yard")

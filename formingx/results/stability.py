@@ -295,6 +295,7 @@ def _chosen(path: Any, states: Any) -> list[State]:
         if any(all(s is not one for one in path.states) for s in given):
             raise InputError("stability: states: must be of this path")
         return sorted(given, key=path.states.index)
-    number = len(there) if states == "all" else min(count("stability: states", states), len(there))
+    everything = isinstance(states, str) and states == "all"
+    number = len(there) if everything else min(count("stability: states", states), len(there))
     picked = np.unique(np.round(np.linspace(0, len(there) - 1, max(number, 2))).astype(int)) if there else []
     return [there[k] for k in picked]

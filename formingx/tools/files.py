@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError, count, finite, known, pair, place, positive, several
 from ..mesh import msh
-from ..units import LENGTHS
+from ..units import LENGTHS, Units
 from . import cad, dxf, geo
 from .arcs import in_plane, piece_through
 from .profile import Arc, Line, Tool
@@ -25,7 +25,7 @@ _Curves = dict[int, Callable[[], list[Line | Arc]]]
 
 
 def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: bool = False, *,
-         tolerance: float | None = None, body: Any = None, units: str | float | None = None) -> Tool:
+         tolerance: float | None = None, body: Any = None, units: str | float | Units | None = None) -> Tool:
     """A tool from curves of a file.
 
     A curve is taken for the line or the arc that it is, exactly; the curves of a mesh (.msh) by their nodes. The ending
@@ -40,9 +40,9 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
         tolerance: length; splines and ellipses (.step, .brep, .dxf) become arcs no farther away than this.
         body: a point (R, Z) outside the tool, or the mesh of the body: the solid is then put on the other side of the
             profile. None: it is to the left of the profile.
-        units: the script's unit of length ("mm", "cm", "m", "um", "in", "ft"): curves of a file that states its own (a
-            .dxf file's $INSUNITS; a .step file always comes in mm) are turned into it; or a factor. None: numbers as
-            they come.
+        units: the script's unit of length ("mm", "cm", "m", "um", "in", "ft"), or its `formingx.Units`: curves of a
+            file that states its own (a .dxf file's $INSUNITS; a .step file always comes in mm) are turned into it; or
+            a factor. None: numbers as they come.
 
     Raises:
         InputError: the file is not what its ending says or cannot be read, a statement that a .geo file may not hold,
@@ -140,8 +140,9 @@ def _tag(tag: Any) -> int:
 
 def _factor(units: Any, kind: str, file: str) -> float:
     """What the file's lengths are multiplied with."""
+    units = units.length if isinstance(units, Units) else units
     if not isinstance(units, str):
-        return positive("tools.read: units", units)
+        return positive("tools.read: units (of length, or a factor)", units)
     known("tools.read: units", units, LENGTHS)
     own = {"step": "mm", "dxf": dxf.unit(file) if kind == "dxf" else None}.get(kind)
     if own is None:

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...discrete.outline import Outline, along
+from ...errors import positive
 
 _STATES = 12
 """States whose stresses are looked at: those, evenly, of all."""
@@ -30,6 +31,8 @@ def column_factors(path: Any, share: float | None, error: float | None) -> np.nd
 
     share, error: see `formingx.mesh.adapted`.
     """
+    share, error = (value if value is None else positive(f"column_factors: {name}", value)
+                    for name, value in (("share", share), ("error", error)))
     columns = path.problem.scene.mesh.columns
     middles = columns.place((columns.ends[1:] + columns.ends[:-1]) / 2)
     factors = np.full(len(columns.ends) - 1, np.inf)
