@@ -364,11 +364,15 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
         how = (f"checkpoint={str(checkpoint)!r} holds it: the same script goes on with resume=True" if checkpoint else
                "it is lost; with checkpoint='folder', resume=True the same script would go on from there")
         raise Interrupted(f"interrupted {stands}; {how}", path) from None
-    path = paths[0]
-    of_volume = volume.doubts(path.last.measures["volume_error"], "the last state",
-                              path.problem.furthest_volume_ratio(path.last))
-    of_volume += cooling.doubts(path.problem, path.segments[-1].states)
-    for bad, text in (of_volume + path.doubts() + edges.doubts(edges.coarsest(path, path.last))
-                      + tension.doubts(tension.first_compression(path)) + snaps.doubts(snaps.largest(path))):
-        if bad == "serious" and path.problem.comm.rank == 0:
+    for bad, text in doubts(paths[0]):
+        if bad == "serious" and paths[0].problem.comm.rank == 0:
             log.warning("%s", text)
+
+
+def doubts(path: Path) -> list[tuple[str, str]]:
+    """(how bad, what) of all that a run says when it ends; collective."""
+    return [*volume.doubts(path.last.measures["volume_error"], "the last state",
+                           path.problem.furthest_volume_ratio(path.last)),
+            *cooling.doubts(path.problem, path.segments[-1].states), *path.doubts(),
+            *edges.doubts(edges.coarsest(path, path.last)), *tension.doubts(tension.first_compression(path)),
+            *snaps.doubts(snaps.largest(path))]

@@ -321,3 +321,16 @@ def test_bad_input():
         fx.doctor("disc")
     with pytest.raises(fx.InputError, match="target = 3.0"):
         fx.doctor(treloar(), targets=[3.0])
+
+
+def test_a_path_is_judged_as_when_its_run_ended(caplog):
+    """A rough plug on coarse elements: what the run warned of; and a state that a body cannot have."""
+    plug = fx.tools.male(radius=2.5, height=30.0, base=-30.0, fillet=0.5).mirrored().moved(z=0.5)
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(8, 1)),
+                     materials=fx.MooneyRivlin(c10=0.4, c01=0.04), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", plug, 0.2, moves=(0, -1), name="plug")])
+    path = fx.trace(scene, until=fx.travel(4.0), progress=False)
+    said = [f.text for f in fx.doctor(path).findings if f.about == "run"]
+    assert said and all(text in caplog.text for text in said) and any("the tool turns by" in text for text in said)
+    path.last.verdict = "the body folds"
+    assert [f.severity for f in fx.doctor(path).findings][0] == "error"

@@ -60,3 +60,27 @@ def test_where_a_point_slides_over_a_convex_tool_its_way_may_cut_it():
             other[contact.rule.dofs[node, 1]] += by / problem.forms.length
             ways = [Way(at, path.last.control, x, 0.0, 1.0) for at in (x, other)]
             assert problem.limit.passes_through(*ways) == passes
+
+
+def ridge(elements, at, points="nodes", width=30.0, fillet=0.0):
+    """A ridge of 90 degrees over a sheet in plane strain, its tip at r = `at`."""
+    tool = tools.Tool([(at - width / 2, 1.2 + width / 2), (at, 1.2), (at + width / 2, 1.2 + width / 2)],
+                      fillets=fillet).moved(z=0.5)
+    return fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(elements, 1)), kinematics=fx.PlaneStrain(),
+                    materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                    contacts=[fx.Contact("top", tool, moves=(0, -1), points=points)])
+
+
+@pytest.mark.parametrize("points", ["nodes", 4])
+def test_a_sharp_open_tool_between_two_points_is_refused(points):
+    """Its tip is in the face by half of the way between two points when it meets one; a fillet is by less."""
+    with pytest.raises(fx.InputError, match="before it meets one: use elements of") as refused:
+        ridge(12, 20.8, points)
+    fits = float(str(refused.value).split("use elements of ")[1].split()[0])
+    ridge(int(np.ceil(40.0 / fits)), 20.8, points)
+    ridge(12, 20.8, points, fillet=6.0)
+
+
+def test_a_sharp_tool_that_comes_down_on_a_node_is_felt():
+    path = fx.trace(ridge(12, 20.0), until=fx.travel(2.0), progress=False)
+    assert path["tool_force"][-1] > 0

@@ -12,6 +12,8 @@ from ..errors import instance, several
 from ..measures.targets import Target
 from ..physics.models import DisplacementPenalty
 from ..physics.supports import Displaced, Symmetry
+from ..results.path import Path
+from ..runs import doubts
 from ..scene.aims import unreachable
 from ..scene.scene import Scene
 from ..solve.stage import Stage
@@ -28,7 +30,7 @@ _PER_FILLET = 2.0          # elements along a fillet
 _PENETRATION = 0.01        # of the thickness
 
 
-def doctor(scene: Scene, *, targets: Sequence[Target] = (), stages: Sequence[Stage] = (),
+def doctor(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequence[Stage] = (),
            units: Units = NONE) -> Report:
     """Look a scene over before the run; collective, no form is compiled and nothing is solved.
 
@@ -42,11 +44,16 @@ def doctor(scene: Scene, *, targets: Sequence[Target] = (), stages: Sequence[Sta
         targets: what the run will aim at, to be looked over too.
         stages: of the process that it will be: their targets and tables.
         units: for the numbers in what is found.
+        scene: or the `Path` of a run: its states are judged too, as when it ended. An "error" is then a state that a
+            body cannot have (`State.verdict`).
 
     Raises:
-        InputError: `scene` is not a Scene, a target not a target, a stage not a stage or of another scene.
+        InputError: `scene` is not a Scene or a Path, a target not a target, a stage not a stage or of another scene.
     """
-    instance("doctor: scene", scene, Scene, "a formingx.Scene")
+    if isinstance(scene, Path):
+        of_run = list(_run(scene))
+        return Report([*of_run, *doctor(scene.problem.scene, targets=targets, stages=stages, units=units).findings])
+    instance("doctor: scene", scene, Scene, "a formingx.Scene, or the Path of a run")
     instance("doctor: units", units, Units, "a formingx.Units")
     targets = several("doctor: targets", targets, "targets, such as [pole_stretch(3)]")
     stages = several("doctor: stages", stages, "stages, such as [Stage('blow', drive='air', until=pressure(1))]")
@@ -61,6 +68,16 @@ def doctor(scene: Scene, *, targets: Sequence[Target] = (), stages: Sequence[Sta
     findings += [Finding("warning", about, text) for check in doctor_sizes.CHECKS for about, text in check(body)]
     findings += [Finding("warning", about, text) for about, text in doctor_cooling.springs_back(scene)]
     return Report([*findings, *_targets(scene, body, targets)])
+
+
+def _run(path: Path) -> Iterator[Finding]:
+    """What the run says of itself, and the first state that a body cannot have."""
+    bad = next((state for state in path.states if state.verdict), None)
+    if bad is not None:
+        yield Finding("error", "run", f"from {path.describe(bad)} on: {bad.verdict}")
+    for severity, text in doubts(path) if path.states else []:
+        if severity == "serious":
+            yield Finding("warning", "run", text)
 
 
 def _driven(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:

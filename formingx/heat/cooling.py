@@ -15,6 +15,7 @@ from . import stepping
 from .boundaries import FixedTemperature, ThermalProperties
 from .conduction import Conduction
 from .contact import ConductingTool, ContactWithTool
+from .layers import graded
 from .run import checked_boundaries, checked_materials
 from .space_error import SpaceError
 
@@ -307,11 +308,24 @@ def doubts(problem: Any, states: Sequence[Any]) -> list[tuple[str, str]]:
     temperatures = [states[k].memory[-1].temperature for k in looked]              # that of the heat is last
     ends = problem.comm.allgather([float(f(T)) for T in temperatures for f in (np.min, np.max) if len(T)])
     worst, span = int(np.argmax(errors)), np.ptp(np.concatenate(ends))
-    if errors[worst] <= max(problem.scene.heat.tolerance, _WARNS * span):
+    duration = float(np.diff([0.0, *(states[k].time for k in looked)])[worst])        # since it was looked at last
+    allowed = max(problem.scene.heat.tolerance, _WARNS * span)
+    if errors[worst] <= allowed:
         return []
     return [("serious", f"The error of the temperature in space is about {errors[worst]:.2g} degrees at time"
                         f" {states[looked[worst]].time:.4g}: thinner layers of elements at faces that touch or lose"
-                        f" heat, as elements=(n, [1, 2, 4]).")]
+                        f" heat{_such_as(problem.scene, errors[worst] / allowed, duration)}.")]
+
+
+def _such_as(scene: Any, times: float, duration: float) -> str:
+    """What to write for elements that bring down an error that is so many times what is allowed (of third order)."""
+    laws = {law.on for law in [*scene.heat.boundaries, *scene.heat._touches(scene)]}
+    faces = [face for face in ("bottom", "top") if face in laws]
+    if not faces or len(scene.mesh.layers) > 1:
+        return ""
+    material, = checked_materials(scene.mesh, scene.heat.materials).values()
+    sizes = graded(scene.mesh, faces, 0.8 * times ** (-1 / 3), float(np.sqrt(material.diffusivity * duration)))
+    return f", such as elements=(n, {[float(f'{size:.2g}') for size in sizes]}), from the bottom up"
 
 
 def _equal(a: Any, b: Any) -> bool:

@@ -8,7 +8,7 @@ into rows between the cuts of their edges, in the shape of the element that they
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,24 @@ def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callab
         return to_mesh(lambda: _cut(grid, cuts), mesh.comm, "the mesh, cut into layers for heat") if cuts else mesh
     except InputError:           # an element is so curved that straight rows do not fit in it: a quarter of its height
         return mesh
+
+
+def graded(mesh: Mesh, faces: Sequence[str], part: float, depth: float) -> list[float]:
+    """Relative sizes of layers from the bottom up, each 1.26 times the next one towards the faces (of "bottom", "top"),
+    where they are `part` as thick as elements are now, and of the depth that heat has gone; collective."""
+    grid = gathered(mesh)
+    triangles = np.concatenate([rows[:, :3] for rows in grid.layers.values()])
+    double = np.abs(np.linalg.det(grid.points[triangles[:, 1:]] - grid.points[triangles[:, :1]]))
+    thinnest, longest = _PART * depth, 0.0
+    for face in faces:
+        ends = grid.boundaries[face][:, :2]
+        length = np.hypot(*(grid.points[ends[:, 1]] - grid.points[ends[:, 0]]).T)
+        below = [np.flatnonzero(np.isin(triangles, edge).sum(1) == 2)[0] for edge in ends]
+        thinnest = min(thinnest, part * float(np.median(double[below] / length)))
+        longest = max(longest, float(length.sum()))
+    n = int(np.ceil(3 * np.log2((2 ** (1 / 3) - 1) * double.sum() / 2 / longest / len(faces) / thinnest + 1)))
+    sizes = [2 ** (k / 3) for k in range(n)]
+    return sizes + sizes[::-1] if len(faces) > 1 else sizes if "bottom" in faces else sizes[::-1]
 
 
 def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],

@@ -275,7 +275,6 @@ class Scene:
                 and contact.tool.bounds[0, 0] <= near:
             raise InputError(f"{contact!r}: it moves along R, but its tool covers the axis: no rigid tool of revolution"
                              f" does that; must be moves=(0, ...), or PlaneStrain()")
-        tool_width.check(mesh, contact, self.kinematics.axisymmetric)
         face = mesh.nodes_of(contact.on)
         comm = mesh.comm
         points = gathered(comm, mesh.domain.geometry.x[:, :2])
@@ -296,6 +295,7 @@ class Scene:
         if any(load is self.driven and load.on == contact.on for load in self.loads):
             raise InputError(f"{contact!r}: the driven pressure acts on the same face and pushes it away from the tool:"
                              f" no tool faces the pressure")
+        tool_width.check(mesh, contact, self.kinematics.axisymmetric)
 
     def check_travel(self, contact: Contact, travel: float) -> None:
         """An InputError if a tool's travel (length) would put a held boundary as a whole inside the tool."""

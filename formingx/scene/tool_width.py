@@ -1,4 +1,4 @@
-"""Whether a tool is so narrow that it fits between two contact points of a face."""
+"""Whether the contact points of a face feel a tool: one that fits between two of them, or is deep in between first."""
 
 from __future__ import annotations
 
@@ -8,28 +8,37 @@ import numpy as np
 from dolfinx.mesh import entities_to_geometry
 
 from ..errors import InputError
+from ..mesh.triangles import Triangles
 from ..physics.contact import Contact
 from ..ranks import gathered
 
 _DIRECTIONS = 90
 
+_CUT = 0.1
+"""Depth over the thickness, as above which a run warns (`results.evaluate.verdict`)."""
+
+_PLACES, _MOVES = 33, 200
+"""Places of an edge that are looked at; moves that lead a tool to a face, at most."""
+
 
 def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
-    """An InputError if a closed tool is narrower than the way between contact points, where it is next to the face.
+    """An InputError if a tool would not be felt, or only when it is deep in the face."""
+    mesh.domain.topology.create_connectivity(1, 2)
+    facets = mesh.facets_of(contact.on)
+    nodes = entities_to_geometry(mesh.domain, 1, facets) if len(facets) else np.zeros((0, 2), dtype=int)
+    ends = gathered(mesh.comm, mesh.domain.geometry.x[nodes][:, :2, :2])
+    if contact.tool.closed:
+        _check_width(contact, ends, axisymmetric)
+    _check_first_touch(contact, ends, Triangles(mesh).thickness)
 
-    It would pass between them and not be felt.
-    """
-    if not contact.tool.closed:
-        return
+
+def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None:
+    """A closed tool is wider than the way between contact points, where it is next to the face: else it passes."""
     outline = contact.tool.outline()
     if axisymmetric and outline[:, 0].min() <= 1e-9 * contact.tool.size:         # it goes on beyond the axis
         outline = np.concatenate([outline, outline * (-1, 1)])
     angles = np.linspace(0, np.pi, _DIRECTIONS, endpoint=False)
     width = float(np.ptp(outline @ np.array([np.cos(angles), np.sin(angles)]), axis=0).min())
-    mesh.domain.topology.create_connectivity(1, 2)
-    facets = mesh.facets_of(contact.on)
-    nodes = entities_to_geometry(mesh.domain, 1, facets) if len(facets) else np.zeros((0, 2), dtype=int)
-    ends = gathered(mesh.comm, mesh.domain.geometry.x[nodes][:, :2, :2])
     nearest = ends[np.argmax(contact.tool.signed_distance(ends.mean(1)))]
     points = 2 if contact.points == "nodes" else int(contact.points)
     edge = float(np.hypot(*(nearest[1] - nearest[0])))
@@ -37,3 +46,36 @@ def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
         raise InputError(f"{contact!r}: the tool is {width:.4g} wide, less than the {edge / points:.4g} from one"
                          f" contact point of {contact.on!r} to the next: it would pass between them; use elements of"
                          f" {points * width:.4g} or less there (they are {edge:.4g} long)")
+
+
+def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> None:
+    """A tool that comes to the face as it is at rest meets a contact point before it is deep in it elsewhere.
+
+    It moves by its distance to the nearest point, again and again (sphere tracing): so it passes none. One that stays
+    is thought to come straight to the middle of an edge.
+    """
+    tool = contact.tool
+    near = tool.nearest(ends.mean(1))
+    way = -near.normal[np.argmax(near.distance)]
+    if contact.moves:
+        way = np.array(contact.moves) / np.hypot(*contact.moves)
+    at = np.array([0.0, 0.5, 1.0]) if contact.points == "nodes" else (
+        np.polynomial.legendre.leggauss(int(contact.points))[0] + 1) / 2
+    points, places = (ends[:, :1] + s[:, None] * (ends[:, 1:] - ends[:, :1]) for s in (at, np.linspace(0, 1, _PLACES)))
+    travel, furthest = 0.0, 2 * (tool.size + float(np.ptp(ends, axis=(0, 1)).max()))
+    for _ in range(_MOVES):
+        gap = -float(tool.signed_distance(points.reshape(-1, 2) - travel * way).max())
+        if gap < 1e-6 * thickness:
+            break
+        travel += gap
+        if gap > furthest or travel > 5 * furthest:
+            return                                          # it goes elsewhere
+    depth = tool.signed_distance(places.reshape(-1, 2) - travel * way).reshape(places.shape[:2]).max(1)
+    worst = int(np.argmax(depth))
+    if depth[worst] > _CUT * thickness:
+        edge = float(np.hypot(*(ends[worst, 1] - ends[worst, 0])))
+        r, z = ends[worst].mean(0)
+        raise InputError(f"{contact!r}: the tool would be {depth[worst]:.4g} deep in {contact.on!r} near (R, Z) ="
+                         f" ({r:.4g}, {z:.4g}), between two contact points, before it meets one: use elements of"
+                         f" {edge * _CUT * thickness / depth[worst]:.4g} or less there (they are {edge:.4g} long), or a"
+                         f" rounder edge")
