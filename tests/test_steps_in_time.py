@@ -58,23 +58,39 @@ def test_what_the_step_control_knows_is_part_of_a_state(tmp_path):
 
 
 CYCLE = np.array([0.0, 1.0, 2.0, 3.0]), np.array([1.0, 2.0, 0.7, 1.5])
-LAWS = [(fx.Viscoelastic, 1e-3), (fx.Viscoelastic, 0.05), (fx.Viscoelastic, 2.0),
-        (fx.TransientNetwork, 0.01), (fx.TransientNetwork, 0.3)]
+LAWS = [(fx.Viscoelastic, 1e-3), (fx.Viscoelastic, 0.05), (fx.Viscoelastic, 2.0), (fx.TransientNetwork, 1e-3),
+        (fx.TransientNetwork, 0.01), (fx.TransientNetwork, 0.3), (fx.KBKZ, 0.01)]
 
 
-@pytest.mark.parametrize("law, tau", [*LAWS, pytest.param(fx.TransientNetwork, 1e-3, marks=pytest.mark.slow)],
-                         ids=lambda x: getattr(x, "__name__", x))
+@pytest.mark.parametrize("law, tau", LAWS, ids=lambda x: getattr(x, "__name__", x))
 @pytest.mark.parametrize("target", [4, 8])
 def test_accuracy_is_kept_for_any_relaxation_time(law, tau, target):
-    """Stress in every state of a cycle, over the largest, against an ODE solver's."""
-    material = law(fx.NeoHookean(c10=0.5), branches=[(1 / tau, tau)])
+    """Stress in every state of a cycle, over the largest, against an ODE solver's; also where it goes through 0.
+
+    Networks took from 457 to 10,246 states while steps had the mean rate; K-BKZ came to no end.
+    """
+    rubber, branches = fx.NeoHookean(c10=0.5), [(1 / tau, tau)]
+    material = law(branches, equilibrium=rubber) if law is fx.KBKZ else law(rubber, branches)
     times, stretches = CYCLE
     for accuracy, promised in (("draft", 1e-2), ("standard", 2e-3)):
         path = run(block(material), Stage("cycle", follow={"pull": [(t, l - 1) for t, l in zip(times, stretches)]}),
                    accuracy=accuracy, step=StepControl(target=target))
         found = -path["support_force"] / np.pi
         exact = material.stress("uniaxial", 1 + path["travel"], times=path["process_time"])
-        assert np.abs(found - exact).max() < promised * np.abs(exact).max()
+        assert np.abs(found - exact).max() < promised * np.abs(exact).max() and len(path) < 300
+
+
+def test_what_was_kept_before_materials_knew_their_course_is_read():
+    """Its next step is one behind a corner."""
+    path = run(block(fx.TransientNetwork(None, [(1.0, 0.1)])), Stage("pull", follow={"pull": [(0, 0), (1, 0.5)]}),
+               accuracy="draft")
+    history, = path.problem.materials
+    with path.problem.at(path.last):
+        kept = history.save(history.get())
+        assert kept["values"]["pace"].min() > 0
+        del kept["values"]["pace"], kept["values"]["change"]
+        found = history.load(kept)
+    assert not found.values["pace"].any() and not found.values["change"].any() and found.values["A_1"].any()
 
 
 @pytest.mark.parametrize("target, promised", [(4, 1e-2), (8, 1e-2), (8, 2e-3)])

@@ -64,6 +64,12 @@ class MaterialHistory:
         parts = np.split(values, np.cumsum(list(self._sizes.values()))[:-1], axis=2)
         return dict(zip(self._sizes, parts, strict=True))
 
+    def corner(self) -> None:
+        """What has moved until now goes on otherwise: what the material remembers of its course is worth nothing."""
+        for name in self._terms.material.of_course:
+            self._now = None
+            self._set(name, self._cells, np.asarray(self._terms.material.internal[name], dtype=float).ravel())
+
     def get(self) -> Memory:
         """See `History`."""
         if self._now is None:
@@ -95,10 +101,13 @@ class MaterialHistory:
         rows = np.minimum(np.searchsorted(numbers, self._numbers), len(numbers) - 1)
         found = {name: np.array(v, dtype=float) for name, v in values.items()}
         q = len(self._terms.places)
-        if list(found) != list(self._sizes) or not np.array_equal(numbers[rows], self._numbers) \
+        for name in set(self._terms.material.of_course) - set(found):        # older files do without
+            rest = np.ravel(np.asarray(self._terms.material.internal[name], dtype=float))
+            found[name] = np.tile(rest, (len(numbers), q, 1))
+        if set(found) != set(self._sizes) or not np.array_equal(numbers[rows], self._numbers) \
                 or any(v.shape != (len(numbers), q, self._sizes[name]) for name, v in found.items()):
             raise InputError(f"what {self._terms.material} remembers is of another mesh, or another material")
-        return Memory(float(data["time"]), {name: v[rows] for name, v in found.items()})
+        return Memory(float(data["time"]), {name: found[name][rows] for name in self._sizes})
 
     def carry(self, source: MaterialHistory, memory: Memory, x: np.ndarray, control: float) -> Memory:
         """See `History`."""

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from .. import _compat
 from ..errors import InputError
-from ..materials.tensors import IDENTITY, deviator_squared, entries, isochoric
+from ..materials.tensors import IDENTITY, cofactor, deviator_squared, entries, inner, isochoric
 from .carry import Carrier
 
 _NOTHING = 3e-6
@@ -55,12 +55,18 @@ class PastStates:
         self._aT = at_points(ufl.as_vector([terms.constants["aT"]])) if self._law.shifted else None
         rows = {name: f.function_space.dofmap.list[self._own].ravel() for name, f in terms.held.items()}
         self._held = [(f.x.array.reshape(-1, int(np.prod(f.ufl_shape))), rows[name]) for name, f in terms.held.items()]
+        self._seen: tuple[Any, Any] | None = None
         self.start()
 
     def start(self) -> None:
         """See `History`."""
         rest = Past(np.zeros(self._n) if self._aT else 0.0, np.repeat(np.array(IDENTITY)[:, None], self._n, axis=1))
         self.put(Memory(0.0, (rest,), np.ones((1, self._n)) if self._law.irreversible else None))
+
+    def corner(self) -> None:
+        """See `MaterialHistory.corner`."""
+        self._before = 0.0
+        self._seen = None
 
     def get(self) -> Memory:
         """See `History`."""
@@ -72,14 +78,16 @@ class PastStates:
         felt = np.array([state.felt for state in memory.states])
         self._past = np.array([state.C for state in memory.states])
         self._weights = self._law.weights(felt[-1] - felt)
-        self._seen: tuple[Any, Any] | None = None
+        self._before = felt[-1] - felt[-2] if len(felt) > 1 else 0.0       # with C, how the body moves
+        self._near = 1.0 if len(felt) < 2 else inner(self._past[-1], cofactor(self._past[-2])) < 4
+        self._seen = None
 
     def refresh(self) -> None:
         """Make the coefficients exact at the fields and the time that the forms hold now."""
         C, step, rate = self._now()
         if self._seen and np.array_equal(self._seen[0], C) and np.array_equal(self._seen[1], step):
             return
-        W, slope = self._law.after(self._weights, step)
+        W, slope = self._law.after(self._weights, step, self._before, self._near)
         S, D, T = self._law.stress(C, self._past, W, slope, self._memory.least)
         count = np.array([1.0, 1.0, 2.0, 1.0])[:, None]
         T = T * rate

@@ -8,7 +8,7 @@ so nothing is solved for. Nothing need be known of a material but its step.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,8 +34,10 @@ class StepError:
         forms = self._forms
         self._materials = problem.materials
         heat = len(self._materials) < len(forms.histories)
-        self._stresses = [_Stress(forms, terms) for terms in forms.terms
-                          if terms.remembers or heat and terms.follows_temperature]
+        terms = [terms for terms in forms.terms if terms.remembers or heat and terms.follows_temperature]
+        self._stresses = [_Stress(forms, one, one.step_energy) for one in terms]
+        self._relaxed = [_Stress(forms, one, one.equilibrium_energy) for one in terms
+                         if one.remembers and one.equilibrium_energy(forms.elastic_F) is not None]
 
     def of(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
         """(error of the stress at the end of a step, what is left of it after another step as long), relative.
@@ -61,15 +63,16 @@ class StepError:
         errors.append((self._at(x, end), found))
         if self._materials:
             self._advance(x, control, end)
-            better = self._at(x, end + step)
+            better = self._held(x, end + step)
             for history, memory in zip(forms.histories, after):
                 history.put(memory)
-            errors.append((better, self._at(x, end + step)))
+            errors.append((better, self._held(x, end + step)))
         for history, memory in zip(forms.histories, start):
             history.put(memory)
         self._at_time(end)
         forms.clock = clock
-        scale = max(self._norm(first), self._norm(found), _AT_REST * forms.stress)
+        relaxed = [stress.values() for stress in self._relaxed]     # branches may turn the sum through 0
+        scale = max(self._norm(first), self._norm(found), self._norm(relaxed), _AT_REST * forms.stress)
         once, lasting = [*(self._norm([a - b for a, b in zip(*pair)]) / scale for pair in errors), 0.0][:2]
         return once, lasting
 
@@ -81,6 +84,12 @@ class StepError:
         self._at_time(time)
         self._problem.place(x)
         return [stress.values() for stress in self._stresses]
+
+    def _held(self, x: np.ndarray, time: float) -> list[np.ndarray]:
+        """`_at`, of a body that has come to rest."""
+        for history in self._materials:
+            history.corner()
+        return self._at(x, time)
 
     def _advance(self, x: np.ndarray, control: float, time: float) -> None:
         self._problem.place(x)
@@ -97,11 +106,11 @@ class StepError:
 
 
 class _Stress:
-    """Deviator of the Kirchhoff stress of a material at the end of a step, at the quadrature points of the energy."""
+    """Deviator of the Kirchhoff stress of an energy of a material, at the quadrature points of the energy."""
 
-    def __init__(self, forms: Any, terms: Any):
+    def __init__(self, forms: Any, terms: Any, energy: Callable):
         F = ufl.variable(forms.elastic_F)
-        tau = ufl.diff(terms.step_energy(F), F) * F.T
+        tau = ufl.diff(energy(F), F) * F.T
         tau -= ufl.tr(tau) / 3 * ufl.Identity(3)
         entries = [tau[0, 0], tau[1, 1], np.sqrt(2) * tau[0, 1], tau[2, 2]]
         self._forms, self._cells = forms, terms.own_cells

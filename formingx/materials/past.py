@@ -49,10 +49,22 @@ class Integral:
         w[0] = np.exp(-x[0])
         w[:-1] += young * (mean - np.exp(-step))
         w[1:] += young * (1 - mean)
+        known = step[:-1] > 0                                   # the way before one that is a parabola
+        s = np.where(known, step[1:] / np.where(known, step[:-1], 1), np.inf)
+        ends, middle, first = (young[1:] * _bulge(step[1:]) * c for c in _parabola(s))
+        w[2:] -= ends
+        w[1:-1] += middle
+        w[:-2] -= first
         return w
 
-    def after(self, weights: np.ndarray, step: Any) -> tuple[np.ndarray, np.ndarray]:
-        """(W, dW/dstep) of the states of `weights` a step of the material's time later; shape (K, n or 1)."""
+    def after(self, weights: np.ndarray, step: Any, before: Any = 0.0,
+              near: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
+        """(W, dW/dstep) of the states of `weights` a step of the material's time later; shape (K, n or 1).
+
+        before: the time between the last two states, 0: not known. The step is exact where h C_k^-1 goes along a
+        parabola through these, which makes it of second order for steps far longer than tau, too (`TransientNetwork`).
+        near: 1, or 0 where the two are far apart, shape (n,).
+        """
         each = weights.ndim == 3
         y = np.atleast_1d(step) / self.tau[:, None]                         # (modes, n or 1)
         decay, G = np.exp(-y), self.modulus[:, None]
@@ -61,6 +73,16 @@ class Integral:
         mean = _mean_decay(y)
         W[-1] += np.sum(G * (mean - decay), axis=0)
         slope[-1] += np.sum(G / self.tau[:, None] * (_mean_decay_slope(y) + decay), axis=0)
+        if len(W) > 1 and np.any(before):
+            known = np.asarray(before) > 0
+            rate = np.where(known, near / np.where(known, before, 1), 0)
+            shape = len(W), max(W.shape[1], np.size(rate))
+            W, slope = np.broadcast_to(W, shape).copy(), np.broadcast_to(slope, shape).copy()
+            bulge, by_step = np.sum(G * _bulge(y), axis=0), np.sum(G / self.tau[:, None] * _bulge_slope(y), axis=0)
+            (_, middle, first), (middle_slope, first_slope) = _parabola(step * rate), _parabola_slopes(step * rate)
+            for k, c, by_s in ((-1, middle, middle_slope), (-2, -first, -first_slope)):
+                W[k] += bulge * c
+                slope[k] += by_step * c + bulge * by_s * rate
         return W, slope
 
     def damped(self, C: np.ndarray, past: np.ndarray, least: np.ndarray | None = None) -> tuple[Any, ...]:
@@ -125,3 +147,34 @@ def _mean_decay_slope(x: np.ndarray) -> np.ndarray:
     return np.where(small, series, (np.exp(-y) * (1 + y) - 1) / y**2)
 
 
+def _parabola(s: Any) -> tuple[Any, Any, Any]:
+    """(f, f (1 + s), f s), f = s/(1 + s), of a step over the one before: its bulge times (-C^-1, C_n^-1, -C_n-1^-1).
+
+    0 from s = 4 on, and less from 2 on: steps that grow by more leave BDF2 unstable.
+    """
+    s = np.minimum(s, 4.0)
+    share = np.minimum(1.0, 2 - s / 2) * s
+    return share / (1 + s), share, share * s / (1 + s)
+
+
+def _parabola_slopes(s: Any) -> tuple[Any, Any]:
+    """Derivatives of the latter two."""
+    s = np.minimum(s, 4.0)
+    share, slope = np.minimum(1.0, 2 - s / 2) * s, np.where(s < 2, 1.0, np.where(s < 4, 2 - s, 0.0))
+    return slope, slope * s / (1 + s) + share / (1 + s) ** 2
+
+
+def _bulge(x: np.ndarray) -> np.ndarray:
+    """[x - 2 + (x + 2) e^-x]/x^2."""
+    small = x < 1e-2
+    y = np.where(small, 1.0, x)
+    series = x * (1 / 6 - x / 12 + x**2 / 40 - x**3 / 180 + x**4 / 1008)
+    return np.where(small, series, (y - 2 + (y + 2) * np.exp(-y)) / y**2)
+
+
+def _bulge_slope(x: np.ndarray) -> np.ndarray:
+    """Its derivative."""
+    small = x < 1e-2
+    y = np.where(small, 1.0, x)
+    series = 1 / 6 - x / 6 + 3 * x**2 / 40 - x**3 / 45 + 5 * x**4 / 1008
+    return np.where(small, series, (1 - (y + 1) * np.exp(-y)) / y**2 - 2 * _bulge(y) / y)

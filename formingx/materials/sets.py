@@ -86,6 +86,11 @@ class Sets(Material):
         return (*self._base.of_flow, "set_middle")
 
     @property
+    def of_course(self) -> tuple[str, ...]:  # type: ignore[override]  # read only here
+        """See `Material`."""
+        return self._base.of_course
+
+    @property
     def largest_I1(self):
         return self.base.largest_I1
 

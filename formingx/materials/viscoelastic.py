@@ -153,9 +153,9 @@ class RelaxingMaterial(HistoryTests, Material):
             time_step: of the user's unit of time, at least 0.
         """
         C = isochoric(F)
-        before = entries(internal["C"]) if self._remembers else None
+        past = self._past(internal, time_step)
         return self._relaxed_energy(F, constants) + sum(
-            mu / 2 * self._step(C, before, entries(internal[f"{self._tensor}_{k}"]), time_step / tau)
+            mu / 2 * self._step(C, past, entries(internal[f"{self._tensor}_{k}"]), time_step / tau)
             for k, mu, tau in self._branches(constants))
 
     def updated(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> dict[str, Any]:
@@ -164,12 +164,11 @@ class RelaxingMaterial(HistoryTests, Material):
         To be called after steps of length 0, too: the next step begins with the C that is remembered.
         """
         C = isochoric(F)
-        before = entries(internal["C"]) if self._remembers else None
-        after = {"C": C} if self._remembers else {}
+        past, after = self._past(internal, time_step), self._left(C, internal, time_step)
         for k, _, tau in self._branches(constants):
             name = f"{self._tensor}_{k}"
-            after[name] = self._advanced(C, before, entries(internal[name]), time_step / tau)
-        return {name: ufl.as_vector(values) for name, values in after.items()}
+            after[name] = self._advanced(C, past, entries(internal[name]), time_step / tau)
+        return {name: ufl.as_vector(value) if isinstance(value, tuple) else value for name, value in after.items()}
 
     def relaxation_modulus(self, times: ArrayLike) -> np.ndarray:
         """G(t) = G_equilibrium + sum mu exp(-t/tau) of small shear, at times of any shape; stress."""
@@ -254,6 +253,14 @@ class RelaxingMaterial(HistoryTests, Material):
         k = 0
         while f"mu_{(k := k + 1)}" in constants and f"tau_{k}" in constants:
             yield k, constants[f"mu_{k}"], constants[f"tau_{k}"]
+
+    def _past(self, internal: dict[str, Any], time_step: Any) -> Any:
+        """What the branches of a step need of the states before, whatever their tau."""
+        return entries(internal["C"]) if self._remembers else None
+
+    def _left(self, C: Entries, internal: dict[str, Any], time_step: Any) -> dict[str, Any]:
+        """What a step leaves of that for the next one."""
+        return {"C": C} if self._remembers else {}
 
     # the law of a branch: energies over mu/2, times over tau, tensors as entries, C with det C = 1; `_metric` is M of
     # the elastic strain F M F^T
@@ -364,11 +371,33 @@ class TransientNetwork(RelaxingMaterial):
     Kirchhoff stress of a branch mu F A F^T (and a pressure), dA/dt = (C^-1 - A)/tau, A = I at rest. Linear in the
     memory: in steady extension faster than 1/(2 tau) the stress grows without bound.
 
-    With x = dt/tau a step has the potential (mu/2) tr(C M), M = e^-x A_n + [(1 - e^-x)/x - e^-x] C_n^-1: exact where
-    C^-1 changes at a constant rate, so of second order. The stored energy is (mu/2) [tr(C A) - 3 - ln det A].
+    A step is exact where C^-1 goes along a parabola in time, through its value at the end of the step and the two
+    known before. So it is of third order, and of second however short tau is: for dt >> tau the stress is that of the
+    rate at the end of the step, by the backward difference of three points (BDF2 with variable steps). With x = dt/tau
+    the step has the potential (mu/2) tr(C M), A = M + (1 - m - p) C^-1, m = (1 - e^-x)/x, M = e^-x A_n
+    + (m - e^-x + p) C_n^-1 + p s (C_n^-1 - C_n-1^-1), p = [x - 2 + (x + 2) e^-x]/x^2 s/(1 + s), s the length of the
+    step over that of the one before. The stored energy is (mu/2) [tr(C A) - 3 - ln det A].
     """
 
     _tensor = "A"
+    of_course = ("change", "pace")
+
+    @property
+    def internal(self) -> dict[str, Any]:  # type: ignore[override]  # read only here
+        return super().internal | {"change": (0.0,) * 4, "pace": 0.0}
+
+    def _past(self, internal, time_step):
+        """(C_n^-1, s (C_n^-1 - C_n-1^-1), s/(1 + s)), the latter two 0 where the step before says nothing."""
+        s, change = time_step * internal["pace"], entries(internal["change"])
+        near = ufl.max_value(0, ufl.min_value(1, 2 - s / 2))        # steps that grow by more leave BDF2 unstable
+        small = ufl.lt(-inner(entries(internal["C"]), change), 1)       # else M is not positive definite
+        share = ufl.conditional(small, near * s / (1 + s), 0)
+        return cofactor(entries(internal["C"])), tuple(s * c for c in change), share
+
+    def _left(self, C, internal, time_step):
+        moves = ufl.gt(time_step, 0)
+        return {"C": C, "change": plus(cofactor(C), cofactor(entries(internal["C"])), -1),
+                "pace": ufl.conditional(moves, 1 / ufl.conditional(moves, time_step, 1), 0)}
 
     def _metric(self, A):
         return A
@@ -379,16 +408,17 @@ class TransientNetwork(RelaxingMaterial):
     def _dissipated(self, C, A):
         return inner(C, A) + inner(cofactor(C), cofactor(A)) / determinant(A) - 6
 
-    def _step(self, C, before, A, x):
-        return inner(C, self._kept(before, A, x)) - 3
+    def _step(self, C, past, A, x):
+        return inner(C, self._kept(past, A, x)) - 3
 
-    def _advanced(self, C, before, A, x):
-        return plus(self._kept(before, A, x), cofactor(C), 1 - _mean_decay(x))
+    def _advanced(self, C, past, A, x):
+        return plus(self._kept(past, A, x), cofactor(C), 1 - _mean_decay(x) - past[2] * _bulge(x))
 
-    def _kept(self, before, A, x):
+    def _kept(self, past, A, x):
         """M."""
-        decay = ufl.exp(-x)
-        return tuple(decay * a + (_mean_decay(x) - decay) * c for a, c in zip(A, cofactor(before)))
+        before, change, share = past
+        decay, p = ufl.exp(-x), share * _bulge(x)
+        return tuple(decay * a + (_mean_decay(x) - decay + p) * c + p * d for a, c, d in zip(A, before, change))
 
     @staticmethod
     def _flow(w):
@@ -408,3 +438,11 @@ def _mean_decay(x: Any) -> Any:
     small = ufl.lt(x, 1e-2)
     y = ufl.conditional(small, 1, x)                            # the branch not taken must be finite too
     return ufl.conditional(small, 1 - x / 2 + x**2 / 6 - x**3 / 24 + x**4 / 120 - x**5 / 720, (1 - ufl.exp(-y)) / y)
+
+
+def _bulge(x: Any) -> Any:
+    """[x - 2 + (x + 2) e^-x]/x^2, by its series where x is small."""
+    small = ufl.lt(x, 1e-2)
+    y = ufl.conditional(small, 1, x)
+    series = x * (1 / 6 - x / 12 + x**2 / 40 - x**3 / 180 + x**4 / 1008)
+    return ufl.conditional(small, series, (y - 2 + (y + 2) * ufl.exp(-y)) / y**2)

@@ -65,7 +65,7 @@ class Flow(Run):
                     self.step.accepted(tangents(new.history), error)
                 return [self._met_before(old, self._limit_before(old, new))]
             except Cutback as cut:
-                self.step.length = cut.part * dt / self._duration
+                self.step.length = min(cut.part, 0.6) * dt / self._duration     # else 1.5 of it is the same step again
                 self._failed(str(cut), self.step.length)
                 if self.step.length < self.step.smallest:
                     self._give_up(f"the step in time became shorter than {self.step.smallest * self._duration:.3g}:"

@@ -44,7 +44,7 @@ class PathFollowing:
         snap_through: see `SnapThrough`.
     """
 
-    inaccurate: float = 2.0
+    inaccurate: float = 1.4
     snap_through: SnapThrough = SnapThrough()
 
 
