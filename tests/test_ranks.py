@@ -87,3 +87,41 @@ def test_a_driven_support_of_which_a_rank_has_nothing():
     stretch = 1 - 0.5 / 3
     assert parallel == pytest.approx(serial, rel=1e-8)
     assert serial[1] == pytest.approx(np.pi * 2 * (stretch**-2 - stretch), rel=1e-6)
+
+
+VERDICT = """
+import json, sys
+sys.path.insert(0, "tests")
+import formingx as fx
+from test_verdict import block, foot
+pot = fx.tools.pot(mouth=4.0, base=3.5, depth=4.0, sheet=0.25, fillet=0.8, lip=0.4, plug=2.6, nose=0.8)
+scene = fx.Scene(mesh=fx.mesh.disc(radius=5.0, thickness=0.25, elements=(14, 1)),
+                 materials=fx.TransientNetwork(fx.NeoHookean(c10=0.5), [(1.0, 0.02)]),
+                 supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")],
+                 contacts=[fx.Contact("top", pot.mould, "stick", name="mould"),
+                           fx.Contact("bottom", pot.plug, 0.3, moves=(0, 1), name="plug")])
+path = fx.Process(scene).run([fx.Stage("plug", drive="plug", until=fx.travel(1.5), speed=30.0),
+                              fx.Stage("air", drive="air", until=fx.pressure(0.2), duration=0.1)],
+                             accuracy="draft", max_steps=300, progress=False)
+last = path.last.measures
+found = {"steps": path.counts.steps, "last": [last[c] for c in ("pole_height", "plug_force", "strain_energy")],
+         "ledger": float(path.work()["unbalanced"][-1]), "walls": path.profile().wall_ratio.tolist(), "said": []}
+for bad, target in ((block(1.0), 0.95), (foot(), -0.85)):
+    try:
+        fx.trace(bad, until=fx.travel(target), progress=False)
+    except fx.ConvergenceError as error:
+        found["said"].append(str(error)[:200])
+        found["last"] += [len(error.path), error.path["travel"][-1]]
+if path.problem.comm.rank == 0:
+    print(json.dumps(found))
+"""
+
+
+def test_ranks_agree_on_a_process_and_on_verdicts():
+    """Plug, mould and relaxing material; runs that a verdict ends."""
+    one, two = (run_json(VERDICT, ranks) for ranks in (1, 2))
+    assert len(one["said"]) == 2 and "did not follow the tool" in one["said"][0] and "inside out" in one["said"][1]
+    assert two["said"] == one["said"] and two["steps"] == one["steps"]
+    for key in ("last", "walls"):
+        assert two[key] == pytest.approx(one[key], rel=1e-6)
+    assert two["ledger"] == pytest.approx(one["ledger"], abs=1e-6 * abs(one["last"][2]))
