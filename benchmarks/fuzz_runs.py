@@ -24,26 +24,40 @@ class Wrong(Exception):
 
 def cases() -> dict[str, Callable[[random.Random], Any]]:
     """{kind and name: a run}."""
-    return {"processes blown": _blown, "processes plugged": _plugged, "processes in time": _in_time}
+    return {"processes blown": _blown, "processes plugged": _plugged, "processes in time": _in_time,
+            "processes moulded": _moulded, "processes cooled": _cooled}
 
 
-def _scene(rng: random.Random, contact: Callable | None = None, relaxes: bool = False) -> tuple:
-    """(scene, radius, thickness) of a sheet."""
+def _scene(rng: random.Random, contact: Callable | None = None, relaxes: bool = False, pressed: bool = False,
+           **more: Any) -> tuple:
+    """(scene, radius, thickness) of a sheet, of one layer or two, round or in plane strain; pressed: by air, too."""
     import formingx as fx
     radius = rng.uniform(10, 60)
     thickness = radius * 10 ** rng.uniform(-2.2, -0.8)
     elements = rng.randint(8, 20), rng.choice([1, 1, 2, [2, 1]])
-    mesh = fx.mesh.disc(radius=radius, thickness=thickness, elements=elements)
+    layers = {"lower": 0.4 * thickness, "upper": 0.6 * thickness} if rng.random() < 0.2 else {"sheet": thickness}
+    mesh = fx.mesh.disc(radius=radius, thickness=layers, elements=elements)
     c10 = 10 ** rng.uniform(-2, 1)
+    plane = fx.PlaneStrain() if rng.random() < 0.2 else None
+    materials = {name: _material(rng, c10, relaxes, "temperature" in more) for name in layers}
+    support = rng.choice([fx.Clamped, fx.SimplySupported])("rim")
+    return fx.Scene(mesh=mesh, materials=materials, supports=[fx.Symmetry("axis"), support], kinematics=plane,
+                    loads=[fx.Pressure("bottom", name="air")] if pressed or not contact else [],
+                    contacts=[contact(radius, thickness)] if contact else [], **more), radius, thickness
+
+
+def _material(rng: random.Random, c10: float, relaxes: bool, warm: bool) -> Any:
+    """Of a stiffness of about c10, at the highest temperature if it depends on that."""
+    import formingx as fx
+    if warm:
+        return fx.NeoHookean(c10=fx.table({20: rng.uniform(1, 5) * c10, 100: 1.2 * c10, 200: c10}))
     material: Any = rng.choice([fx.NeoHookean(c10=c10), fx.MooneyRivlin(c10=c10, c01=0.2 * c10), fx.Yeoh(
         c10=c10, c20=0.0, c30=1e-3 * c10), fx.Gent(mu=2 * c10, Jm=60.0)])
     if relaxes:
         branches = [(c10 * 10 ** rng.uniform(-1, 1), 10 ** rng.uniform(-2, 2)) for _ in range(rng.randint(1, 2))]
-        material = fx.Viscoelastic(fx.NeoHookean(c10=c10), branches=branches)
-    support = rng.choice([fx.Clamped, fx.SimplySupported])("rim")
-    return fx.Scene(mesh=mesh, materials=material, supports=[fx.Symmetry("axis"), support],
-                    loads=[] if contact else [fx.Pressure("bottom", name="air")],
-                    contacts=[contact(radius, thickness)] if contact else []), radius, thickness
+        law = rng.choice([fx.Viscoelastic, fx.Viscoelastic, fx.TransientNetwork])
+        material = law(fx.NeoHookean(c10=c10), branches=branches)
+    return material
 
 
 def _ball(rng: random.Random) -> Callable:
@@ -88,6 +102,39 @@ def _in_time(rng: random.Random) -> None:
         table = _table(rng, radius**3 * rng.uniform(0.2, 3.0))
         stages = [fx.Stage("flow", drive="air", follow={fx.enclosed_volume: table})]
     _judge(lambda **options: fx.Process(scene).run(stages, progress=False, accuracy="draft", **options))
+
+
+def _cup(rng: random.Random) -> Callable:
+    """A cup over a sheet, or a male mould that it is draped over, rounded as far as elements feel it."""
+    import formingx as fx
+
+    def contact(radius, thickness):
+        fillet = radius * rng.uniform(0.1, 0.3)
+        cup = fx.tools.cup(radius=0.98 * radius, depth=radius * rng.uniform(0.2, 0.8), mouth=thickness,
+                           draft=rng.uniform(0, 8), fillet=fillet, lip=0.1 * radius)
+        return fx.Contact("top", cup, rng.choice(["none", "stick", rng.uniform(0.05, 1.5)]), name="mould")
+    return contact
+
+
+def _moulded(rng: random.Random) -> None:
+    import formingx as fx
+    scene, _, thickness = _scene(rng, _cup(rng), pressed=True)
+    stiff = max(scene.shear_modulus(layer) for layer in scene.mesh.layers) * thickness / scene.extent[0]
+    stages = [fx.Stage("blow", drive="air", until=fx.pressure(stiff * rng.uniform(0.5, 6)))]
+    _judge(lambda **options: fx.Process(scene).run(stages, progress=False, **options))
+
+
+def _cooled(rng: random.Random) -> None:
+    """A hot sheet that a plug pushes, or air blows, in cold air."""
+    import formingx as fx
+    heat = fx.Cooling(fx.ThermalProperties(conductivity=1.0, density=1.0, heat_capacity=1.0),
+                      [fx.Convection("top", h=10 ** rng.uniform(-2, 1), air=20.0)], unit="C", tolerance=0.1)
+    contact = _ball(rng) if rng.random() < 0.5 else None
+    scene, radius, _ = _scene(rng, contact, temperature=rng.uniform(100, 200), heat=heat)
+    table = _table(rng, radius * rng.uniform(0.1, 0.5) if contact else radius**3 * rng.uniform(0.2, 1.0))
+    follow = {"plug": table} if contact else {fx.enclosed_volume: table}
+    stage = fx.Stage("form", follow=follow, **({} if contact else {"drive": "air"}))
+    _judge(lambda **options: fx.Process(scene).run([stage], progress=False, accuracy="draft", **options))
 
 
 def _table(rng: random.Random, most: float) -> list[tuple[float, float]]:
