@@ -57,6 +57,14 @@ def test_no_circle():
         visit(name, [])
 
 
+def test_what_is_private_stays_so():
+    """No file imports a name from another that begins with an underscore (the modules that do are not names)."""
+    found = {(name_of(file), alias.name) for file in FILES for node in ast.walk(ast.parse(file.read_text()))
+             if isinstance(node, ast.ImportFrom) and node.level and node.module for alias in node.names
+             if alias.name.startswith("_")}
+    assert found == set()
+
+
 def test_no_file_is_long():
     long = {name_of(file): n for file in FILES if (n := len(file.read_text().splitlines())) > 520}
     assert long == {}

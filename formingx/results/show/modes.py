@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import InputError, positive
 from .. import files
-from .views import _screen
+from .views import screen
 
 
 def draw(loss: Any, file: Any, scale: float) -> None:
@@ -51,7 +51,7 @@ def _draw(loss: Any, lines: list, file: str, scale: float) -> None:
     turn = np.linspace(0, 2 * np.pi, 181) if axisymmetric else np.linspace(
         0, 2 * np.pi / loss.number if loss.number else np.ptp(everything, axis=0).max(), 61)
     FilePath(file).parent.mkdir(parents=True, exist_ok=True)
-    with _screen():
+    with screen():
         high, wide = np.ptp(everything[:, 1]), 2 * everything[:, 0].max()
         flat = high < 0.3 * wide
         plotter: Any = pyvista.Plotter(off_screen=True, window_size=(1000, 500 if flat else 800))

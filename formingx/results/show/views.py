@@ -67,7 +67,7 @@ def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
 
     def draw():
         picture = io.BytesIO()
-        with _screen():
+        with screen():
             _draw(profile, stations, place, camera, picture, title)
         files.replace(file, lambda stream: stream.write(picture.getvalue()), "wb")
     files.on_root(comm, draw)
@@ -126,7 +126,7 @@ def _fit(plotter: Any, points: np.ndarray) -> None:
 
 
 @contextlib.contextmanager
-def _screen() -> Iterator[None]:
+def screen() -> Iterator[None]:
     """A display to draw on: the one that is there, or an Xvfb of our own that ends with the block.
 
     Debian's VTK aborts without one.
