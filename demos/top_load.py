@@ -53,7 +53,7 @@ def main():
         found[name] = one = fx.top_load(blow(elements, mould), material=STIFF, travel=travel, modes=modes)
         summary[name] = numbers(one)
         say(f"{name}: {one}")
-        axes.plot(one.travel, 100 * one.force, style, color="0.3", label=f"{name}, axisymmetric")
+        axes.plot(one.travel, 100 * one.force, style, color="C0", label=f"{name}, axisymmetric")
         for n in modes:
             if f"n_{n}" in summary[name]:
                 there = summary[name][f"n_{n}"]

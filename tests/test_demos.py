@@ -350,6 +350,53 @@ def test_top_load_quick(tmp_path):
     assert drawn(tmp_path / "top_load.png")
 
 
+@pytest.mark.slow
+def test_stability(tmp_path):
+    """Every number against its exact equation, to what it is asked for."""
+    from formingx.exact import stability as exact
+    found = summary("stability", tmp_path)
+    for nu, numbers in found["cylinder"].items():
+        for n, value in numbers.items():
+            assert value == pytest.approx(exact.cylinder(float(nu[3:]), int(n[2:])),
+                                          rel=1e-5 if float(nu[3:]) <= 1 else 1e-3)
+    for ratio, numbers in found["tube"].items():
+        for n, value in numbers.items():
+            pressure, inner = exact.tube(float(ratio), int(n[2:]))
+            assert value["pressure_over_mu"] == pytest.approx(pressure, rel=1e-4)
+            assert value["inner_radius_ratio"] == pytest.approx(inner, rel=1e-4)
+    for ratio, lengths in found["inflated_tube"].items():
+        for kB, numbers in lengths.items():
+            for n, value in numbers.items():
+                assert value["inner_radius_ratio"] == pytest.approx(
+                    exact.inflated_tube(float(ratio), float(kB[3:]), int(n[2:])), rel=1e-4)
+    for nu, numbers in found["block"].items():
+        for kind, value in numbers.items():
+            assert value == pytest.approx(exact.block(float(nu[3:]), kind), rel=1e-3)
+    for n, value in found["plate"]["clamped"].items():
+        assert value == pytest.approx(exact.clamped_plate(int(n[2:])), rel=2e-3)
+    assert [len(found[group]) for group in ("cylinder", "tube", "inflated_tube", "block")] == [5, 3, 2, 4]
+    assert found["sheet"]["alarms"] == 0 and found["switched"]["mirror_error"] < 1e-5
+
+
+@pytest.mark.slow
+def test_flange(tmp_path):
+    found = summary("flange", tmp_path)
+    assert [found[f"h_{h}"]["alarms"] for h in ("0.3", "0.1", "0.05")] == [0, 35, 56]
+    for h, travel in (("0.1", 1.6404), ("0.05", 0.8651)):                # on 400 x 4 and 500 x 2 elements
+        assert found[f"h_{h}"]["first_n"] == 8
+        assert found[f"h_{h}"]["first_travel"] == pytest.approx(travel, rel=5e-3)
+
+
+@pytest.mark.slow
+def test_top_load(tmp_path):
+    found = summary("top_load", tmp_path)
+    assert found["axisymmetric"]["largest_force_N"] == pytest.approx(1872, rel=2e-2)     # on 360 elements
+    assert found["axisymmetric"]["ended"] == "" and found["first_n"] == 4
+    assert found["n_4"]["force_N"] == pytest.approx(1250, rel=3e-2)
+    assert all(f"n_{n}" in found and found[f"n_{n}"]["force_N"] > found["n_4"]["force_N"] for n in (2, 3, 5, 6))
+    assert found["groove_gains"] < 0 and found["grooved"]["first_n"] == 2
+
+
 def test_bottle_3_to_1_quick(tmp_path):
     """The one that stiffens has no pressure maximum and a more even wall than the neo-Hookean one."""
     found = summary("bottle_3_to_1", tmp_path, "--quick")

@@ -204,6 +204,28 @@ def test_what_is_formed_is_silent():
     assert "limit point" in str(found)
 
 
+def test_a_pot_and_a_parison_are_silent():
+    """The pot of the README, plug and vacuum, and a bottle being blown: stretched everywhere, they stand."""
+    pot = fx.tools.pot(mouth=38.0, base=28.0, depth=40.0, sheet=1.2, fillet=8.0, lip=3.0, nose=20.0)
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(30, 1)),
+                     materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     loads=[fx.Pressure("bottom", name="vacuum")],
+                     contacts=[fx.Contact("top", pot.mould, "stick", separates=False, name="mould"),
+                               fx.Contact("bottom", pot.plug, "none", moves=(0, 1), name="plug")])
+    path = fx.Process(scene).run([fx.Stage("plug", drive="plug", until=fx.travel(22.0)),
+                                  fx.Stage("vacuum", drive="vacuum", until=fx.pressure(0.09))],
+                                 step=fx.StepControl(target=8), progress=False)
+    assert path.stability(range(7), 12).alarms == []
+    bottle = fx.tools.bottle(radius=3, height=10, neck=1.5, shoulder=2, neck_height=1.5, base=-2.9, fillet=0.8,
+                             shoulder_fillet=0.8)
+    scene = fx.Scene(mesh=fx.mesh.parison(inner_radius=1.1, thickness=0.3, length=10.6, elements=(40, 1)),
+                     materials=fx.MooneyRivlin(c10=50.0, c01=15.0), loads=[fx.Pressure("inner")],
+                     supports=[fx.Symmetry("axis"), fx.Clamped("neck")],
+                     contacts=[fx.Contact("outer", bottle, "stick")])
+    path = fx.trace(scene, until=fx.pressure(100.0), progress=False)
+    assert path.stability(range(7), 12).alarms == []
+
+
 def test_membrane_and_loads_that_do_not_know():
     path = fx.trace(treloar(model=fx.Membrane()), until=fx.pole_height(1.0), progress=False)
     with pytest.raises(InputError, match="membrane"):
