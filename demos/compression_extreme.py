@@ -2,7 +2,12 @@
 
 Without friction: the neo-Hookean block of `compression_homogeneous`, whose exact force is eq. (7.6). At H/h = 20 the
 wall is a 20th and the area 20 times what they were, so the plate is held by present area and wall
-(`Contact(present_area=True)`); with the penalty of the block at rest it would sink in by 2 % of the wall and more.
+(`Contact(present_area=True)`); by the penalty of the block at rest it would sink in by 2 % of the wall and more.
+
+Stuck: the block of `compression_roll_over`, whose elements at the corner that rolls in are crushed from H/h = 4 on:
+where the volume ratio at a quadrature point leaves 0.6 to 1.5, the deformed body becomes the reference of a new mesh
+(`trace(remesh=)`). "stuck": elements of 0.04 cm (0.03 at that corner), "stuck_coarse": twice as large. Runs end at some
+7 (`ended`): beside the axis new meshes lose their volumes faster and faster.
 """
 
 import numpy as np
@@ -15,6 +20,8 @@ from formingx.results import files
 from formingx.results.show import plots
 
 RATIOS, GRIDS = (5, 10, 20), ((2, 2), (8, 8))
+STUCK = (3.4, 5.23, 6.5, 8.0)
+MESHES = {"stuck": ((16, 8), 0.04, 0.03), "stuck_coarse": ((8, 4), 0.08, 0.06)}     # at first; size, corner, cm
 
 
 def travel(ratio):
@@ -29,6 +36,24 @@ def frictionless(elements):
     met = {r: path.met(fx.travel(travel(r))) for r in RATIOS}
     over = {f"{r:g}": force(s) / exact_force(HALF_HEIGHT / r) for r, s in met.items() if s is not None}
     return path, over, end
+
+
+def stuck(elements, size, corner, ratios):
+    """(path, numbers) of the stuck block, remeshed on the way."""
+    scene = block(fx.MooneyRivlin(c10=1.0, c01=0.1), "stick", elements, roll_over=True)
+    path, end = press(scene, [travel(r) for r in ratios], progress=False, remesh=fx.Remesh(size=size, corner=corner),
+                      record={"least_J": lambda problem: problem.volume_ratios()[0]})
+    met = {f"{r:g}": path.met(fx.travel(travel(r))) for r in ratios}
+    least = [state.measures["least_J"] for state in path.states]
+    made = [state for state in path.states if state.kind == "remesh"]
+    return path, {
+        "force_N": {r: force(state) for r, state in met.items() if state is not None},
+        "least_J": float(min(least)), "remeshes": len(made), "ended": end,
+        "reached_ratio": HALF_HEIGHT / (HALF_HEIGHT - path.last.measures["travel"]),
+        "remesh_at_ratio": [HALF_HEIGHT / (HALF_HEIGHT - state.measures["travel"]) for state in made],
+        "jumps": {what: [state.jump[what] for state in made] for what in ("force", "energy", "volume")},
+        "triangles": [s.problem.scene.mesh.domain.topology.index_map(2).size_local for s in path.segments],
+        "steps": path.counts.steps, "newton_iterations": path.counts.iterations}
 
 
 def main():
@@ -47,6 +72,13 @@ def main():
     worse = {f"{r:g}": max((g["force_over_exact"][f"{r:g}"] for g in grids.values()), key=lambda v: abs(v - 1))
              for r in RATIOS if f"{r:g}" in there}
     summary = {"frictionless": {"force_over_exact": worse, "grids": grids}}
+    meshes = {"stuck_coarse": MESHES["stuck_coarse"]} if args.quick else MESHES
+    for name, (elements, size, corner) in meshes.items():
+        paths[name], summary[name] = stuck(elements, size, corner, STUCK[:1] if args.quick else STUCK)
+        n = summary[name]
+        say(f"{name}: force, N, " + ", ".join(f"{f:.0f} at {r}" for r, f in n["force_N"].items())
+            + f"; {n['remeshes']} remeshes, least J {n['least_J']:.3f}; jumps of force at most"
+            f" {max(map(abs, n['jumps']['force']), default=0):.1e}, {n['steps']} states; {n['ended'][:200]}")
     save(draw(paths), args.out / "compression_extreme.png")
     summarise(args.out, {**summary, "versions": files.versions()})
 
@@ -56,9 +88,10 @@ def draw(paths):
     figure, axes = plots.figure()
     ratio = np.geomspace(1.02, 20, 200)
     axes.plot(ratio, exact_force(HALF_HEIGHT / ratio), "k", linewidth=1, label="without friction, exact, eq. (7.6)")
-    for (name, path), mark in zip(paths.items(), "os"):
+    for (name, path), mark in zip(paths.items(), ("o", "s", ".-", ".-")):
+        label = name.replace("_", ", ") if "stuck" in name else f"{name} elements"
         axes.plot(HALF_HEIGHT / (HALF_HEIGHT - path["travel"][1:]), NEWTON * path["tool_force"][1:], mark,
-                  fillstyle="none", label=f"{name} elements")
+                  fillstyle="none", markersize=4, linewidth=1, label=label)
     axes.set(xlabel="compression ratio H / h", ylabel="force on one plate, N", xscale="log", yscale="log")
     axes.legend(frameon=False)
     return figure

@@ -40,6 +40,7 @@ from .physics.kinematics import Axisymmetric, PlaneStrain, ThreeD
 from .physics.loads import Gravity, Load, Pressure, Spin
 from .physics.models import DisplacementPenalty, Membrane, MixedPressure
 from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Support, Symmetry
+from .remeshing import Remesh
 from .results.compare import Comparison, compare
 from .results.compare_nodes import NodalComparison, compare_nodes, write_nodes
 from .results.evaluate.profile import Profile

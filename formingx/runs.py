@@ -10,6 +10,7 @@ import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+from . import remeshing
 from .discrete.problem import Problem
 from .errors import ConvergenceError, InputError, Interrupted, count, finite, instance, known, several
 from .heat import cooling
@@ -17,6 +18,7 @@ from .measures.columns import Measure
 from .measures.targets import Amplitude, Target
 from .mesh.adapted import adapted, of_columns
 from .physics.contact import Contact
+from .remeshing import Remesh
 from .results.evaluate import edges, snaps, tension, volume
 from .results.files.checkpoint import Checkpoint, holds_states, read
 from .results.path import Path
@@ -41,7 +43,8 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
           tolerances: Tolerances | None = None, max_steps: int | None = None, progress: bool = True,
           start: Path | None = None, checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
           at_fold: str | None = None, resume: bool = False, beyond: bool = False,
-          pilot: bool | Mapping[str, float] = False, stop_at: Unstable | None = None) -> Path:
+          pilot: bool | Mapping[str, float] = False, remesh: Remesh | None = None,
+          stop_at: Unstable | None = None) -> Path:
     """Follow the equilibrium path from the unloaded body until a target is reached, through limit points.
 
     Args:
@@ -70,6 +73,9 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
         pilot: run twice: on the scene's mesh, which may be coarse, and from rest again on `mesh.adapted(path)`, which
             has columns of elements as the first run asks for. True, or arguments of that, such as {"error": 0.02}.
             `Path.pilot` is the first run; a first run that did not reach the target counts as far as it came.
+        remesh: a `Remesh`: the mesh is made again, of the body as it is, where elements are crushed; states of kind
+            "remesh", whose `jump` says by how much force, energy and volume changed. For blocks and sheets of one layer
+            of an elastic material, under tools; on one rank, without checkpoint.
         stop_at: `unstable(modes=range(2, 9))`: end, as a result, once the body is unstable in one of these modes;
             `Path.ended` says which.
 
@@ -88,6 +94,11 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     (1, 12.0)
     """
     instance("trace: scene", scene, Scene, "a formingx.Scene")
+    if remesh is not None:
+        remeshing.check(scene, remesh, [*through, until])
+        if start is not None or checkpoint is not None or pilot is not False or stop_at is not None:
+            raise InputError("trace: remesh: with start, checkpoint, pilot or stop_at: a run with several meshes begins"
+                             " at rest and is not written; leave them out")
     if pilot is not False:
         return _after_pilot("trace", pilot, start, resume, scene, checkpoint, lambda scene, checkpoint: trace(
             scene, until=until, through=through, step=step, tolerances=tolerances, max_steps=max_steps,
@@ -112,6 +123,10 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     with _carried(checkpoint) as carried:
         problem = Problem(scene) if start is None else start.problem
         path = carried(_path(Curve(problem, tolerances or Tolerances()), start, record, beyond))
+        if remesh is not None:
+            remeshing.follow(path, [*through, until], remesh, step, tolerances or Tolerances(), at_fold, max_steps,
+                             progress, begin)
+            return path
         targets = [(target, target.bind(problem)) for target in (*through, until)]
         _keep(path, checkpoint)
         if stop_at is not None:

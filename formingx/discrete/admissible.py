@@ -90,6 +90,12 @@ class Admissible:
             found = Least("volume ratio", float(J[k]), tuple(self._X[k].tolist()))
         return max(self._forms.comm.allgather(found), key=lambda part: abs(np.log(max(part.value, 1e-300))))
 
+    def volume_ratios(self) -> tuple[float, float]:
+        """The least and the largest J at quadrature points of the energy, at the state last set; collective."""
+        J = np.prod(list(self.quantities().values()), axis=0)[:, :self._n]
+        found = self._forms.comm.allgather((J.min(initial=np.inf), J.max(initial=-np.inf)))
+        return float(min(low for low, _ in found)), float(max(high for _, high in found))
+
     def holds(self) -> bool:
         """True if no point lies beyond the axis, and in-plane determinants are positive where the energy looks.
 

@@ -24,6 +24,7 @@ class Outline:
 
     Attributes:
         rest: end, other end and middle of each edge at rest, shape (m, 3, 2), length.
+        ends: numbers of the corners at its two ends, the same of edges that meet, shape (m, 2).
     """
 
     def __init__(self, forms: Any):
@@ -44,7 +45,7 @@ class Outline:
         self._dofs, self._own = numbers[nodes], X[nodes]
         names = vectors.dofmap.index_map.local_to_global(nodes.ravel().astype(np.int32)).reshape(-1, 3)
         ends = self._gathered(names)[:, :2]
-        self._ends = np.unique(ends, return_inverse=True)[1].reshape(-1, 2)
+        self.ends = np.unique(ends, return_inverse=True)[1].reshape(-1, 2)
         self.rest = self._gathered(self._own)
 
     def edges(self) -> np.ndarray:
@@ -57,12 +58,12 @@ class Outline:
 
     def pieces(self, edges: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
         """(points, shape (n, 2), length; straight pieces between them, shape (parts m, 2)) along `edges()`."""
-        m, corners = len(edges), int(self._ends.max()) + 1
+        m, corners = len(edges), int(self.ends.max()) + 1
         points = np.empty((corners + m * (parts - 1), 2))
-        points[self._ends] = edges[:, :2]
+        points[self.ends] = edges[:, :2]
         points[corners:] = along(edges, parts)[:, 1:-1].reshape(-1, 2)
         inner = corners + np.arange(m * (parts - 1)).reshape(m, parts - 1)
-        chain = np.column_stack([self._ends[:, 0], inner, self._ends[:, 1]])
+        chain = np.column_stack([self.ends[:, 0], inner, self.ends[:, 1]])
         return points, np.stack([chain[:, :-1], chain[:, 1:]], -1).reshape(-1, 2)
 
     def fold(self, edges: np.ndarray) -> np.ndarray | None:
@@ -80,8 +81,8 @@ class Outline:
 
     def _near(self, i: int, j: int) -> bool:
         """True if two edges are the same, neighbours, or neighbours of one."""
-        around = np.isin(self._ends, self._ends[i]).any(1)
-        return bool(np.isin(self._ends[around], self._ends[j]).any())
+        around = np.isin(self.ends, self.ends[i]).any(1)
+        return bool(np.isin(self.ends[around], self.ends[j]).any())
 
     def _gathered(self, values: np.ndarray) -> np.ndarray:
         comm = self._forms.comm

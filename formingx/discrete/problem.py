@@ -316,6 +316,10 @@ class Problem(Units):
         with self.at(state):
             return self._admissible.furthest_volume_ratio()
 
+    def volume_ratios(self) -> tuple[float, float]:
+        """See `Admissible.volume_ratios`; of the state last set."""
+        return self._admissible.volume_ratios()
+
     def inside_out(self) -> tuple[int, int, tuple[float, float]]:
         """See `Admissible.inside_out`; of the state last set."""
         return self._admissible.inside_out()

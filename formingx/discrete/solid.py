@@ -116,7 +116,8 @@ class Solid(Formulation):
         return self.scene.kinematics.weight(self.X)
 
     def _deformation_gradient(self) -> Any:
-        return self.scene.kinematics.deformation_gradient(self.u, self.X)
+        F = self.scene.kinematics.deformation_gradient(self.u, self.X)
+        return F if self.scene.preformed is None else F * self.scene.preformed.gradient(self)
 
     def _groups(self) -> list[tuple[Any, list[str]]]:
         return self.bodies

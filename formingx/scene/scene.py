@@ -53,6 +53,7 @@ class Scene:
             arrays (R, Z), a CSV file with columns R, Z, T, what `formingx.heat` returned, or a DOLFINx Function.
         heat: `Cooling(...)`: the temperature changes as time goes by.
         expansion: a `ThermalExpansion` for all layers, or {layer: `ThermalExpansion`}: what is cold is smaller.
+        preformed: what the body brings from another mesh (`trace(remesh=)`).
 
     Raises:
         InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, or whose
@@ -62,7 +63,7 @@ class Scene:
     def __init__(self, *, mesh: Mesh, materials: Material | Mapping[str, Material], supports: Sequence[Any],
                  loads: Sequence[Any] = (), contacts: Sequence[Contact] = (), model: Any = None, kinematics: Any = None,
                  quadrature_degree: int | None = None, temperature: Any = None, heat: Any = None,
-                 expansion: Any = None, thickness: Any = None):
+                 expansion: Any = None, thickness: Any = None, preformed: Any = None):
         if not isinstance(mesh, Mesh):
             raise InputError(f"Scene: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")
         if isinstance(materials, Material):
@@ -70,7 +71,7 @@ class Scene:
         if not isinstance(materials, Mapping):
             raise InputError(f"Scene: materials = {materials!r}: must be a formingx material, or {{layer: material}}")
         mesh.check()                                           # its nodes may have been moved
-        self.mesh = mesh
+        self.mesh, self.preformed = mesh, preformed
         self._extent = _extent(mesh)
         self.materials = dict(materials)
         self.supports = _all_of(Support, "supports", supports, "supports, such as Clamped('rim')")
@@ -105,7 +106,7 @@ class Scene:
         self.model.check(self)
         if self.model.solid:
             self._check_hinges()
-        for contact in self.contacts:
+        for contact in self.contacts if preformed is None else ():      # else tools stand where they have gone
             self._check_contact(contact)
         if heat is not None:
             if not hasattr(heat, "check") or isinstance(heat, type):
@@ -117,12 +118,12 @@ class Scene:
     heat: Any = None
     expansion: Mapping[str, ThermalExpansion] = MappingProxyType({})
 
-    def with_mesh(self, mesh: Mesh) -> Scene:
+    def with_mesh(self, mesh: Mesh, preformed: Any = None) -> Scene:
         """The same scene on another mesh of the body: with the same names of layers and boundaries."""
         return Scene(mesh=mesh, materials=self.materials, supports=self.supports, loads=self.loads,
                      contacts=self.contacts, model=self.model, kinematics=self.kinematics,
                      quadrature_degree=self.quadrature_degree, heat=self.heat, expansion=self.expansion or None,
-                     temperature=None if self.temperature is None else self.temperature.given)
+                     preformed=preformed, temperature=None if self.temperature is None else self.temperature.given)
 
     @property
     def things(self) -> list[Part]:

@@ -1,0 +1,134 @@
+"""A body whose mesh is what it was deformed to: F = grad x . F_old, and how a state goes on from there."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import basix
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from .. import _compat
+from ..ranks import gathered
+
+_NEIGHBOURS, _FEWEST = 30, 14
+"""Points that a field is fitted to about an element, at most, and that lie within its reach at least."""
+
+_DEGREE = 4
+"""Of the quadrature at whose points that fit is made linear in the element."""
+
+_LEAST = 0.5
+"""det F of a point, or of a fit, that is believed."""
+
+_ENTRIES = ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))
+
+
+class Preformed(NamedTuple):
+    """What a body brings from its mesh before, at n points: the quadrature points there.
+
+    Attributes:
+        points: where they are now, shape (n, 2), length.
+        F: deformation gradient so far, entries rr, rz, zr, zz, hoop, shape (n, 5).
+        pressures: of the pressure fields, shape (n, fields), dimensionless.
+        pole_height, pole_stretch: of the pole so far.
+    """
+
+    points: np.ndarray
+    F: np.ndarray
+    pressures: np.ndarray
+    pole_height: float
+    pole_stretch: float
+
+    @classmethod
+    def of(cls, problem: Any, state: Any) -> Preformed:
+        """What the body of a state brings; collective."""
+        forms = problem.forms
+        with problem.at(state):
+            F, fields = forms.F, ufl.split(forms.w)[1:]
+            values = [forms.X[0] + forms.u[0], forms.X[1] + forms.u[1], *(F[i] for i in _ENTRIES), *fields]
+            where: Any = basix.make_quadrature(forms.domain.basix_cell(), forms.scene.quadrature_degree)[0]
+            rows: Any = _evaluated(forms, ufl.as_vector(values), where).reshape(-1, len(values))
+        rest, J = state.measures, _det(rows[:, 2:7])
+        rows = rows[(J > _LEAST) & (J < 1 / _LEAST)]         # what is crushed tells nothing
+        rows[:, 2:7] /= np.cbrt(_det(rows[:, 2:7]))[:, None]
+        return cls(rows[:, :2], rows[:, 2:7], rows[:, 7:], rest.get("pole_height", 0.0), rest.get("pole_stretch", 1.0))
+
+    def gradient(self, forms: Any) -> Any:
+        """F_old on the elements of a formulation (UFL, shape (3, 3)): linear in each, then scaled to det F_old = 1."""
+        space = fem.functionspace(forms.domain, ("DG", 1, (5,)))
+        field = fem.Function(space)
+        fitted = _without_folds(self._fitted(forms, self.F, np.array([1, -1, -1, 1, 1])))
+        field.x.array.reshape(-1, 5)[space.dofmap.list[: len(fitted)]] = fitted
+        field.x.scatter_forward()
+        rr, rz, zr, zz, hoop = ufl.split(field)
+        share = ((rr * zz - rz * zr) * hoop) ** (-1 / 3)
+        return share * ufl.as_tensor([[rr, rz, 0], [zr, zz, 0], [0, 0, hoop]])
+
+    def unknowns(self, problem: Any) -> np.ndarray:
+        """The unknowns of the body as it stands, own part: no displacement, its pressures."""
+        x, forms = np.zeros(problem.x.getLocalSize()), problem.forms
+        if self.pressures.shape[1]:
+            fitted = self._fitted(forms, self.pressures, np.ones(self.pressures.shape[1]))
+            values = np.zeros(len(forms.w.x.array))
+            for k in range(self.pressures.shape[1]):
+                values[forms.space.sub(1 + k).dofmap.list[: len(fitted)]] = fitted[..., k]
+            x[: problem.n_owned] = values[: problem.n_owned]
+        return x
+
+    def _fitted(self, forms: Any, values: np.ndarray, parity: np.ndarray) -> np.ndarray:
+        """What is linear in each own cell, fitted to what is near: its values at the corners, (cells, 3, components).
+
+        parity: 1 or -1: what becomes of a component beyond the axis, where the body is seen in a mirror; there the
+        hoop is stretched as the radius. Quadratic least squares, weights falling with the distance from the middle:
+        jumps between the old elements are smoothed.
+        """
+        from scipy.spatial import cKDTree
+        where: Any = basix.make_quadrature(forms.domain.basix_cell(), _DEGREE)[0]
+        inside = _evaluated(forms, forms.X, where)
+        corners = _evaluated(forms, forms.X, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+        points, values = gathered(forms.comm, self.points), gathered(forms.comm, values)
+        if forms.scene.kinematics.axisymmetric:
+            near = points[:, 0] < 2 * np.sqrt(np.ptp(points[:, 0]) * np.ptp(points[:, 1]) / max(len(corners), 1))
+            points = np.concatenate([points, points[near] * (-1, 1)])
+            values = np.concatenate([values, values[near] * parity])
+        middle = corners.mean(1)
+        away, rows = cKDTree(points).query(middle, min(_NEIGHBOURS, len(points)))
+        size = np.maximum(np.linalg.norm(corners - middle[:, None], axis=2).max(1), away[:, _FEWEST - 1])[:, None]
+        weight = np.exp(-((away / size) ** 2))
+        by, at = (np.stack([np.ones_like(r), r, z, r * r, r * z, z * z], -1) for r, z in (
+            np.moveaxis((x - middle[:, None]) / size[..., None], -1, 0) for x in (points[rows], inside)))
+        fit = np.linalg.pinv(weight[..., None] * by, rcond=1e-3) * weight[:, None]
+        found = np.linalg.pinv(np.column_stack([1 - where.sum(1), where])) @ (at @ (fit @ values[rows]))
+        if forms.scene.kinematics.axisymmetric and values.shape[1] == 5:
+            axis = corners[..., 0] < 1e-9 * forms.length
+            found[axis] *= (1, 0, 0, 1, 1)
+            found[axis, 0] = found[axis, 4] = (found[axis, 0] + found[axis, 4]) / 2
+        return found
+
+
+def _det(F: np.ndarray) -> np.ndarray:
+    """Of entries, shape (..., 5): shape (...)."""
+    return (F[..., 0] * F[..., 3] - F[..., 1] * F[..., 2]) * F[..., 4]
+
+
+def _without_folds(F: np.ndarray) -> np.ndarray:
+    """Linear fields, by their values at the corners, shape (cells, 3, 5), as steep as leaves det F to be believed."""
+    mean = F.mean(1, keepdims=True)
+    places = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4
+    share = np.ones(len(F))
+    for _ in range(20):
+        there = places @ (mean + share[:, None, None] * (F - mean))
+        bad = ((_det(there) < _LEAST * _det(mean)) | (there[..., 4] <= 0)).any(1)
+        if not bad.any():
+            break
+        share[bad] *= 0.7
+    return mean + share[:, None, None] * (F - mean)
+
+
+def _evaluated(forms: Any, expression: Any, where: np.ndarray) -> np.ndarray:
+    """In the own cells, shape (cells, places, components)."""
+    topology = forms.domain.topology
+    cells = np.arange(topology.index_map(topology.dim).size_local, dtype=np.int32)
+    found = fem.Expression(expression, where, jit_options=_compat.JIT_OPTIONS).eval(forms.domain, cells)
+    return found.reshape(len(cells), len(where), -1)

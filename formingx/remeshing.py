@@ -1,0 +1,256 @@
+"""Runs whose mesh is made again on the way: the deformed body becomes the reference, F = grad x . F_old.
+
+For blocks that are crushed: where the volume ratio J at a quadrature point leaves its range, a new mesh is made of the
+outline as it is now, and takes over what the body carries: deformation so far, pressures, what touches and with which
+pressure and friction. The state that the new mesh comes to at the same travel is one of kind "remesh".
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .discrete.outline import Outline
+from .discrete.preformed import Preformed
+from .discrete.problem import Problem
+from .errors import ConvergenceError, InputError, instance, pair, positive
+from .measures.targets import Amplitude, Target
+from .mesh.remeshed import remeshed
+from .physics.supports import Clamped, Symmetry
+from .solve.arc_length import Curve
+from .solve.newton import Failure, Tolerances, fixed
+from .solve.path_following import Run
+from .solve.record import Record, Segment
+from .solve.state import State
+from .solve.stepping import StepControl
+
+log = logging.getLogger("formingx")
+
+_SHARES, _GOOD = (1.0, 0.9, 1.1, 0.8), 0.4
+"""Sizes that are tried, over what is asked for, and the part of the way from the limits of J to 1 that is good."""
+
+_WORN = "the mesh is worn"
+"""Why a run ends whose mesh is to be made again."""
+
+
+@dataclass(frozen=True)
+class Remesh:
+    """When a mesh is made again, and of which elements: for `formingx.trace`.
+
+    Args:
+        size: length of an edge of an element, as the body is then.
+        corner: the same where faces meet that tools press on, and where they leave them; default a third of it.
+        volume_ratio: (least, largest) volume ratio J at a quadrature point of a good mesh, of a material that keeps its
+            volume.
+
+    Raises:
+        InputError: a size that is not positive, a range that does not hold 1.
+    """
+
+    size: float
+    corner: float | None = None
+    volume_ratio: tuple[float, float] = (0.6, 1.5)
+
+    def __post_init__(self) -> None:
+        positive("Remesh: size", self.size)
+        if self.corner is not None and positive("Remesh: corner", self.corner) > self.size:
+            raise InputError(f"Remesh: corner = {self.corner!r}: must be at most size = {self.size!r}")
+        low, high = pair("Remesh: volume_ratio", self.volume_ratio)
+        if not 0 < low < 1 < high:
+            raise InputError(f"Remesh: volume_ratio = {self.volume_ratio!r}: must be a number between 0 and 1, and one"
+                             f" above 1")
+
+
+def check(scene: Any, remesh: Any, targets: Sequence[Target]) -> None:
+    """An InputError if a scene has what is not carried to another mesh, or a target is not one of what is driven."""
+    instance("trace: remesh", remesh, Remesh, "a formingx.Remesh")
+    why = ""
+    if scene.mesh.comm.size > 1:
+        why = "several ranks: gmsh makes a mesh on one: run without mpirun"
+    elif not scene.model.solid:
+        why = "a membrane"
+    elif scene.kinematics.components > 2:
+        why = "a sheet in space"
+    elif len(scene.mesh.layers) > 1:
+        why = "several layers"
+    elif any(material.internal or material.integral or material.varies for material in scene.materials.values()):
+        why = "a material with a history or with constants that vary"
+    elif scene.temperature is not None or scene.heat is not None:
+        why = "a temperature"
+    elif any(not isinstance(support, Symmetry | Clamped) for support in scene.supports):
+        why = "a support other than Symmetry and Clamped"
+    elif any(not contact.separates or contact.points != "nodes" for contact in scene.contacts):
+        why = "a contact with separates=False, or at Gauss points"
+    if why:
+        raise InputError(f"trace: remesh: is not known with {why}")
+    for target in targets:
+        if not target.name.endswith(("travel", "pressure")):
+            raise InputError(f"trace: remesh: target {target}: must be a travel or a pressure")
+
+
+def follow(path: Any, targets: Sequence[Target], remesh: Remesh, step: StepControl | None, tolerances: Tolerances,
+           at_fold: str | None, max_steps: int | None, progress: bool, begin: Callable[[Curve], State]) -> None:
+    """Follow a path to the last of the targets, with as many meshes as it takes.
+
+    Raises:
+        ConvergenceError: it was not reached.
+    """
+    record = path.record
+    record.on_state.append(lambda state: _look(record, state, remesh))
+    start: State | None = begin(record.curve)
+    step = step or StepControl()
+    while True:
+        record.ended, problem = "", record.problem
+        run = Run(record, [(t, t.bind(problem)) for t in targets if path.met(t) is None], step, at_fold)
+        before = len(record.segments[-1].states)
+        try:
+            run.follow(max_steps, progress, start)
+        except ConvergenceError as error:
+            low, high = _ratios(record, record.last) if record.segments[-1].states else (1.0, 1.0)
+            if len(record.segments[-1].states) < before + 3 or low > 0.9 and high < 1.1:
+                raise
+            log.info("a new mesh, as no state was found: %s", error)
+            record.ended = _WORN
+        if path.met(targets[-1]) is not None or record.ended != _WORN:
+            record.ended = "" if record.ended == _WORN else record.ended
+            return
+        step = replace(run.step, length=min(run.step.length, step.length * 4))
+        start = _best(path, remesh, tolerances)
+
+
+def _best(path: Any, remesh: Remesh, tolerances: Tolerances) -> State:
+    """The first state on a new mesh, which is the record's from now on: of sizes about the one that is asked for the
+    first whose elements keep their volumes well, or else the best."""
+    (low, high), record = remesh.volume_ratio, path.record
+    found, why = [], ""
+    for share in _SHARES:
+        try:
+            segment, start = _again(path, remesh, tolerances, share)
+        except (ConvergenceError, Failure, InputError) as error:
+            why = why or str(getattr(error, "reason", error))
+            continue
+        segment.problem.x.array_w[:] = start.x
+        segment.problem.look_at(start.x, start.control)
+        least, largest = segment.problem.volume_ratios()
+        found.append((min((least - low) / (1 - low), (high - largest) / (high - 1)), segment, start))
+        if found[-1][0] > _GOOD:
+            break
+    if not found:
+        raise ConvergenceError(f"no state was found on a new mesh, of {len(_SHARES)} that were tried: {why}")
+    _, segment, start = max(found, key=lambda one: one[0])
+    record.segments.append(segment)
+    path._view(segment)
+    return start
+
+
+def _ratios(record: Record, state: State) -> tuple[float, float]:
+    with record.problem.at(state) as problem:
+        return problem.volume_ratios()
+
+
+def _look(record: Record, state: State, remesh: Remesh) -> None:
+    """End the run where a mesh is worn; note of a remeshed state what it changed."""
+    low, high = _ratios(record, state)
+    if state.kind == "remesh":
+        before = record.segments[-2].states[-1].measures
+        force = next((name for name in before if name.endswith("force")), None)
+        for what, name in (("force", force), ("energy", "strain_energy")):
+            if name and before.get(name):
+                state.jump[what] = state.measures[name] / before[name] - 1
+        log.info("a new mesh: %s", state.jump)
+    elif state.kind != "start" and _worn(low, high, remesh, state):
+        record.ended = _WORN
+
+
+def _worn(low: float, high: float, remesh: Remesh, state: State) -> bool:
+    """True if the mesh of a state is to be made again."""
+    return not (remesh.volume_ratio[0] <= low and high <= remesh.volume_ratio[1])
+
+
+def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> tuple[Segment, State]:
+    """A new mesh of the last state's body, elements `share` of the size, and the body in balance there."""
+    record, old, state = path.record, path.problem, path.last
+    scene, driven = old.scene, old.setting.leading
+    outline = Outline(old.forms)
+    with old.at(state):
+        edges = outline.edges()
+        of = {name: outline.of(name) for name in scene.mesh.boundaries}
+        x_old = old.x.array_r[: old.n_owned].copy()
+        touched = [(c.contact.on, c.positions(x_old, state.control)[c.touching(x_old, state.control)]
+                    + c.travelled(state.control)) for c in old.contacts]
+    order = _around(outline, edges)
+    names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
+    corners = _corners(edges[order], names, touched)
+    layer, = scene.mesh.layers
+    sizes = share * remesh.size, share * (remesh.corner or remesh.size / 3)
+    mesh = remeshed(edges[order], names, corners, *sizes, layer,
+                    scene.kinematics.axisymmetric, scene.mesh.comm)
+    made = scene.with_mesh(mesh, Preformed.of(old, state))
+    problem = Problem(made)
+    control = state.control * old.scales[driven] / problem.scales[driven]
+    curve = Curve(problem, tolerances)
+    x = made.preformed.unknowns(problem)
+    with old.at(state):
+        for new, contact in zip(problem.contacts, old.contacts, strict=True):
+            new.go_on_from(contact, (x_old, state.control), (x[: problem.n_owned], control))
+    volume = problem.forms.volume / old.forms.volume / (1 + state.measures["mass_error"]) - 1
+    x = _balanced(problem, curve, x, control)
+    start = curve.resume(x, control)
+    start.kind, start.jump = "remesh", {"volume": volume}
+    record.counts.iterations += curve.spent()
+    return Segment(problem, curve), start
+
+
+def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> np.ndarray:
+    """The state at the same control: by Newton's method, or as what is left without balance fades."""
+    first = problem.setting
+    problem.x.array_w[:] = x
+    try:
+        curve.newton.correct(problem.x, control, fixed(control))
+        if not problem.folded(problem.x, control):
+            return problem.x.array_r.copy()
+        why = "an element turned inside out"
+    except Failure as failure:
+        why = failure.reason
+    log.info("the forces that a new mesh leaves without balance are taken away gradually: %s", why)
+    still = replace(first, base=first.standing(control), rate=[0.0] * len(first.rate), fading=True)
+    record, target = Record(problem, curve), Target("change", 1.0, None)
+    try:
+        problem.enter(still, x, 0.0)
+        Run(record, [(target, Amplitude(problem, None))]).follow(60, False, curve.resume(x, 0.0))
+    except (ConvergenceError, Failure) as error:
+        raise ConvergenceError(f"no state was found on a new mesh: {error}; give Remesh another size, or a range of"
+                               f" volume_ratio nearer to 1") from None
+    problem.enter(first, record.last.x, control)
+    return record.last.x
+
+
+def _around(outline: Outline, edges: np.ndarray) -> list[int]:
+    """Numbers of the edges one after the other round the body, from one where R or Z is least."""
+    after = {int(a): k for k, (a, _) in enumerate(outline.ends)}
+    order = [0]
+    while len(order) < len(edges):
+        order.append(after[int(outline.ends[order[-1], 1])])
+    if len(set(order)) < len(edges):
+        raise InputError("trace: remesh: the body has a hole, or several parts: must be one piece without holes")
+    return order
+
+
+def _corners(edges: np.ndarray, names: list[frozenset[str]], touched: list[tuple[str, np.ndarray]]) -> np.ndarray:
+    """Where two faces meet that tools may press on, and the ends of what they do press on, shape (k, 2)."""
+    faces = {on for on, _ in touched}
+    found = []
+    press = np.zeros(len(edges), dtype=bool)
+    for on, points in touched:
+        if len(points):
+            near = np.linalg.norm(edges[:, 2][:, None] - points[None], axis=2).min(1)
+            press |= np.array([on in of for of in names]) & (near < 1e-6 * np.ptp(edges[:, 0], axis=0).max())
+    for k in range(len(edges)):
+        a, b = names[k - 1] & faces, names[k] & faces
+        if (a and b and a != b) or ((a or b) and press[k] != press[k - 1] and a and b):
+            found.append(edges[k, 0])
+    return np.array(found).reshape(-1, 2)

@@ -1,0 +1,69 @@
+"""Runs whose mesh is made again on the way."""
+
+import numpy as np
+import pytest
+
+import formingx as fx
+
+
+def block(friction, **options):
+    """A block of half height 1 under a plate."""
+    mesh = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(4, 4), **options)
+    return fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=1.0, c01=0.1),
+                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")],
+                    contacts=[fx.Contact(face, fx.tools.plane(1.0), friction, moves=(0, -1))
+                              for face in ("top", "rim")])
+
+
+def pressed(friction, travel, **options):
+    return fx.trace(block(friction), until=fx.travel(travel), progress=False, **options)
+
+
+def test_a_homogeneous_block_does_not_feel_it(monkeypatch):
+    """Without friction F_old is the same everywhere: the force goes on, as do volume, energy and columns."""
+    from formingx import remeshing
+    monkeypatch.setattr(remeshing, "_worn", lambda low, high, remesh, state: state.kind == "target")
+    path = fx.trace(block("none"), until=fx.travel(0.6), through=[fx.travel(0.5)], progress=False,
+                    remesh=fx.Remesh(size=0.3))
+    state, = (s for s in path.states if s.kind == "remesh")
+    before = path.states[path.states.index(state) - 1]
+    assert abs(state.jump["force"]) < 2e-5 and abs(state.jump["energy"]) < 2e-5 and abs(state.jump["volume"]) < 1e-12
+    assert state.measures["pole_height"] == pytest.approx(before.measures["pole_height"], rel=1e-4)
+    assert state.measures["pole_stretch"] == pytest.approx(before.measures["pole_stretch"], rel=1e-4)
+    whole = pressed("none", 0.6).last.measures
+    assert path.last.measures["pole_height"] == pytest.approx(-0.3, rel=1e-4)
+    for name in ("tool_force", "strain_energy", "travel"):
+        assert path.last.measures[name] == pytest.approx(whole[name], rel=5e-4)
+    assert len(path.segments) == 2 and len(path["tool_force"]) == len(path)
+
+
+def test_a_stuck_block_goes_on():
+    """Remeshed where the corner crushes its elements: the force goes on to a percent, no volume is lost."""
+    path = pressed("stick", 0.6, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)))
+    made = [state for state in path.states if state.kind == "remesh"]
+    assert made and all(abs(s.jump["force"]) < 0.02 and abs(s.jump["energy"]) < 0.02 for s in made)
+    assert all(abs(s.jump["volume"]) < 1e-12 for s in made)
+    whole = pressed("stick", 0.6).last.measures["tool_force"]
+    assert path.last.measures["tool_force"] == pytest.approx(whole, rel=0.05)
+    assert np.all(np.diff([s.measures["travel"] for s in path.states if s.kind != "remesh"]) > 0)
+
+
+@pytest.mark.parametrize("options, message", [
+    ({"size": -1.0}, "Remesh: size = -1"), ({"size": 1.0, "corner": 2.0}, "corner = 2"),
+    ({"size": 1.0, "volume_ratio": (1.1, 1.5)}, "volume_ratio")])
+def test_wrong_sizes(options, message):
+    with pytest.raises(fx.InputError, match=message):
+        fx.Remesh(**options)
+
+
+def test_what_is_not_carried_is_refused():
+    remesh = fx.Remesh(size=0.3)
+    with pytest.raises(fx.InputError, match="several layers"):
+        scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness={"a": 0.5, "b": 0.5}, elements=(2, 1)),
+                         materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
+                         supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
+        fx.trace(scene, until=fx.pressure(0.1), remesh=remesh)
+    with pytest.raises(fx.InputError, match="must be a travel or a pressure"):
+        fx.trace(block("none"), until=fx.pole_height(-0.2), remesh=remesh)
+    with pytest.raises(fx.InputError, match="checkpoint"):
+        fx.trace(block("none"), until=fx.travel(0.2), remesh=remesh, checkpoint="nowhere")
