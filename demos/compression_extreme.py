@@ -42,7 +42,7 @@ def stuck(elements, size, corner, ratios):
     """(path, numbers) of the stuck block, remeshed on the way."""
     scene = block(fx.MooneyRivlin(c10=1.0, c01=0.1), "stick", elements, roll_over=True)
     path, end = press(scene, [travel(r) for r in ratios], progress=False, remesh=fx.Remesh(size=size, corner=corner),
-                      record={"least_J": lambda problem: problem.volume_ratios()[0]})
+                      record={"least_J": lambda problem: problem.admissible.volume_ratios()[0]})
     met = {f"{r:g}": path.met(fx.travel(travel(r))) for r in ratios}
     least = [state.measures["least_J"] for state in path.states]
     made = [state for state in path.states if state.kind == "remesh"]

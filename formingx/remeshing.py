@@ -135,7 +135,7 @@ def _best(path: Any, remesh: Remesh, tolerances: Tolerances) -> State:
             continue
         segment.problem.x.array_w[:] = start.x
         segment.problem.look_at(start.x, start.control)
-        least, largest = segment.problem.volume_ratios()
+        least, largest = segment.problem.admissible.volume_ratios()
         found.append((min((least - low) / (1 - low), (high - largest) / (high - 1)), segment, start))
         if found[-1][0] > _GOOD:
             break
@@ -149,7 +149,7 @@ def _best(path: Any, remesh: Remesh, tolerances: Tolerances) -> State:
 
 def _ratios(record: Record, state: State) -> tuple[float, float]:
     with record.problem.at(state) as problem:
-        return problem.volume_ratios()
+        return problem.admissible.volume_ratios()
 
 
 def _look(record: Record, state: State, remesh: Remesh) -> None:
@@ -221,7 +221,7 @@ def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> 
     record, target = Record(problem, curve), Target("change", 1.0, None)
     try:
         problem.enter(still, x, 0.0)
-        Run(record, [(target, Amplitude(problem, None))]).follow(60, False, curve.resume(x, 0.0))
+        Run(record, [(target, Amplitude(problem, None))]).follow(200, False, curve.resume(x, 0.0))
     except (ConvergenceError, Failure) as error:
         raise ConvergenceError(f"no state was found on a new mesh: {error}; give Remesh another size, or a range of"
                                f" volume_ratio nearer to 1") from None

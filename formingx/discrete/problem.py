@@ -65,6 +65,7 @@ class Problem(Units):
         contacts: the scene's contacts (`FaceContact`); present: of those that take part now.
         histories: what F depends on besides x and control (`History`); limit: what a step may bring (`StepLimit`).
         setting: the `Setting` that x and control are seen under; see `enter`.
+        admissible: whether the body has a shape, and keeps its volume (`Admissible`).
         force_scale: norm of all support forces at the state whose residual was last computed.
     """
 
@@ -85,7 +86,7 @@ class Problem(Units):
         remembering = (contact for contact in self.contacts if contact.remembers)
         self.histories: list[History] = [*remembering, *forms.histories]
         self.limit = StepLimit(self)
-        self._admissible = forms.admissible()
+        self.admissible = forms.admissible()
         self._constraints = Constraints(forms, self.assemble)
         self._by_motion = self._lift = None
         self._movable = [k for k, thing in enumerate(scene.things) if thing in scene.supports and thing.driven]
@@ -309,20 +310,16 @@ class Problem(Units):
     def folded(self, x: PETSc.Vec, control: float) -> bool:
         """True if the body has no shape: a hoop stretch or an in-plane determinant is not positive (`Admissible`)."""
         self.set_state(x, control)
-        return not self._admissible.holds()
+        return not self.admissible.holds()
 
     def furthest_volume_ratio(self, state: Any) -> Least | None:
         """Where J is furthest from 1 in a state, see `Admissible.furthest_volume_ratio`; collective."""
         with self.at(state):
-            return self._admissible.furthest_volume_ratio()
-
-    def volume_ratios(self) -> tuple[float, float]:
-        """See `Admissible.volume_ratios`; of the state last set."""
-        return self._admissible.volume_ratios()
+            return self.admissible.furthest_volume_ratio()
 
     def inside_out(self) -> tuple[int, int, tuple[float, float]]:
         """See `Admissible.inside_out`; of the state last set."""
-        return self._admissible.inside_out()
+        return self.admissible.inside_out()
 
     def begin(self, old: Any = None) -> None:
         """Newton's method begins at a guess ahead of a state (None: of none)."""
