@@ -89,8 +89,9 @@ class Swept(SolidTool):
         if self.kind == "extruded" or outline[-1, 0] != 0 or outline[0, 0] <= 0:
             raise InputError(f"to_stl: {self!r}: must be a mould revolved or round a box, its profile to end at r = 0")
         low = outline[:, 1].min() - wall
-        points, triangles = self._swept(np.vstack([outline, [0.0, low], [outline[0, 0], low], outline[:1]]))
-        points, triangles = merged(points, triangles)
+        (top, upper), (back, lower) = (self._swept(np.array(line)) for line in (
+            outline, [[0.0, low], [outline[0, 0], low], outline[0]]))
+        points, triangles = merged(np.vstack([top, back]), np.vstack([upper, lower + len(top)]))
         write_stl(points + self._shift, triangles if volume(points, triangles) > 0 else triangles[:, ::-1], file)
 
     def _swept(self, outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
