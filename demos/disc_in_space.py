@@ -56,6 +56,8 @@ def main():
     order = np.log(sizes[-2] / sizes[-1])
     summary["order_of_pressure"] = {s: np.log((coarse[s] - 1) / (fine[s] - 1)) / order for s in fine}
     path.to_csv(args.out / "disc.csv")
+    if not args.quick:
+        path.view3d(args.out / "disc_3d.png", grid=0.1)
     summarise(args.out, {**summary, "versions": files.versions()})
 
 

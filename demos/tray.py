@@ -81,6 +81,8 @@ def main():
         say("  from STL, over the exact tool: " + ", ".join(f"{k} {v:+.2%}" for k, v in off.items())
             + f"; {summary['stl'][name]['seconds']:.1f} s")
     path.wall().to_csv(args.out / "wall.csv")
+    if not args.quick:
+        path.view3d(args.out / "tray_3d.png", grid=0.1)
     path.to_csv(args.out / "tray.csv")
     summarise(args.out, {**summary, "versions": files.versions()})
 

@@ -103,6 +103,9 @@ class Path(States):
             InputError: plotly is not installed.
             OSError: the file cannot be written.
         """
+        if self._in_space:
+            from .space import show
+            return show.report(self, file, title, failure, units or NONE, density, trim)
         from .show import report
         return report.write(report.of_path(self), file, title, failure, self.problem.comm, units or NONE, density, trim)
 
@@ -116,11 +119,16 @@ class Path(States):
         from .show import plots
         return plots.convergence(self, axes)
 
-    def view3d(self, file: Any, state: State | None = None) -> Picture:
+    def view3d(self, file: Any, state: State | None = None, grid: float | None = None) -> Picture:
         """Draw the sheet of a state (default: the last), coloured by thickness, as PNG; returns it, for a notebook.
 
-        It is revolved about the axis, or, in plane strain, extruded.
+        It is revolved about the axis, or, in plane strain, extruded; in space it is drawn whole, and with `grid` the
+        squares of that size (length) that were printed on the flat sheet.
         """
+        if self._in_space:
+            from .space import show
+            show.view(self, state or self.last, file, grid)
+            return Picture(file)
         from .show import views
         axisymmetric = self.problem.scene.kinematics.axisymmetric
         (views.revolved if axisymmetric else views.extruded)(self.profile(state), file, self.problem.comm)
@@ -160,7 +168,7 @@ class Path(States):
             state: default the last.
             density: of the material at rest (under `ThermalExpansion` where it is free of stress), in g/cm3, for the
                 weight in grams; say the unit of length with `units` (without, it is cm).
-            trim: the radius at which the part is cut off, or ("height", h), lengths: the last place from the axis where
+            trim: in space a z, beyond which the part lies; else the radius at which the part is cut off, or ("height", h), lengths: the last place from the axis where
                 the middle line goes beyond it.
             heights: give the wall at these heights too (`Wall.height`).
             units: a `formingx.Units`.
@@ -168,6 +176,9 @@ class Path(States):
         Raises:
             InputError: the mesh is no sheet, or the part does not reach the trim or a height.
         """
+        if self._in_space:
+            from .space.part import part as part_in_space
+            return part_in_space(self.wall(state), density, trim, heights, units or NONE)
         from .evaluate.part import part
         axisymmetric = self.problem.scene.kinematics.axisymmetric
         return part(self.wall(state), axisymmetric, density, trim, heights, units or NONE)
@@ -207,11 +218,16 @@ class Path(States):
             InputError: there is no such tool, or it has no corner that the body must fill.
         """
         from .evaluate.contact_face import contact_of
+        if self._in_space:
+            from .space.part import filling as filling_in_space
+            return filling_in_space(self, contact_of(self, tool, "filling")[0])
         from .evaluate.filling import filling
         return filling(self, contact_of(self, tool, "filling")[0])
 
     def contact(self, tool: Any = None, state: State | None = None) -> Any:
         """Contact pressure, friction and gap along the face that meets a tool (`ContactTable`): to_csv, to_excel."""
+        if self._in_space:
+            raise InputError("contact: in space there are no contact pressures point by point yet: use tool_forces()")
         from .evaluate.contact_face import ContactFace, contact_of
         return ContactFace(self, contact_of(self, tool, "contact")[0]).of(state or self.last)
 
@@ -235,13 +251,15 @@ class Path(States):
         ("change"). Energy of changes of temperature ("heat"). Where it went: "strain_energy", above that at first;
         "dissipated_energy" in materials; "friction"; "jumps". "unbalanced": the error of the integrals, and of the run.
         """
+        if self._in_space:
+            raise InputError("work: in space there is no ledger yet")
         from .evaluate.work import work
         return work(self)
 
     def to_stl(self, file: Any, state: State | None = None) -> None:
         """Write the part at a state (default: the last) as a solid of triangles, STL (rank 0 writes)."""
         from .files.solid import to_stl
-        to_stl(self.profile(state), self.problem.scene.kinematics.axisymmetric, file, self.problem.comm)
+        to_stl(self._solid(state), file, self.problem.comm)
 
     def to_msh(self, file: Any, state: State | None = None) -> None:
         """Write `formed()` of a state (default: the last) as a gmsh file, with its names; on one rank."""
@@ -264,4 +282,23 @@ class Path(States):
     def to_gltf(self, file: Any, state: State | None = None) -> None:
         """Write the part at a state (default: the last) as binary glTF (.glb), coloured by its wall (rank 0 writes)."""
         from .files.solid import to_gltf
-        to_gltf(self.profile(state), self.problem.scene.kinematics.axisymmetric, file, self.problem.comm)
+        to_gltf(self._solid(state), file, self.problem.comm)
+
+    def shell_model(self, file: Any, state: State | None = None) -> None:
+        """Write a part in space as shells, each with its wall, for a structural code (.inp; rank 0 writes)."""
+        if not self._in_space:
+            raise InputError("shell_model: is for a sheet in space; of a section use to_stl, or formed()")
+        from .space.show import shell_model
+        shell_model(self, file, state)
+
+    @property
+    def _in_space(self) -> bool:
+        return bool(self.problem.scene.kinematics.components == 3)
+
+    def _solid(self, state: State | None) -> Any:
+        """Points, triangles and wall ratios of the part as a solid."""
+        if self._in_space:
+            from .space.show import solid as solid_in_space
+            return solid_in_space(self, state or self.last)
+        from .files.solid import coloured
+        return coloured(self.profile(state), self.problem.scene.kinematics.axisymmetric)

@@ -107,6 +107,8 @@ class Profiles:
 
     def _make_probe(self) -> Probe:
         mesh = self._problem.scene.mesh
+        if self._problem.scene.kinematics.components == 3:
+            raise InputError("a sheet in space has no profile: use path.wall(), its section(), or path.view3d")
         faces = next((pair for pair in FACES if all(name in mesh.boundaries for name in pair)), None)
         if faces is None:
             raise InputError(f"a profile needs boundaries {' or '.join(f'{a!r} and {b!r}' for a, b in FACES)};"

@@ -46,10 +46,19 @@ def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarra
     return points, triangles
 
 
-def to_stl(profile: Any, axisymmetric: bool, file: Any, comm: Any) -> None:
-    """Write a binary STL file, its name ending in .stl (rank 0 writes)."""
-    file = tabular.named("to_stl", file, ".stl")
+def coloured(profile: Any, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`solid`, and the wall ratio at its points, shape (n,)."""
     points, triangles = solid(profile, axisymmetric)
+    n = len(profile.bottom)
+    ratio = np.interp(np.arange(0, n - 1 + 1e-9, 2 / _PARTS), np.arange(n), profile.wall_ratio)
+    ratio = np.concatenate([ratio, ratio[::-1]])
+    return points, triangles, np.tile(ratio, len(points) // len(ratio))
+
+
+def to_stl(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: Any) -> None:
+    """Write what `coloured` gives as a binary STL file, its name ending in .stl (rank 0 writes)."""
+    file = tabular.named("to_stl", file, ".stl")
+    points, triangles, _ = surface
     corners = points[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
@@ -59,16 +68,13 @@ def to_stl(profile: Any, axisymmetric: bool, file: Any, comm: Any) -> None:
     tabular.on_root(comm, lambda: tabular.replace(file, lambda stream: stream.write(data), "wb"))
 
 
-def to_gltf(profile: Any, axisymmetric: bool, file: Any, comm: Any) -> None:
-    """Write a binary glTF file, its name ending in .glb, coloured by the wall ratio (rank 0 writes)."""
+def to_gltf(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: Any) -> None:
+    """Write what `coloured` gives as a binary glTF file (.glb), coloured by the wall ratio (rank 0 writes)."""
     from matplotlib import colormaps
     file = tabular.named("to_gltf", file, ".glb")
-    points, triangles = solid(profile, axisymmetric)
-    n = len(profile.bottom)
-    ratio = np.interp(np.arange(0, n - 1 + 1e-9, 2 / _PARTS), np.arange(n), profile.wall_ratio)
-    ratio = np.concatenate([ratio, ratio[::-1]])
+    points, triangles, ratio = surface
     shade = (ratio - ratio.min()) / (np.ptp(ratio) or 1.0)
-    colours = np.tile(colormaps["viridis_r"](shade)[:, :3], (len(points) // len(ratio), 1))
+    colours = colormaps["viridis_r"](shade)[:, :3]
     upright = points[:, [0, 2, 1]] * (1, 1, -1)              # glTF has y up
     arrays = [("POSITION", upright.astype("<f4"), 5126, 34962), ("COLOR_0", colours.astype("<f4"), 5126, 34962),
               ("indices", triangles.astype("<u4").ravel(), 5125, 34963)]

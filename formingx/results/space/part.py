@@ -1,0 +1,112 @@
+"""A formed part in space in numbers, and how far it fills a tool."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError, finite, positive
+from ...units import NONE, Units
+from ..files.sheet import Sheet
+from .wall import WallInSpace
+
+
+@dataclass(frozen=True)
+class PartInSpace:
+    """A part as modelled (a quarter of a sheet is a quarter of the part); whole triangles are in it or not.
+
+    Attributes:
+        volume, area: length^3, of the surface length^2; draw_ratio: area over that at rest; mean_wall: volume over area.
+        least_wall: length; least_at: (x, y, z) where; least_from: (x, y) where it was on the flat sheet.
+        evenness: least over mean wall; variation: standard deviation of the wall over the surface, over its mean.
+        weight: grams if a density in g/cm3 was given; else None. scrap: volume beyond the trim over that of the sheet.
+        wrinkled: share of the area at rest that is in compression. units: of the labels.
+    """
+
+    volume: float
+    area: float
+    draw_ratio: float
+    mean_wall: float
+    least_wall: float
+    least_at: tuple[float, ...]
+    least_from: tuple[float, ...]
+    evenness: float
+    variation: float
+    weight: float | None
+    scrap: float
+    wrinkled: float
+    units: Units = field(repr=False, default=NONE)
+
+    @property
+    def rows(self) -> list[tuple[str, str]]:
+        """(what, its value with its unit), for people."""
+        u = self.units
+        at, rest = (", ".join(f"{v:.4g}" for v in where) for where in (self.least_at, self.least_from))
+        rows = [("weight", f"{self.weight:.5g} g")] if self.weight is not None else []
+        rows += [("least wall", f"{self.least_wall:.5g} {u.length or ''} at (x, y, z) = ({at}), from (X, Y) ="
+                                f" ({rest})".replace("  ", " ")),
+                 ("mean wall", f"{self.mean_wall:.5g} {u.length or ''}".rstrip()),
+                 ("evenness (least over mean wall)", f"{self.evenness:.4g}"),
+                 ("coefficient of variation of the wall", f"{self.variation:.4g}"),
+                 ("areal draw ratio", f"{self.draw_ratio:.4g}"),
+                 ("volume", f"{self.volume:.5g} {u.volume}".rstrip()), ("area", f"{self.area:.5g} {u.area}".rstrip())]
+        rows += [("scrap, of the sheet's volume", f"{100 * self.scrap:.3g} %")] if self.scrap else []
+        return rows + ([("in compression, of the sheet", f"{100 * self.wrinkled:.3g} %")] if self.wrinkled else [])
+
+    def __str__(self) -> str:
+        width = max(len(what) for what, _ in self.rows)
+        return "\n".join(f"{what:{width}}  {value}" for what, value in self.rows)
+
+
+def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, units: Units) -> PartInSpace:
+    """See `Path.part`; trim: the z of the plane beyond which, seen from the flat sheet, the part lies."""
+    if len(tuple(heights)):
+        raise InputError("part: heights: in space use path.wall().section(point, normal)")
+    kept = np.ones(len(wall.wall), dtype=bool)
+    if trim is not None:
+        level, z = finite("part: trim", trim), wall.middle[:, 2]
+        kept = (z - level) * np.sign(z[np.argmax(np.abs(z))] - level) > 0
+        if not kept.any() or kept.all():
+            raise InputError(f"part: trim = {trim!r}: must be a z that the part passes: it goes from {z.min():.6g} to"
+                             f" {z.max():.6g}")
+    h, area = wall.wall[kept], wall.area[kept]
+    volume, rest = float((h * area).sum()), wall.area_at_rest[kept]
+    mean, k = volume / area.sum(), int(np.flatnonzero(kept)[np.argmin(h)])
+    whole = float((wall.wall * wall.area).sum())
+    weight = None if density is None else units.mass(volume, positive("part: density", density))
+    return PartInSpace(volume, float(area.sum()), float(area.sum() / rest.sum()), mean, float(wall.wall[k]),
+                       tuple(wall.middle[k].tolist()), tuple(wall.rest[wall.triangles[k], :2].mean(0).tolist()),
+                       float(wall.wall[k] / mean), float(np.sqrt(np.average((h - mean) ** 2, weights=area)) / mean),
+                       weight, 1 - volume / whole, float(rest[wall.wrinkled[kept]].sum() / rest.sum()), units)
+
+
+@dataclass(frozen=True, repr=False)
+class FillingInSpace(Sheet):
+    """How far a tool is filled, state by state: touching: share of the sheet's area at rest that is held or nearer to
+    the tool than a tenth of its thickness; gap: the largest distance from it, length; control, states: of the run."""
+
+    control: tuple[str, np.ndarray]
+    touching: np.ndarray
+    gap: np.ndarray
+    comm: Any
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        return {self.control[0]: self.control[1], "touching": self.touching, "gap": self.gap}
+
+
+def filling(path: Any, contact: Any) -> FillingInSpace:
+    """See `Path.filling`."""
+    rows, comm = [], path.problem.comm
+    for state in path.states:
+        with path.problem.at(state) as problem:
+            d = contact.contact.tool.signed_distance(contact.positions(problem.x.array_r, state.control))
+            held = contact.touching(problem.x.array_r, state.control) | (d > -0.1 * contact.thickness)
+        area = contact.rule.area
+        parts = comm.allgather((float(area[held].sum()), float(area.sum()), float((-d).max(initial=0.0))))
+        touching, whole, gap = (list(column) for column in zip(*parts))
+        rows.append((sum(touching) / sum(whole), max(gap)))
+    name = path.columns[0]
+    return FillingInSpace((name, path[name]), *np.array(rows).T, comm)
