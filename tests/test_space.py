@@ -1,11 +1,14 @@
 """Sheets in space: their equations, exact solutions, contact that sticks, tools, what is read off, what is refused."""
 
+import numpy as np
 import pytest
+from conftest import run_json
 from test_demos import summary
 from test_derivatives import assert_derivatives, difference, random_state
 
 import formingx as fx
 from formingx.discrete.problem import Problem
+from formingx.tools.solid import write_stl
 
 MATERIALS = [fx.NeoHookean(c10=2.0), fx.MooneyRivlin(c10=1.5, c01=0.4), fx.Ogden(mu=(1.4, -0.3), alpha=(2.5, -2.0)),
              fx.Viscoelastic(fx.NeoHookean(c10=0.5), [(1.0, 1.0)])]
@@ -45,3 +48,158 @@ def test_disc_converges_to_the_membrane_of_revolution(tmp_path):
         assert abs(fine["pole_thickness_over_axisymmetric"][s] - 1) < 4 * bound
     assert abs(fine["limit_pressure_over_axisymmetric"] - 1) < 2.5e-3
     assert fine["failures"] == 0 and fine["iterations"] <= 35
+
+
+def test_layers_and_thickness_add_up():
+    """Two layers of half the thickness are the sheet; a thickness that varies is that of its function."""
+    half = {"inner": 0.004, "outer": lambda x, y: 0.006 + 0 * x}
+    one, two = (fx.solve(scene, to=0.005, increments=2).last.measures for scene in (
+        disc(), disc(thickness=half, mesh={"layers": ["inner", "outer"]})))
+    assert two["enclosed_volume"] == pytest.approx(one["enclosed_volume"], rel=1e-10)
+    with pytest.raises(fx.InputError, match=r"thickness of 'sheet' = -0\.4.* at \(.*must be greater than 0"):
+        disc(thickness=lambda x, y: 0.6 - x)
+
+
+def test_tray_quick(tmp_path):
+    """The values of size 0.1; the trough's law, within the error of that size; the walls from the STL file."""
+    found = summary("tray", tmp_path, "--quick")
+    exact, stl, trough = found["size_0.1"], found["stl"]["size_0.1"], found["trough"]["size_0.1"]
+    for place, ratio in (("floor", 0.480), ("long_wall", 0.4545), ("bottom_edge", 0.328)):       # of size 0.025
+        assert exact[place] == pytest.approx(ratio, rel=0.02)
+        assert stl[place] == pytest.approx(exact[place], rel=5e-3)
+    assert stl["corner"] == pytest.approx(exact["corner"], rel=5e-3)
+    assert exact["failures"] == 0 and exact["iterations"] <= 250
+    assert abs(trough["wall_error"]) < 5e-3 and abs(trough["fillet_error"]) < 0.015
+
+
+@pytest.mark.slow
+def test_tray(tmp_path):
+    """Trough within 0.2 % at 0.05, walls of 0.05 within 1 % (corner 4 %) of those of 0.025, no failures."""
+    found = summary("tray", tmp_path)
+    fine, middle = found["size_0.025"], found["size_0.05"]
+    for place in ("floor", "long_wall", "bottom_edge", "corner"):
+        assert middle[place] == pytest.approx(fine[place], rel=0.045 if place == "corner" else 0.01)
+        for size in ("size_0.05", "size_0.025"):
+            assert found["stl"][size][place] == pytest.approx(found[size][place], rel=5e-3)
+    for numbers in (fine, middle):
+        assert numbers["failures"] == 0 and numbers["iterations"] <= 250
+    assert abs(found["trough"]["size_0.05"]["wall_error"]) < 2e-3
+
+
+def trough(**more):
+    """A strip of a trough, coarse."""
+    sheet = fx.mesh.sheet([(0, 0), (1, 0), (1, 0.3), (0, 0.3)], 0.15, names=["y0", "rim", "y1", "x0"])
+    tool = fx.tools.extruded(fx.Tool([(3.0, 0.0), (1.0, 0.0), (1.0, -1.0), (0.0, -1.0)], [0.0, 0.0, 0.2, 0.0]))
+    sides = [fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y"), fx.Symmetry("y1", "y")]
+    return fx.Scene(mesh=sheet, thickness=0.02, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("top")],
+                    supports=[fx.SimplySupported("rim"), *sides],
+                    contacts=[fx.Contact("bottom", tool, name="mould", **more)])
+
+
+def test_goes_on_from_a_checkpoint_and_part_is_read_off(tmp_path):
+    scene, end = trough(), fx.pressure(0.4)
+    whole = fx.trace(scene, until=end, progress=False, checkpoint=tmp_path / "run")
+    on = fx.trace(scene, until=end, progress=False, start=fx.load(tmp_path / "run", scene, state=12))
+    wall = whole.wall()
+    assert len(on) == len(whole)
+    np.testing.assert_allclose(on.wall().ratio, wall.ratio, rtol=1e-10)
+    kept = (wall.wall * wall.area).sum()
+    assert kept == pytest.approx(0.02 * 0.3, rel=1e-12)                             # the volume
+    part = whole.part(density=1.0)
+    assert part.volume == pytest.approx(kept) and part.weight == pytest.approx(kept) and str(part)
+    assert part.least_wall == wall.wall.min() and part.draw_ratio == pytest.approx(wall.area.sum() / 0.3)
+    cut = wall.section((0, 0.15, 0), (0, 1, 0))
+    assert cut["arc_length"][-1] == pytest.approx(2.0, abs=0.25) and np.ptp(cut["y"]) < 1e-9
+    whole.to_stl(tmp_path / "part.stl")
+    assert fx.tools.solid(tmp_path / "part.stl").volume == pytest.approx(kept, rel=0.05)
+    whole.shell_model(tmp_path / "part.inp")
+    assert (tmp_path / "part.inp").read_text().count("*SHELL SECTION") == len(wall.wall)
+    filled = whole.filling()
+    assert filled.touching[-1] > 0.9 and np.all(np.diff(filled.gap) < 1e-9)
+
+
+def test_ranks():
+    script = """
+import json, sys
+sys.path.insert(0, "tests")
+import formingx as fx
+from test_space import trough
+path = fx.trace(trough(), until=fx.pressure(0.2), progress=False)
+wall = path.wall()
+if path.problem.comm.rank == 0:
+    print(json.dumps([wall.ratio.tolist(), path["enclosed_volume"].tolist(), path["contact_area"].tolist()]))
+"""
+    for one, two in zip(*(run_json(script, ranks) for ranks in (1, 2))):
+        np.testing.assert_allclose(two, one, rtol=1e-10, atol=1e-12)
+
+
+def test_box_distance_is_exact():
+    """Differences of distances along their gradient are those of the points; the STL file of the box agrees."""
+    box = fx.tools.box(half=(1.0, 1.5), depth=1.0, corner=0.3, fillet=0.2)
+    inside = [(0.9, 0, -0.5), (0.9, 1.4, -0.5), (0, 0, -0.9), (0.95, 0, -0.95), (0.75, 0.2, -0.9)]
+    corner = 0.3 - np.hypot(0.2, 0.2)
+    expected = [0.1, corner, 0.1, 0.2 - np.hypot(0.15, 0.15), 0.1]
+    np.testing.assert_allclose(-box.signed_distance(inside), expected, atol=1e-12)
+    assert box.signed_distance([(1.1, 0, -0.5)])[0] == pytest.approx(0.1)
+    plug = fx.tools.box(half=(0.5, 0.8), depth=1.0, corner=0.2, mouth=1.0, plug=True)
+    np.testing.assert_allclose(plug.signed_distance([(0, 0, -0.2), (0, 0, 0.1)]), [-0.2, 0.1], atol=1e-12)
+
+
+def test_tool_files_are_looked_over(tmp_path):
+    box = fx.tools.box(half=(1.0, 1.5), depth=1.0, corner=0.3, fillet=0.2, draft=3.0)
+    box.to_stl(tmp_path / "box.stl", wall=0.3)
+    solid = fx.tools.solid(tmp_path / "box.stl")
+    x = np.random.default_rng(1).uniform([-1, -1.5, -1.1], [1, 1.5, -0.1], (2000, 3))
+    near = np.abs(box.signed_distance(x)) < 0.1
+    np.testing.assert_allclose(solid.signed_distance(x)[near], box.signed_distance(x)[near], atol=1e-3)
+    found = solid.undercuts()
+    assert found["undercut_area"] == 0 and found["least_draft"] == pytest.approx(3.0, abs=0.01)
+    with pytest.raises(fx.InputError, match="inside out.*inverted=False"):
+        fx.tools.solid(tmp_path / "box.stl", inverted=True)
+    points, triangles = solid.surface()
+    write_stl(points, triangles[1:], tmp_path / "open.stl")
+    with pytest.raises(fx.InputError, match=r"open.stl' is open: 3 edges .* one at \("):
+        fx.tools.solid(tmp_path / "open.stl")
+    write_stl(points, np.vstack([triangles[:1, ::-1], triangles[1:]]), tmp_path / "turned.stl")
+    with pytest.raises(fx.InputError, match="look the other way than their neighbours, at 3 edges"):
+        fx.tools.solid(tmp_path / "turned.stl")
+    with pytest.raises(fx.InputError, match="units of length the same"):
+        disc(contacts=[fx.Contact("bottom", fx.tools.solid(tmp_path / "box.stl", scale=25.4).moved(z=-30))])
+
+
+@pytest.mark.parametrize("make, words", [
+    (lambda: trough(friction=0.3), "in space a sheet sticks.*'stick'"),
+    (lambda: trough(friction="none"), "in space a sheet sticks.*'stick'"),
+    (lambda: disc(model=fx.MixedPressure()), "a sheet in space is a Membrane"),
+    (lambda: disc(on="rim"), "a pressure on its 'bottom' or its 'top'"),
+    (lambda: disc(thickness=None), "needs a thickness"),
+    (lambda: disc(contacts=[fx.Contact("bottom", fx.tools.plane(1.0))]), "a sheet in space those of"),
+    (lambda: fx.trace(disc(), until=fx.pressure(0.001), progress=False).stability(), "in space"),
+    (lambda: fx.trace(disc(), until=fx.pressure(0.001), progress=False).work(), "in space"),
+    (lambda: fx.trace(disc(), until=fx.pressure(0.001), progress=False).profile(), "in space"),
+])
+def test_what_is_not_proven_is_refused(make, words):
+    with pytest.raises(fx.InputError, match=words):
+        make()
+
+
+def test_relaxed_energy_gives_way_in_compression():
+    """A strip pulled along x, free to narrow, at a width below that of simple tension: 1 % of the stiffness is left."""
+    forms = Problem(disc(model=fx.Membrane(wrinkles=0.01))).forms
+
+    def energy(a, b):
+        forms.w.sub(0).interpolate(lambda X: np.stack([(a - 1) * X[0], (b - 1) * X[1], 0 * X[2]]) / forms.length)
+        return forms.integral(forms.potential)
+    taut, natural = energy(2.0, 1.0), energy(2.0, 2**-0.5)
+    assert natural < taut
+    full = Problem(disc()).forms
+    full.w.sub(0).interpolate(lambda X: np.stack([X[0], -0.5 * X[1], 0 * X[2]]) / full.length)
+    assert energy(2.0, 0.5) - natural == pytest.approx(0.01 * (full.integral(full.potential) - natural), rel=1e-4)
+
+
+def test_ribbed_tray_quick(tmp_path):
+    found = summary("ribbed_tray", tmp_path, "--quick")
+    coarse = found["size_16"]
+    assert found["mould"]["undercut_area"] == 0 and coarse["touching"] > 0.95
+    assert coarse["weight_g"] == pytest.approx(27.57, rel=0.02) and 0.4 < coarse["least_wall_mm"] < 0.8
+    assert (tmp_path / "part.stl").stat().st_size > 1000

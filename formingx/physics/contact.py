@@ -73,7 +73,7 @@ class Contact(Part):
         ramp: theta over thickness of the sheet; default 1e-7 where points slide, 1e-5 where they stick or are held.
         elastic_slip: g_s over thickness of the sheet: how far a point goes under Coulomb's law before it slides.
         separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
-            start); with "stick" or "none".
+            start); with "stick" or "none". In space what has touched is always held, until a stage leaves the tool out.
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge); in space so many
             hundredths of all nodes.
             What sticks or gives off heat depends on when it touched: with 4, a run takes half the iterations, and
@@ -178,7 +178,7 @@ class Contact(Part):
         """
         theta, elastic_slip = self.ramp * thickness, self.elastic_slip * thickness
         if self.tool.components == 3:
-            return LaggedStick(self.tool, k, theta, thickness, self.separates)
+            return LaggedStick(self.tool, k, theta)
         foot = (1 - _AT_FOOT * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)
         return Law(self.tool, self.friction_at(temperature), k, theta, elastic_slip, shift, self.separates,

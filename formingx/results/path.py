@@ -29,7 +29,10 @@ class Path(States):
     pilot: Path | None = None
 
     def doubts(self) -> list[tuple[str, str]]:
-        """(how bad: "serious" or "minor"; what) of contact in the last state; collective."""
+        """(how bad: "serious" or "minor"; what) of contact in the last state, of wrinkles in space; collective."""
+        if self._in_space:
+            from .space import show
+            return show.doubts(self.wall()) if self.problem.scene.model.wrinkles is None else []
         return self._view(self.segments[-1]).verdict.doubts(self.last)
 
     def profile(self, state: State | None = None) -> Profile:
@@ -140,6 +143,8 @@ class Path(States):
         modes: waves round the axis; in plane strain wave numbers along the depth. states: how many, "all", or those.
         An InputError for a membrane, and for a load that does not say how it changes with a mode.
         """
+        if self._in_space:
+            raise InputError("stability: in space there are no modes yet")
         from .stability import Watch
         self._watch = self._watch or Watch(self)
         return self._watch.look(modes, states)
@@ -168,8 +173,8 @@ class Path(States):
             state: default the last.
             density: of the material at rest (under `ThermalExpansion` where it is free of stress), in g/cm3, for the
                 weight in grams; say the unit of length with `units` (without, it is cm).
-            trim: in space a z, beyond which the part lies; else the radius at which the part is cut off, or ("height", h), lengths: the last place from the axis where
-                the middle line goes beyond it.
+            trim: the radius at which the part is cut off, or ("height", h), lengths: the last place from the axis where
+                the middle line goes beyond it. In space a z, beyond which the part lies.
             heights: give the wall at these heights too (`Wall.height`).
             units: a `formingx.Units`.
 

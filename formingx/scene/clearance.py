@@ -12,6 +12,7 @@ from ..physics.contact import Contact
 from .scene import Scene
 
 _LOOKS = 50            # how often the tools are looked at on the way of a stage
+_MOST = 1000           # points of a tool in space that are looked at
 
 
 def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None) -> list[Any]:
@@ -62,19 +63,24 @@ def _check_overlap(scene: Scene, who: str, present: dict[int, Contact], outlines
         for j, b in present.items():
             if j <= i or j in scene.together(i) or not np.isfinite(where[i] + where[j]):
                 continue
-            shift = where[i] * np.array(a.moves or (0, 0)) - where[j] * np.array(b.moves or (0, 0))
+            rests = (0,) * a.tool.components
+            shift = where[i] * np.array(a.moves or rests) - where[j] * np.array(b.moves or rests)
             for points, other, back in ((outlines[i] + shift, b, 0.0), (outlines[j], a, shift)):
                 depth = other.tool.signed_distance(points - back)
                 worst = int(np.argmax(depth))
                 if depth[worst] > near:
-                    r, z = points[worst] + where[j] * np.array(b.moves or (0, 0))
+                    at = ", ".join(f"{x:.6g}" for x in points[worst] + where[j] * np.array(b.moves or rests))
+                    axes = ", ".join(scene.kinematics.axes).replace("r, z", "R, Z")
                     raise InputError(f"{who}: tools overlap: with {_at(a, where[i])} and {_at(b, where[j])} one reaches"
-                                     f" {depth[worst]:.6g} into the other at (R, Z) = ({r:.6g}, {z:.6g}); leave one out"
+                                     f" {depth[worst]:.6g} into the other at ({axes}) = ({at}); leave one out"
                                      f" with without=[...], or end the travel earlier")
 
 
 def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
-    """Points along a tool's profile, shape (n, 2)."""
+    """Points along a tool's profile, shape (n, 2); of one in space some of its surface, shape (n, 3)."""
+    if contact.tool.components == 3:
+        points = contact.tool.surface()[0]
+        return points[:: max(1, len(points) // _MOST)]
     corners = contact.tool.outline()
     parts = np.linspace(0, 1, pieces, endpoint=False)[:, None]
     return np.concatenate([*(a + parts * (b - a) for a, b in zip(corners, corners[1:])), corners[-1:]])

@@ -302,14 +302,14 @@ class Scene:
         """An InputError if a tool's travel (length) would put a held boundary as a whole inside the tool."""
         moves = np.array(contact.moves)
         for support in self.supports:
-            for held in support.constraints():
+            for held in self.kinematics.in_axes(support, support.constraints()):
                 if not isinstance(held, Held) or held.on is None or moves[held.component] == 0:
                     continue
                 depth = contact.tool.signed_distance(self.mesh.nodes_of(held.on) - travel * moves)
                 if depth.min() >= 0:
                     raise InputError(f"travel = {travel:g}: {contact!r} would go through the whole height of the"
                                      f" body to {held.on!r}, which is held: the travel must be less than"
-                                     f" {travel - depth.max() / np.hypot(*moves):.6g}")
+                                     f" {travel - depth.max() / np.linalg.norm(moves):.6g}")
 
     def _check_axis(self, supports: Sequence[Any]) -> None:
         if not self.kinematics.axisymmetric:

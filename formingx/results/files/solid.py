@@ -88,10 +88,10 @@ def to_gltf(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm:
         accessors.append(accessor)
         data += array.tobytes()
     accessors[0] |= {"min": upright.min(0).astype("<f4").tolist(), "max": upright.max(0).astype("<f4").tolist()}
-    surface = {"metallicFactor": 0.0, "roughnessFactor": 0.6}
+    shine = {"metallicFactor": 0.0, "roughnessFactor": 0.6}
     about = {"asset": {"version": "2.0", "generator": "formingx"}, "scene": 0, "scenes": [{"nodes": [0]}],
              "nodes": [{"mesh": 0}], "buffers": [{"byteLength": len(data)}], "bufferViews": views,
-             "accessors": accessors, "materials": [{"doubleSided": True, "pbrMetallicRoughness": surface}],
+             "accessors": accessors, "materials": [{"doubleSided": True, "pbrMetallicRoughness": shine}],
              "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "COLOR_0": 1}, "indices": 2, "material": 0}]}]}
     text = json.dumps(about).encode()
     text += b" " * (-len(text) % 4)

@@ -15,10 +15,10 @@ from .wall import WallInSpace
 
 @dataclass(frozen=True)
 class PartInSpace:
-    """A part as modelled (a quarter of a sheet is a quarter of the part); whole triangles are in it or not.
+    """A part as modelled (a quarter of a sheet is a quarter of the part).
 
     Attributes:
-        volume, area: length^3, of the surface length^2; draw_ratio: area over that at rest; mean_wall: volume over area.
+        volume, area: length^3, of the surface length^2; draw_ratio: area over that at rest; mean_wall: volume/area.
         least_wall: length; least_at: (x, y, z) where; least_from: (x, y) where it was on the flat sheet.
         evenness: least over mean wall; variation: standard deviation of the wall over the surface, over its mean.
         weight: grams if a density in g/cm3 was given; else None. scrap: volume beyond the trim over that of the sheet.
@@ -64,15 +64,16 @@ def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, unit
     """See `Path.part`; trim: the z of the plane beyond which, seen from the flat sheet, the part lies."""
     if len(tuple(heights)):
         raise InputError("part: heights: in space use path.wall().section(point, normal)")
-    kept = np.ones(len(wall.wall), dtype=bool)
+    share = np.ones(len(wall.wall))
     if trim is not None:
-        level, z = finite("part: trim", trim), wall.middle[:, 2]
-        kept = (z - level) * np.sign(z[np.argmax(np.abs(z))] - level) > 0
-        if not kept.any() or kept.all():
+        level, z = finite("part: trim", trim), wall.now[:, 2]
+        if not z.min() < level < z.max():
             raise InputError(f"part: trim = {trim!r}: must be a z that the part passes: it goes from {z.min():.6g} to"
                              f" {z.max():.6g}")
-    h, area = wall.wall[kept], wall.area[kept]
-    volume, rest = float((h * area).sum()), wall.area_at_rest[kept]
+        share = _beyond((z - level)[wall.triangles] * np.sign(z[np.argmax(np.abs(z))] - level))
+    kept = share > 0
+    h, area, rest = wall.wall[kept], (wall.area * share)[kept], (wall.area_at_rest * share)[kept]
+    volume = float((h * area).sum())
     mean, k = volume / area.sum(), int(np.flatnonzero(kept)[np.argmin(h)])
     whole = float((wall.wall * wall.area).sum())
     weight = None if density is None else units.mass(volume, positive("part: density", density))
@@ -80,6 +81,15 @@ def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, unit
                        tuple(wall.middle[k].tolist()), tuple(wall.rest[wall.triangles[k], :2].mean(0).tolist()),
                        float(wall.wall[k] / mean), float(np.sqrt(np.average((h - mean) ** 2, weights=area)) / mean),
                        weight, 1 - volume / whole, float(rest[wall.wrinkled[kept]].sum() / rest.sum()), units)
+
+
+def _beyond(d: np.ndarray) -> np.ndarray:
+    """Part of triangles' areas where what is d at their corners, shape (m, 3), and linear between, is above 0."""
+    alone = np.argmax((d > 0) == ((d > 0).sum(1) == 1)[:, None], axis=1)       # the corner that is on its own side
+    a, b, c = (np.take_along_axis(d, (alone[:, None] + k) % 3, 1)[:, 0] for k in range(3))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        tip = a * a / ((a - b) * (a - c))
+    return np.where((d > 0).all(1), 1.0, np.where((d <= 0).all(1), 0.0, np.where(a > 0, tip, 1 - tip)))
 
 
 @dataclass(frozen=True, repr=False)
@@ -109,4 +119,5 @@ def filling(path: Any, contact: Any) -> FillingInSpace:
         touching, whole, gap = (list(column) for column in zip(*parts))
         rows.append((sum(touching) / sum(whole), max(gap)))
     name = path.columns[0]
-    return FillingInSpace((name, path[name]), *np.array(rows).T, comm)
+    touched, gaps = np.array(rows).T
+    return FillingInSpace((name, path[name]), touched, gaps, comm)

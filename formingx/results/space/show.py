@@ -147,9 +147,9 @@ def doubts(wall: WallInSpace) -> list[tuple[str, str]]:
         return []
     k = int(np.argmax(wall.wrinkled))
     at = ", ".join(f"{v:.4g}" for v in wall.middle[k])
-    return [("serious", f"{100 * share:.2g} % of the sheet is in compression in the last state, one place at (x, y, z) ="
-                        f" ({at}): it wrinkles there, and its wall depends on the mesh: use Membrane(wrinkles=0.01), and"
-                        f" look at path.wall().wrinkled.")]
+    return [("serious", f"{100 * share:.2g} % of the sheet is in compression in the last state, one place at (x, y, z)"
+                        f" = ({at}): it wrinkles there, and its wall depends on the mesh: use Membrane(wrinkles=0.01),"
+                        f" and look at path.wall().wrinkled.")]
 
 
 def _mirrors(path: Any, wall: WallInSpace) -> list[np.ndarray]:

@@ -1,0 +1,108 @@
+"""A tray with ribs, draft and a boss, from an STL file: a plug draws the sheet down, then vacuum; the sheet relaxes.
+
+The mould is drawn here as a height over the plane, 150 mm by 90 mm at its mouth and 35 mm deep, its walls have 10
+degrees, with ribs and a boss (an F) on its floor, and written as a closed solid. Lengths in mm, stresses in MPa, times in s.
+"""
+
+import numpy as np
+from common import COMM, parser, say, summarise
+
+import formingx as fx
+from formingx.results import files
+from formingx.tools.solid import write_stl
+
+HALF, CORNER, DEPTH, DRAFT = np.array([75.0, 45.0]), 20.0, 35.0, np.radians(10.0)
+SHEET, THICKNESS, DENSITY = (170.0, 110.0), 1.5, 1.05
+MATERIAL = fx.Viscoelastic(fx.NeoHookean(c10=0.03), [(0.15, 0.5)])
+BARS = [((-50, 0), (2.0, 26.0), 5.0), ((-30, 0), (2.0, 26.0), 5.0),                 # ribs: middle, half widths, height
+        ((20, 0), (3.0, 14.0), 3.0), ((30, 11), (12.0, 3.0), 3.0), ((27, -1), (9.0, 3.0), 3.0)]    # an F
+PLUG_TRAVEL, SEAL, VACUUM = 24.0, 0.02, 0.08
+
+
+def rounded(a, b, radius):
+    """The smaller of two, with a fillet between."""
+    h = np.clip(0.5 + 0.5 * (b - a) / radius, 0, 1)
+    return b + (a - b) * h - radius * h * (1 - h)
+
+
+def away(x, y, middle, half, corner):
+    """Distance to a rounded rectangle in the plane, below 0 inside."""
+    u, v = np.abs(x - middle[0]) - half[0] + corner, np.abs(y - middle[1]) - half[1] + corner
+    return np.hypot(np.maximum(u, 0), np.maximum(v, 0)) + np.minimum(np.maximum(u, v), 0) - corner
+
+
+def height(x, y):
+    """z of the mould's surface."""
+    wall = -away(x, y, (0, 0), HALF, CORNER) / np.tan(DRAFT)
+    deep = rounded(wall, np.full_like(x, DEPTH), 9.0)
+    for middle, half, high in BARS:                                   # their flanks have a draft of 20 degrees
+        bar = np.clip(-away(x, y, middle, half, 1.0) / np.tan(np.radians(20.0)), -30.0, high)
+        deep = rounded(deep, DEPTH - bar, 2.5)
+    return -np.maximum(rounded(deep, np.full_like(x, 1e3), 1.0), 0.0)
+
+
+def write_mould(file, step):
+    """The height on a grid, closed by sides and a bottom."""
+    x, y = (np.linspace(-w / 2 - 10, w / 2 + 10, int(w / step) + 2) for w in SHEET)
+    X, Y = np.meshgrid(x, y, indexing="ij")
+    n, m = X.shape
+    top = np.stack([X, Y, height(X, Y)], -1).reshape(-1, 3)
+    low = top * (1, 1, 0) - (0, 0, DEPTH + 15)
+    row = np.arange(n * m).reshape(n, m)
+    a, b, c, d = row[:-1, :-1], row[1:, :-1], row[1:, 1:], row[:-1, 1:]
+    up = np.concatenate([np.stack(t, -1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
+    rim = np.concatenate([row[:-1, 0], row[-1, :-1], row[:0:-1, -1], row[0, :0:-1]])
+    i, j, k = rim, np.roll(rim, -1), n * m
+    sides = np.concatenate([np.column_stack([j, i, i + k]), np.column_stack([j, i + k, j + k])])
+    triangles = np.concatenate([up, up[:, ::-1] + k, sides])
+    write_stl(np.vstack([top, low]), triangles, file)
+
+
+def form(size, mould):
+    """The path of plug and vacuum."""
+    sheet = fx.mesh.sheet(fx.mesh.rectangle(*SHEET, corner=25), size=size)
+    plug = fx.tools.box(half=(52, 27), depth=30, corner=15, fillet=8, draft=5, mouth=30.5, plug=True)
+    contacts = [fx.Contact("bottom", mould, "stick", name="mould", nodes_per_step=2),
+                fx.Contact("top", plug, "stick", moves=(0, 0, -1), name="plug", nodes_per_step=2)]
+    scene = fx.Scene(mesh=sheet, thickness=THICKNESS, materials=MATERIAL, supports=[fx.SimplySupported("rim")],
+                     loads=[fx.Pressure("top", name="vacuum")], contacts=contacts, model=fx.Membrane(wrinkles=0.01))
+    stages = [fx.Stage("plug", drive="plug", until=fx.travel(PLUG_TRAVEL), speed=60.0), fx.Stage("hold", duration=0.3),
+              fx.Stage("seal", drive="vacuum", until=fx.pressure(SEAL)), fx.Stage("plug off", without=["plug"]),
+              fx.Stage("vacuum", drive="vacuum", until=fx.pressure(VACUUM), without=["plug"])]
+    return fx.Process(scene).run(stages)
+
+
+def main():
+    options = parser("ribbed_tray", __doc__.splitlines()[0])
+    options.add_argument("--sizes", type=float, nargs="+", default=[12.0, 8.0, 5.0], help="of the triangles, mm")
+    args = options.parse_args()
+    sizes, step = ([16.0], 3.0) if args.quick else (args.sizes, 1.25)
+    if COMM.rank == 0:
+        args.out.mkdir(parents=True, exist_ok=True)
+        write_mould(args.out / "mould.stl", step)
+    COMM.Barrier()
+    mould, units = fx.tools.solid(args.out / "mould.stl"), fx.Units(length="mm", stress="MPa", time="s")
+    summary = {"mould": {"triangles": mould.triangles, **mould.undercuts()}}
+    for size in sizes:
+        path = form(size, mould)
+        part = path.part(density=DENSITY, trim=-0.5, units=units)
+        summary[f"size_{size:g}"] = {
+            "least_wall_mm": part.least_wall, "least_at_mm": list(part.least_at), "weight_g": part.weight,
+            "draw_ratio": part.draw_ratio, "touching": path.filling("mould").touching[-1],
+            "plug_force_N": float(np.abs(path["plug_force"]).max()), "states": len(path),
+            "iterations": path.counts.iterations, "failures": path.counts.failures,
+            "unknowns": path.problem.n_unknowns, "seconds": path.counts.seconds}
+        say(f"size {size:g} mm: {path.counts.iterations} iterations, {path.counts.failures} failures,"
+            f" {path.counts.seconds:.0f} s", str(part), "")
+    path.wall().to_csv(args.out / "wall.csv", units)
+    path.to_csv(args.out / "ribbed_tray.csv")
+    path.to_stl(args.out / "part.stl")
+    if not args.quick:
+        path.view3d(args.out / "ribbed_tray.png")
+        path.view3d(args.out / "printed_grid.png", grid=10.0)
+        path.report(args.out / "report.html", "Ribbed tray", units=units, density=DENSITY, trim=-0.5)
+    summarise(args.out, {**summary, "versions": files.versions()})
+
+
+if __name__ == "__main__":
+    main()
