@@ -1,7 +1,8 @@
 """A tray with ribs, draft and a boss, from an STL file: a plug draws the sheet down, then vacuum; the sheet relaxes.
 
-The mould is drawn here as a height over the plane, 150 mm by 90 mm at its mouth and 35 mm deep, its walls have 10
-degrees, with ribs and a boss (an F) on its floor, and written as a closed solid. Lengths in mm, stresses in MPa, times in s.
+The mould is drawn here as a height over the plane, 150 mm by 90 mm at its mouth and 35 mm deep, its walls at 10 degrees
+to the axis, with ribs and a boss (an F) on its floor, and written as a closed solid. Lengths in mm, stresses in MPa,
+times in s.
 """
 
 import numpy as np
