@@ -28,7 +28,7 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
     Raises:
         InputError: there is neither a screen nor Xvfb to draw on.
     """
-    from ..show.views import _fit, _screen
+    from ..show.views import _fit, screen
     file, wall, comm = files.named("view3d", file, ".png"), wall_of(path, state), path.problem.comm
     lines = wall.printed(grid) if grid else []
     mirrored = _mirrors(path, wall)
@@ -36,7 +36,7 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
     def draw():
         import pyvista
         picture = io.BytesIO()
-        with _screen():
+        with screen():
             plotter: Any = pyvista.Plotter(off_screen=True, window_size=(1000, 800))
             plotter.set_background("white")
             values = wall.at_nodes / wall._to_nodes(wall.thickness_at_rest)
