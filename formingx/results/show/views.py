@@ -104,7 +104,7 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
         plotter.add_mesh(pyvista.lines_from_points(points, close=True), color="black", line_width=2)
     plotter.camera_position = [camera, (0, 0, 0), (0, 0, 1)]
     plotter.reset_camera()
-    _fit(plotter, np.vstack([np.column_stack(place(line, s)) for s in stations]))
+    fit(plotter, np.vstack([np.column_stack(place(line, s)) for s in stations]))
     plotter.enable_anti_aliasing("ssaa")
     try:
         plotter.screenshot(file)
@@ -112,7 +112,7 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
         plotter.close()
 
 
-def _fit(plotter: Any, points: np.ndarray) -> None:
+def fit(plotter: Any, points: np.ndarray) -> None:
     """Turn the zoom and shift the picture so that points, shape (n, 3), fill the window beside the colour bar."""
     camera, (width, height) = plotter.camera, plotter.window_size
     matrix = camera.GetCompositeProjectionTransformMatrix(width / height, -1, 1)

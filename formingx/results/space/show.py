@@ -28,7 +28,7 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
     Raises:
         InputError: there is neither a screen nor Xvfb to draw on.
     """
-    from ..show.views import _fit, screen
+    from ..show.views import fit, screen
     file, wall, comm = files.named("view3d", file, ".png"), wall_of(path, state), path.problem.comm
     lines = wall.printed(grid) if grid else []
     mirrored = _mirrors(path, wall)
@@ -56,7 +56,7 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
             below = wall.now[:, 2].min() < -wall.now[:, 2].max()        # look into the part
             plotter.camera_position = [(1.7, -2.4, 2.6 if below else 1.7), (0, 0, 0), (0, 0, 1)]
             plotter.reset_camera()
-            _fit(plotter, np.vstack([wall.now * side for side in mirrored]))
+            fit(plotter, np.vstack([wall.now * side for side in mirrored]))
             plotter.enable_anti_aliasing("ssaa")
             try:
                 plotter.screenshot(picture)
