@@ -103,8 +103,8 @@ class Verdict:
             bad, cells, (R, Z) = problem.inside_out()
             if bad > max(_FEWEST, _INSIDE_OUT * cells):
                 yield (f"{bad} of {cells} elements are inside out, the worst at (R, Z) = ({R:.5g}, {Z:.5g}):"
-                       f" make the mesh again on the way (trace(remesh=Remesh(size=...)), a crushed block), or columns by a first"
-                       f" run (trace(pilot=True), a sheet over an edge)")
+                       f" make the mesh again on the way (trace(remesh=Remesh(size=...)), a crushed block), or by a"
+                       f" first run (trace(pilot=True), a sheet over an edge)")
             edges = self._outline.edges()
             for deep in self._deepest(edges, state, own=False):
                 yield (f"the body stands {deep.depth:.4g} deep in the tool of {deep.name!r} at (r, z) ="
