@@ -83,3 +83,77 @@ def test_bad_input_is_told_in_words():
                          ((1, 3, 0), "below the second")):
         with pytest.raises(fx.InputError, match=words):
             fx.Design(disc, {"c": wrong})
+
+
+def cup(b, fillet=0.2):
+    """A sheet that sticks to a cup as it comes to it."""
+    mesh = fx.mesh.disc(radius=1.0, thickness=0.03, elements=(12, 1))
+    mould = fx.tools.cup(radius=1.0, depth=0.7, mouth=0.03, draft=10.0, fillet=fillet)
+    return fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=lambda R, Z: 0.5 * (1 + b * (R**2 - 0.5))),
+                    contacts=[fx.Contact("top", mould, "stick")], **CAN), fx.pressure(0.25)
+
+
+def test_when_a_node_touches_moves_with_the_parameter():
+    """Differences of whole runs of a stuck cup; with the steps held as they were the derivative would be 0.04 off.
+
+    (Those at an element from the rim, and there, scatter with the steps.)
+    """
+    design = fx.Design(cup, {"b": (0.0, -1, 1)})
+    run = design.run()
+    exact = run.derivative("wall")[1][:, 0] / 0.03
+    above, below = (design.run({"b": b}).wall for b in (0.02, -0.02))
+    assert abs(exact - (above - below) / 0.04 / 0.03)[2:-2].max() < 0.006
+    assert exact[[3, 12, 19]] == pytest.approx([-0.13, -0.055, 0.11], abs=0.02)
+
+
+def pot(mu, travel, relaxing=False):
+    """A plug with Coulomb's friction, then a little air; a sheet that may relax."""
+    mesh = fx.mesh.disc(radius=3.0, thickness=0.1, elements=(12, 1))
+    plug = fx.tools.male(radius=1.5, height=8.0, base=-8.0, draft=3.0, fillet=0.8)
+    sheet = fx.Viscoelastic(fx.NeoHookean(c10=0.5), branches=[(1.0, 2.0)]) if relaxing else fx.NeoHookean(c10=1.0)
+    scene = fx.Scene(mesh=mesh, materials=sheet, supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     loads=[fx.Pressure("bottom", name="air")],
+                     contacts=[fx.Contact("bottom", plug, mu, moves=(0, 1), name="plug")])
+    return scene, [fx.Stage("plug", drive="plug", until=fx.travel(travel), speed=4.0 if relaxing else None),
+                   fx.Stage("air", drive="air", until=fx.pressure(0.03), duration=0.5 if relaxing else None)]
+
+
+@pytest.mark.parametrize("relaxing", (False, pytest.param(True, marks=pytest.mark.slow)))
+def test_stages_friction_and_time(relaxing):
+    """By friction, and by the travel at which the stage before ended; of a sheet that forgets, too."""
+    at = {"mu": 0.3, "travel": 1.8}
+    design = fx.Design(lambda **values: pot(**values, relaxing=relaxing), {"mu": (0.3, 0, 1), "travel": (1.8, 1, 2)},
+                       step=fx.StepControl(target=8))
+    by = design.run().derivative("wall")[1]
+    for k, name in enumerate(at):
+        above, below = (design.run({name: at[name] + h}).wall for h in (0.01, -0.01))
+        whole = (above - below) / 0.02
+        assert np.linalg.norm(by[:, k] - whole) < (0.02 if relaxing else 2e-3) * np.linalg.norm(whole), name
+
+
+def test_where_a_run_has_no_derivative_it_says_so():
+    """A flow with a history, a jump: no number is given."""
+    def held(mu):
+        scene, stages = pot(mu, 1.0)
+        return scene, [*stages[:1], fx.Stage("hold", drive="air", hold=fx.pole_height(1.05), duration=1.0)]
+    run = fx.Design(held, {"mu": (0.3, 0, 1)}, step=fx.StepControl(target=8)).run()
+    with pytest.raises(fx.InputError, match="no derivative: a flow"):
+        run.derivative("wall")
+
+
+def test_spread_and_table():
+    run = fx.Design(disc, {"c": (0.0, -1, 1), "h": (0.05, 0.01, 0.1)}).run()
+    by = run.derivative("wall")[1]
+    assert run.spread({"c": 0.1, "h": 0.002}) == pytest.approx(np.hypot(0.1 * by[:, 0], 0.002 * by[:, 1]))
+    assert "c" in str(run.sensitivities("wall")) and run.sensitivities("pressure").by.shape == (1, 2)
+    with pytest.raises(fx.InputError, match="parameter 'mu' is not known"):
+        run.spread({"mu": 0.1})
+
+
+def test_least_weight():
+    """The wall is nowhere thinner than asked, and somewhere as thin; a thicker one than needed is made thinner."""
+    design = fx.Design(programmed, {"h": fx.along(4, start=0.0, low=-1, high=1)})
+    answer = design.least_weight(least_wall=0.012, runs=10)
+    assert answer.best.wall.min() == pytest.approx(0.012, rel=2e-3)
+    assert answer.best.volume < 0.95 * answer.before.volume
+    assert answer.best.wall.max() < 0.0125

@@ -155,9 +155,9 @@ class _Carrier:
         none = np.zeros(len(face.points), dtype=bool)
         if touch is None or not law.has_friction or not face.present:
             return none
-        arrived = (touch.distance <= -law.theta) & (law.distance(face.positions(state.x[:n], state.control))
-                                                    > -law.theta)
-        late = arrived & np.isnan(touch.arrival[:, 0])
+        distance = law.distance(face.positions(state.x[:n], state.control))
+        arrived = (touch.distance <= -law.theta) & (distance > -law.theta)
+        late = arrived & (np.isnan(touch.arrival[:, 0]) | (not face.contact.sticks) & (distance < law.theta))
         velocity = face.moved(before.direction, before.slope)
         start = face.positions(before.x[:n], before.control)
         gap = law.distance(np.where(np.isnan(touch.arrival), start, touch.arrival))
