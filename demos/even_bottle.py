@@ -41,7 +41,7 @@ def main():
     options.add_argument("--elements", type=int, default=60, help="along the meridian")
     options.add_argument("--runs", type=int, default=6, help="at most so many")
     args = options.parse_args()
-    elements = (30 if args.quick else args.elements, 1)
+    elements = (24 if args.quick else args.elements, 1)
     design = fx.Design(lambda wall: bottle(wall, elements),
                        {"wall": fx.along(KNOTS, start=WALL, low=0.1, high=0.39)}, step=fx.StepControl(target=8))
     first = design.run()

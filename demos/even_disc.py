@@ -57,7 +57,7 @@ def main():
     options.add_argument("--elements", type=int, default=80, help="elements along the radius")
     options.add_argument("--knots", type=int, default=21, help="of the splines")
     args = options.parse_args()
-    elements, knots = ((20, 1), 7) if args.quick else ((args.elements, 1), args.knots)
+    elements, knots = ((14, 1), 6) if args.quick else ((args.elements, 1), args.knots)
     stretches, walls = (STRETCHES[:1], WALLS[:1]) if args.quick else (STRETCHES, WALLS)
     summary = {"thickness": {}, "constant": {}, "knots": knots, "elements_along": elements[0],
                "versions": files.versions()}

@@ -17,7 +17,7 @@ import formingx as fx
 from formingx.figures import figure
 from formingx.results import files
 
-DEPTH, SHEET, C, PRESSURE = 1.5, 0.01, 0.5, 0.5
+DEPTH, SHEET, C, PRESSURE = 1.5, 0.01, 0.5, 0.9
 WALL, COUNTED = SHEET / (1 + DEPTH), 0.97                    # of the half width
 PLACES = {"rim": 0.0, "half_wall": (DEPTH - 1) / 2, "mouth": DEPTH - 1, "corner_0.5": DEPTH - 0.5,
           "corner_0.1": DEPTH - 0.1}                          # how deep on the wall they end
@@ -75,7 +75,8 @@ def main():
         profile, mean = answer.values["profile"], answer.best.wall[answer.inside].mean()
         if of == "h0":
             summary["h0_over_h"], summary["h0_over_h_on_the_floor"] = (
-                {name: float(SHEET * np.exp(profile(R)) / mean) for name, R in there.items()} for there in (wall, floor))
+                {name: float(SHEET * np.exp(profile(R)) / mean) for name, R in there.items()}
+                for there in (wall, floor))
         else:
             summary["C_over_C_rim"] = {name: float(np.exp(profile(wall[name]) - profile(wall["rim"])))
                                        for name in ("half_wall", "mouth")}
@@ -84,7 +85,7 @@ def main():
         say(f"{of}: {answer.paths} runs, cv {answer.cv[0]:.4f}, after {answer.cv[1]:.4f}; radius of the free arc"
             f" {arc(answer):.4f}", str(summary["h0_over_h" if of == "h0" else "C_over_C_rim"]))
         R = np.linspace(0, 1, 201)
-        axes[k].plot(R, np.exp(profile(R)) * SHEET / mean if of == "h0" else np.exp(profile(R) - profile(1.0)), "C0")
+        axes[k].plot(R, np.exp(profile(R) - (of == "C") * profile(1.0)) * (SHEET / mean if of == "h0" else 1), "C0")
         for name, at in wall.items():
             axes[k].axvline(at, color="0.8", linewidth=0.8)
             axes[k].text(at, 0.02, f" {name}", rotation=90, fontsize=7, transform=axes[k].get_xaxis_transform(),

@@ -30,6 +30,9 @@ _SPARE = 1e-6
 _DAMPED = 1e-6
 """Of what has most effect: smaller effects count as none."""
 
+_WORTH = 0.02
+"""Of the sum of squares: a run that is better by less is the last."""
+
 _SHORTEST = 1 / 64
 """Part of a step of a search below which nothing better is looked for."""
 
@@ -124,7 +127,13 @@ class Design:
         notes: list[str] = []
         why = f"{most} runs were taken"
         while len(taken) + len(notes) < most:
-            left, by = aim.residual(best)
+            try:
+                left, by = aim.residual(best)
+            except InputError as error:
+                if best is first:
+                    raise
+                why = str(error)
+                break
             if not np.any(np.abs(by * size) > 1e-9):
                 raise InputError("fit: no parameter has an effect on what is fitted")
             held = _DAMPED * np.linalg.norm(by * size, 2) * np.eye(len(size))     # what has no effect stays
@@ -148,7 +157,11 @@ class Design:
                 why = "no shorter step is better" if share < _SHORTEST else why
                 break
             foretold = best.wall + share * (best.derivative("wall")[1] @ step)
+            gained = 1 - aim.cost(new) / aim.cost(best)
             best = new
+            if gained < _WORTH:
+                why = f"the last run was {100 * gained:.1f} % better"
+                break
             log.info("design: run %d, cost %.3g", len(taken), aim.cost(best))
         return Answer(first, best, taken, notes, aim.inside, why, foretold)
 
@@ -174,7 +187,13 @@ class Design:
         def cost(run: DesignRun) -> float:
             return run.volume / first.volume + 10 * max(least - run.wall[inside].min(), 0.0) / least
         while len(taken) + len(notes) < most:
-            wall, by = best.derivative("wall")
+            try:
+                wall, by = best.derivative("wall")
+            except InputError as error:
+                if best is first:
+                    raise
+                why = str(error)
+                break
             grows = best.derivative("volume")[1][0] / first.volume
             n = len(size)
             # the wall's lack, in parts of the least wall, is one more unknown: there is a solution at any rate

@@ -28,6 +28,10 @@ _NONE = 2e-13
 """Corrections, over the unknowns, that are round-off."""
 
 
+class Apart(Failure):
+    """A neighbour is not found near its run: its parameter was changed by too much for contact's thin ramps."""
+
+
 class Neighbour:
     """One problem beside that of a run, and its state.
 
@@ -84,7 +88,7 @@ def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: 
     the neighbours.
 
     Raises:
-        Failure: one is not found near it.
+        Apart: one is not found near it. Failure: the state has no tangent.
     """
     problem, newton = curve.problem, curve.newton
     problem.x.array_w[:] = state.x
@@ -127,11 +131,11 @@ def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: 
                 one.x, one.control = one.x + dx[:, j], one.control + steps[j]
             away = _norm(problem, one.x - state.x) + abs(one.control - state.control)
             if not np.isfinite(correction):
-                raise Failure(f"beside {one.name} there is no state near", [])
+                raise Apart(f"with {one.name} a little changed no state is found near", [])
             first[k] = correction if iteration == 0 else first[k]
             good &= correction <= max(enough * away, _NONE * size)
             if iteration == _MOST - 1 and correction > max(_GOOD * away, 10 * _NONE * size):
-                raise Failure(f"with {one.name} a little changed no state is found near", [])
+                raise Apart(f"with {one.name} a little changed no state is found near", [])
         if good:
             return
         # what is left is of second order: if nothing is of the one that was corrected most, the others are solved for

@@ -16,12 +16,12 @@ from ..solve.arc_length import Curve
 from ..solve.newton import Failure, Tolerances
 from ..solve.record import Record
 from .carry import carry
-from .neighbours import Neighbour
+from .neighbours import Apart, Neighbour
 from .parameters import Parameters
 
-_SMOOTH, _KINKS = 1e-5, 1e-8
-"""Changes of parameters, over their size, to the neighbours: of a scene without contact, and with it, which acts within
-a thin ramp."""
+_SMOOTH, _CLOSER = 1e-5, (1e-8, 1e-9, 1e-10)
+"""Changes of parameters, over their size, to the neighbours: of a scene without contact; and with it, which acts within
+a thin ramp: one after the other until all are found."""
 
 
 @dataclass(frozen=True)
@@ -76,14 +76,20 @@ class DesignRun:
     @cached_property
     def _pairs(self) -> list[tuple[Neighbour, Neighbour, float]]:
         """For each parameter a neighbour above and one below, solved for to the last state; how far apart they are."""
-        problem = self.path.problem
-        steps = (_KINKS if problem.contacts else _SMOOTH) * self._parameters.size
-        made = [(self._beside(k, step), self._beside(k, -step), 2 * step) for k, step in enumerate(steps)]
-        try:
-            carry(self.path, self._end, [one for *pair, _ in made for one in pair])
-        except Failure as failure:
-            raise InputError(f"Design: this run has no derivative: {failure.reason}") from None
-        return made
+        closest, reason = (_CLOSER if self.path.problem.contacts else (_SMOOTH,)), ""
+        for size in closest:
+            steps = size * self._parameters.size
+            made = [(self._beside(k, step), self._beside(k, -step), 2 * step) for k, step in enumerate(steps)]
+            try:
+                carry(self.path, self._end, [one for *pair, _ in made for one in pair])
+            except Apart as failure:
+                reason = failure.reason
+            except Failure as failure:
+                reason = failure.reason
+                break
+            else:
+                return made
+        raise InputError(f"Design: this run has no derivative: {reason}")
 
     def _beside(self, k: int, step: float) -> Neighbour:
         """A neighbour, one parameter changed; not solved for."""
