@@ -201,7 +201,6 @@ def test_throne_plug_quick(tmp_path):
         assert drawn(tmp_path / f"{picture}.png")
 
 
-@pytest.mark.slow
 def test_plug_adapted_quick(tmp_path):
     found = summary("plug_adapted", tmp_path, "--quick")["mu_0.3"]
     assert found["columns_of_pilots"] == [30] and 30 < found["columns"] < 60 and found["jumps"] == 0
@@ -258,6 +257,7 @@ def test_compression_extreme(tmp_path):
     assert found["stuck"]["least_J"] > 0.1 and found["stuck"]["remeshes"] >= 2
 
 
+@pytest.mark.slow
 def test_plug_friction_quick(tmp_path):
     found = summary("plug_friction", tmp_path, "--quick")["mu_0.3"]
     force, membrane = found["force_N_at_travel_cm"], found["membrane_force_N_at_travel_cm"]
