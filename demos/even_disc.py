@@ -38,7 +38,7 @@ def search(model, elements, knots, stretch, of):
     """The answer of one case: `of` is "h0" or "c"."""
     design = fx.Design(lambda profile: sheet(model, elements, stretch, **{of: profile}),
                        {"profile": fx.along(knots, start=0.0, low=-4.0, high=4.0, smooth=True)})
-    return design.fit(even=True, volume=None, runs=8, good=1e-4)
+    return design.fit(even=True, volume=None, runs=6, good=2e-4)
 
 
 def numbers(answer, name):
@@ -57,7 +57,7 @@ def main():
     options.add_argument("--elements", type=int, default=80, help="elements along the radius")
     options.add_argument("--knots", type=int, default=21, help="of the splines")
     args = options.parse_args()
-    elements, knots = ((14, 1), 6) if args.quick else ((args.elements, 1), args.knots)
+    elements, knots = ((14, 1), 8) if args.quick else ((args.elements, 1), args.knots)
     stretches, walls = (STRETCHES[:1], WALLS[:1]) if args.quick else (STRETCHES, WALLS)
     summary = {"thickness": {}, "constant": {}, "knots": knots, "elements_along": elements[0],
                "versions": files.versions()}

@@ -140,7 +140,7 @@ class Design:
             step = lsq_linear(np.vstack([by * size, held]), np.append(-left, 0 * size), tol=1e-12,
                               bounds=((low - best.vector) / size, (high - best.vector) / size)).x * size
             gain = np.sqrt(np.mean((by @ step) ** 2))
-            if gain < good:
+            if gain < good or np.sum((left + by @ step) ** 2) > (1 - _WORTH) * np.sum(left**2):
                 why = f"the next step would change the wall by {gain:.1e}"
                 break
             share, new = 1.0, None
