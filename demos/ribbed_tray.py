@@ -75,7 +75,7 @@ def form(size, mould):
 
 def main():
     options = parser("ribbed_tray", __doc__.splitlines()[0])
-    options.add_argument("--sizes", type=float, nargs="+", default=[12.0, 8.0, 5.0], help="of the triangles, mm")
+    options.add_argument("--sizes", type=float, nargs="+", default=[8.0, 5.0, 3.0], help="of the triangles, mm")
     args = options.parse_args()
     sizes, step = ([16.0], 3.0) if args.quick else (args.sizes, 1.25)
     if COMM.rank == 0:

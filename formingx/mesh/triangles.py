@@ -29,10 +29,10 @@ class Place(NamedTuple):
 
 
 def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
-    """A point, shape (2,), the same on all ranks, with the nearest boundary of the mesh; collective."""
+    """A point, shape (2,) (of a sheet in space (x, y)), the same on all ranks, with the nearest boundary of the mesh; collective."""
     best, size = ("", np.inf), 0.0
     for name in mesh.boundaries:
-        nodes = mesh.nodes_of(name)
+        nodes = mesh.nodes_of(name)[:, :2]
         if len(nodes):
             away = float(np.hypot(*(nodes - point).T).min())
             best, size = (name, away) if away < best[1] else best, max(size, float(np.abs(nodes).max()))

@@ -39,6 +39,9 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
         with screen():
             plotter: Any = pyvista.Plotter(off_screen=True, window_size=(1000, 800))
             plotter.set_background("white")
+            below = wall.now[:, 2].min() < -wall.now[:, 2].max()        # look into the part
+            seen_from = np.array([1.7, -2.4, 2.6 if below else 1.7])
+            lift = 0.004 * np.ptp(wall.now, axis=0).max() * seen_from / np.linalg.norm(seen_from)   # else lines flicker
             values = wall.at_nodes / wall._to_nodes(wall.thickness_at_rest)
             middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), 0.01) / 2
             bar = {"title": "thickness / original\n", "color": "black", "vertical": True, "position_x": 0.85,
@@ -52,9 +55,8 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
                                  smooth_shading=True, split_sharp_edges=False, scalar_bar_args=bar, ambient=0.45,
                                  diffuse=0.65, specular=0.2, specular_power=20)
                 for line in lines:
-                    plotter.add_mesh(pyvista.lines_from_points(line * side), color="black", line_width=1.5)
-            below = wall.now[:, 2].min() < -wall.now[:, 2].max()        # look into the part
-            plotter.camera_position = [(1.7, -2.4, 2.6 if below else 1.7), (0, 0, 0), (0, 0, 1)]
+                    plotter.add_mesh(pyvista.lines_from_points(line * side + lift), color="black", line_width=1.5)
+            plotter.camera_position = [tuple(seen_from), (0, 0, 0), (0, 0, 1)]
             plotter.reset_camera()
             fit(plotter, np.vstack([wall.now * side for side in mirrored]))
             plotter.enable_anti_aliasing("ssaa")
