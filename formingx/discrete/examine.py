@@ -81,7 +81,7 @@ class Examination:
         if failed and bool(np.isfinite(failed.J).all()):
             facts["failed_J"], facts["at_failed_J"], _ = _smallest_J(problem, failed)
         facts["residual"], facts["worst"], point = _residuals(problem, x, attempt.control)
-        if self._last is not None:
+        if self._last is not None and self._shape:
             self._marks.append(("largest force left over", _moved(problem, self._last, point)))
         facts["flipped"] = _flips(problem, attempt)
 
@@ -131,7 +131,7 @@ def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], 
         if comm.allreduce(len(part), MPI.SUM):
             total = comm.allreduce(float(np.sum(part**2)), MPI.SUM)
             residual[name] = float(np.sqrt(total)) / scale if np.isfinite(total) else np.inf
-    sizes = np.nan_to_num(np.hypot(*values[dofs].T), nan=np.inf)
+    sizes = np.nan_to_num(np.linalg.norm(values[dofs], axis=1), nan=np.inf)
     mine = (float(sizes.max(initial=-1.0)), points[np.argmax(sizes)].tolist() if len(sizes) else [0.0, 0.0])
     point = np.array(max(comm.allgather(mine))[1])
     return residual, place(problem.scene.mesh, point), point

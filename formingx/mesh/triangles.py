@@ -29,7 +29,7 @@ class Place(NamedTuple):
 
 
 def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
-    """A point, shape (2,) (of a sheet in space (x, y)), the same on all ranks, with the nearest boundary of the mesh; collective."""
+    """A point, shape (2,), in space (x, y), the same on all ranks, with the nearest boundary; collective."""
     best, size = ("", np.inf), 0.0
     for name in mesh.boundaries:
         nodes = mesh.nodes_of(name)[:, :2]
