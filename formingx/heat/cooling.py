@@ -304,6 +304,7 @@ def doubts(problem: Any, states: Sequence[Any]) -> list[tuple[str, str]]:
         return []
     begun = [k + 1 for k, (a, b) in enumerate(zip(states, states[1:])) if a.stage != b.stage]
     looked = sorted({*np.linspace(0, len(states) - 1, _LOOKS).astype(int).tolist(), *(k - 1 for k in begun)})
+    looked = [k for j, k in enumerate(looked) if not j or states[k].time > states[looked[j - 1]].time]
     errors = history.errors_in_space([states[k] for k in looked])
     temperatures = [states[k].memory[-1].temperature for k in looked]              # that of the heat is last
     ends = problem.comm.allgather([float(f(T)) for T in temperatures for f in (np.min, np.max) if len(T)])
