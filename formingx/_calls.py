@@ -31,6 +31,12 @@ _PACKAGE = __name__.partition(".")[0]
 _seen: set[type] = set()
 
 
+class _WrongCall(InputError, TypeError):
+    """Whoever looks for a `TypeError`, as code of Python does, finds it."""
+
+    __module__, __qualname__ = InputError.__module__, "InputError"
+
+
 def explain(module: types.ModuleType) -> None:
     """Explain the calls that fail of all that a module of the package exports: functions, classes and their methods."""
     for name, thing in list(vars(module).items()):
@@ -82,7 +88,7 @@ def _explained(call: Callable, name: str, skip: int) -> Callable:
             why = _wrong(call, f"{owner.__name__}.{name}" if owner else name, skip, args, given)
             if why is None:
                 raise
-            raise InputError(why) from error
+            raise _WrongCall(why) from error
         if type(result) not in _seen:
             _explain_class(type(result))
         return result
