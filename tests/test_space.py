@@ -8,6 +8,7 @@ from test_derivatives import assert_derivatives, difference, random_state
 
 import formingx as fx
 from formingx.discrete.problem import Problem
+from formingx.results.files.fields import Fields
 from formingx.tools.solid import write_stl
 
 MATERIALS = [fx.NeoHookean(c10=2.0), fx.MooneyRivlin(c10=1.5, c01=0.4), fx.Ogden(mu=(1.4, -0.3), alpha=(2.5, -2.0)),
@@ -174,13 +175,45 @@ def test_tool_files_are_looked_over(tmp_path):
     (lambda: disc(on="rim"), "a pressure on its 'bottom' or its 'top'"),
     (lambda: disc(thickness=None), "needs a thickness"),
     (lambda: disc(contacts=[fx.Contact("bottom", fx.tools.plane(1.0))]), "a sheet in space those of"),
-    (lambda: fx.trace(disc(), until=fx.pressure(0.001), progress=False).stability(), "in space"),
-    (lambda: fx.trace(disc(), until=fx.pressure(0.001), progress=False).work(), "in space"),
-    (lambda: fx.trace(disc(), until=fx.pressure(0.001), progress=False).profile(), "in space"),
+    (lambda: trough(separates=True), "separates = True: in space what has touched is held"),
+    (lambda: fx.Design(lambda h: (disc(thickness=h), fx.pressure(0.001)), {"h": (0.01, 0.005, 0.02)}).fit(even=True),
+     "in space has no profile"),
+    (lambda: fx.trace(disc(), until=fx.pressure(0.001), pilot=True, progress=False), "not one of columns"),
 ])
 def test_what_is_not_proven_is_refused(make, words):
     with pytest.raises(fx.InputError, match=words):
         make()
+
+
+def test_a_path_in_space_gives_what_it_has(tmp_path):
+    """And refuses the rest in words; a scene and a run are looked over; fields are those of the wall."""
+    path = fx.trace(trough(), until=fx.pressure(0.2), progress=False)
+    for name in ("stability", "work", "profile", "stress", "formed", "released", "contact"):
+        with pytest.raises(fx.InputError, match="in space"):
+            getattr(path, name)()
+    with pytest.raises(fx.InputError, match="sheet in space"):
+        fx.mesh.adapted(path)
+    with pytest.raises(fx.InputError, match="stability.*in space"):
+        fx.trace(trough(), until=fx.pressure(0.2), stop_at=fx.unstable(), progress=False)
+    assert fx.doctor(path, targets=[fx.pressure(0.2)]).findings == []
+    plug = fx.Contact("top", fx.tools.box(half=(0.3, 0.1), depth=0.2, mouth=0.5, plug=True), moves=(0, 0, 1))
+    scene = fx.Scene(mesh=disc().mesh, thickness=0.02, materials=MATERIALS[0], supports=HELD, contacts=[plug])
+    assert "must it be moves = (0, 0, -1)?" in str(fx.doctor(scene))
+    fields = Fields(path).of(path.last)
+    np.testing.assert_allclose(np.sort(fields["thickness"][:, 0, 0]), np.sort(path.wall().wall), rtol=1e-12)
+    np.testing.assert_allclose(fields["thickness_ratio"] * 0.02, fields["thickness"], rtol=1e-12)
+    assert fields["displacement"].shape[-1] == 3 and fields["displacement"][..., 2].min() < -0.1
+    path.to_xdmf(tmp_path / "tray.xdmf")
+
+
+def test_a_run_that_ends_early_says_why():
+    with pytest.raises(fx.ConvergenceError, match="max_steps = 3 ran out") as failure:
+        fx.trace(trough(), until=fx.pressure(1.0), max_steps=3, progress=False)
+    assert len(failure.value.path) == 4
+    loose = fx.Scene(mesh=disc().mesh, thickness=0.01, materials=MATERIALS[0], supports=HELD[:1],
+                     loads=[fx.Gravity(density=1e-3)])
+    with pytest.raises(fx.ConvergenceError, match="Forces left over.* displacement"):
+        fx.solve(loose, to=1.0, increments=2)
 
 
 def test_relaxed_energy_gives_way_in_compression():

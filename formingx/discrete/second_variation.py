@@ -61,6 +61,8 @@ class SecondVariation:
 
     def __init__(self, problem: Any):
         forms = problem.forms
+        if forms.domain.geometry.dim == 3:
+            raise InputError("stability: is not there yet for a sheet in space")
         if forms.domain.topology.dim != 2:
             raise InputError("stability: a membrane has no bending stiffness: where its hoop is compressed it wrinkles"
                              " in more and more waves; look at its stresses, or take a solid, MixedPressure()")

@@ -136,6 +136,8 @@ def _layers(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
 def _fillets(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
     """Rounded edges of a tool that the face cannot follow: fewer than two of its elements along one."""
     for contact in scene.contacts:
+        if contact.tool.components == 3:
+            continue
         nodes = scene.mesh.nodes_of(contact.on)
         facets = scene.mesh.facets_of(contact.on)
         total = scene.mesh.comm.allreduce(_own(scene, facets), MPI.SUM)
@@ -212,6 +214,8 @@ def _units(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
         if gap > 20 * sheet.length:
             yield Finding("warning", repr(contact), f"the tool is {gap:.3g} away from a body of length"
                           f" {sheet.length:.3g}: are the units of length the same (mm and m)?")
+            continue
+        if tool.components == 3:                             # their sizes are looked at by Scene
             continue
         arcs = [p.radius for p in tool.pieces if isinstance(p, Arc) and p.radius > 0]
         shaped = len(tool.pieces) > 2 or tool.closed

@@ -242,6 +242,8 @@ def _across(pushed: Pushed, points: np.ndarray) -> np.ndarray:
 def _mould_sizes(body: Body) -> Found:
     """A sheet beside a mould that stays, many times wider or narrower than what it is to be formed into."""
     for contact in body.scene.contacts:
+        if contact.tool.components == 3:
+            continue
         face, outline = body.scene.mesh.nodes_of(contact.on), contact.tool.outline()
         wide, reach = float(np.abs(face[:, 0]).max()), np.abs(outline[:, 0])
         if contact.moves is not None or np.ptp(face[:, 1]) > 0.1 * wide:
@@ -258,7 +260,7 @@ def _mould_sizes(body: Body) -> Found:
 def _ways(body: Body) -> Found:
     """A tool that moves away from its face, or past it."""
     for i, tool in enumerate(body.scene.things):
-        if not isinstance(tool, Contact) or tool.moves is None or not tool.separates:
+        if not isinstance(tool, Contact) or tool.moves is None or not (tool.separates or tool.tool.components == 3):
             continue
         if body.scene.together(i)[0] != i:
             continue
@@ -278,8 +280,8 @@ def _ways(body: Body) -> Found:
         if gaps[1] > gaps[0] and gaps[-1] > gaps[0] and (start <= near or not others or not aims):
             yield repr(tool), (f"it moves away from the body: over a travel of {body.say(far, 'travel')} its gap to"
                                f" {tool.on!r} grows from {body.say(max(0.0, start), 'travel')} to"
-                               f" {body.say(gaps[-1], 'travel')}: must it be moves = ({0 - tool.moves[0]:g},"
-                               f" {0 - tool.moves[1]:g})?")
+                               f" {body.say(gaps[-1], 'travel')}: must it be moves ="
+                               f" ({', '.join(f'{0 - m:g}' for m in tool.moves)})?")
         elif not others and gaps.min() > near:
             yield repr(tool), (f"it touches nothing on its way: over a travel of {body.say(far, 'travel')} it comes no"
                                f" nearer to {tool.on!r} than {body.say(gaps.min(), 'travel')}: place it nearer (moved),"

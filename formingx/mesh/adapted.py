@@ -61,7 +61,8 @@ def of_columns(mesh: Mesh) -> Columns:
     """The columns of a mesh; an InputError if it has none, or its nodes were moved."""
     columns = mesh.columns
     if columns is None:
-        raise InputError("adapted: the mesh is not one of columns: make it by disc, sphere, parison or from_lines")
+        raise InputError("adapted: the mesh is not one of columns: make it by disc, sphere, parison or from_lines"
+                         " (a sheet in space: give mesh.sheet another size)")
     nodes = np.concatenate(list(columns.place(columns.ends)[[0, -1]]))
     off = max(np.min(np.linalg.norm(nodes[:, None] - mesh.nodes_of(name), axis=2), axis=1).reshape(2, -1)[k].max()
               for k, name in enumerate(columns.faces))

@@ -73,7 +73,8 @@ class Contact(Part):
         ramp: theta over thickness of the sheet; default 1e-7 where points slide, 1e-5 where they stick or are held.
         elastic_slip: g_s over thickness of the sheet: how far a point goes under Coulomb's law before it slides.
         separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
-            start); with "stick" or "none". In space what has touched is always held, until a stage leaves the tool out.
+            start); with "stick" or "none". Default True; in space what has touched is always held, until a stage leaves
+            the tool out: there it is False.
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge); in space so many
             hundredths of all nodes.
             What sticks or gives off heat depends on when it touched: with 4, a run takes half the iterations, and
@@ -97,7 +98,7 @@ class Contact(Part):
     mu: Any
 
     def __init__(self, on: str, tool: Tool | SolidTool, friction: Any = "stick", *, penalty: float | None = None,
-                 ramp: float | None = None, elastic_slip: float = _ELASTIC_SLIP, separates: bool = True,
+                 ramp: float | None = None, elastic_slip: float = _ELASTIC_SLIP, separates: bool | None = None,
                  nodes_per_step: int = 1, points: str | int = "nodes",
                  present_area: bool = False, moves: tuple[float, ...] | None = None, name: str | None = None):
         self.name, name = name, f"Contact({on!r})"
@@ -105,20 +106,26 @@ class Contact(Part):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
         self.on, self.tool, self.friction = instance("Contact: on", on, str, "the name of a boundary"), tool, friction
         self.mu = _coefficient(f"{name}: friction", friction)
-        self.separates = instance(f"{name}: separates", separates, bool, "True or False")
-        usual = _HELD if not separates or tool.components == 3 else _STICK if self.sticks else _SLIDES
+        held = tool.components == 3
+        self.separates = instance(f"{name}: separates", not held if separates is None else separates, bool,
+                                  "True or False")
+        if held and self.separates:
+            raise InputError(f"{name}: separates = True: in space what has touched is held, until a stage leaves the"
+                             f" tool out (without=[...]): must be False, or left out")
+        usual = _HELD if not self.separates else _STICK if self.sticks else _SLIDES
         self.penalty = positive(f"{name}: penalty", usual[0] if penalty is None else penalty)
         self.ramp = positive(f"{name}: ramp", usual[1] if ramp is None else ramp)
         self.elastic_slip = positive(f"{name}: elastic_slip", elastic_slip)
-        if not separates and (self.friction_by_temperature or 0 < self.mu < math.inf):
+        if not self.separates and not held and (self.friction_by_temperature or 0 < self.mu < math.inf):
             raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
                              f" Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = count(f"{name}: nodes_per_step", nodes_per_step)
         self.points = _points(f"{name}: points", points)
         self.present_area = instance(f"{name}: present_area", present_area, bool, "True or False")
         if present_area and (self.friction_by_temperature or self.mu > 0 or not self.separates):
-            raise InputError(f"{name}: friction = {friction!r}, separates = {separates!r} with present_area=True: what"
-                             f" a point holds on to would change with its penalty; use 'none', or a larger penalty")
+            raise InputError(f"{name}: friction = {friction!r}, separates = {self.separates!r} with present_area=True:"
+                             f" what a point holds on to would change with its penalty; use 'none', or a larger"
+                             f" penalty")
         numbers: Callable = pair if tool.components == 2 else triple
         self.moves = None if moves is None else numbers(f"{name}: moves", moves)
         if self.moves is not None and not any(self.moves):

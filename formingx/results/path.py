@@ -42,6 +42,7 @@ class Path(States):
 
     def stress(self, state: State | None = None) -> StressField:
         """Stresses and stretches at a state (default: the last), layer by layer."""
+        self._section_only("stress", "look at path.wall(): stretches")
         state = state or self.last
         return self._view(self._segment(state)).stresses.of(state)
 
@@ -143,19 +144,20 @@ class Path(States):
         modes: waves round the axis; in plane strain wave numbers along the depth. states: how many, "all", or those.
         An InputError for a membrane, and for a load that does not say how it changes with a mode.
         """
-        if self._in_space:
-            raise InputError("stability: in space there are no modes yet")
+        self._section_only("stability")
         from .stability import Watch
         self._watch = self._watch or Watch(self)
         return self._watch.look(modes, states)
 
     def formed(self, state: State | None = None) -> Any:
         """The body of a state (default: the last) as a new `Mesh`, free of stress; an InputError if it is none."""
+        self._section_only("formed", "use to_stl, or shell_model")
         from .formed import formed
         return formed(self._segment(state or self.last).problem, state or self.last)
 
     def column_factors(self, share: float | None, error: float | None) -> np.ndarray:
         """Wanted over present length of the mesh's columns, shape (n,), by which `formingx.mesh.adapted` goes."""
+        self._section_only("adapted", "use a smaller size in fx.mesh.sheet")
         from .evaluate.column_factors import column_factors
         return column_factors(self, share, error)
 
@@ -207,6 +209,7 @@ class Path(States):
             InputError: a membrane; arguments that do not fit the scene; the part does not reach the trim.
             ConvergenceError: no state of the free part was found; it carries the path so far.
         """
+        self._section_only("released")
         from .released import released
         state = state or self.last
         make = lambda record: Path(record, True)                           # noqa: E731
@@ -231,8 +234,7 @@ class Path(States):
 
     def contact(self, tool: Any = None, state: State | None = None) -> Any:
         """Contact pressure, friction and gap along the face that meets a tool (`ContactTable`): to_csv, to_excel."""
-        if self._in_space:
-            raise InputError("contact: in space there are no contact pressures point by point yet: use tool_forces()")
+        self._section_only("contact", "use tool_forces(), or filling()")
         from .evaluate.contact_face import ContactFace, contact_of
         return ContactFace(self, contact_of(self, tool, "contact")[0]).of(state or self.last)
 
@@ -256,8 +258,7 @@ class Path(States):
         ("change"). Energy of changes of temperature ("heat"). Where it went: "strain_energy", above that at first;
         "dissipated_energy" in materials; "friction"; "jumps". "unbalanced": the error of the integrals, and of the run.
         """
-        if self._in_space:
-            raise InputError("work: in space there is no ledger yet")
+        self._section_only("work")
         from .evaluate.work import work
         return work(self)
 
@@ -295,6 +296,11 @@ class Path(States):
             raise InputError("shell_model: is for a sheet in space; of a section use to_stl, or formed()")
         from .space.show import shell_model
         shell_model(self, file, state)
+
+    def _section_only(self, what: str, instead: str = "") -> None:
+        """An InputError in space."""
+        if self._in_space:
+            raise InputError(f"{what}: is not there yet for a sheet in space" + (f": {instead}" if instead else ""))
 
     @property
     def _in_space(self) -> bool:

@@ -2,7 +2,7 @@
 
 Every triangle gets six nodes of its own, so that nothing is smeared over an interface. The fields:
 
-    displacement            (u_r, u_z), length
+    displacement            (u_r, u_z), in space (u_x, u_y, u_z), length
     stretches               the larger and the smaller in the plane, and the hoop stretch (`Stress.principal_stretches`)
     principal_stresses      of the Cauchy stress, from the largest to the smallest, stress
     cauchy_rr, _zz, _rz, _hoop  its components; hydrostatic_pressure: minus a third of its trace, stress
@@ -14,7 +14,7 @@ Every triangle gets six nodes of its own, so that nothing is smeared over an int
                             (the first two nodes from the axis share their areas: there it is less accurate)
     thickness, thickness_ratio  of the sheet there, where the mesh has two faces that face each other
 
-A membrane is a line and has displacement and thickness only. Rank 0 writes.
+A membrane has displacement and thickness only. Rank 0 writes.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Fields:
     """Evaluates the fields of a path's states at the nodes of all cells.
 
     Attributes:
-        points: reference positions of the nodes of this rank's cells, shape (cells, nodes, 2), length.
+        points: reference positions of the nodes of this rank's cells, shape (cells, nodes, components), length.
     """
 
     def __init__(self, path: Any):
@@ -54,8 +54,9 @@ class Fields:
         forms, domain = self._problem.forms, self._problem.forms.domain
         self.dimension = domain.topology.dim
         self._cells = np.arange(domain.topology.index_map(self.dimension).size_local, dtype=np.int32)
-        self._where, self._u = (fem.Expression(ufl.as_vector([v[0], v[1]]), _NODES[self.dimension])
-                                for v in (forms.X, forms.u))
+        self._components = domain.geometry.dim
+        self._where, self._u = (fem.Expression(ufl.as_vector([v[i] for i in range(self._components)]),
+                                               _NODES[self.dimension]) for v in (forms.X, forms.u))
         self.points = self._eval(self._where)
         self._elastic = ElasticStretches(self._problem, _NODES[self.dimension])
         self._between: tuple[np.ndarray, np.ndarray] | None = None
@@ -63,10 +64,16 @@ class Fields:
 
     def of(self, state: Any) -> dict[str, np.ndarray]:
         """{name: values, shape (cells, nodes, components)} of a state; collective."""
-        problem, shape = self._problem, self.points.shape[:2]
+        problem, forms, shape = self._problem, self._problem.forms, self.points.shape[:2]
         with problem.at(state):
             found = {"displacement": self._eval(self._u)}
-        if self.dimension == 2:
+        if self._components == 3:
+            ratio, rest = forms.F[2, 2], sum(forms.thicknesses.values())
+            wall = fem.Expression(ufl.as_vector([rest * ratio, ratio, 0.0]), _NODES[2])
+            with problem.at(state):
+                h = self._eval(wall)
+            found |= {"thickness": h[..., 0], "thickness_ratio": h[..., 1]}
+        elif self.dimension == 2:
             field = self._path.stress(state)
             stress = field.in_cells(_NODES[2])
             sigma = stress.cauchy
@@ -93,8 +100,8 @@ class Fields:
 
     def _eval(self, expression: Any) -> np.ndarray:
         if not len(self._cells):
-            return np.zeros((0, len(_NODES[self.dimension]), 2))
-        return expression.eval(self._problem.forms.domain, self._cells).reshape(len(self._cells), -1, 2)
+            return np.zeros((0, len(_NODES[self.dimension]), self._components))
+        return expression.eval(self._problem.forms.domain, self._cells).reshape(len(self._cells), -1, self._components)
 
     def _contact_pressure(self, state: Any) -> np.ndarray:
         """Normal traction per deformed area at the faces that tools meet, zero elsewhere, shape (cells, nodes)."""
@@ -176,10 +183,10 @@ class _Body:
     def __init__(self, points: np.ndarray, dimension: int):
         cells, nodes = points.shape[:2]
         shape = {1: "interval", 2: "triangle"}[dimension]
-        element = basix.ufl.element("Lagrange", shape, 2, shape=(2,))
+        element = basix.ufl.element("Lagrange", shape, 2, shape=points.shape[2:])
         self.mesh = dolfinx_mesh.create_mesh(
             MPI.COMM_SELF, cells=np.arange(cells * nodes, dtype=np.int64).reshape(cells, nodes),
-            x=points.reshape(-1, 2), e=element)
+            x=points.reshape(-1, points.shape[2]), e=element)
         self._order = self.mesh.topology.original_cell_index
         self._spaces: dict[int, fem.FunctionSpace] = {}
         self._functions: dict[str, fem.Function] = {}
