@@ -25,10 +25,9 @@ from .contact.face import FaceContact
 from .contact.resultants import penetration
 from .examine import Examination
 from .formulations import formulate
+from .histories import Histories
 from .history import History
-from .material_history import MaterialHistory
 from .matrix import ExtendedMatrix
-from .past_states import PastStates
 from .schedule import Setting
 from .step_error import StepError
 from .step_limit import StepLimit
@@ -53,7 +52,7 @@ class _Stage(NamedTuple):
     left: np.ndarray | None = None
 
 
-class Problem(Units):
+class Problem(Histories, Units):
     """Residual, tangent and derivative by the control of a scene.
 
     Attributes:
@@ -97,7 +96,6 @@ class Problem(Units):
                                       [row for _, row in self._constraints.means], self.comm, self.symmetric)
         self.matrix = self._matrix.mat
         self.x = self.matrix.createVecRight()
-        self._foretold: tuple[Any, list[Any]] = None, []    # x, and what the forms' histories would remember there
         self._stage: Any = None
         self.enter(Setting.first(scene), np.zeros(self.x.getLocalSize()), 0.0)
         self._metric = np.maximum(self.assemble(forms.compile(forms.metric_row())), 0)
@@ -150,59 +148,9 @@ class Problem(Units):
         return tuple(self.comm.allgather(status)) if self.present else None
 
     @property
-    def has_history(self) -> bool:
-        """True if F depends on more than x and control."""
-        return bool(self.histories)
-
-    @property
-    def materials(self) -> list[MaterialHistory | PastStates]:
-        """The histories of materials."""
-        return [history for history in self.forms.histories if isinstance(history, (MaterialHistory, PastStates))]
-
-    @property
-    def body_has_history(self) -> bool:
-        """True if materials or the temperature have a history."""
-        return bool(self.forms.histories)
-
-    @property
-    def relaxes(self) -> bool:
-        """True if F depends on time: on histories other than those of rate-independent materials."""
-        return any(not isinstance(history, MaterialHistory) or history.rate_dependent
-                   for history in self.forms.histories)
-
-    @property
-    def time(self) -> float:
-        """Process time at the control that the forms see now."""
-        return self.forms.time_at(self.control)
-
-    @property
     def temperature(self) -> Temperature | None:
         """Of the body at the last accepted state, inside `at` that of the state; None: the scene has none."""
         return self.forms.temperature
-
-    @property
-    def clock(self) -> float:
-        """Process time at control 0: of the setting, or what a run that chooses its times has set since."""
-        return self.forms.clock
-
-    @clock.setter
-    def clock(self, time: float) -> None:
-        self.forms.clock = time
-
-    def time_at(self, control: float) -> float:
-        """Process time at a control, under the setting that holds now."""
-        return self.forms.time_at(control)
-
-    @property
-    def memory(self) -> list[Any]:
-        """What each history remembers of the last accepted state."""
-        return [history.get() for history in self.histories]
-
-    @memory.setter
-    def memory(self, memory: list[Any]) -> None:
-        self._foretold = None, []
-        for history, remembered in zip(self.histories, memory, strict=True):
-            history.put(remembered)
 
     def examine(self, last: Any, attempt: Any) -> Examination:
         """What the last good state (or None) and a failed attempt (or None) tell; collective."""
@@ -379,18 +327,6 @@ class Problem(Units):
         if self._stage.left is not None:
             out.array_w += self._stage.left
 
-    def advance(self, x: np.ndarray, control: float) -> None:
-        """A state is accepted: what has a history takes it up. x: own part, shape (n,)."""
-        if self.forms.histories:
-            self.forms.control.value = control
-            self.place(x)
-        known = self._foretold[1] if self._foretold[0] is x else []
-        for history in self.histories[: len(self.histories) - len(known)]:
-            history.advance(x[: self._n], control)
-        for history, memory in zip(self.forms.histories, known):
-            history.put(memory)
-        self._foretold = None, []
-
     def take_temperature(self) -> None:
         """The temperature has changed: constants and friction follow it; collective.
 
@@ -398,21 +334,6 @@ class Problem(Units):
             InputError: a constant or friction has no value at a temperature.
         """
         together(self.comm, [self.forms.take_temperature, *(contact.take_temperature for contact in self.contacts)])
-
-    def foretell(self, start: np.ndarray, x: np.ndarray, control: float) -> list[Any]:
-        """What the histories of the forms would remember, were a state accepted; they stay as they are.
-
-        start: the unknowns at the state that the step begins at.
-        """
-        self.look_at(x, control)
-        before = [history.get() for history in self.forms.histories]
-        for history in self.forms.histories:
-            history.advance(x[: self._n], control, start)
-        after = [history.get() for history in self.forms.histories]
-        for history, memory in zip(self.forms.histories, before):
-            history.put(memory)
-        self._foretold = x, after
-        return after
 
     def motion(self, control: float) -> np.ndarray:
         """The held unknowns at their values for a control, all else 0, shape (owned part of x,)."""
