@@ -19,6 +19,7 @@ from formingx.results.evaluate.part import _strips
 from formingx.solve import path_following, predictor, snap_through
 from formingx.solve.arc_length import Curve
 from formingx.solve.newton import Failure
+from formingx.solve.progress import Aim
 from formingx.solve.state import State
 
 
@@ -185,19 +186,17 @@ def test_no_parabola_goes_through_a_jump():
     assert predictor.behind(broken, 3.0, apart) is None
 
 
-def test_a_jump_does_not_pass_its_target(monkeypatch):
+def test_a_jump_does_not_pass_its_target():
     """How far the control goes on in it ends where something that is driven has its target value."""
     class Driven(Amplitude):
         moves = True
 
         def __init__(self):
             pass
-    monkeypatch.setattr(path_following.Run, "_sense", 1.0)
-    run = path_following.Run.__new__(path_following.Run)
-    run.curve = SimpleNamespace(value=lambda bound, x, control: control)
-    run.aim = SimpleNamespace(open=[(fx.travel(0.5), Driven())])
+    aim = Aim(SimpleNamespace(value=lambda bound, x, control: control), [(fx.travel(0.5), Driven())])
     near = State(np.zeros(1), 0.49, np.ones(1), 1.0)
-    assert run._change(near, 0.1) == pytest.approx(0.01) and run._change(near, 1e-3) == pytest.approx(1e-3)
+    assert aim.short_of_targets(near, 0.1) == pytest.approx(0.01)
+    assert aim.short_of_targets(near, 1e-3) == pytest.approx(1e-3)
 
 
 def test_loss_in_a_jump_is_that_of_the_mean_force_on_the_way():

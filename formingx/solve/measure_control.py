@@ -16,10 +16,10 @@ from ..measures.targets import Target, is_met, process_time
 from . import predictor
 from .equations import Array, Measure
 from .newton import Failure, tangents
-from .path_following import Cutback, Run
+from .path_following import Run
 from .record import Record
 from .state import State
-from .stepping import StepControl
+from .stepping import Cutback, StepControl
 
 _SAME = 1e-12          # relative: times that are the same
 _STILL = 1e-7          # relative: a change that is none

@@ -27,7 +27,7 @@ from .progress import Aim, Progress
 from .record import Record, Unusable
 from .snap_through import NoEquilibrium, SnapThrough, at_limit_points, snap_through, snaps, was_passed
 from .state import State
-from .stepping import StepControl, TimeError
+from .stepping import Cutback, StepControl, TimeError
 
 log = logging.getLogger("formingx")
 
@@ -93,7 +93,7 @@ class Run:
             if start is None:
                 kept = self._go_on(may_turn)
             else:
-                self._accept(self._facing_target(start))
+                self._accept(self.aim.facing(start, first=not record.states))
             self._at_fold = self._at_fold or at_limit_points(self.problem, self._falls)
             if self._step is None or asdict(self._step) == kept.get("given"):
                 self.step = StepControl(**kept.get("step", {}))
@@ -175,7 +175,7 @@ class Run:
         pressure = isinstance(bound, Amplitude) and bound.of_load
         if may_turn and last.stepping.get("until") != [*aim.until[:2]] and not pressure:
             with self.problem.at(last):
-                facing = self._facing_target(replace(last))
+                facing = aim.facing(replace(last))
             self._turned = [facing] if facing.slope != last.slope else []
         self._first -= 1 if self._turned else there
         for state in self.states:
@@ -198,17 +198,6 @@ class Run:
         no_rest_at = None if np.isnan(self._no_rest_at) else float(self._no_rest_at)
         self.record.complete_step(self.step, self.aim.until, given=self._step and asdict(self._step),
                            accuracy=self._accuracy, jumps=(self._ahead, no_rest_at))
-
-    def _facing_target(self, start: State) -> State:
-        """The start, its tangent turned if the target lies the other way.
-
-        (At rest a target that does not change sign with the control may be reached both ways.)
-        """
-        if self.aim.until.signed or self.record.states:
-            left, rate = self.curve.aim(self.aim.measure, self.aim.until.value, start)
-            if left * rate > 0:
-                start.direction, start.slope = -start.direction, -start.slope
-        return start
 
     def _next(self, old: State) -> list[State]:
         """The next states: one at a target within reach, or one step ahead, and what lies on the way to it.
@@ -346,7 +335,8 @@ class Run:
         for ahead in dict.fromkeys((self._ahead, *others)):
             self._ahead = ahead
             try:
-                by = 1 - old.control if fading else self._change(old, max(ahead, length * abs(old.slope)))
+                by = self._sense * max(ahead, length * abs(old.slope))
+                by = 1 - old.control if fading else self.aim.short_of_targets(old, by)
                 new = snap_through(self.curve, old, by, length > 0 and not fading, settings, self._solutions(old),
                                    lambda: self._progress.limited("a jump", self.step.length))
                 break
@@ -370,15 +360,6 @@ class Run:
         """Viscous ones that a jump from a state may take."""
         most = self.settings.snap_through.solutions
         return most // 5 if self._found_no_rest_near(old) else most
-
-    def _change(self, old: State, size: float) -> float:
-        """Of the control in a jump, of at most a size: it does not pass a target."""
-        by = self._sense * size
-        for target, bound in self.aim.open:
-            if isinstance(bound, Amplitude) and bound.moves:
-                then, now = (self.curve.value(bound, old.x, c) - target.value for c in (old.control + by, old.control))
-                by *= now / (now - then) if now * then < 0 else 1.0
-        return by
 
     def _check_progress(self) -> None:
         """Stop if many states have come no nearer to the target, or what is driven has gone beyond all bounds."""
@@ -454,18 +435,6 @@ class Run:
             f" was {values[best]:.6g}, at {record.describe(states[best])}.{limits} The last good state is"
             f" {record.describe(record.last)}; it is kept in the error's `path`."
             + ("" if diagnosis.advice else _TRY), diagnosis=diagnosis)
-
-
-class Cutback(Exception):
-    """A step is too long; part: of its length, that will do. lasts: of the steps after it, too.
-
-    control: to hold at the end of the shorter step, in place of its length. Along the path a step in time may be far
-    from short in time where the body moves at once as a step begins.
-    """
-
-    def __init__(self, why: str, part: float, lasts: bool = False, control: float | None = None):
-        super().__init__(why)
-        self.part, self.lasts, self.control = part, lasts, control
 
 
 class _Astray(Failure):

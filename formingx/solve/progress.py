@@ -79,6 +79,26 @@ class Aim:
                 best = (target, bound, -left / rate)
         return best
 
+    def facing(self, start: State, first: bool = False) -> State:
+        """The start, its tangent turned if the target lies the other way.
+
+        (At rest, `first`, a target that does not change sign with the control may be reached both ways.)
+        """
+        if self.until.signed or not first:
+            left, rate = self._curve.aim(self.measure, self.until.value, start)
+            if left * rate > 0:
+                start.direction, start.slope = -start.direction, -start.slope
+        return start
+
+    def short_of_targets(self, old: State, by: float) -> float:
+        """A change of the control in a jump, or as much of it as does not pass a target."""
+        for target, bound in self.open:
+            if isinstance(bound, Amplitude) and bound.moves:
+                then, now = (self._curve.value(bound, old.x, c) - target.value
+                             for c in (old.control + by, old.control))
+                by *= now / (now - then) if now * then < 0 else 1.0
+        return by
+
     # why a run should give up, in words; "" if nothing speaks against going on
 
     def turned_back(self) -> str:

@@ -97,3 +97,15 @@ class TimeError:
         share = predictor.weights([*past, end], middle) if time > past[-1].time else np.array([])
         once, lasting = self._problem.step_error(past, share, x, control)
         return max(once / self._once, lasting / self._adding_up)
+
+
+class Cutback(Exception):
+    """A step is too long; part: of its length, that will do. lasts: of the steps after it, too.
+
+    control: to hold at the end of the shorter step, in place of its length. Along the path a step in time may be far
+    from short in time where the body moves at once as a step begins.
+    """
+
+    def __init__(self, why: str, part: float, lasts: bool = False, control: float | None = None):
+        super().__init__(why)
+        self.part, self.lasts, self.control = part, lasts, control
