@@ -288,6 +288,7 @@ def test_imperfections_knock_down():
     loss = path.stability([0]).first
     (before, behind), = path.branch_points
     assert before is loss.left and behind is loss.right
+    assert "another path begins" in str(fx.doctor(path))
     bent = fx.imperfect(mesh, loss, 1e-2)
     assert np.abs(bent.nodes_of("inner")[:, 0] - 0.8).max() == pytest.approx(
         1e-2 * np.abs(loss.amplitudes[loss.points[:, 0] < 0.8 + 1e-9, 0]).max(), rel=1e-6)

@@ -78,6 +78,10 @@ def _run(path: Path) -> Iterator[Finding]:
     for severity, text in doubts(path) if path.states else []:
         if severity == "serious":
             yield Finding("warning", "run", text)
+    for left, right in path.branch_points:
+        yield Finding("warning", "run", f"between {path.describe(left)} and {path.describe(right)} another path begins,"
+                                        f" without a limit point: the body may take that one; `path.stability([0])`"
+                                        f" finds the mode, and where")
 
 
 def _driven(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
