@@ -12,6 +12,7 @@ from typing import Any
 
 import formingx
 
+from ..design import design as designs
 from ..errors import InputError, place
 from ..runs import Process
 from ..study import design
@@ -75,7 +76,7 @@ def _no_runs() -> Iterator[None]:
 
     def run(process, stages, **_):
         raise _Looked(doctor(process.scene, stages=stages))
-    others: list[Any] = [(formingx, trace), (formingx, solve), (formingx, study), (Process, run)]
+    others: list[Any] = [(formingx, trace), (designs, trace), (formingx, solve), (formingx, study), (Process, run)]
     kept = [getattr(owner, other.__name__) for owner, other in others]
     try:
         for owner, other in others:
