@@ -148,6 +148,7 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
     sphere = {"inner_radius": positive, "thickness": positive, "elements": ("pair", (4, 2)), "grading": positive}
     contact = {"on": ("word", "top"), "tool": ("thing", fx.tools.plane(0.3)), "friction": ("friction", "stick"),
                "penalty": optional, "ramp": optional, "nodes_per_step": ("count", 1), "separates": ("flag", True),
+               "present_area": ("flag", False),
                "moves": ("pair or None", None), "name": name, "points": ("points", "nodes"), "elastic_slip": positive}
     stage = {"name": ("label", "up"), "drive": ("optional thing", "air"), "until": ("optional thing", fx.pressure(0.1)),
              "through": ("several", ()), "without": ("several", ()), "step": ("optional thing", None),
@@ -158,7 +159,7 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
     process = {"stages": ("several", [fx.Stage("up", drive="air", until=fx.pressure(0.1))]),
                "step": ("optional thing", None), "tolerances": ("optional thing", None),
                "max_steps": ("count or None", 200), "progress": ("flag", False), "start": ("optional thing", None),
-               "checkpoint": ("folder", None), **kept, "accuracy": ("accuracy", "standard")}
+               "checkpoint": ("folder", None), **kept, "accuracy": ("accuracy", "standard"), "pilot": ("flag", False)}
     part = {"name": ("label", "plug"), "of": ("word", "top"), "within": ("pair", (0.0, 0.5)), "along": ("word", "r")}
     return [
         *materials, *boundary, *targets, *tools,
@@ -196,8 +197,9 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
             "supports": ("several", [fx.Symmetry("axis"), fx.Clamped("rim")]),
             "loads": ("several", [fx.Pressure("bottom")]), "contacts": ("several", []),
             "model": ("optional thing", None), "kinematics": ("optional thing", None),
-            "quadrature_degree": ("count", 5), "temperature": ("optional number", None),
-            "heat": ("optional thing", None), "expansion": ("optional thing", None)}, _run),
+            "quadrature_degree": ("count or None", 5), "temperature": ("optional number", None),
+            "heat": ("optional thing", None), "expansion": ("optional thing", None),
+            "thickness": ("optional thing", None), "preformed": ("optional thing", None)}, _run),
         Call("StepControl", fx.StepControl, {
             "length": positive, "target": ("count", 4), "growth": positive, "smallest": positive,
             "largest": ("step", 1.0)}, lambda s: fx.trace(_scene(), until=fx.pole_height(0.1), step=s, progress=False)),
@@ -208,7 +210,8 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
             "scene": ("thing", _scene()), "until": ("thing", fx.pole_height(0.1)), "through": ("several", ()),
             "step": ("optional thing", None), "tolerances": ("optional thing", None),
             "max_steps": ("count or None", 200), "progress": ("flag", False), "start": ("optional thing", None),
-            "checkpoint": ("folder", None), **kept, "at_fold": ("optional word", None)}),
+            "checkpoint": ("folder", None), **kept, "at_fold": ("optional word", None), "pilot": ("flag", False),
+            "remesh": ("optional thing", None), "stop_at": ("optional thing", None)}),
         Call("load", fx.load, {"folder": ("file", saved), "scene": ("thing", made), "state": ("state", None)}),
         Call("solve", fx.solve, {"scene": ("thing", _scene()), "to": number, "increments": ("count", 1),
                                  "tolerances": ("optional thing", None), "record": ("optional thing", None),

@@ -1,10 +1,10 @@
 """Williams' plug on meshes that pilot runs make (Song 1993, recommendation 2): force at 8 to 20 cm under friction.
 
-The sheet and the plug of `plug_friction`, but no formula for the elements: a run on 30 columns of one size to 8 cm says
-how long columns are where they lie on the plug's edge (`fx.mesh.adapted`), a run on those goes to 12 cm and says it
-again, for little friction one to 20 cm too, and the next one is the result. Beside it a membrane that slides over the
-same edge (it knows neither bending nor shear), and uniform columns, twice as many, to 8 cm. Then an edge of an eighth
-of the thickness. Beyond some 12 cm elements at the face are inside out, or the face goes through itself
+The sheet and the plug of `plug_friction`, but no formula for the elements: a run on 30 columns of one size to 8 cm
+says how long columns are where they lie on the plug's edge (`fx.mesh.adapted`); for little friction a run on those to
+12 cm says it again, and one to 20 cm, and the next one is the result. Beside it a membrane that slides over the same
+edge (it knows neither bending nor shear), and uniform columns, twice as many, to 8 cm. Then an edge of an eighth of
+the thickness. Beyond some 12 cm elements at the face are inside out, or the face goes through itself
 (`first_verdict`): runs go on with `beyond=True`, for forces are those of a membrane to some percent. Lengths in cm,
 forces in N.
 """
@@ -60,7 +60,7 @@ def push(mesh, mu, fillet, travels):
 def run(case):
     """Pilots and the run of one coefficient of friction: its numbers, and what is drawn of it."""
     mu, fillet, travels = case
-    pilots = [travels[:1]] if len(travels) < 3 else [travels[:1], travels[:2]] + [travels] * (mu < ROUGH)
+    pilots = [travels[:1]] if len(travels) < 3 or mu >= ROUGH else [travels[:1], travels[:2], travels]
     mesh, columns = sheet(FIRST, mu), []
     for on_the_way in pilots:
         path, _ = push(mesh, mu, fillet, on_the_way)

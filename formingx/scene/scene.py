@@ -71,6 +71,8 @@ class Scene:
         if not isinstance(materials, Mapping):
             raise InputError(f"Scene: materials = {materials!r}: must be a formingx material, or {{layer: material}}")
         mesh.check()                                           # its nodes may have been moved
+        if preformed is not None and not hasattr(preformed, "gradient"):
+            raise InputError(f"Scene: preformed = {preformed!r}: must be what trace(remesh=) makes, or None")
         self.mesh, self.preformed = mesh, preformed
         self._extent = _extent(mesh)
         self.materials = dict(materials)
