@@ -1,4 +1,4 @@
-"""Blocks pressed 20 times flatter without friction, and 8 times flatter stuck (Song 1993, chapter 7).
+"""Blocks pressed 20 times flatter without friction, and some 7 times flatter stuck (Song 1993, chapter 7).
 
 Without friction: the neo-Hookean block of `compression_homogeneous`, whose exact force is eq. (7.6). At H/h = 20 the
 wall is a 20th and the area 20 times what they were, so the plate is held by present area and wall
@@ -6,8 +6,8 @@ wall is a 20th and the area 20 times what they were, so the plate is held by pre
 
 Stuck: the block of `compression_roll_over`, whose elements at the corner that rolls in are crushed from H/h = 4 on:
 where the volume ratio at a quadrature point leaves 0.6 to 1.5, the deformed body becomes the reference of a new mesh
-(`trace(remesh=)`). "stuck": elements of 0.04 cm (0.03 at that corner), "stuck_coarse": twice as large. Runs end at some
-7 (`ended`): beside the axis new meshes lose their volumes faster and faster.
+(`trace(remesh=)`). "stuck": elements of 0.04 cm (0.03 at that corner), "stuck_coarse": twice as large. Runs end at
+some 7 and 5 (`ended`): beside the axis new meshes lose their volumes faster and faster.
 """
 
 import numpy as np
