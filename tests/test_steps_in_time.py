@@ -6,6 +6,7 @@ from test_time import block
 
 import formingx as fx
 from formingx import Stage, StepControl
+from formingx.solve.stepping import TimeError
 
 QUICK = [(0, 0), (1, 0), (1.0001, 0.6), (2, 0.6), (2.0001, 0.2), (4, 0.2)]
 SLOW = fx.Viscoelastic(fx.NeoHookean(c10=0.5), branches=[(5.0, 0.2), (0.1, 10.0)])
@@ -165,3 +166,18 @@ def test_doctor_sees_a_modulus_that_pulls_a_cooling_body_back():
         assert len(found(material)) == 1 and "6 times as large at 20 degrees" in found(material)[0]
         assert not found(material, air=145.0)
     assert not found(sets) and not found(fx.NeoHookean(c10=rubber))
+
+
+@pytest.mark.parametrize("followed", ["pull", fx.travel], ids=["table", "flow"])
+def test_cutbacks_end(followed, monkeypatch):
+    """A run whose error in time does not fall with its steps ends in words at the smallest one."""
+    asked = []
+
+    def too_large(error, *_):
+        asked.append(error)
+        assert len(asked) < 500, "it goes on for ever"
+        return 10.0
+    monkeypatch.setattr(TimeError, "of", too_large)
+    stage = Stage("cycle", **({"drive": "pull"} if followed is fx.travel else {}), follow={followed: [(0, 0), (1, 0.5)]})
+    with pytest.raises(fx.ConvergenceError, match="became shorter than.*the error in time"):
+        run(block(fx.Viscoelastic(fx.NeoHookean(c10=0.5), branches=[(1.0, 1.0)])), stage)

@@ -151,9 +151,9 @@ class Curve:
         return self._solve_from(*self._ahead(old, length, behind), plane, "step", old, predictor)
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
-                behind: State | None = None) -> State:
+                behind: State | None = None, kind: str = "target") -> State:
         """Predict as `step` does, correct to where an equation such as "measure = target" holds."""
-        return self._solve_from(*self._ahead(old, length, behind), equation, "target", old, predictor)
+        return self._solve_from(*self._ahead(old, length, behind), equation, kind, old, predictor)
 
     def _ahead(self, old: State, length: float, behind: State | None = None) -> tuple[Array, float]:
         """(x, control) so far along the tangent, or along the parabola that a state behind gives."""

@@ -90,9 +90,9 @@ class FixedControlCurve(Curve):
         return self._correct(old, length, "step")
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
-                behind: State | None = None) -> State:
+                behind: State | None = None, kind: str = "target") -> State:
         """The same, to where an equation for the control holds."""
-        return self._correct(old, length, "target")
+        return self._correct(old, length, kind)
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""

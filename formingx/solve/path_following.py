@@ -264,13 +264,12 @@ class Run:
             limit.prepare(Way(old.x, old.control, old.direction, old.slope, reach), ends=True)
         behind = None if self.problem.has_kinks else predictor.behind(self.states, reach, self.curve.distance)
         with self.curve.newton.in_a_hurry(length > self.settings.snap_through.lengths[0]):
-            if (target is None or bound is None) and held is not None:
-                new = self.curve.step_to(old, reach, fixed(held), self._predictor, behind)
-                new.kind = "step"
-            elif target is None or bound is None:
-                new = self.curve.step(old, length, self._predictor, behind)
-            else:
+            if target is not None and bound is not None:
                 new = self.curve.step_to(old, reach, bound.equation(target.value), self._predictor, behind)
+            elif held is not None:
+                new = self.curve.step_to(old, reach, fixed(held), self._predictor, behind, kind="step")
+            else:
+                new = self.curve.step(old, length, self._predictor, behind)
         if target is not None:
             if not 0 < self.curve.progress(old, new) < 2 * length:
                 raise _Astray("the target was met on a far part of the path", [])
