@@ -181,3 +181,15 @@ def test_cutbacks_end(followed, monkeypatch):
     stage = Stage("cycle", **({"drive": "pull"} if followed is fx.travel else {}), follow={followed: [(0, 0), (1, 0.5)]})
     with pytest.raises(fx.ConvergenceError, match="became shorter than.*the error in time"):
         run(block(fx.Viscoelastic(fx.NeoHookean(c10=0.5), branches=[(1.0, 1.0)])), stage)
+
+
+def test_a_second_cutback_is_one_in_time(monkeypatch):
+    """Where the body moves at once as a step begins, a shorter piece of path may take as long: time itself is cut."""
+    ways = []
+
+    def too_large(error, states, x, control):
+        ways.append(control - states[-1].control)
+        return 8.0 if len(ways) < 4 else 0.5
+    monkeypatch.setattr(TimeError, "of", too_large)
+    run(block(SLOW), Stage("cycle", follow={"pull": [(0, 0), (1, 0.5)]}))
+    assert ways[2:4] == pytest.approx([0.4 * ways[1], 0.4 * ways[2]], rel=1e-9)             # 0.8 / 8^(1/3)
