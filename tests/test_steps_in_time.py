@@ -178,7 +178,8 @@ def test_cutbacks_end(followed, monkeypatch):
         assert len(asked) < 500, "it goes on for ever"
         return 10.0
     monkeypatch.setattr(TimeError, "of", too_large)
-    stage = Stage("cycle", **({"drive": "pull"} if followed is fx.travel else {}), follow={followed: [(0, 0), (1, 0.5)]})
+    driven = {"drive": "pull"} if followed is fx.travel else {}
+    stage = Stage("cycle", **driven, follow={followed: [(0, 0), (1, 0.5)]})
     with pytest.raises(fx.ConvergenceError, match="became shorter than.*the error in time"):
         run(block(fx.Viscoelastic(fx.NeoHookean(c10=0.5), branches=[(1.0, 1.0)])), stage)
 
