@@ -151,6 +151,11 @@ class Contact(Part):
         """True without friction or memory: contact then has an energy."""
         return not self.friction_by_temperature and self.mu == 0 and self.separates
 
+    @property
+    def lagged(self) -> bool:
+        """True if what touches is held from the next step on (`LaggedStick`): on tools in space."""
+        return self.tool.components == 3
+
     def shear_limit(self, pressure: np.ndarray, mu: np.ndarray | float) -> tuple[np.ndarray, np.ndarray | float]:
         """The shear stress at which n points slide under a pressure, shape (n,), and its derivative: Coulomb's mu p.
 
@@ -184,7 +189,7 @@ class Contact(Part):
         temperature: of the body there, shape (n,), if friction depends on it.
         """
         theta, elastic_slip = self.ramp * thickness, self.elastic_slip * thickness
-        if self.tool.components == 3:
+        if self.lagged:
             return LaggedStick(self.tool, k, theta)
         foot = (1 - _AT_FOOT * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)

@@ -87,6 +87,9 @@ class ContactLaw(Protocol):
         stiffness_ahead     there: the tangent of the path, with the points that have just touched;
         distance, nearest, ramp     limits of the next step: when points arrive, and whether that was foreseen.
 
+    What only `formingx.physics.contact.Law` has, and others may: `without`, for derivatives of runs with contact
+    (`formingx.Design`); `shift`, for a mesh that is made again on the way (`trace(remesh=)`).
+
     Attributes:
         theta: half-width of the ramp: at -theta contact begins, length; elastic_slip: before a point slides, length.
         has_friction: tractions depend on slip; remembers: on `Touch`.

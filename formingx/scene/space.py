@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError, finite, known, positive, together, values
 from ..mesh.sheet import Sheet
-from ..physics.loads import Pressure
+from ..physics.loads import Pressure, Spin
 from ..physics.supports import PinnedNode
 from ..ranks import gathered
 
@@ -72,7 +72,7 @@ def refuse(scene: Any, heat: Any) -> None:
     if heat is not None:
         raise InputError("Scene: heat: in space there is no conduction yet: give a temperature=... that stays")
     for load in scene.loads:
-        if type(load).__name__ == "Spin":
+        if isinstance(load, Spin):
             raise InputError(f"Scene: {load!r}: it turns about the axis of a round body: not in space")
         if isinstance(load, Pressure) and load.on not in ("bottom", "top"):
             raise InputError(f"Scene: {load!r}: a sheet in space takes a pressure on its 'bottom' or its 'top'")

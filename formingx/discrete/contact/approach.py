@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from ...physics.lagged_stick import LaggedStick
 from ...ranks import gathered
 from .face import FaceContact
 
@@ -46,7 +45,7 @@ class Approach:
         face = self.face
         start, velocity = face.positions(fields, control), face.moved(direction, slope)
         free = ~face.law.touching(start, face.touch)
-        if isinstance(face.law, LaggedStick):               # a tangent of a long step foretells no arrivals
+        if face.contact.lagged:                             # a tangent of a long step foretells no arrivals
             most = _NEARER * np.maximum(-face.law.distance(start), 0.0) + face.rule.lengths
             speed = np.linalg.norm(velocity, axis=1)
             most = np.divide(most, speed, out=np.full(len(speed), length), where=free & (speed > 0))
@@ -68,9 +67,9 @@ class Approach:
         start, velocity = face.positions(fields, control), face.moved(direction, slope)
         times = self._arrivals(start, velocity, length)
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
-        at_end = ends & face.contact.sticks & (times >= _AT_END * length)
-        if isinstance(face.law, LaggedStick):               # it asks for no place of arrival
+        if face.contact.lagged:                             # it asks for no place of arrival
             return
+        at_end = ends & face.contact.sticks & (times >= _AT_END * length)
         face.expect_arrivals(np.where(at_end[:, None], np.nan, start + times[:, None] * velocity))
 
     def _arrivals(self, start: np.ndarray, velocity: np.ndarray, length: float) -> np.ndarray:
@@ -96,10 +95,10 @@ class Approach:
         if face.touch is None:
             return False
         a, b = (face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control)))
-        found = int(np.sum((a <= -theta - _NEAR * face.thickness) & (b > -theta)))
-        if isinstance(face.law, LaggedStick):
+        if face.contact.lagged:
             deep = np.where(face.law.touching(a, face.touch), 0.0, b - 2 * face.rule.lengths)
             return bool(self._comm.allreduce(float(deep.max(initial=0.0)), MPI.MAX) > 0)
+        found = int(np.sum((a <= -theta - _NEAR * face.thickness) & (b > -theta)))
         return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self._allowed, self._foreseen) + 2)
 
     def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:

@@ -77,8 +77,8 @@ class FaceContact:
         carrier = Carrier(self.comm, source.positions(*there), x)
         touched = carrier.all(source.touching(*there))[carrier.nearest]
         pressure, friction = carrier.fitted(np.column_stack([found.normal, found.tangential]) / area).T
-        k, theta = self.contact.penalty * self._solid.stress / self.thickness, law.theta
-        over = np.where(touched, np.maximum(pressure, 0.0), 0.0) / (k * theta)
+        theta = law.theta
+        over = np.where(touched, np.maximum(pressure, 0.0), 0.0) / (self._penalty_at_rest * theta)
         depth = theta * np.where(over > 1, over, 2 * np.sqrt(over) - 1)
         d = self.contact.tool.signed_distance(x)
         self._shift = np.where(touched, d - depth, np.maximum(d + theta, 0.0))
@@ -132,9 +132,10 @@ class FaceContact:
 
     @property
     def area(self) -> np.ndarray:
-        """That forces act on, shape (n,). (In space none of points that have just arrived: they are held from now.)"""
-        late = self._memory is not None and isinstance(self.rule, Vertices)
-        return np.where(self._memory.arrived, 0.0, self.rule.area) if late and self._memory else self.rule.area
+        """That forces act on, shape (n,). (Lagged: none of points that have just arrived: they are held from now.)"""
+        if self._memory is None or not self.contact.lagged:
+            return self.rule.area
+        return np.where(self._memory.arrived, 0.0, self.rule.area)
 
     # equations
 
@@ -155,7 +156,7 @@ class FaceContact:
 
     def leave_out(self, points: np.ndarray) -> None:
         """Some points (a mask, shape (n,)) touch nothing, until another increment begins."""
-        law: Any = self.law                                  # one that sticks a step late knows no such thing
+        law: Any = self.law                                  # see `ContactLaw`
         self.increment = Increment(law.without(points), self.touch)
 
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
@@ -210,9 +211,14 @@ class FaceContact:
     def _of_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
         return self.rule.between_unknowns((self._scale * self._length)[:, None, None] * stiffness)
 
+    @property
+    def _penalty_at_rest(self) -> float:
+        """Of the contact, stress/length."""
+        return self.contact.penalty * self._solid.stress / self.thickness
+
     def _law(self, penalty: np.ndarray | float) -> Any:
-        k = self.contact.penalty * self._solid.stress / self.thickness
-        law: Any = self.contact.law(k * penalty, self.thickness, self.points, self._temperatures())
+        law: Any = self.contact.law(self._penalty_at_rest * penalty, self.thickness, self.points,
+                                    self._temperatures())
         if self._shift is not None:
             law.shift = self._shift
         return law
