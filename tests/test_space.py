@@ -19,8 +19,8 @@ HELD = [fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y"
 def disc(size=0.3, material=MATERIALS[0], on="bottom", model=None, **scene):
     """A quarter of a disc of radius 1 under a pressure."""
     sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=size, **scene.pop("mesh", {}))
-    return fx.Scene(mesh=sheet, thickness=scene.pop("thickness", 0.01), materials=material, supports=HELD,
-                    loads=[fx.Pressure(on)], model=model, **scene)
+    return fx.Scene(mesh=sheet, thickness=scene.pop("thickness", 0.01), materials=material, model=model,
+                    supports=scene.pop("supports", HELD), loads=scene.pop("loads", [fx.Pressure(on)]), **scene)
 
 
 @pytest.mark.parametrize("wrinkles", [None, 0.01])
@@ -174,6 +174,10 @@ def test_tool_files_are_looked_over(tmp_path):
     (lambda: disc(model=fx.MixedPressure()), "a sheet in space is a Membrane"),
     (lambda: disc(on="rim"), "a pressure on its 'bottom' or its 'top'"),
     (lambda: disc(thickness=None), "needs a thickness"),
+    (lambda: disc(loads=[fx.Spin(1.0)]), "turns about the axis"),
+    (lambda: disc(supports=[*HELD, fx.PinnedNode(0.0, 0.0)]), "boundaries are held, not nodes"),
+    (lambda: fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(2, 1)), materials=MATERIALS[0],
+                      supports=[fx.Symmetry("axis"), fx.Symmetry("rim", "y")]), "a section has no component 'y'"),
     (lambda: disc(contacts=[fx.Contact("bottom", fx.tools.plane(1.0))]), "a sheet in space those of"),
     (lambda: trough(separates=True), "separates = True: in space what has touched is held"),
     (lambda: fx.Design(lambda h: (disc(thickness=h), fx.pressure(0.001)), {"h": (0.01, 0.005, 0.02)}).fit(even=True),

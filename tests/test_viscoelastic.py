@@ -411,6 +411,7 @@ def test_plot():
     (lambda: Viscoelastic("rubber", P0), "must be a material, or None"),
     (lambda: Viscoelastic(Viscoelastic(RUBBER, P0), P0), "must not relax itself"),
     (lambda: Viscoelastic(RUBBER, P0, order=3), "order 3 is not known"),
+    (lambda: Viscoelastic(RUBBER, P0, shift=3.0), "tau_1: shift = 3.0: must be WLF"),
     (lambda: Viscoelastic(fx.Hyperelastic(lambda I1, I2, mu_1: mu_1 * (I1 - 3), mu_1=1.0), P0), "a constant 'mu_1'"),
     (lambda: Viscoelastic(RUBBER, P0).stress("uniaxial", [1, 2], times=[0]), "a time for each"),
     (lambda: Viscoelastic(RUBBER, P0).stress("uniaxial", [1, 2], times=[1, 0]), "times must not fall"),

@@ -14,10 +14,7 @@ from ufl.constantvalue import Zero
 from ufl.tensors import ListTensor
 
 from ..errors import InputError
-from .supports import Held
-
-_Y = 2
-"""Number of a component along y where supports name them: r, z, y, x."""
+from .supports import NAMES, Held
 
 
 class Kinematics:
@@ -41,9 +38,9 @@ class Kinematics:
             InputError: a component that the body does not have.
         """
         for item in items:
-            if item.component >= _Y:
-                raise InputError(f"{support!r}: a section has no component {'yx'[item.component - _Y]!r}: must be"
-                                 f" 'r' or 'z'")
+            if NAMES[item.component] not in self.axes:
+                raise InputError(f"{support!r}: a section has no component {NAMES[item.component]!r}: must be 'r' or"
+                                 f" 'z'")
         return items
 
     def deformation_gradient(self, u: Any, X: Any) -> Any:
@@ -153,8 +150,8 @@ class ThreeD(Kinematics):
     def in_axes(self, support, items):
         """A hinge holds all nodes of its rim, along y too."""
         if {item.component for item in items} == {0, 1}:
-            items = [*items, items[0]._replace(component=_Y)]
-        return [Held(self.axes.index("xzyx"[h.component]), on=h.on, driven=h.driven) for h in items]
+            items = [*items, items[0]._replace(component=NAMES.index("y"))]
+        return [Held(self.axes.index(NAMES[h.component].replace("r", "x")), on=h.on, driven=h.driven) for h in items]
 
     def deformation_gradient(self, u, X):
         return ufl.Identity(3) + ufl.grad(u)

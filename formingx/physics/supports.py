@@ -8,6 +8,8 @@ from ..errors import InputError, finite, instance
 from .part import Part
 
 R, Z = 0, 1
+NAMES = ("r", "z", "y", "x")
+"""Of the components that supports hold, by their numbers; in space r, of what holds a rim whole, is x."""
 
 
 class Held(NamedTuple):
@@ -161,7 +163,7 @@ class Displaced(Support):
 
 
 def _component(name: str, value: str) -> int:
-    """0 of r, 1 of z, in space 2 of y, 3 of x: `Kinematics.in_axes` puts them in order."""
-    if not isinstance(value, str) or value not in ("r", "z", "x", "y"):
+    """Its number in `NAMES`: `Kinematics.in_axes` makes it that of the body's."""
+    if not isinstance(value, str) or value not in NAMES:
         raise InputError(f"{name} = {value!r}: must be 'r' or 'z' (in space 'x', 'y' or 'z')")
-    return {"r": R, "z": Z, "y": 2, "x": 3}[value]
+    return NAMES.index(value)
