@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,13 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError, positive
 from .material import Material
+
+
+def checked_shift(name: str, shift: Any) -> Callable:
+    """A law by which relaxation times depend on the temperature, or an InputError."""
+    if not callable(shift):
+        raise InputError(f"{name}: shift = {shift!r}: must be WLF(...), Arrhenius(...) or a function of temperature")
+    return shift
 
 
 class HistoryTests:

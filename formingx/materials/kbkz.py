@@ -21,7 +21,7 @@ from . import branches
 from .constants import OfTemperature, Sample
 from .damping import Damping
 from .homogeneous import MODES
-from .in_time import HistoryTests
+from .in_time import HistoryTests, checked_shift
 from .material import Material
 from .past import Integral
 from .tensors import inner, isochoric
@@ -73,10 +73,7 @@ class KBKZ(HistoryTests, Material):
                                                                   "True or False"), shift is not None)
         self.parameters = {} if equilibrium is None else dict(equilibrium.parameters)
         if shift is not None:
-            if not callable(shift):
-                raise InputError(f"KBKZ: shift = {shift!r}: must be WLF(...), Arrhenius(...) or a function of"
-                                 f" temperature")
-            self.parameters["aT"] = OfTemperature(shift, repr(shift))
+            self.parameters["aT"] = OfTemperature(checked_shift("KBKZ", shift), repr(shift))
         self.check()
 
     of_flow = ("aT",)

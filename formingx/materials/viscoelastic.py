@@ -25,7 +25,7 @@ from ..physics import kinematics
 from . import branches as tests
 from .constants import OfTemperature, Sample
 from .homogeneous import MODES
-from .in_time import HistoryTests
+from .in_time import HistoryTests, checked_shift
 from .material import Material, brief
 from .tensors import IDENTITY, Entries, cofactor, determinant, deviator_squared, entries, inner, isochoric, plus
 
@@ -427,9 +427,7 @@ class TransientNetwork(RelaxingMaterial):
 
 def _shifted(name: str, tau: Any, shift: Any) -> OfTemperature:
     """aT(T) tau."""
-    if not callable(shift):
-        raise InputError(f"{name}: shift = {shift!r}: must be WLF(...), Arrhenius(...) or a function of temperature")
-    tau = positive(name, tau)
+    shift, tau = checked_shift(name, shift), positive(name, tau)
     return OfTemperature(lambda T: tau * shift(T), f"{tau!r} * {shift!r}")
 
 

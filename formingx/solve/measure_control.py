@@ -19,9 +19,8 @@ from .newton import Failure, tangents
 from .path_following import Run
 from .record import Record
 from .state import State
-from .stepping import Cutback, StepControl
+from .stepping import SAME_TIME, Cutback, StepControl
 
-_SAME = 1e-12          # relative: times that are the same
 _STILL = 1e-7          # relative: a change that is none
 
 
@@ -81,7 +80,7 @@ class Flow(Run):
     def _next_event(self, time: float) -> float:
         """The next time that must be hit: a corner of the course, or a target."""
         times = [*self._times, *(t.value for t, _ in self.aim.open if t.name == "process_time")]
-        return min(t for t in times if t > time + _SAME * max(abs(time), self._duration))
+        return min(t for t in times if t > time + SAME_TIME * max(abs(time), self._duration))
 
     def _at(self, old: State, time: float) -> State:
         """The state at a time, one step from `old`; raises `Failure`."""
@@ -153,7 +152,7 @@ class Flow(Run):
         problem, best = self.problem, new
         for target, bound in self.aim.open:
             if target.name == "process_time":
-                new.met = target if abs(target.value - new.time) <= _SAME * max(abs(new.time), 1e-300) else new.met
+                new.met = target if abs(target.value - new.time) <= SAME_TIME * max(abs(new.time), 1e-300) else new.met
                 continue
             values = []
             for state in (old, new):

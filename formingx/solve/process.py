@@ -26,14 +26,12 @@ from .path_following import Run
 from .record import Record
 from .stage import Plan, Stage
 from .state import State
-from .stepping import StepControl
+from .stepping import SAME_TIME, StepControl
 
 _IN_TIME = StepControl(length=1e-3, smallest=1e-13)
 """Step control of a material that relaxes: the error in time soon takes over."""
 
 _Targets: TypeAlias = list[tuple[Target, Measure]]
-
-_SAME = 1e-12          # relative: times that are the same
 
 
 class Execution:
@@ -224,7 +222,7 @@ class Execution:
         if not piece:
             self._check_beginning(tables, now, end)
         begun = piece > 0
-        while begun or now < end - _SAME * abs(end):
+        while begun or now < end - SAME_TIME * abs(end):
             then = next_knot(tables, now, end)
             if not begun:
                 piece += 1
@@ -262,12 +260,12 @@ class Execution:
                              f" back")
         for i, table in tables:
             name, first = self.plans[self._k].names[i], table[0]
-            if first[0] < now - _SAME * abs(now):
+            if first[0] < now - SAME_TIME * abs(now):
                 raise InputError(f"{who}: the table of {name} begins at time {first[0]:g}, but the process time is"
                                  f" {now:g} already: it goes back in time")
             stands = self._stands(i)
             size = max(np.abs(table[:, 1]).max(), self.problem.scales[i])
-            if first[0] <= now + _SAME * abs(now) and abs(stands - first[1]) > 1e-9 * size:
+            if first[0] <= now + SAME_TIME * abs(now) and abs(stands - first[1]) > 1e-9 * size:
                 raise InputError(f"{who}: the table of {name} begins with {first[1]:g} at time {first[0]:g}, but it"
                                  f" stands at {stands:g} then")
 
@@ -297,7 +295,7 @@ def straight(amplitudes: list[float], scales: Sequence[float], tables: list[tupl
     base, change = list(amplitudes), [0.0] * len(amplitudes)
     for i, table in tables:
         first, value = table[0]
-        if now < first - _SAME * abs(first):                # still on the way from where it stands to its first knot
+        if now < first - SAME_TIME * abs(first):            # still on the way from where it stands to its first knot
             part = min((then - now) / (first - now), 1.0)
             change[i] = part * (value / scales[i] - base[i])
         else:                                               # a hold has no round-off of the ramp before it to drive
@@ -316,7 +314,7 @@ def end_of(stage: Stage, tables: list[tuple[int, Array]], now: float) -> float:
 
 def next_knot(tables: list[tuple[int, Array]], now: float, end: float) -> float:
     """The first time after now at which tables have a corner, or the end."""
-    return min([t for _, table in tables for t in table[:, 0] if now + _SAME * abs(t) < t < end] + [end])
+    return min([t for _, table in tables for t in table[:, 0] if now + SAME_TIME * abs(t) < t < end] + [end])
 
 
 def begin(curve: Curve) -> State:

@@ -16,6 +16,10 @@ from .state import State
 ACCURACY = {"draft": 1e-2, "standard": 2e-3, "fine": 3e-4}
 """Error of stress and thickness that each promises."""
 
+SAME_TIME = 1e-12
+"""What times may differ by, relative, to count as the same."""
+
+
 @dataclass
 class StepControl:
     """Step length from the iterations of the last step, eq. (4.21) of Song (1993): target over actual.
