@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ...tools.solid import volume, write_stl
 from ..evaluate.profile import fine
 from . import tabular
 
@@ -41,7 +42,7 @@ def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarra
         triangles = np.concatenate([triangles, *_ends(number)])
     triangles = triangles[[len(set(t)) == 3 for t in triangles.tolist()]]
     points = points.reshape(-1, 3)
-    if np.einsum("ij,ij->i", points[triangles[:, 0]], np.cross(*points[triangles[:, 1:]].transpose(1, 0, 2))).sum() < 0:
+    if volume(points, triangles) < 0:
         triangles = triangles[:, ::-1]
     return points, triangles
 
@@ -58,14 +59,7 @@ def coloured(profile: Any, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray, 
 def to_stl(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: Any) -> None:
     """Write what `coloured` gives as a binary STL file, its name ending in .stl (rank 0 writes)."""
     file = tabular.named("to_stl", file, ".stl")
-    points, triangles, _ = surface
-    corners = points[triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
-    rows = np.zeros(len(triangles), dtype=[("v", "<f4", (4, 3)), ("attribute", "<u2")])
-    rows["v"] = np.concatenate([normals[:, None], corners], axis=1)
-    data = b"formingx".ljust(80) + np.uint32(len(triangles)).astype("<u4").tobytes() + rows.tobytes()
-    tabular.on_root(comm, lambda: tabular.replace(file, lambda stream: stream.write(data), "wb"))
+    tabular.on_root(comm, lambda: write_stl(*surface[:2], file))
 
 
 def to_gltf(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: Any) -> None:
