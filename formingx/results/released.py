@@ -25,13 +25,14 @@ from ..units import NONE, Units
 from .evaluate.part import strips_within
 from .evaluate.profile import FACES
 from .evaluate.wall import Wall
+from .numbers import KeyNumbers
 
 _THROUGH = 1.0
 """Time that a wall is given to cool, over thickness^2/diffusivity: exp(-pi^2) of a difference is left."""
 
 
 @dataclass(frozen=True)
-class Released:
+class Released(KeyNumbers):
     """A part before and after it was let go.
 
     Attributes:
@@ -81,21 +82,14 @@ class Released:
     @property
     def rows(self) -> list[tuple[str, str]]:
         """(what, its value with its unit), for people."""
-        length = self.units.length or ""
-
-        def said(value: float) -> str:
-            return f"{value:.5g} {length}".rstrip()
+        said, before = self._length, self.before
         return [("trimmed at the radius", said(self.trimmed)),
-                ("height (in its tools)", f"{said(self.height)} ({said(_height(self.before))})"),
+                ("height (in its tools)", f"{said(self.height)} ({said(_height(before))})"),
                 ("springback of the height", said(self.springback)),
-                ("largest diameter (in its tools)", f"{said(self.diameter)} ({said(_diameter(self.before))})"),
+                ("largest diameter (in its tools)", f"{said(self.diameter)} ({said(_diameter(before))})"),
                 ("shrinkage of the diameter", f"{100 * self.shrinkage:.3g} %"),
                 ("least wall", said(self.least_wall)),
                 ("flange has turned by", f"{self.flange_angle:.3g} degrees")]
-
-    def __str__(self) -> str:
-        width = max(len(what) for what, _ in self.rows)
-        return "\n".join(f"{what:{width}}  {value}" for what, value in self.rows)
 
 
 def _height(wall: Wall) -> float:

@@ -9,12 +9,13 @@ import numpy as np
 
 from ...errors import InputError, finite, known, positive, several
 from ...units import NONE, Units
+from ..numbers import PartNumbers
 from .profile import fine
 from .wall import Wall
 
 
 @dataclass(frozen=True)
-class Part:
+class Part(PartNumbers):
     """A part, from the axis to the rim or to where it is trimmed; in plane strain per unit of depth, as modelled.
 
     Attributes:
@@ -55,26 +56,11 @@ class Part:
     @property
     def rows(self) -> list[tuple[str, str]]:
         """(what, its value with its unit), for people."""
-        u = self.units
-
-        def said(value, unit):
-            return f"{value:{'.5g' if abs(value) < 1e5 else '.0f'}} {unit}".rstrip()
-        rows = [("weight", said(self.weight, "g"))] if self.weight is not None else []
         along, rest = self.least_from
-        where = f"{said(self.least_wall, u.length or '')} at height {said(self.least_at_height, u.length or '')}," \
-                f" r = {said(self.least_at[0], u.length or '')}, from {along} = {said(rest, u.length or '')}"
-        rows += [("least wall", where), ("mean wall", said(self.mean_wall, u.length or "")),
-                 ("evenness (least over mean wall)", f"{self.evenness:.4g}"),
-                 ("coefficient of variation of the wall", f"{self.variation:.4g}"),
-                 ("areal draw ratio", f"{self.draw_ratio:.4g}"), ("volume", said(self.volume, u.volume)),
-                 ("area of the middle surface", said(self.area, u.area))]
-        rows += [("content", said(self.content, u.volume))]
-        rows += [(f"wall at height {said(h, u.length or '')}", said(w, u.length or "")) for h, w in self.walls.items()]
-        return rows + ([("scrap, of the sheet's volume", f"{100 * self.scrap:.3g} %")] if self.scrap else [])
-
-    def __str__(self) -> str:
-        width = max(len(what) for what, _ in self.rows)
-        return "\n".join(f"{what:{width}}  {value}" for what, value in self.rows)
+        where = (f"height {self._length(self.least_at_height)}, r = {self._length(self.least_at[0])}, from {along} ="
+                 f" {self._length(rest)}")
+        return self._rows(where, [("content", self._said(self.content, self.units.volume)), *(
+            (f"wall at height {self._length(h)}", self._length(w)) for h, w in self.walls.items())])
 
 
 def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: float | tuple[str, float] | None = None,

@@ -10,11 +10,12 @@ import numpy as np
 from ...errors import InputError, finite, positive
 from ...units import NONE, Units
 from ..files.sheet import Sheet
+from ..numbers import PartNumbers
 from .wall import WallInSpace
 
 
 @dataclass(frozen=True)
-class PartInSpace:
+class PartInSpace(PartNumbers):
     """A part as modelled (a quarter of a sheet is a quarter of the part).
 
     Attributes:
@@ -42,22 +43,9 @@ class PartInSpace:
     @property
     def rows(self) -> list[tuple[str, str]]:
         """(what, its value with its unit), for people."""
-        u = self.units
         at, rest = (", ".join(f"{v:.4g}" for v in where) for where in (self.least_at, self.least_from))
-        rows = [("weight", f"{self.weight:.5g} g")] if self.weight is not None else []
-        rows += [("least wall", f"{self.least_wall:.5g} {u.length or ''} at (x, y, z) = ({at}), from (X, Y) ="
-                                f" ({rest})".replace("  ", " ")),
-                 ("mean wall", f"{self.mean_wall:.5g} {u.length or ''}".rstrip()),
-                 ("evenness (least over mean wall)", f"{self.evenness:.4g}"),
-                 ("coefficient of variation of the wall", f"{self.variation:.4g}"),
-                 ("areal draw ratio", f"{self.draw_ratio:.4g}"),
-                 ("volume", f"{self.volume:.5g} {u.volume}".rstrip()), ("area", f"{self.area:.5g} {u.area}".rstrip())]
-        rows += [("scrap, of the sheet's volume", f"{100 * self.scrap:.3g} %")] if self.scrap else []
-        return rows + ([("in compression, of the sheet", f"{100 * self.wrinkled:.3g} %")] if self.wrinkled else [])
-
-    def __str__(self) -> str:
-        width = max(len(what) for what, _ in self.rows)
-        return "\n".join(f"{what:{width}}  {value}" for what, value in self.rows)
+        return self._rows(f"(x, y, z) = ({at}), from (X, Y) = ({rest})", []) + (
+            [("in compression, of the sheet", f"{100 * self.wrinkled:.3g} %")] if self.wrinkled else [])
 
 
 def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, units: Units) -> PartInSpace:

@@ -1,0 +1,52 @@
+"""Key numbers of a part, with their units: printed one a line, and rows of a report."""
+
+from __future__ import annotations
+
+from ..units import Units
+
+
+class KeyNumbers:
+    """Prints its `rows`; `units`: of the labels."""
+
+    units: Units
+
+    @property
+    def rows(self) -> list[tuple[str, str]]:
+        """(what, its value with its unit), for people."""
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        width = max(len(what) for what, _ in self.rows)
+        return "\n".join(f"{what:{width}}  {value}" for what, value in self.rows)
+
+    def _length(self, value: float) -> str:
+        return self._said(value, self.units.length or "")
+
+    def _said(self, value: float, unit: str) -> str:
+        return f"{value:{'.5g' if abs(value) < 1e5 else '.0f'}} {unit}".rstrip()
+
+
+class PartNumbers(KeyNumbers):
+    """What a part of a section and one in space have in common."""
+
+    volume: float
+    area: float
+    draw_ratio: float
+    mean_wall: float
+    least_wall: float
+    evenness: float
+    variation: float
+    weight: float | None
+    scrap: float
+
+    def _rows(self, where: str, more: list[tuple[str, str]]) -> list[tuple[str, str]]:
+        """Rows; where: the least wall is; more: those of one kind of part alone."""
+        rows = [("weight", self._said(self.weight, "g"))] if self.weight is not None else []
+        rows += [("least wall", f"{self._length(self.least_wall)} at {where}"),
+                 ("mean wall", self._length(self.mean_wall)),
+                 ("evenness (least over mean wall)", f"{self.evenness:.4g}"),
+                 ("coefficient of variation of the wall", f"{self.variation:.4g}"),
+                 ("areal draw ratio", f"{self.draw_ratio:.4g}"),
+                 ("volume", self._said(self.volume, self.units.volume)),
+                 ("area of the middle surface", self._said(self.area, self.units.area)), *more]
+        return rows + ([("scrap, of the sheet's volume", f"{100 * self.scrap:.3g} %")] if self.scrap else [])
