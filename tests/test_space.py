@@ -1,8 +1,12 @@
 """Sheets in space: their equations, exact solutions, contact that sticks, tools, what is read off, what is refused."""
 
+import shutil
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import run_json
+from matplotlib.image import imread
 from test_demos import summary
 from test_derivatives import assert_derivatives, difference, random_state
 
@@ -208,6 +212,28 @@ def test_a_path_in_space_gives_what_it_has(tmp_path):
     np.testing.assert_allclose(fields["thickness_ratio"] * 0.02, fields["thickness"], rtol=1e-12)
     assert fields["displacement"].shape[-1] == 3 and fields["displacement"][..., 2].min() < -0.1
     path.to_xdmf(tmp_path / "tray.xdmf")
+
+
+@pytest.mark.parametrize("wrinkles", [None, 0.01])
+def test_report_says_where_a_membrane_is_crushed_unless_its_energy_is_relaxed(tmp_path, monkeypatch, wrinkles):
+    """Without a screen it says that it has no pictures, too."""
+    path = fx.solve(disc(model=fx.Membrane(wrinkles=wrinkles)), to=0.001, increments=1)
+    wall = path.wall()
+    monkeypatch.setattr(path, "wall", lambda state=None: replace(wall, now=0.9 * wall.rest))
+    monkeypatch.setattr(shutil, "which", lambda program: None)
+    monkeypatch.delenv("DISPLAY", raising=False)
+    text = path.report(tmp_path / "report.html", density=1.0).read_text()
+    assert ("100 % of the sheet is in compression" in text) == (wrinkles is None) == bool(path.doubts())
+    assert "No pictures: a 3-D view needs a screen" in text
+
+
+def test_views_are_written(tmp_path):
+    """In space, and of two sections, by one plotter: pictures that are not of one colour."""
+    path = fx.solve(disc(), to=0.001, increments=1)
+    path.view3d(tmp_path / "sheet.png", grid=0.25)
+    path.report(tmp_path / "report.html")
+    assert np.unique(imread(tmp_path / "sheet.png").reshape(-1, 4), axis=0).shape[0] > 100
+    assert (tmp_path / "report.html").read_text().count("<img") == 2
 
 
 def test_a_run_that_ends_early_says_why():

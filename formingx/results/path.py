@@ -32,7 +32,7 @@ class Path(States):
         """(how bad: "serious" or "minor"; what) of contact in the last state, of wrinkles in space; collective."""
         if self._in_space:
             from .space import show
-            return show.doubts(self.wall()) if self.problem.scene.model.wrinkles is None else []
+            return show.doubts(self, self.wall())
         return self._view(self.segments[-1]).verdict.doubts(self.last)
 
     def profile(self, state: State | None = None) -> Profile:
@@ -162,7 +162,13 @@ class Path(States):
         return column_factors(self, share, error)
 
     def wall(self, state: State | None = None) -> Any:
-        """The wall of the part at a state (default: the last), place by place (`Wall`): to_csv, to_excel."""
+        """The wall of the part at a state (default: the last), place by place: to_csv, to_excel.
+
+        A `Wall`, from the axis to the rim; in space a `WallInSpace`, triangle by triangle.
+        """
+        if self._in_space:
+            from .space.wall import wall_of
+            return wall_of(self, state or self.last)
         from .evaluate.wall import Walls
         self._walls = self._walls or Walls(self)
         return self._walls.of(state or self.last)

@@ -95,11 +95,8 @@ class Walls:
         self._path = path
         self._lines: tuple[list[str], Any] | None = None
 
-    def of(self, state: Any) -> Any:
-        """The wall in a state (collective); in space a `WallInSpace`."""
-        if self._path.problem.scene.kinematics.components == 3:
-            from ..space.wall import wall_of
-            return wall_of(self._path, state)
+    def of(self, state: Any) -> Wall:
+        """The wall in a state (collective)."""
         path, profile = self._path, self._path.profile(state)
         names = list(path.problem.scene.mesh.layers)
         shares = {names[0]: np.ones(len(profile.bottom))}

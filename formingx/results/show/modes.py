@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, positive
+from ...errors import positive
 from .. import files
-from .views import screen
+from .views import plotted
 
 
 def draw(loss: Any, file: Any, scale: float) -> None:
@@ -18,11 +16,10 @@ def draw(loss: Any, file: Any, scale: float) -> None:
 
     Blue: towards the axis (downwards, where that is more), red: away from it.
     """
-    if FilePath(file).suffix.lower() != ".png":
-        raise InputError(f"file {str(file)!r}: its name must end in .png")
+    file = files.named("Loss.view3d", file, ".png")
     scale = positive("Loss.view3d: scale", scale)
     lines, comm = _outline(loss), loss.path.problem.comm
-    files.on_root(comm, lambda: _draw(loss, lines, os.fspath(file), scale))
+    files.on_root(comm, lambda: _draw(loss, lines, file, scale))
 
 
 def _outline(loss: Any) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -43,19 +40,16 @@ def _outline(loss: Any) -> list[tuple[np.ndarray, np.ndarray]]:
     return lines
 
 
-def _draw(loss: Any, lines: list, file: str, scale: float) -> None:
+def _draw(loss: Any, lines: list, file: Any, scale: float) -> None:
     import pyvista
     axisymmetric = loss.path.problem.scene.kinematics.axisymmetric
     everything = np.vstack([line for line, _ in lines])
     size = scale * np.ptp(everything, axis=0).max()
     turn = np.linspace(0, 2 * np.pi, 181) if axisymmetric else np.linspace(
         0, 2 * np.pi / loss.number if loss.number else np.ptp(everything, axis=0).max(), 61)
-    FilePath(file).parent.mkdir(parents=True, exist_ok=True)
-    with screen():
-        high, wide = np.ptp(everything[:, 1]), 2 * everything[:, 0].max()
-        flat = high < 0.3 * wide
-        plotter: Any = pyvista.Plotter(off_screen=True, window_size=(1000, 500 if flat else 800))
-        plotter.set_background("white")
+    high, wide = np.ptp(everything[:, 1]), 2 * everything[:, 0].max()
+    flat = high < 0.3 * wide
+    with plotted(file, 500 if flat else 800) as plotter:
         for points, mode in lines:
             U, W, V = mode.T[..., None] * size
             phase = loss.number * turn
@@ -71,8 +65,3 @@ def _draw(loss: Any, lines: list, file: str, scale: float) -> None:
         plotter.camera_position = [(2.0, -3.4, 1.2 if high > wide else 1.9), (0, 0, 0), (0, 0, 1)]
         plotter.reset_camera()
         plotter.camera.zoom(0.95 if high > wide else 2.0 if flat else 1.25)
-        plotter.enable_anti_aliasing("ssaa")
-        try:
-            plotter.screenshot(file)
-        finally:
-            plotter.close()

@@ -64,13 +64,7 @@ def _mirrored(profile: Any) -> Any:
 def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any, comm: Any, title: str) -> None:
     """Draw the section swept through `stations`; place(points (n, 2), station) gives its x, y, z there, each (n,)."""
     file = files.named("view3d", file, ".png")
-
-    def draw():
-        picture = io.BytesIO()
-        with screen():
-            _draw(profile, stations, place, camera, picture, title)
-        files.replace(file, lambda stream: stream.write(picture.getvalue()), "wb")
-    files.on_root(comm, draw)
+    files.on_root(comm, lambda: _draw(profile, stations, place, camera, file, title))
 
 
 def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any, title: str) -> None:
@@ -87,33 +81,50 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
     rim = np.linspace(profile.bottom[-1], profile.top[-1], 3)[1:-1]
     line = np.vstack([profile.bottom, rim, profile.top[::-1]])
     values = np.concatenate([ratio, np.full(len(rim), ratio[-1]), beyond[::-1]])
-    plotter: Any = pyvista.Plotter(off_screen=True, window_size=(1000, 800))
-    plotter.set_background("white")
+    with plotted(file) as plotter:
+        shades = shading(values, title)
+        plotter.add_mesh(swept(line, values), **shades, specular=0.25, split_sharp_edges=True)
+        for s in (stations[0], stations[-1]):          # the cut faces
+            faces = [np.column_stack(place(side, s)) for side in (profile.bottom, profile.top)]
+            section = pyvista.StructuredGrid(*(np.stack([f[:, k] for f in faces], 1)[..., None] for k in range(3)))
+            section["ratio"] = np.tile(ratio, 2)
+            plotter.add_mesh(section, scalars="ratio", cmap=shades["cmap"], clim=shades["clim"], lighting=False,
+                             show_scalar_bar=False)
+            points = np.vstack([faces[0], faces[1][::-1]])
+            plotter.add_mesh(pyvista.lines_from_points(points, close=True), color="black", line_width=2)
+        look(plotter, camera, np.vstack([np.column_stack(place(line, s)) for s in stations]))
+
+
+@contextlib.contextmanager
+def plotted(file: Any, height: int = 800) -> Iterator[Any]:
+    """A plotter to add meshes to, 1000 by `height`; when the block ends, what it shows is written as PNG."""
+    import pyvista
+    picture = io.BytesIO()
+    with screen():
+        plotter: Any = pyvista.Plotter(off_screen=True, window_size=(1000, height))
+        try:
+            plotter.set_background("white")
+            yield plotter
+            plotter.enable_anti_aliasing("ssaa")
+            plotter.screenshot(picture)
+        finally:                                       # before its screen goes
+            plotter.close()
+    files.replace(file, lambda stream: stream.write(picture.getvalue()), "wb")
+
+
+def shading(values: np.ndarray, title: str = "thickness / original") -> dict[str, Any]:
+    """How `add_mesh` shows the array "ratio" of a surface: colours of all its values, a bar beside it, light."""
+    middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), 0.01) / 2     # a flat sheet is of one colour
     bar = {"title": title + "\n", "color": "black", "vertical": True, "position_x": 0.85, "position_y": 0.2,
            "height": 0.6, "width": 0.07, "title_font_size": 20, "label_font_size": 18, "fmt": "%.2f", "n_labels": 5}
-    middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), 0.01) / 2     # a flat sheet is of one colour
-    shades = {"scalars": "ratio", "cmap": "viridis_r", "clim": (middle - half, middle + half)}
-    plotter.add_mesh(swept(line, values), **shades, smooth_shading=True, scalar_bar_args=bar,
-                     ambient=0.45, diffuse=0.65, specular=0.25, specular_power=20, split_sharp_edges=True)
-    for s in (stations[0], stations[-1]):              # the cut faces
-        faces = [np.column_stack(place(side, s)) for side in (profile.bottom, profile.top)]
-        section = pyvista.StructuredGrid(*(np.stack([f[:, k] for f in faces], 1)[..., None] for k in range(3)))
-        section["ratio"] = np.tile(ratio, 2)
-        plotter.add_mesh(section, **shades, lighting=False, show_scalar_bar=False)
-        points = np.vstack([faces[0], faces[1][::-1]])
-        plotter.add_mesh(pyvista.lines_from_points(points, close=True), color="black", line_width=2)
-    plotter.camera_position = [camera, (0, 0, 0), (0, 0, 1)]
+    return {"scalars": "ratio", "cmap": "viridis_r", "clim": (middle - half, middle + half), "scalar_bar_args": bar,
+            "smooth_shading": True, "ambient": 0.45, "diffuse": 0.65, "specular_power": 20}
+
+
+def look(plotter: Any, camera: Any, points: np.ndarray) -> None:
+    """Look from `camera` so that points, shape (n, 3), fill the window beside the colour bar, by zoom and a shift."""
+    plotter.camera_position = [tuple(camera), (0, 0, 0), (0, 0, 1)]
     plotter.reset_camera()
-    fit(plotter, np.vstack([np.column_stack(place(line, s)) for s in stations]))
-    plotter.enable_anti_aliasing("ssaa")
-    try:
-        plotter.screenshot(file)
-    finally:                                           # before its screen goes
-        plotter.close()
-
-
-def fit(plotter: Any, points: np.ndarray) -> None:
-    """Turn the zoom and shift the picture so that points, shape (n, 3), fill the window beside the colour bar."""
     camera, (width, height) = plotter.camera, plotter.window_size
     matrix = camera.GetCompositeProjectionTransformMatrix(width / height, -1, 1)
     matrix = np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])

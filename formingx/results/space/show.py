@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import io
 from pathlib import Path as FilePath
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -15,6 +14,7 @@ from ...scene.summary import summary
 from ...units import Units
 from .. import files
 from ..show import page
+from ..show.views import look, plotted, shading
 from .wall import WallInSpace, wall_of
 
 _SIDE = ((0, "x0"), (1, "y0"))
@@ -28,44 +28,26 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
     Raises:
         InputError: there is neither a screen nor Xvfb to draw on.
     """
-    from ..show.views import fit, screen
-    file, wall, comm = files.named("view3d", file, ".png"), wall_of(path, state), path.problem.comm
+    file, wall = files.named("view3d", file, ".png"), wall_of(path, state)
     lines = wall.printed(grid) if grid else []
     mirrored = _mirrors(path, wall)
 
     def draw():
         import pyvista
-        picture = io.BytesIO()
-        with screen():
-            plotter: Any = pyvista.Plotter(off_screen=True, window_size=(1000, 800))
-            plotter.set_background("white")
-            below = wall.now[:, 2].min() < -wall.now[:, 2].max()        # look into the part
-            seen_from = np.array([1.7, -2.4, 2.6 if below else 1.7])
-            lift = 0.004 * np.ptp(wall.now, axis=0).max() * seen_from / np.linalg.norm(seen_from)   # else lines flicker
-            values = wall.at_nodes / wall._to_nodes(wall.thickness_at_rest)
-            middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), 0.01) / 2
-            bar = {"title": "thickness / original\n", "color": "black", "vertical": True, "position_x": 0.85,
-                   "position_y": 0.2, "height": 0.6, "width": 0.07, "title_font_size": 20, "label_font_size": 18,
-                   "fmt": "%.2f", "n_labels": 5}
-            faces = np.column_stack([np.full(len(wall.triangles), 3), wall.triangles]).ravel()
+        below = wall.now[:, 2].min() < -wall.now[:, 2].max()            # look into the part
+        camera = np.array([1.7, -2.4, 2.6 if below else 1.7])
+        lift = 0.004 * np.ptp(wall.now, axis=0).max() * camera / np.linalg.norm(camera)         # else lines flicker
+        values = wall.at_nodes / wall._to_nodes(wall.thickness_at_rest)
+        faces = np.column_stack([np.full(len(wall.triangles), 3), wall.triangles]).ravel()
+        with plotted(file) as plotter:
             for side in mirrored:
                 surface = pyvista.PolyData(wall.now * side, faces)
                 surface["ratio"] = values
-                plotter.add_mesh(surface, scalars="ratio", cmap="viridis_r", clim=(middle - half, middle + half),
-                                 smooth_shading=True, split_sharp_edges=False, scalar_bar_args=bar, ambient=0.45,
-                                 diffuse=0.65, specular=0.2, specular_power=20)
+                plotter.add_mesh(surface, **shading(values), specular=0.2, split_sharp_edges=False)
                 for line in lines:
                     plotter.add_mesh(pyvista.lines_from_points(line * side + lift), color="black", line_width=1.5)
-            plotter.camera_position = [tuple(seen_from), (0, 0, 0), (0, 0, 1)]
-            plotter.reset_camera()
-            fit(plotter, np.vstack([wall.now * side for side in mirrored]))
-            plotter.enable_anti_aliasing("ssaa")
-            try:
-                plotter.screenshot(picture)
-            finally:
-                plotter.close()
-        files.replace(file, lambda stream: stream.write(picture.getvalue()), "wb")
-    files.on_root(comm, draw)
+            look(plotter, camera, np.vstack([wall.now * side for side in mirrored]))
+    files.on_root(path.problem.comm, draw)
 
 
 def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -112,15 +94,16 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     wall, last, comm = path.wall(), path.last, path.problem.comm
     found = part(wall, density, trim, (), units)
     size = np.ptp(wall.rest[:, :2], axis=0).max() / 12
-    pictures = []
+    pictures: list[str] = []
     with TemporaryDirectory() as folder:
         for caption, grid in (("The wall over the original thickness.", None),
                               ("Squares that were printed on the flat sheet.", size)):
             target = FilePath(folder) / "picture.png"
             try:
                 view(path, last, target, grid)
-            except (InputError, ImportError):
-                continue
+            except (InputError, ImportError) as error:
+                pictures = [f"<p class=note>No pictures: {html.escape(str(error))}.</p>"]
+                break
             if comm.rank == 0:
                 pictures.append(page.picture(target.read_bytes(), caption, "small"))
     counts = path.counts
@@ -129,7 +112,7 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
             f" {counts.seconds:.1f} s. A sheet in space, as a membrane.</p>"]
     if failure is not None:
         body.append(f"<div class='note bad'><h2>The run could not go on</h2><p>{page.lines(str(failure))}</p></div>")
-    body += [f"<p class=note>{html.escape(text)}</p>" for _, text in doubts(wall)]
+    body += [f"<p class=note>{html.escape(text)}</p>" for _, text in doubts(path, wall)]
     body += [*pictures, "<h2>The answer</h2>", page.table(["", ""], [list(row) for row in found.rows])]
     names = list(dict.fromkeys(state.stage for state in path.states))
     columns = [c for c in path.columns if not c.endswith("error")]
@@ -142,14 +125,16 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     return FilePath(file)
 
 
-def doubts(wall: WallInSpace) -> list[tuple[str, str]]:
-    """(how bad, what) a reader should know of a membrane that is in compression somewhere."""
+def doubts(path: Any, wall: WallInSpace) -> list[tuple[str, str]]:
+    """(how bad, what) a reader should know of a membrane in compression whose energy is not relaxed there."""
+    if path.problem.scene.model.wrinkles is not None:
+        return []
     share = float(wall.area_at_rest[wall.wrinkled].sum() / wall.area_at_rest.sum())
     if share < 1e-3:
         return []
     k = int(np.argmax(wall.wrinkled))
     at = ", ".join(f"{v:.4g}" for v in wall.middle[k])
-    return [("serious", f"{100 * share:.2g} % of the sheet is in compression in the last state, one place at (x, y, z)"
+    return [("serious", f"{100 * share:.3g} % of the sheet is in compression in the last state, one place at (x, y, z)"
                         f" = ({at}): it wrinkles there, and its wall depends on the mesh: use Membrane(wrinkles=0.01),"
                         f" and look at path.wall().wrinkled.")]
 
