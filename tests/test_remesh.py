@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 import formingx as fx
 
@@ -54,6 +55,38 @@ def test_a_stuck_block_goes_on():
 def test_wrong_sizes(options, message):
     with pytest.raises(fx.InputError, match=message):
         fx.Remesh(**options)
+
+
+def test_a_session_of_gmsh_that_is_open_stays_as_it_is():
+    """A mesh does not depend on what a script has set in gmsh, and leaves it alone."""
+    import gmsh
+    from formingx.mesh.remeshed import remeshed
+    corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+    ends = np.roll(corners, -1, axis=0)
+    edges = np.stack([corners, ends, (corners + ends) / 2], axis=1)
+    names = [frozenset({name}) for name in ("bottom", "rim", "top", "axis")]
+
+    def counts():
+        found = (remeshed(edges, names, corners[1:2], 0.3, 0.1, "sheet", True, MPI.COMM_SELF),
+                 fx.mesh.sheet(fx.mesh.rectangle(2.0, 1.0), size=0.2, comm=MPI.COMM_SELF),
+                 fx.mesh.sheet(fx.mesh.rectangle(2.0, 1.0), size=lambda x, y: 0.2 + 0.1 * x * x, comm=MPI.COMM_SELF))
+        return [mesh.domain.topology.index_map(2).size_local for mesh in found]
+    alone = counts()
+    options = {"Mesh.MeshSizeMax": 0.07, "Mesh.ElementOrder": 2, "Mesh.MeshSizeFactor": 0.5}
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.model.add("mine")
+        gmsh.model.geo.addPoint(0.0, 0.0, 0.0)
+        gmsh.model.geo.synchronize()
+        gmsh.model.add("beside")
+        gmsh.model.setCurrent("mine")
+        for option, value in options.items():
+            gmsh.option.setNumber(option, value)
+        assert counts() == alone
+        assert gmsh.isInitialized() and gmsh.model.getCurrent() == "mine" and len(gmsh.model.getEntities(0)) == 1
+        assert {option: gmsh.option.getNumber(option) for option in options} == options
+    finally:
+        gmsh.finalize()
 
 
 def test_what_is_not_carried_is_refused():

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from . import with_gmsh
 from .grid import Grid, to_mesh
 from .mesh import Mesh
 
@@ -28,7 +29,6 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
         corners: where elements are `corner` long, shape (k, 2); `size` elsewhere, lengths.
         axisymmetric: R is scaled so that the volume of revolution (else: the area) is that inside the outline.
     """
-    import gmsh
     turns = [k for k in range(len(edges)) if names[k] != names[k - 1]] or [0]
     ends, middles, named = [], [], []
     for first, last in zip(turns, [*turns[1:], turns[0] + len(edges)]):
@@ -39,24 +39,20 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
         named += [names[first % len(edges)]] * len(between)
     ring, middle = np.concatenate(ends), np.concatenate(middles)
     n = len(ring)
-    gmsh.initialize(interruptible=False)
     try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
-        gmsh.model.add("body")
-        tags = [gmsh.model.geo.addPoint(r, z, 0) for r, z in ring]
-        lines = [gmsh.model.geo.addLine(tags[k], tags[(k + 1) % n]) for k in range(n)]
-        for line in lines:
-            gmsh.model.geo.mesh.setTransfiniteCurve(line, 2)
-        gmsh.model.geo.addPlaneSurface([gmsh.model.geo.addCurveLoop(lines)])
-        gmsh.model.geo.synchronize()
-        gmsh.model.mesh.generate(2)
-        numbers, coordinates, _ = gmsh.model.mesh.getNodes()
-        _, triangles = gmsh.model.mesh.getElementsByType(2)
+        with with_gmsh.model("body") as gmsh:
+            geo = gmsh.model.geo
+            tags = [geo.addPoint(r, z, 0) for r, z in ring]
+            lines = [geo.addLine(tags[k], tags[(k + 1) % n]) for k in range(n)]
+            for line in lines:
+                geo.mesh.setTransfiniteCurve(line, 2)
+            geo.addPlaneSurface([geo.addCurveLoop(lines)])
+            geo.synchronize()
+            gmsh.model.mesh.generate(2)
+            numbers, coordinates, _ = gmsh.model.mesh.getNodes()
+            _, triangles = gmsh.model.mesh.getElementsByType(2)
     except Exception as error:
         raise InputError(f"remesh: gmsh made no mesh of the body: {error}") from None
-    finally:
-        gmsh.finalize()
     points = np.asarray(coordinates).reshape(-1, 3)[:, :2]
     place = {int(number): k for k, number in enumerate(numbers)}
     cells = np.array([place[int(t)] for t in triangles]).reshape(-1, 3)

@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError, instance, known, non_negative, pair, positive, several
+from . import with_gmsh
 from .grid import Grid, counter_clockwise, to_mesh
 from .mesh import Mesh
 
@@ -140,15 +141,10 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
 
 def _grid(edges: list[Edge], size: Any) -> Grid:
     """The triangles, on one rank."""
-    import gmsh
-    mine = not gmsh.isInitialized()
-    if mine:
-        gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.option.setNumber("General.NumThreads", 1)
-        gmsh.option.setNumber("Mesh.Algorithm", 6)
-        gmsh.model.add("sheet")
+    options = {"General.NumThreads": 1, "Mesh.MeshSizeExtendFromBoundary": 0}
+    if not callable(size):
+        options |= {"Mesh.MeshSizeMin": size, "Mesh.MeshSizeMax": size}
+    with with_gmsh.model("sheet", options) as gmsh:
         geo, points = gmsh.model.geo, {}
 
         def point(at: tuple[float, float]) -> int:
@@ -163,14 +159,9 @@ def _grid(edges: list[Edge], size: Any) -> Grid:
         for name in dict.fromkeys(e.name for e in edges):
             group = gmsh.model.addPhysicalGroup(1, [t for t, e in zip(tags, edges) if e.name == name])
             gmsh.model.setPhysicalName(1, group, name)
-        for option in ("FromPoints", "FromCurvature", "ExtendFromBoundary"):
-            gmsh.option.setNumber(f"Mesh.MeshSize{option}", 0)
         if callable(size):
             gmsh.model.mesh.setSizeCallback(
                 lambda dim, tag, x, y, z, lc: positive(f"sheet: size at ({x:g}, {y:g})", float(size(x, y))))
-        else:
-            gmsh.option.setNumber("Mesh.MeshSizeMin", size)
-            gmsh.option.setNumber("Mesh.MeshSizeMax", size)
         try:
             gmsh.model.mesh.generate(2)
         except InputError:
@@ -191,8 +182,3 @@ def _grid(edges: list[Edge], size: Any) -> Grid:
         if not len(cells):
             raise InputError("sheet: the outline holds no triangle: must be closed, and not cross itself")
         return Grid(X, np.arange(1, len(X) + 1), {"sheet": counter_clockwise(X, cells)}, boundaries)
-    finally:
-        if mine:
-            gmsh.finalize()
-        else:
-            gmsh.model.remove()
