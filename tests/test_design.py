@@ -131,6 +131,22 @@ def test_stages_friction_and_time(relaxing):
         assert np.linalg.norm(by[:, k] - whole) < (0.02 if relaxing else 2e-3) * np.linalg.norm(whole), name
 
 
+def test_a_stage_that_waits_ends_where_its_target_is_met():
+    """A sheet that creeps under its weight: when it has sagged so far goes with the weight."""
+    creeps = fx.TransientNetwork(fx.NeoHookean(c10=1e-6), [(1.0, 2.0)])
+
+    def sagging(weight):
+        mesh = fx.mesh.disc(radius=1.0, thickness=1e-3, elements=(8, 1))
+        scene = fx.Scene(mesh=mesh, materials=creeps, supports=CAN["supports"], model=fx.Membrane(),
+                         loads=[fx.Gravity(1.0, value=weight)])
+        return scene, [fx.Stage("sag", until=fx.sag(0.05), duration=60.0)]
+    design = fx.Design(sagging, {"weight": (1e-4, 5e-5, 2e-4)})
+    run = design.run()
+    above, below = (design.run({"weight": weight}).path.last.time for weight in (1.01e-4, 0.99e-4))
+    assert run.derivative(lambda path: path.last.time)[1].item() == pytest.approx((above - below) / 2e-6, rel=2e-3)
+    assert abs(run.derivative("sag")[1].item()) < 1e-6
+
+
 def test_where_a_run_has_no_derivative_it_says_so():
     """A flow with a history, a jump: no number is given."""
     def held(mu):

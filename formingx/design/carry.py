@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -63,7 +63,7 @@ class _Carrier:
         if history and any(state.kind == "jump" for state in states):
             jump = next(state for state in states if state.kind == "jump")
             raise Failure(f"its derivative ends where the body snaps, at {self.path.describe(jump)}", [])
-        if history and any(p.stage.flow or p.stage.hold for p in self._plans):
+        if history and any(p.in_flow for p in self._plans):
             raise Failure("a flow is not carried along where something has a history", [])
         before: State | None = None
         for k, state in enumerate(states):
@@ -110,15 +110,13 @@ class _Carrier:
                     problem.bring_in(number, x, one.control)
             if setting.piece == 0:
                 base, rate, control = amplitudes, [0.0] * len(amplitudes), 0.0
-            elif p.tables or p.stage.duration and not p.numbers:
+            elif p.by_time:
                 time = now.base[-1] + now.rate[-1] * one.control if standing else 0.0
                 then = next_knot(p.tables, time, end_of(p.stage, p.tables, time))
                 base, rate = straight(amplitudes, problem.scales, p.tables, time, then)
                 one.then, control = then, 0.0
-            elif p.stage.flow or p.stage.hold:
-                base, rate, control = driving(amplitudes, problem.scales, p.numbers, p.stage, clocked=False)
             else:
-                base, rate, control = driving(amplitudes, problem.scales, p.numbers, p.stage)
+                base, rate, control = driving(amplitudes, problem.scales, p.numbers, p.stage, clocked=not p.in_flow)
             problem.enter(replace(setting, base=base, rate=rate), x, control)
             one.control = control
 
@@ -206,10 +204,10 @@ class _Carrier:
             return fixed(1.0), [fixed(1.0)] * len(self.neighbours)
         key = (setting.stage, setting.piece)
         p = None if self._single else self._plans[setting.stage]
-        if p is not None and (p.tables or p.stage.duration and not p.numbers):
+        if p is not None and p.by_time and not p.stage.waits:
             return fixed(state.control), [fixed((one.then - one.problem.setting.base[-1])
                                                 / one.problem.setting.rate[-1]) for one in self.neighbours]
-        if p is not None and (p.stage.flow or p.stage.hold):
+        if p is not None and p.in_flow:
             raise Failure("a flow is not carried along", [])
         if key not in self._until:
             targets = [(self.problem, self._end if p is None else p.stage.until),
@@ -221,7 +219,6 @@ class _Carrier:
         if state.met is None or state.met[:2] != target[:2]:
             raise Failure(f"it did not come to {target}", [])
         return self._until[key]
-
 
     def _gaps(self) -> tuple[Any, list[Any]]:
         """The gap of a point that arrives at the end of the step, which turns the path; None: there is none."""
@@ -255,14 +252,9 @@ def _gap(problem: Any, face: Any, point: int | None) -> Any:
     return c
 
 
-class _Kind(NamedTuple):
-    numbers: list[int]
-    tables: list[tuple[int, int]]
-    off: list[int]
-
-
-def _kind(p: Plan) -> _Kind:
-    return _Kind(p.numbers, [(i, len(table)) for i, table in p.tables], p.off)
+def _kind(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[int]]:
+    """What a stage drives, its tables and their lengths, what it leaves out."""
+    return p.numbers, [(i, len(table)) for i, table in p.tables], p.off
 
 
 def _onto(law: Any, x: np.ndarray, velocity: np.ndarray, gap: np.ndarray) -> np.ndarray:

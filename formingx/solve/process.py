@@ -72,10 +72,9 @@ class Execution:
                 self._change(piece == 0)
                 if any(plan is p for p in self._unsure):     # now its travels are known
                     self._look(plan, self._stands)
-            stage = plan.stage
-            if stage.flow or stage.hold:
+            if plan.in_flow:
                 self._flow(plan.numbers, piece > 0)
-            elif plan.tables or stage.duration and not plan.numbers:
+            elif plan.by_time:
                 self._follow(plan.tables, max(piece, 0))
             elif plan.numbers:
                 self._drive(plan.numbers, piece > 0)

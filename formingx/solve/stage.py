@@ -164,6 +164,16 @@ class Plan(NamedTuple):
     off: list[int]
     names: list[str]
 
+    @property
+    def in_flow(self) -> bool:
+        """True if what is driven makes a measure follow a course in time."""
+        return bool(self.stage.flow or self.stage.hold)
+
+    @property
+    def by_time(self) -> bool:
+        """True if the time is the control: tables are followed, or nothing is driven while it goes by."""
+        return bool(self.tables or self.stage.duration and not self.numbers)
+
 
 def plan(scene: Scene, stage: Stage) -> Plan:
     """A stage by the numbers of the things of its scene.
