@@ -9,6 +9,9 @@ import numpy as np
 
 from .run import DesignRun
 
+_SCATTER = 6e-5
+"""Of the wall, relative: by so much it may differ as runs take other steps."""
+
 
 def unevenness(wall: np.ndarray) -> float:
     """Standard deviation over mean."""
@@ -59,7 +62,7 @@ class Answer:
         """Parameters whose whole range, foretold by the derivatives, changes the wall by less than its scatter."""
         by = self.before.derivative("wall")[1][self.inside] * self.before._parameters.size
         mean = self.before.wall[self.inside].mean()
-        return [name for name, d in zip(self.before._parameters.names, abs(by).max(0) / mean) if d < 6e-5]
+        return [name for name, d in zip(self.before._parameters.names, abs(by).max(0) / mean) if d < _SCATTER]
 
     def __str__(self) -> str:
         (a, b), before, after = self.cv, self.before.wall[self.inside], self.best.wall[self.inside]

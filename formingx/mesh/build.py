@@ -257,8 +257,8 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
     if names[0] == names[1]:
         names = ["start", "end"]
     if np.sum(around[:, 0] * np.roll(around[:, 1], -1) - np.roll(around[:, 0], -1) * around[:, 1]) < 0:
-        lines, names, ends = [line[::-1] for line in lines], names[::-1], pieces - ends[::-1]
         # the body lies to the left of `inner`
+        lines, names, ends = [line[::-1] for line in lines], names[::-1], pieces - ends[::-1]
 
     def between(at: np.ndarray) -> np.ndarray:
         first, second = (np.stack([np.interp(at, np.arange(pieces + 1), line[:, i]) for i in (0, 1)], axis=-1)
