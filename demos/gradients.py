@@ -78,6 +78,18 @@ def beside(design, values, name, step, radii, thickness):
     return [{f"{R:g}": d for R, d in zip(radii, one)} for one in found]
 
 
+def draw(exact, whole, step):
+    """The derivative of the cup's wall by b."""
+    drawing, axes = figure()
+    axes.plot(RADII, list(exact.values()), "C0.-", label="derivative of one run")
+    axes.plot(RADII, list(whole.values()), "ko", mfc="none", label=f"differences of runs, b = {step:g} and -{step:g}")
+    axes.axhline(0, color="0.6", linewidth=0.8)
+    axes.set(xlabel="reference radius R / R0", ylabel="d(wall / thickness at rest) / db",
+             title="wall of a stuck cup, C = 0.5 (1 + b (R² - 0.5))")
+    axes.legend()
+    return drawing
+
+
 def ratios(path):
     """Wall over that at rest at R = 0 and 0.5."""
     profile = path.profile()
@@ -109,13 +121,7 @@ def main():
     for name, (a, b) in {"b": (exact, whole), "fillet": summary["fillet"].values()}.items():
         say(f"cup, by {name:7}" + ", ".join(f"{d:8.4f}" for d in a.values()),
             " differences  " + ", ".join(f"{d:8.4f}" for d in b.values()))
-    drawing, axes = figure()
-    axes.plot(RADII, list(exact.values()), "C0", label="exact")
-    axes.plot(RADII, list(whole.values()), "ko", mfc="none", label=f"differences of runs, b = {step:g} and -{step:g}")
-    axes.set_xlabel("R / R0")
-    axes.set_ylabel("d(wall / h) / db")
-    axes.legend()
-    save(drawing, args.out / "cup.png")
+    save(draw(exact, whole, step), args.out / "cup.png")
     summary["pot"] = {}
     for sheet in () if args.quick else ("elastic", "relaxing"):
         design = fx.Design(lambda relaxing=sheet == "relaxing", **values: pot(**values, relaxing=relaxing), {
