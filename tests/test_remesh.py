@@ -60,6 +60,7 @@ def test_wrong_sizes(options, message):
 def test_a_session_of_gmsh_that_is_open_stays_as_it_is():
     """A mesh does not depend on what a script has set in gmsh, and leaves it alone."""
     import gmsh
+
     from formingx.mesh.remeshed import remeshed
     corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
     ends = np.roll(corners, -1, axis=0)

@@ -13,17 +13,17 @@ _DEFAULTS = {"General.Terminal": 0, "Mesh.Algorithm": 6, "Mesh.ElementOrder": 1,
 
 
 @contextmanager
-def model(name: str, options: Mapping[str, float] = _DEFAULTS) -> Iterator[Any]:
-    """gmsh with a new model and these options; afterwards a script's session has its current model and options again."""
+def model(name: str, options: Mapping[str, float] | None = None) -> Iterator[Any]:
+    """gmsh with a new model and these options; then a script's session has its current model and options again."""
     import gmsh
     mine = not gmsh.isInitialized()
     if mine:
         gmsh.initialize(interruptible=False)
-    options = {**_DEFAULTS, **options}
-    before = {option: gmsh.option.getNumber(option) for option in options}
+    wanted = {**_DEFAULTS, **(options or {})}
+    before = {option: gmsh.option.getNumber(option) for option in wanted}
     current = gmsh.model.getCurrent()
     try:
-        for option, value in options.items():
+        for option, value in wanted.items():
             gmsh.option.setNumber(option, value)
         gmsh.model.add(name)
         yield gmsh
