@@ -14,7 +14,7 @@ STRESSES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6, "bar": 
 _FORCES = {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "kgf": 9.80665, "lbf": 4.4482216152605}
 _ENERGIES = {"J": 1.0, "kJ": 1e3, "MJ": 1e6, "mJ": 1e-3, "uJ": 1e-6}
 _KINDS = (("pressure", "stress"), ("stress", "stress"), ("force", "force"), ("energy", "energy"), ("work", "energy"),
-          ("enclosed_volume", "volume"), ("volume", "volume"), ("area", "area"), ("travel", "length"),
+          ("power", "power"), ("volume", "volume"), ("area", "area"), ("travel", "length"),
           ("height", "length"), ("contact_length", "length"), ("arc_length", "length"), ("reference_length", "length"),
           ("penetration", "length"), ("displacement", "length"), ("radius", "length"), ("wall", "length"),
           ("gap", "length"), ("thickness", "length"), ("process_time", "time"), ("temperature", "temperature"))
@@ -71,6 +71,11 @@ class Units:
     def energy(self) -> str:
         """The unit of energies, stress length^3: "mJ" of mm and MPa; "" if one is not said."""
         return self._derived(_ENERGIES, 3)
+
+    @property
+    def power(self) -> str:
+        """The unit of an energy over process time: "mJ/s" of mm, MPa and s; "" if one is not said."""
+        return f"{self.energy}/{self.time}" if self.energy else ""
 
     def mass(self, volume: float, density: float) -> float:
         """Grams of a volume (length^3) of a density in g/cm3; a length that is not said is taken for cm."""

@@ -211,8 +211,9 @@ def test_units():
     assert fx.Units("in", "psi").force == "lbf" and fx.Units("cm", "kg/cm2").force == "kgf"
     assert fx.Units("cm", "psi").force == "psi cm2" and fx.Units().force == ""
     labels = {"plug_force": "N", "vacuum_pressure": "MPa", "plug_travel": "mm", "pole_stretch": "", "wall_ratio": "",
-              "enclosed_volume": "mm3", "strain_energy": "mJ", "process_time": "s", "mass_error": "", "r": "mm",
-              "contact_pressure": "MPa", "contact_length": "mm", "wall_of_outer": "mm"}
+              "enclosed_volume": "mm3", "strain_energy": "mJ", "dissipated_power": "mJ/s", "process_time": "s",
+              "mass_error": "", "r": "mm", "contact_pressure": "MPa", "contact_length": "mm",
+              "wall_of_outer": "mm"}
     assert {name: units.of(name) for name in labels} == labels
     with pytest.raises(fx.InputError, match="length 'furlong' is not known"):
         fx.Units("furlong")
