@@ -118,10 +118,29 @@ def several(name: str, values: Any, what: str) -> list[Any]:
 
 def pair(name: str, values: Any) -> tuple[float, float]:
     """`values` as two floats, or an InputError unless they are two finite numbers."""
-    found = several(name, values, "two numbers")
-    if len(found) != 2:
-        raise InputError(f"{name} = {values!r}: must be two numbers")
-    return finite(name, found[0]), finite(name, found[1])
+    first, second = _finite(name, values, 2, "two numbers")
+    return first, second
+
+
+def triple(name: str, values: Any) -> tuple[float, float, float]:
+    """`values` as three floats, or an InputError unless they are three finite numbers."""
+    first, second, third = _finite(name, values, 3, "three numbers")
+    return first, second, third
+
+
+def direction(name: str, values: Any) -> np.ndarray:
+    """`values` as a unit vector, shape (3,), or an InputError unless they are three finite numbers, not all 0."""
+    way = np.array(triple(name, values))
+    if not way.any():
+        raise InputError(f"{name} = {values!r}: must not be 0 in all components")
+    return way / np.linalg.norm(way)
+
+
+def _finite(name: str, values: Any, n: int, what: str) -> list[float]:
+    found = several(name, values, what)
+    if len(found) != n:
+        raise InputError(f"{name} = {values!r}: must be {what}")
+    return [finite(name, value) for value in found]
 
 
 def finite_array(name: str, values: Any) -> np.ndarray:
@@ -135,23 +154,15 @@ def finite_array(name: str, values: Any) -> np.ndarray:
     return found
 
 
-def as_points(name: str, values: Any) -> np.ndarray:
-    """`values`, of shape (..., 2), as an array of shape (n, 2), or an InputError unless they are points (R, Z)."""
+def as_points(name: str, values: Any, components: int = 2) -> np.ndarray:
+    """`values`, of shape (..., components), as an array of shape (n, components), or an InputError unless they are."""
     try:
         found = np.asarray(values, dtype=float)
     except (TypeError, ValueError, OverflowError):
         found = np.zeros(1)
-    if found.size and found.shape[-1:] != (2,):
-        raise InputError(f"{name} = {values!r}: must be points (R, Z)")
-    return found.reshape(-1, 2)
-
-
-def triple(name: str, values: Any) -> tuple[float, float, float]:
-    """`values` as three floats, or an InputError unless they are three finite numbers."""
-    found = [finite(name, value) for value in several(name, values, "three numbers")]
-    if len(found) != 3:
-        raise InputError(f"{name} = {values!r}: must be three numbers")
-    return found[0], found[1], found[2]
+    if found.size and found.shape[-1:] != (components,):
+        raise InputError(f"{name} = {values!r}: must be points {'(R, Z)' if components == 2 else '(x, y, z)'}")
+    return found.reshape(-1, components)
 
 
 def values(name: str, function: Callable, at: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -41,6 +41,9 @@ def path():
     (lambda p: p.problem.scene.shear_modulus("skin"), "layer 'skin' is not known; known: 'sheet'"),
     (lambda p: fx.NeoHookean(c10=1.0).stress("uniaxial", {}), r"NeoHookean.stress: stretches = {}: must be numbers"),
     (lambda p: fx.tools.plane(1.0).signed_distance([1, 2, 3]), r"must be points \(R, Z\)"),
+    (lambda p: fx.tools.box(half=(1, 1), depth=1).signed_distance([1, 2]), r"must be points \(x, y, z\)"),
+    (lambda p: fx.tools.box(half=(1, 1, 1), depth=1), "box: half = .*: must be two numbers"),
+    (lambda p: fx.tools.box(half=(1, 1), depth=1).moved(x="1"), "moved = .*: must be a number"),
 ])
 def test_wrong_calls(path, call, words):
     with pytest.raises(fx.InputError, match=words):

@@ -115,6 +115,8 @@ def test_goes_on_from_a_checkpoint_and_part_is_read_off(tmp_path):
     assert part.least_wall == wall.wall.min() and part.draw_ratio == pytest.approx(wall.area.sum() / 0.3)
     cut = wall.section((0, 0.15, 0), (0, 1, 0))
     assert cut["arc_length"][-1] == pytest.approx(2.0, abs=0.25) and np.ptp(cut["y"]) < 1e-8   # met to 1e-9 of the size
+    with pytest.raises(fx.InputError, match=r"normal = \(0, 0, 0\): must not be 0"):
+        whole.wall().section((0, 0.15, 0), (0, 0, 0))
     whole.to_stl(tmp_path / "part.stl")
     assert fx.tools.solid(tmp_path / "part.stl").volume == pytest.approx(kept, rel=0.05)
     whole.shell_model(tmp_path / "part.inp")
@@ -159,6 +161,8 @@ def test_tool_files_are_looked_over(tmp_path):
     np.testing.assert_allclose(solid.signed_distance(x)[near], box.signed_distance(x)[near], atol=1e-3)
     found = solid.undercuts()
     assert found["undercut_area"] == 0 and found["least_draft"] == pytest.approx(3.0, abs=0.01)
+    with pytest.raises(fx.InputError, match=r"along = \(0, 0, 0\): must not be 0"):
+        solid.undercuts(along=(0, 0, 0))
     with pytest.raises(fx.InputError, match="inside out.*inverted=False"):
         fx.tools.solid(tmp_path / "box.stl", inverted=True)
     points, triangles = solid.surface()

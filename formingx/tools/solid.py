@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, instance, known, non_negative, pair, place, positive, triple
+from ..errors import InputError, as_points, direction, instance, known, non_negative, pair, place, positive, triple
 from ..io.output import replace
 from .profile import Tool
 
@@ -25,7 +25,7 @@ class SolidTool:
 
     def signed_distance(self, x: np.ndarray) -> np.ndarray:
         """Distance of points x, shape (n, 3), to the surface, positive inside the tool, shape (n,), length."""
-        return self._distance(np.asarray(x, dtype=float) - self._shift)
+        return self._distance(as_points("signed_distance: x", x, 3) - self._shift)
 
     @property
     def bounds(self) -> np.ndarray:
@@ -96,7 +96,7 @@ class Swept(SolidTool):
 
     def _swept(self, outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The surface over points (r, z) of a profile."""
-        rings = np.array([np.column_stack([self._ring(r), np.full(len(self._ring(r)), z)]) for r, z in outline])
+        rings = np.array([np.insert(self._ring(r), 2, z, axis=1) for r, z in outline])
         m, n = rings.shape[:2]
         row = np.arange(m * n).reshape(m, n)
         a, b, c, d = row[:-1, :-1], row[1:, :-1], row[1:, 1:], row[:-1, 1:]
@@ -128,7 +128,7 @@ class Triangulated(SolidTool):
     """A closed surface of triangles that look outward; the distance is VTK's, exact, the sign by its normals.
 
     Attributes:
-        points, triangles: shapes (n, 3), length, and (m, 3).
+        name: of its file; triangles: how many; volume: length^3.
     """
 
     def __init__(self, points: np.ndarray, triangles: np.ndarray, name: str):
@@ -157,14 +157,14 @@ class Triangulated(SolidTool):
         least angle of the others to it (90: a floor).
         """
         from scipy.spatial import ConvexHull
-        way = np.array(triple("undercuts: along", along))
+        way = direction("undercuts: along", along)
         corners = self._points[self._triangles]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         area = np.linalg.norm(normal, axis=1) / 2
         hull = ConvexHull(self._points).equations
         depth = -(corners.mean(1) @ hull[:, :3].T + hull[:, 3]).max(1)
         inner = depth > 1e-6 * np.ptp(self._points, axis=0).max()
-        draft = np.degrees(np.arcsin(np.clip(normal @ way / (2 * area * np.linalg.norm(way)), -1, 1)))
+        draft = np.degrees(np.arcsin(np.clip(normal @ way / (2 * area), -1, 1)))
         under = inner & (draft < -0.01)
         return {"undercut_area": float(area[under].sum()),
                 "least_draft": float(draft[inner & ~under].min(initial=90.0))}

@@ -11,7 +11,7 @@ import numpy as np
 
 from ... import _compat
 from ...discrete.surface import wrinkled
-from ...errors import InputError, pair, positive, triple
+from ...errors import InputError, direction, pair, positive, triple
 from ..files.sheet import Sheet
 
 
@@ -114,8 +114,7 @@ class WallInSpace(Sheet):
         Raises:
             InputError: the plane does not meet the part.
         """
-        n = np.array(triple("section: normal", normal))
-        d = (self.now - triple("section: point", point)) @ (n / np.linalg.norm(n))
+        d = (self.now - triple("section: point", point)) @ direction("section: normal", normal)
         size = 1e-9 * np.ptp(self.now, axis=0).max()
         beyond = size if d.min() < -size else -size         # where nodes on the plane count to; it may be a symmetry's
         d = np.where(np.abs(d) < size, beyond, d)
