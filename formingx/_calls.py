@@ -25,10 +25,8 @@ from .errors import ConvergenceError, InputError
 
 _SAID = (InputError, ConvergenceError, OSError)              # in words already
 _WORDS = {float: "a number", int: "a whole number", str: "a word", bool: "True or False", type(None): "None"}
-
-
 _PACKAGE = __name__.partition(".")[0]
-_seen: set[type] = set()
+_seen: set[type] = set()     # classes whose methods are explained
 
 
 class _WrongCall(InputError, TypeError):
@@ -45,9 +43,9 @@ def explain(module: types.ModuleType) -> None:
         if isinstance(thing, type) and not issubclass(thing, BaseException):
             _explain_class(thing)
         elif isinstance(thing, types.FunctionType):
-            known = _explained(thing, thing.__name__, skip=0)
-            setattr(sys.modules[thing.__module__], thing.__name__, known)    # where pickle looks for it
-            setattr(module, name, known)
+            explained = _explained(thing, thing.__name__, skip=0)
+            setattr(sys.modules[thing.__module__], thing.__name__, explained)    # where pickle looks for it
+            setattr(module, name, explained)
 
 
 def _explain_class(cls: type) -> None:
@@ -77,7 +75,7 @@ def _explained(call: Callable, name: str, skip: int) -> Callable:
         return call
 
     @functools.wraps(call)
-    def known(*args: Any, **given: Any) -> Any:
+    def explained(*args: Any, **given: Any) -> Any:
         try:
             result = call(*args, **given)
         except _SAID:
@@ -92,8 +90,8 @@ def _explained(call: Callable, name: str, skip: int) -> Callable:
         if type(result) not in _seen:
             _explain_class(type(result))
         return result
-    known._is_explained = True                               # type: ignore[attr-defined]
-    return known
+    explained._is_explained = True                           # type: ignore[attr-defined]
+    return explained
 
 
 def _wrong(call: Callable, name: str, skip: int, args: tuple, given: dict[str, Any]) -> str | None:
