@@ -35,7 +35,7 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
     def draw():
         import pyvista
         below = wall.now[:, 2].min() < -wall.now[:, 2].max()            # look into the part
-        camera = np.array([1.7, -2.4, 2.6 if below else 1.7])
+        camera = np.array([0.8, -2.0, 3.6] if below else [1.7, -2.4, 1.7])
         lift = 0.004 * np.ptp(wall.now, axis=0).max() * camera / np.linalg.norm(camera)         # else lines flicker
         values = wall.at_nodes / wall._to_nodes(wall.thickness_at_rest)
         faces = np.column_stack([np.full(len(wall.triangles), 3), wall.triangles]).ravel()
@@ -105,7 +105,7 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
                 pictures = [f"<p class=note>No pictures: {html.escape(str(error))}.</p>"]
                 break
             if comm.rank == 0:
-                pictures.append(page.picture(target.read_bytes(), caption, "small"))
+                pictures.append(page.picture(target.read_bytes(), caption, "wide"))
     counts = path.counts
     body = [f"<h1>{html.escape(title or 'Report of a run')}</h1>",
             f"<p class=lead>{counts.steps} states after the start, {counts.iterations} Newton iterations,"
@@ -113,7 +113,8 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     if failure is not None:
         body.append(f"<div class='note bad'><h2>The run could not go on</h2><p>{page.lines(str(failure))}</p></div>")
     body += [f"<p class=note>{html.escape(text)}</p>" for _, text in doubts(path, wall)]
-    body += [*pictures, "<h2>The answer</h2>", page.table(["", ""], [list(row) for row in found.rows])]
+    body += ["<div class=grid>", *pictures, "</div><h2>The answer</h2>",
+             page.table(["", ""], [list(row) for row in found.rows])]
     names = list(dict.fromkeys(state.stage for state in path.states))
     columns = [c for c in path.columns if not c.endswith("error")]
     ends = [next(s for s in reversed(path.states) if s.stage == name) for name in names]
