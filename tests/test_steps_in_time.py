@@ -81,8 +81,8 @@ def test_accuracy_is_kept_for_any_relaxation_time(law, tau, target):
         assert np.abs(found - exact).max() < promised * np.abs(exact).max() and len(path) < 300
 
 
-def test_what_was_kept_before_materials_knew_their_course_is_read():
-    """Its next step is one behind a corner."""
+def test_a_file_without_the_motion_of_a_material_is_read():
+    """As one written before materials kept it; the next step begins as from rest."""
     path = run(block(fx.TransientNetwork(None, [(1.0, 0.1)])), Stage("pull", follow={"pull": [(0, 0), (1, 0.5)]}),
                accuracy="draft")
     history, = path.problem.materials

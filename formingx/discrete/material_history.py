@@ -64,9 +64,9 @@ class MaterialHistory:
         parts = np.split(values, np.cumsum(list(self._sizes.values()))[:-1], axis=2)
         return dict(zip(self._sizes, parts, strict=True))
 
-    def corner(self) -> None:
-        """What has moved until now goes on otherwise: what the material remembers of its course is worth nothing."""
-        for name in self._terms.material.of_course:
+    def forget_motion(self) -> None:
+        """The body comes to rest: how it moved tells nothing of the next step (`Material.of_motion`)."""
+        for name in self._terms.material.of_motion:
             self._now = None
             self._set(name, self._cells, np.asarray(self._terms.material.internal[name], dtype=float).ravel())
 
@@ -101,7 +101,7 @@ class MaterialHistory:
         rows = np.minimum(np.searchsorted(numbers, self._numbers), len(numbers) - 1)
         found = {name: np.array(v, dtype=float) for name, v in values.items()}
         q = len(self._terms.places)
-        for name in set(self._terms.material.of_course) - set(found):        # older files do without
+        for name in set(self._terms.material.of_motion) - set(found):        # older files do without
             rest = np.ravel(np.asarray(self._terms.material.internal[name], dtype=float))
             found[name] = np.tile(rest, (len(numbers), q, 1))
         if set(found) != set(self._sizes) or not np.array_equal(numbers[rows], self._numbers) \

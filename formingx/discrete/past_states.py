@@ -64,8 +64,8 @@ class PastStates:
         rest = Past(np.zeros(self._n) if self._aT else 0.0, np.repeat(np.array(IDENTITY)[:, None], self._n, axis=1))
         self.put(Memory(0.0, (rest,), np.ones((1, self._n)) if self._law.irreversible else None))
 
-    def corner(self) -> None:
-        """See `MaterialHistory.corner`."""
+    def forget_motion(self) -> None:
+        """See `MaterialHistory.forget_motion`."""
         self._before = 0.0
         self._seen = None
 

@@ -39,8 +39,8 @@ class Material:
         parameters: {name: constant}.
         internal: {name: value at rest}, a number or nested tuples, whose shape is that of the variable; of a quantity
             per quadrature point. Empty: no history.
-        of_course: names of internal variables that tell how the body has moved, for a rate: where it goes on otherwise
-            (behind a corner in a table, or a jump) they are as at rest.
+        of_motion: names of internal variables that tell how the body moved in the last step, for its rate in the next;
+            as at rest they tell nothing.
         rate_dependent: False: its history follows the strain alone, as damage does, and time is nothing to it.
         integral: the stress that comes of all past states (`past.Integral`), or None.
         stores_energy: True if `stored_energy` is one.
@@ -49,7 +49,7 @@ class Material:
 
     parameters: dict[str, Any]
     internal: dict[str, Any] = {}
-    of_course: Any = ()
+    of_motion: Any = ()
     rate_dependent = True
     integral: Any = None
     stores_energy: Any = True

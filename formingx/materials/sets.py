@@ -86,9 +86,9 @@ class Sets(Material):
         return (*self._base.of_flow, "set_middle")
 
     @property
-    def of_course(self) -> tuple[str, ...]:  # type: ignore[override]  # read only here
+    def of_motion(self) -> tuple[str, ...]:  # type: ignore[override]  # read only here
         """See `Material`."""
-        return self._base.of_course
+        return self._base.of_motion
 
     @property
     def largest_I1(self):

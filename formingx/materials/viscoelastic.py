@@ -380,7 +380,7 @@ class TransientNetwork(RelaxingMaterial):
     """
 
     _tensor = "A"
-    of_course = ("change", "pace")
+    of_motion = ("change", "pace")
 
     @property
     def internal(self) -> dict[str, Any]:  # type: ignore[override]  # read only here
