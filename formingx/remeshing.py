@@ -20,6 +20,7 @@ from .discrete.problem import Problem
 from .errors import ConvergenceError, InputError, instance, pair, positive
 from .measures.targets import Amplitude, Target
 from .mesh.remeshed import remeshed
+from .physics.contact import Contact
 from .physics.supports import Clamped, Symmetry
 from .solve.arc_length import Curve
 from .solve.newton import Failure, Tolerances, fixed
@@ -85,6 +86,8 @@ def check(scene: Any, remesh: Any, targets: Sequence[Target]) -> None:
         why = "a support other than Symmetry and Clamped"
     elif any(not contact.separates or contact.points != "nodes" for contact in scene.contacts):
         why = "a contact with separates=False, or at Gauss points"
+    elif any(type(contact).law is not Contact.law for contact in scene.contacts):
+        why = "a law of contact of one's own"
     if why:
         raise InputError(f"trace: remesh: is not known with {why}")
     for target in targets:

@@ -7,12 +7,12 @@ from mpi4py import MPI
 import formingx as fx
 
 
-def block(friction, **options):
+def block(friction, contact=fx.Contact, **options):
     """A block of half height 1 under a plate."""
     mesh = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(4, 4), **options)
     return fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=1.0, c01=0.1),
                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")],
-                    contacts=[fx.Contact(face, fx.tools.plane(1.0), friction, moves=(0, -1))
+                    contacts=[contact(face, fx.tools.plane(1.0), friction, moves=(0, -1))
                               for face in ("top", "rim")])
 
 
@@ -97,6 +97,11 @@ def test_what_is_not_carried_is_refused():
                          materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
                          supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
         fx.trace(scene, until=fx.pressure(0.1), remesh=remesh)
+    with pytest.raises(fx.InputError, match="a law of contact of one's own"):
+        class Own(fx.Contact):
+            def law(self, *given):
+                return super().law(*given)
+        fx.trace(block("none", Own), until=fx.travel(0.1), remesh=remesh)
     with pytest.raises(fx.InputError, match="must be a travel or a pressure"):
         fx.trace(block("none"), until=fx.pole_height(-0.2), remesh=remesh)
     with pytest.raises(fx.InputError, match="checkpoint"):
