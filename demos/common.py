@@ -3,8 +3,9 @@
 import argparse
 import os
 from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from pathlib import Path
+from threading import Thread
 
 from mpi4py import MPI
 
@@ -35,6 +36,14 @@ def save(figure, file: Path) -> None:
         figure.savefig(file, dpi=150)
 
 
+def plain_ticks(axis, values) -> None:
+    """Those of these ticks of a logarithmic axis that it reaches, written as they are."""
+    low, high = axis.get_view_interval()
+    there = [v for v in values if low <= v <= high]
+    axis.set_ticks(there, [f"{v:g}" for v in there])
+    axis.set_ticks([], minor=True)
+
+
 def sweep(function, cases: list) -> list:
     """function(case) of every case, in parallel: over the ranks, or on one rank in processes of their own.
 
@@ -43,8 +52,16 @@ def sweep(function, cases: list) -> list:
     if COMM.size > 1:
         found = COMM.allgather({k: function(cases[k]) for k in range(COMM.rank, len(cases), COMM.size)})
         return [next(part[k] for part in found if k in part) for k in range(len(cases))]
-    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn"), initializer=_end_with_parent) as pool:
         return list(pool.map(function, cases))
+
+
+def _end_with_parent() -> None:
+    """End this process once the one that started it is gone, killed for one: nobody waits for what it computes."""
+    def wait() -> None:
+        parent_process().join()
+        os._exit(1)
+    Thread(target=wait, daemon=True).start()
 
 
 def summarise(out: Path, summary: dict) -> None:

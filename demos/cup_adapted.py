@@ -8,7 +8,7 @@ is made by the run before. Lengths in cm, stresses in psi.
 """
 
 import numpy as np
-from common import parser, save, say, summarise
+from common import parser, plain_ticks, save, say, summarise
 from cup import DEPTH, I1_CONSTANT, I2_CONSTANT, RADIUS, THICKNESS
 
 import formingx as fx
@@ -84,7 +84,10 @@ def draw(runs, walls, truth, last):
     left.axhline(truth[last], color="0.5", linewidth=1)
     left.set(xlabel="columns of elements", ylabel="least wall / original", title=f"wall beside the corner, {last} psi",
              xscale="log")
-    right.set(xlabel="reference radius R, cm", ylabel="length of a column at rest, cm", title="columns", yscale="log")
+    right.set(xlabel="reference radius R, cm", ylabel="length of a column at rest, cm", title="finest meshes",
+              yscale="log")
+    plain_ticks(left.xaxis, (*UNIFORM, REFERENCE))
+    plain_ticks(right.yaxis, (0.05, 0.1, 0.2, 0.5))
     for axes in (left, right):
         axes.grid(alpha=0.3)
         axes.legend(frameon=False)

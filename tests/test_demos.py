@@ -1,9 +1,15 @@
 """Each demo as a user runs it, with its key numbers."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from time import sleep
 
 import pytest
-from conftest import drawn, run
+from conftest import ROOT, drawn, run
 
 
 def summary(demo, out, *options, ranks=None):
@@ -199,6 +205,51 @@ def test_throne_plug_quick(tmp_path):
     assert found["comparison"]["largest_difference_of_rims"] < 0.03                        # thesis: small
     for picture in ("forces", "profiles"):
         assert drawn(tmp_path / f"{picture}.png")
+
+
+def test_processes_of_a_sweep_end_with_the_one_that_began_them(tmp_path):
+    """A demo that is killed leaves none behind that computes for nobody."""
+    script = tmp_path / "sweeping.py"
+    script.write_text(f"""
+import os, sys, time
+sys.path.insert(0, {str(ROOT / "demos")!r})
+import common
+
+def work(k):
+    open(os.path.join({str(tmp_path)!r}, f"{{os.getpid()}}.pid"), "w").close()
+    time.sleep(600)
+
+if __name__ == "__main__":
+    common.sweep(work, [1, 2])
+""")
+    with subprocess.Popen([sys.executable, script]) as parent:
+        try:
+            assert eventually(lambda: list(tmp_path.glob("*.pid")))
+        finally:
+            parent.kill()
+    workers = [int(file.stem) for file in tmp_path.glob("*.pid")]
+    try:
+        assert eventually(lambda: not any(map(runs, workers)))
+    finally:
+        for worker in filter(runs, workers):
+            os.kill(worker, signal.SIGKILL)
+
+
+def eventually(found) -> bool:
+    """True as soon as something is found."""
+    for _ in range(1200):
+        if found():
+            return True
+        sleep(0.1)
+    return False
+
+
+def runs(process) -> bool:
+    """True if a process is there, and no zombie."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
 
 
 def test_plug_adapted_quick(tmp_path):
