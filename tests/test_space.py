@@ -13,6 +13,7 @@ from test_derivatives import assert_derivatives, difference, random_state
 import formingx as fx
 from formingx.discrete.problem import Problem
 from formingx.results.files.fields import Fields
+from formingx.results.space.part import _beyond
 from formingx.tools.solid import write_stl
 
 MATERIALS = [fx.NeoHookean(c10=2.0), fx.MooneyRivlin(c10=1.5, c01=0.4), fx.Ogden(mu=(1.4, -0.3), alpha=(2.5, -2.0)),
@@ -123,6 +124,22 @@ def test_goes_on_from_a_checkpoint_and_part_is_read_off(tmp_path):
     assert (tmp_path / "part.inp").read_text().count("*SHELL SECTION") == len(wall.wall)
     filled = whole.filling()
     assert filled.touching[-1] > 0.9 and filled.gap[-1] < 1e-3 < filled.gap[0] == pytest.approx(1.0)
+
+
+def test_trim_and_printed_squares_are_exact():
+    """Cut triangles count by the part that is beyond the plane; at rest the squares are where they were printed."""
+    d = np.array([(1, -1, -1), (-1, 1, 1), (3, -1, 3), (0, 1, 1), (1, 1, 1), (-1, 0, 0), (-1, -1, -1)], dtype=float)
+    np.testing.assert_allclose(_beyond(d), [1 / 4, 3 / 4, 15 / 16, 1, 1, 0, 0], atol=1e-15)
+    path = fx.solve(disc(), to=0.001, increments=1)
+    wall, z = path.wall(), path.wall().now[:, 2]
+    low, high = (path.part(trim=share * z[np.argmax(np.abs(z))]) for share in (0.2, 0.6))
+    assert path.part().volume > low.volume > high.volume > 0 and low.scrap < high.scrap
+    assert low.scrap == pytest.approx(1 - low.volume / path.part().volume, rel=1e-12)
+    lines = path.wall(path.states[0]).printed(0.25)
+    assert len(lines) == 10 and sum(len(line) for line in lines) > 50
+    for line, (axis, at) in zip(lines, [(axis, 0.25 * k) for axis in (0, 1) for k in range(5)]):
+        np.testing.assert_allclose(line[:, axis], at, atol=1e-6)
+    assert wall.printed(0.25)[1].shape[1] == 3
 
 
 def test_ranks():

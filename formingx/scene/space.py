@@ -102,4 +102,4 @@ def check_contact(scene: Any, contact: Any) -> None:
     if depth[k] > 1e-6 * length:
         at = ", ".join(f"{v:.6g}" for v in points[k])
         raise InputError(f"{contact!r}: the sheet starts inside the tool: {depth[k]:.6g} deep at (x, y, z) = ({at}):"
-                         f" move the tool, or is its solid on the other side (tool.reversed())?")
+                         f" move the tool (moved), or is the solid of its profile on the other side (Tool.reversed())?")
