@@ -116,6 +116,10 @@ def test_goes_on_from_a_checkpoint_and_part_is_read_off(tmp_path):
     assert part.least_wall == wall.wall.min() and part.draw_ratio == pytest.approx(wall.area.sum() / 0.3)
     cut = wall.section((0, 0.15, 0), (0, 1, 0))
     assert cut["arc_length"][-1] == pytest.approx(2.0, abs=0.25) and np.ptp(cut["y"]) < 1e-8   # met to 1e-9 of the size
+    for normal in ((0, 1, 0), (0, -1, 0)):                                          # along a plane of symmetry
+        edge = wall.section((0, 0, 0), normal)
+        assert edge["arc_length"][-1] == pytest.approx(cut["arc_length"][-1], abs=0.05) and np.ptp(edge["y"]) < 1e-8
+    assert wall.around((0, 0, 0), 10.0) == pytest.approx((wall.ratio * wall.area_at_rest).sum() / 0.3)
     with pytest.raises(fx.InputError, match=r"normal = \(0, 0, 0\): must not be 0"):
         whole.wall().section((0, 0.15, 0), (0, 0, 0))
     whole.to_stl(tmp_path / "part.stl")
@@ -160,11 +164,14 @@ if path.problem.comm.rank == 0:
 def test_box_distance_is_exact():
     """Differences of distances along their gradient are those of the points; the STL file of the box agrees."""
     box = fx.tools.box(half=(1.0, 1.5), depth=1.0, corner=0.3, fillet=0.2)
-    inside = [(0.9, 0, -0.5), (0.9, 1.4, -0.5), (0, 0, -0.9), (0.95, 0, -0.95), (0.75, 0.2, -0.9)]
+    inside = [(0.9, 0, -0.5), (0.9, 1.4, -0.5), (0, 0, -0.9), (0.95, 0, -0.95), (0.75, 0.2, -0.9), (0.5, 0, -0.3)]
     corner = 0.3 - np.hypot(0.2, 0.2)
-    expected = [0.1, corner, 0.1, 0.2 - np.hypot(0.15, 0.15), 0.1]
+    expected = [0.1, corner, 0.1, 0.2 - np.hypot(0.15, 0.15), 0.1, 0.5]
     np.testing.assert_allclose(-box.signed_distance(inside), expected, atol=1e-12)
     assert box.signed_distance([(1.1, 0, -0.5)])[0] == pytest.approx(0.1)
+    away = box.moved(x=1.0).moved(x=1.0, z=-2.0)
+    np.testing.assert_allclose(-away.signed_distance(np.array(inside) + (2, 0, -2)), expected, atol=1e-12)
+    np.testing.assert_allclose(away.bounds, box.bounds + (2, 0, -2), atol=1e-12)
     plug = fx.tools.box(half=(0.5, 0.8), depth=1.0, corner=0.2, mouth=1.0, plug=True)
     np.testing.assert_allclose(plug.signed_distance([(0, 0, -0.2), (0, 0, 0.1)]), [-0.2, 0.1], atol=1e-12)
 
@@ -178,6 +185,12 @@ def test_tool_files_are_looked_over(tmp_path):
     np.testing.assert_allclose(solid.signed_distance(x)[near], box.signed_distance(x)[near], atol=1e-3)
     found = solid.undercuts()
     assert found["undercut_area"] == 0 and found["least_draft"] == pytest.approx(3.0, abs=0.01)
+    behind = fx.tools.revolved(fx.Tool([(2.0, 0.0), (0.8, 0.0), (1.0, -1.0), (0.0, -1.0)]))     # wider below its mouth
+    behind.to_stl(tmp_path / "behind.stl", wall=0.3)
+    assert fx.tools.solid(tmp_path / "behind.stl").undercuts()["undercut_area"] == pytest.approx(
+        np.pi * 1.8 * np.hypot(1.0, 0.2), rel=1e-3)
+    with pytest.raises(fx.InputError, match="its profile to end at r = 0"):
+        fx.tools.revolved(fx.Tool([(2.0, 0.0), (1.0, 0.0), (0.5, -1.0)])).to_stl(tmp_path / "hole.stl", wall=0.3)
     with pytest.raises(fx.InputError, match=r"along = \(0, 0, 0\): must not be 0"):
         solid.undercuts(along=(0, 0, 0))
     with pytest.raises(fx.InputError, match="inside out.*inverted=False"):
