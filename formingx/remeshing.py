@@ -31,8 +31,11 @@ from .solve.stepping import StepControl
 
 log = logging.getLogger("formingx")
 
-_SHARES, _GOOD = (1.0, 0.9, 1.1, 0.8), 0.4
-"""Sizes that are tried, over what is asked for, and the part of the way from the limits of J to 1 that is good."""
+_SHARES = (1.0, 0.9, 1.1, 0.8)
+"""Sizes that are tried, over what is asked for."""
+
+_GOOD = 0.4
+"""Part of the way from the limits of J to 1 that is good."""
 
 _WORN = "the mesh is worn"
 """Why a run ends whose mesh is to be made again."""

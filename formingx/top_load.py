@@ -23,7 +23,7 @@ from .scene.scene import Scene
 from .solve.stepping import StepControl
 from .tools import Tool, plane
 
-_POINTS, _GIVES, _RAMP = 16, 2.0, 1e-4
+_FOOT: dict[str, Any] = {"points": 16, "penalty": 2.0, "ramp": 1e-4}
 """Contact of the foot: a line on a rigid plate hops from point to point; this many, on a plate that gives way by a
 thousandth of the wall or so, roll."""
 
@@ -134,7 +134,7 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
     scene = Scene(mesh=body, materials=material,
                   supports=[*[Symmetry("axis")] * ("axis" in body.boundaries), Symmetry(neck, "r"),
                             Displaced(neck, "z")],
-                  contacts=[Contact(foot, floor, "none", points=_POINTS, penalty=_GIVES, ramp=_RAMP)])
+                  contacts=[Contact(foot, floor, "none", **_FOOT)])
     ended = ""
     try:
         path = trace(scene, until=travel_to(-travel), progress=False, step=step or StepControl(largest=_STEP))

@@ -70,6 +70,17 @@ def test_no_file_is_long():
     assert long == {}
 
 
+def test_tuned_numbers_have_a_name_each():
+    """No module begins with a tuple of numbers: each has a line and a word of its own, or is a field of a dataclass."""
+    codes = {"physics.supports", "solve.linear", "solve.predictor", "discrete.contact.approach"}     # indices, counts
+    tops = [(name_of(file), node) for file in FILES for node in ast.parse(file.read_text()).body]
+    found = {(name, ast.unparse(node.targets[0])) for name, node in tops
+             if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple) and name not in codes
+             and isinstance(node.value, ast.Tuple) and all(isinstance(n, ast.Constant | ast.UnaryOp) and isinstance(
+                 ast.literal_eval(n), int | float) for n in node.value.elts)}
+    assert found == set()
+
+
 def members(tree):
     """Names in the class bodies of `solve/equations.py`."""
     return {getattr(n, "name", None) or n.target.id for c in ast.walk(tree) if isinstance(c, ast.ClassDef)

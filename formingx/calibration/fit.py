@@ -18,8 +18,11 @@ from .fit_plot import plotted
 from .measured import read_tests
 from .uncertainty import uncertainty
 
-_FIRST, _LAST = 20, 400
-"""Evaluations for every first guess, and then for the best three."""
+_FIRST = 20
+"""Evaluations for every first guess."""
+
+_LAST = 400
+"""And then for the best three."""
 
 
 class Fit(NamedTuple):

@@ -7,8 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-_NOISE, _OPEN = 0.01, 0.5
-"""A constant is open if a noise of this share of the largest stress, or of the misfit, leaves it so far uncertain."""
+_NOISE = 0.01
+"""Share of the largest stress that a measurement is wrong by, where the misfit does not say more."""
+_OPEN = 0.5
+"""A constant that this leaves so far uncertain, relative, is open."""
 _VISIBLE = 1e-6
 """A change of a constant is made larger until the stress changes by this share of the largest."""
 

@@ -21,8 +21,17 @@ from ..errors import InputError
 from ..solve.newton import Failure
 from ..solve.state import State
 
-_ENOUGH, _ENOUGH_IN_CONTACT, _GOOD, _MOST = 1e-9, 1e-5, 1e-3, 12
-"""Corrections over the distance of a neighbour at which it is solved for; which must be reached; iterations."""
+_ENOUGH = 1e-9
+"""Corrections over the distance of a neighbour at which it is solved for."""
+
+_ENOUGH_IN_CONTACT = 1e-5
+"""The same with contact."""
+
+_GOOD = 1e-3
+"""The same of one that is taken as it is after all iterations."""
+
+_MOST = 12
+"""Iterations."""
 
 _NONE = 2e-13
 """Corrections, over the unknowns, that are round-off."""

@@ -19,9 +19,11 @@ from .carry import carry
 from .neighbours import Apart, Neighbour
 from .parameters import Parameters
 
-_SMOOTH, _CLOSER = 1e-5, (1e-8, 1e-9, 1e-10)
-"""Changes of parameters, over their size, to the neighbours: of a scene without contact; and with it, which acts within
-a thin ramp: one after the other until all are found."""
+_SMOOTH = 1e-5
+"""Change of a parameter, over its size, to the neighbours of a scene without contact."""
+
+_CLOSER = (1e-8, 1e-9, 1e-10)
+"""With contact, which acts within a thin ramp: one after the other until all are found."""
 
 
 @dataclass(frozen=True)

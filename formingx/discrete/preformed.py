@@ -12,8 +12,11 @@ from dolfinx import fem
 from .. import _compat
 from ..ranks import gathered
 
-_NEIGHBOURS, _FEWEST = 30, 14
-"""Points that a field is fitted to about an element, at most, and that lie within its reach at least."""
+_NEIGHBOURS = 30
+"""Points that a field is fitted to about an element, at most."""
+
+_FEWEST = 14
+"""Of them that lie within its reach, at least."""
 
 _DEGREE = 4
 """Of the quadrature at whose points that fit is made linear in the element."""

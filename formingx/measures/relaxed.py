@@ -12,8 +12,11 @@ from mpi4py import MPI
 
 from .. import _compat
 
-_STRAIN, _NONE = 1e-6, 1e-10
-"""Equibiaxial strain that is added where no stress is left (over the shear modulus): rest has the ratio of moduli."""
+_NONE = 1e-10
+"""A stress, over the shear modulus, that is none."""
+
+_STRAIN = 1e-6
+"""Equibiaxial strain that is added there: rest has the ratio of moduli."""
 
 
 class PoleStressRatio:

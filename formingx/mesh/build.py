@@ -18,9 +18,11 @@ ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
 _TALLEST = 1.5
 """Height over width of such elements at most: the inf-sup constant of P2 + bubble / P1dg falls as triangles get slim,
 and across a thick sheet, which bends, they lock (benchmarks/thickness.py)."""
-_BENDS, _BENDING = 1 / 40, {"draft": 1, "standard": 4, "fine": 6}
-"""A hinged sheet bends within a few thicknesses of its rim: thickness over length from which on that is seen, and least
-number of elements through it then. (Narrower ones at the rim would do with fewer, but there a clamped one creases.)"""
+_BENDS = 1 / 40
+"""A hinged sheet bends within a few thicknesses of its rim: thickness over length from which on that is seen."""
+_BENDING = {"draft": 1, "standard": 4, "fine": 6}
+"""Least number of elements through it then. (Narrower ones at the rim would do with fewer, but there a clamped one
+creases.)"""
 _FILM = 1 / 400
 """Thickness over length below which none of that is seen: one element through each layer; more cost accuracy, by
 round-off, and from 1/1e5 on the start."""

@@ -9,7 +9,8 @@ import numpy as np
 from ..errors import InputError
 from .boxes import overlapping
 
-_SMALLEST, _LARGEST = 1e-50, 1e50      # lengths whose squares and products are still numbers
+_SMALLEST = 1e-50                      # the square of such a length is still a number
+_LARGEST = 1e50                        # and a product of some of these
 _FLAT = 1e-12                          # of the square of the longest edge: an area that is nothing
 
 

@@ -16,7 +16,8 @@ from ..errors import InputError, finite, instance, known, non_negative, positive
 from ..mesh.triangles import Place, Triangles
 
 _SLIM = 3.0                                # slenderness of triangles that can do harm
-_TOO_STIFF, _WRONG = 0.003, 0.05           # expected error that is worth a word, and with which no run is worth it
+_TOO_STIFF = 0.003                         # expected error that is worth a word
+_WRONG = 0.05                              # and with which no run is worth it
 
 
 class Locking(NamedTuple):

@@ -15,7 +15,8 @@ from ..io import csv_files
 from . import files
 from .show import plots
 
-_SAMPLES, _FINE = 2000, 33         # of a curve; and of the two pieces that meet at a sample
+_SAMPLES = 2000                    # of a curve
+_FINE = 33                         # of the two pieces that meet at a sample
 _MOST = 10_000                     # points of theirs: each is measured against every sample
 _LARGEST = 1e100                   # range of a side over that of the other: its square is a number
 

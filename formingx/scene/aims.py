@@ -14,7 +14,8 @@ from .scene import Scene
 
 _NEAR = 1e-5           # of the body's length: a point is on a boundary
 _MOST = 1e9            # of the largest shear modulus, or of the body's length
-_SQUARES, _ROOMY = 200, 1.05   # along a mould's larger side, and by how much its volume by them may be wrong
+_SQUARES = 200         # along a mould's larger side
+_ROOMY = 1.05          # by how much its volume by them may be wrong
 
 
 def check(scene: Scene, targets: Iterable[Any], off: Collection[int] | None = None) -> None:

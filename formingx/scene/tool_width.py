@@ -17,8 +17,11 @@ _DIRECTIONS = 90
 _CUT = 0.1
 """Depth over the thickness, as above which a run warns (`results.evaluate.verdict`)."""
 
-_PLACES, _MOVES = 33, 200
-"""Places of an edge that are looked at; moves that lead a tool to a face, at most."""
+_PLACES = 33
+"""Places of an edge that are looked at."""
+
+_MOVES = 200
+"""Of a tool to a face, at most."""
 
 
 def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:

@@ -15,9 +15,30 @@ from .equations import Attempt, Findings
 from .linear import DirectSolver, condition
 from .state import State
 
-_BEFORE, _SINGULAR = 10, 100.0
-"""States before the last one at which the condition number of the tangent is looked at, too, and the growth from
-there that tells of a singular tangent."""
+
+@dataclass(frozen=True)
+class Limits:
+    """From where on a number of the last good state is told as a cause.
+
+    Attributes:
+        before: states before it at which the condition number of the tangent is looked at, too.
+        singular: its growth from there that tells of a singular tangent.
+        round_off: a condition number that leaves next to nothing of 16 digits.
+        slowing: slope of the control over its largest, below which the last slopes may tell of a limit point ahead.
+        material: part of what a material's limit allows of I1 - 3.
+        volume, shape: J, and a deformed element's shape over that at rest, of one about to turn inside out.
+    """
+
+    before: int = 10
+    singular: float = 100.0
+    round_off: float = 1e14
+    slowing: float = 0.3
+    material: float = 0.8
+    volume: float = 0.3
+    shape: float = 0.1
+
+
+_LIMITS = Limits()
 
 
 @dataclass(frozen=True)
@@ -175,7 +196,7 @@ def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     usable = [s for s in states[1 if problem.slack_at_rest else 0:] if s.kind != "limit point"]
     if sign(states[-1]):
         facts["condition"] = condition(problem.matrix, solver)
-    if len(usable) > _BEFORE and sign(usable[-1 - _BEFORE]):
+    if len(usable) > _LIMITS.before and sign(usable[-1 - _LIMITS.before]):
         facts["condition_before"] = condition(problem.matrix, solver)
     if len(usable) > 1 and not problem.has_history:
         # one sign per stretch between limit points: there it cannot change unless another branch starts
@@ -186,7 +207,7 @@ def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
         a, b = states[-2:]
         slopes = [curve.unit_slope(s) for s in states]
         drop = slopes[-2]**2 - slopes[-1]**2              # slope^2 falls in proportion to the control left
-        if drop > 0 and slopes[-2] * slopes[-1] > 0 and abs(slopes[-1]) < 0.3 * max(map(abs, slopes)):
+        if drop > 0 and slopes[-2] * slopes[-1] > 0 and abs(slopes[-1]) < _LIMITS.slowing * max(map(abs, slopes)):
             ahead = b.control + (b.control - a.control) * slopes[-1]**2 / drop
             facts["limit_ahead"] = problem.shown(ahead)[1]
     return facts
@@ -229,7 +250,7 @@ def _verdict(facts: dict[str, Any], fixed_control: bool, pace: str,
 
 def _of_material(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """(cause, advice) of a material near the end of its domain."""
-    if (facts.get("I1") or 0) > 0.8:
+    if (facts.get("I1") or 0) > _LIMITS.material:
         yield (f"a material is near the end of its domain: I1 - 3 is {100 * facts['I1']:.3g} % of what its limit"
                f" allows at {facts['limit']}",
                "a target that needs less stretch there, a larger limit of the material, or shorter steps"
@@ -251,8 +272,8 @@ def _of_elements(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     J, failed_J = facts.get("smallest_J"), facts.get("failed_J")
     infinite = any(np.isinf(v) for v in facts.get("residual", {}).values())
     inverted = failed_J is not None and failed_J <= 0
-    if J is not None and (J < 0.3 or facts["shape"] < 0.1 and (inverted or infinite)):
-        now = f"J = {J:.3g}" if J < 0.3 else f"its shape is {facts['shape']:.2g} of what it was at rest"
+    if J is not None and (_LIMITS.volume > J or facts["shape"] < _LIMITS.shape and (inverted or infinite)):
+        now = f"J = {J:.3g}" if _LIMITS.volume > J else f"its shape is {facts['shape']:.2g} of what it was at rest"
         R, Z = facts["at_J"].R, facts["at_J"].Z
         yield (f"an element is about to turn inside out: {now} in the last good state, at {facts['at_J']}"
                + (f" (in the failed attempt J = {failed_J:.3g})" if inverted else ""),
@@ -283,8 +304,8 @@ def _of_branches(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
                f"a small imperfection in the load or the mesh, or a target before {what} {b:.6g}")
     if _singular(facts) and not facts.get("turned") and facts.get("limit_ahead") is None:
         yield (f"the tangent becomes singular, and there is no limit point: its condition number has grown from"
-               f" {facts['condition_before']:.1g} to {facts['condition']:.1g} in {_BEFORE} states; another branch"
-               f" starts here, where the body buckles or a point of contact is about to slip away",
+               f" {facts['condition_before']:.1g} to {facts['condition']:.1g} in {_LIMITS.before} states; another"
+               f" branch starts here, where the body buckles or a point of contact is about to slip away",
                "smaller elements; contact at points=4 (Contact), where there is any")
     if facts.get("flipped"):
         yield (f"contact does not settle: {facts['flipped']} nodes changed state in the last iteration",
@@ -295,12 +316,12 @@ def _of_branches(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 def _singular(facts: dict[str, Any]) -> bool:
     """True if the tangent is near a singular one: its condition has grown from state to state."""
     before = facts.get("condition_before")
-    return bool(before and (facts.get("condition") or 0) > _SINGULAR * before)
+    return bool(before and (facts.get("condition") or 0) > _LIMITS.singular * before)
 
 
 def _of_numbers(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """(cause, advice) of round-off."""
-    if (facts.get("condition") or 0) > 1e14 and not _singular(facts):
+    if (facts.get("condition") or 0) > _LIMITS.round_off and not _singular(facts):
         yield (f"round-off: the condition number of the tangent is {facts['condition']:.1g}, next to nothing of"
                f" 16 digits is left",
                "a larger eps, a lower contact penalty, or layers less different in stiffness")

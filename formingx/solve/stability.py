@@ -6,6 +6,7 @@ these in K = L D L^T, and one more for each unstable mode (Sylvester's law of in
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -17,16 +18,43 @@ from .linear import DirectSolver
 from .newton import Failure
 from .state import State
 
-_STEPS, _ACCURATE = 80, 1e-10
-"""Of Lanczos' method: steps at most, and its error, relative."""
 
-_EVALUATIONS, _LOCATED, _BESIDE, _PATIENCE, _ALIKE = 60, 1e-8, 1e-6, 3, 0.7
-"""Of locating a loss: states solved for at most; its error, and how far beside it a count makes sure of it, in parts of
-the step that it lies in; how often its bracket may fail to halve before it is halved; how alike two modes are that are
-one."""
+@dataclass(frozen=True)
+class Lanczos:
+    """How modes are computed, by Lanczos' method with the inverse.
 
-_ASTRAY = 0.1
-"""How far from the cubic between two states, in parts of their distance, a state between them may be."""
+    Attributes:
+        steps: at most, each a solve with factors that are there.
+        accurate: error of an eigenvalue, relative to it, at which it ends.
+        exhausted: size of what is left of a new vector, over the largest eigenvalue of the inverse, that is round-off:
+            all modes are found.
+    """
+
+    steps: int = 80
+    accurate: float = 1e-10
+    exhausted: float = 1e-14
+
+
+@dataclass(frozen=True)
+class Locating:
+    """How the state at which a mode ceases to be stable is located between two others.
+
+    Attributes:
+        states: solved for at most.
+        located: error of its place, in parts of the distance of the two.
+        beside: how far beside it counts of unstable modes make sure of it, in the same parts.
+        patience: how often the bracket may fail to halve before it is halved.
+        alike: scalar product of two normed modes above which they are one, seen from two states.
+        astray: how far a state may be from the cubic between the two, over their distance: further off lies another
+            branch.
+    """
+
+    states: int = 60
+    located: float = 1e-8
+    beside: float = 1e-6
+    patience: int = 3
+    alike: float = 0.7
+    astray: float = 0.1
 
 
 class Kind(NamedTuple):
@@ -71,14 +99,15 @@ class Modes:
     """The unstable modes of the states of a problem; created once.
 
     Args:
-        curve: the `Curve` that solves for states.
+        curve: the `Curve` that solves for states. lanczos, locating: how it is done.
 
     Raises:
         InputError: as `SecondVariation`.
     """
 
-    def __init__(self, curve: Curve):
+    def __init__(self, curve: Curve, lanczos: Lanczos | None = None, locating: Locating | None = None):
         self.curve, self.problem = curve, curve.problem
+        self._by, self._how = lanczos or Lanczos(), locating or Locating()
         self.variation = SecondVariation(curve.problem)
         self._solver = DirectSolver(self.variation.matrix, True, inertia=True)
         self._in, self._out = self.variation.matrix.createVecs()
@@ -101,18 +130,18 @@ class Modes:
         shape: others cross it on their way.
         """
         looks = [self._look(0.0, a, kind, index), self._look(1.0, b, kind, index)]
-        low, high = looks
+        (low, high), how = looks, self._how
         gained, solved, shrunk = high.unstable > low.unstable, True, 0
         while True:
             values = self._follow(looks, high if gained else low, index)
-            guess = _root(values, low.fraction, high.fraction) if shrunk < _PATIENCE else None
+            guess = _root(values, low.fraction, high.fraction) if shrunk < how.patience else None
             fraction, shrunk = ((low.fraction + high.fraction) / 2, 0) if guess is None else (guess, shrunk)
             nearest = min(looks, key=lambda look: abs(look.fraction - fraction))
             width = high.fraction - low.fraction
-            if width < 2 * _BESIDE or len(looks) == _EVALUATIONS:
+            if width < 2 * how.beside or len(looks) == how.states:
                 break
-            if abs(nearest.fraction - fraction) < _LOCATED:     # the root of a mode, but of that which is looked for?
-                fraction = low.fraction + _BESIDE if nearest is low else high.fraction - _BESIDE
+            if abs(nearest.fraction - fraction) < how.located:     # a root, but of the mode that is looked for?
+                fraction = low.fraction + how.beside if nearest is low else high.fraction - how.beside
             try:
                 looks.append(new := self._look(fraction, self._between(a, b, fraction), kind, index))
             except Failure:
@@ -120,7 +149,7 @@ class Modes:
                 break
             low, high = (low, new) if (new.unstable > index) is gained else (new, high)
             shrunk = 0 if high.fraction - low.fraction < width / 2 else shrunk + 1
-        state, exact = nearest.state, width < 2 * _BESIDE
+        state, exact = nearest.state, width < 2 * how.beside
         if exact:
             fraction = nearest.fraction
         else:
@@ -149,7 +178,7 @@ class Modes:
         mode, found = self._of_index(end, index), []
         for look in looks:
             alike = [abs(self._inner(mode, other)) for other in look.modes]
-            if max(alike) > _ALIKE:
+            if max(alike) > self._how.alike:
                 found.append((look.fraction, float(look.values[np.argmax(alike)])))
         return found
 
@@ -163,7 +192,7 @@ class Modes:
         state.stage, state.setting, state.memory = a.stage, a.setting, a.memory
         x, control = self.curve.interpolate(a, b, fraction)
         guess = State(x, control, a.direction, a.slope)
-        if self.curve.distance(guess, state) > _ASTRAY * self.curve.distance(a, b):
+        if self.curve.distance(guess, state) > self._how.astray * self.curve.distance(a, b):
             raise Failure("the state that was found lies on another branch", [])
         return state
 
@@ -191,8 +220,8 @@ class Modes:
             theta, ways = np.linalg.eigh(T)
             best = np.argsort(-abs(theta))[:number]
             rest = size * abs(ways[-1, best])
-            if len(alpha) >= number and np.all(rest < _ACCURATE * abs(theta[best])) or len(alpha) == _STEPS \
-                    or size < 1e-14 * abs(theta).max():
+            accurate = len(alpha) >= number and np.all(rest < self._by.accurate * abs(theta[best]))
+            if accurate or len(alpha) == self._by.steps or size < self._by.exhausted * abs(theta).max():
                 break
             beta.append(size)
             basis.append(w / size)

@@ -21,7 +21,8 @@ from . import cad_process
 from .arcs import arcs_along, in_plane, piece_through
 from .profile import Arc, Line
 
-_SECONDS, _BYTES = 10, 50_000   # of a processor's time to read a file and to follow its curves, and for so much of it
+_SECONDS = 10                   # of a processor's time to read a file and to follow its curves
+_BYTES = 50_000                 # as much again for so much of it
 _BUSY = 20                      # times as long by the clock: the machine may be busy
 
 

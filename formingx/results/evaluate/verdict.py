@@ -14,8 +14,11 @@ from ...solve.state import State
 _VOLUME = 0.25
 """Root mean square of J - 1. (Creases at clamped rims, and at corners of coarse blocks, stay below 0.17.)"""
 
-_INSIDE_OUT, _FEWEST = 0.05, 4
-"""Part of the elements that may have a point with J <= 0, and number of them that always may: corners are singular."""
+_INSIDE_OUT = 0.05
+"""Part of the elements that may have a point with J <= 0."""
+
+_FEWEST = 4
+"""Number of them that always may: corners are singular."""
 
 _INSIDE = 0.25
 """Depth of the body in a tool, over the thickness and over the length of an edge: beyond both it stands in the tool."""
@@ -24,8 +27,11 @@ _SUNK = 0.15
 """Penetration of contact points over the wall that is left there: above it the body did not follow the tool. (Williams'
 plug on coarse elements comes to 0.051.)"""
 
-_WARNS, _ENDS = 2e-3, 0.05
-"""By how much penetration may change a force before a run warns (that is its accuracy), and before it ends."""
+_WARNS = 2e-3
+"""By how much penetration may change a force before a run warns: that is its accuracy."""
+
+_ENDS = 0.05
+"""By how much it may before a run ends."""
 
 _STIFFEST = 3.0
 """That change over the part of the body's energy that penetration holds: at most, of a body pressed flat."""
