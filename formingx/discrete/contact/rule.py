@@ -103,9 +103,7 @@ class Lobatto(Rule):
     def _edges(self) -> np.ndarray:
         """Two ends and the middle of each edge of the face, all ranks', as rows of all ranks' points, shape (m, 3)."""
         from scipy.spatial import cKDTree
-        own = [self._X[ends_first(fem.locate_dofs_topological(self._vectors, 1, np.array([f], dtype=np.int32),
-                                                              remote=False), self._X)] for f in self._facets]
-        X = gathered(self._comm, np.array(own).reshape(-1, 3, self.points.shape[1]))
+        X = gathered(self._comm, self._X[_nodes_of(self._facets, self._vectors, self._X)])
         found = cKDTree(gathered(self._comm, self.points)).query(X.reshape(-1, X.shape[2]))[1]
         return np.asarray(found).reshape(-1, 3)
 
@@ -152,9 +150,7 @@ class Gauss(Rule):
         self._length, components = solid.length, self._kinematics.components
         X = vectors.tabulate_dof_coordinates()[:, :components]
         self._unknowns = la.vector(solid.space.dofmap.index_map, 1)
-        facets = [ends_first(fem.locate_dofs_topological(vectors, 1, np.array([f], dtype=np.int32), remote=False), X)
-                  for f in _own_facets(solid.scene.mesh, on)]
-        nodes = np.array(facets, dtype=np.int32).reshape(-1, 3)
+        nodes = _nodes_of(_own_facets(solid.scene.mesh, on), vectors, X)
         at, weights = np.polynomial.legendre.leggauss(count)
         s, q = (1 + at) / 2, len(at)
         shapes = np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)])
@@ -218,6 +214,13 @@ def _displacements(solid: Any) -> tuple[Any, np.ndarray]:
     """(space of the displacement, local numbers of each node's unknowns, shape (nodes, components))."""
     vectors, numbers = solid.space.sub(0).collapse()
     return vectors, np.asarray(numbers, dtype=np.int32).reshape(-1, solid.scene.kinematics.components)
+
+
+def _nodes_of(facets: np.ndarray, vectors: Any, X: np.ndarray) -> np.ndarray:
+    """Two ends and the middle of each facet, local numbers of nodes at X, shape (facets, 3)."""
+    found = [ends_first(fem.locate_dofs_topological(vectors, 1, np.array([f], dtype=np.int32), remote=False), X)
+             for f in facets]
+    return np.array(found, dtype=np.int32).reshape(-1, 3)
 
 
 def _own_facets(mesh: Any, on: str) -> np.ndarray:
