@@ -55,11 +55,11 @@ def take_fields(source: Any, state: Any, problem: Any) -> None:
     Exact, cell by cell: a displacement is quadratic with a bubble, a pressure linear. Collective.
     """
     there, here = source.forms, problem.forms
-    domain, cells = there.domain, np.arange(there.domain.topology.index_map(2).size_local, dtype=np.int32)
+    domain = there.domain
     with source.at(state):
         fields = [there.u / here.length] + [there.stress / here.stress * p for p in ufl.split(there.w)[1:]]
-        known = [_at_nodes(f, domain, cells) for f in fields]
-    corners = gathered(source.comm, domain.geometry.x[_compat.cell_nodes(domain)[cells, :3], :2])
+        known = [in_own_cells(domain, f, _PLACES) for f in fields]
+    corners = gathered(source.comm, domain.geometry.x[_compat.cell_nodes(domain)[: len(known[0]), :3], :2])
     rows = {key: k for k, key in enumerate(map(_key, corners))}
     known = [gathered(source.comm, values) for values in known]
     mine = here.domain.geometry.x[_compat.cell_nodes(here.domain)[:, :3], :2]
@@ -82,11 +82,12 @@ _PLACES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0], [1 /
 """Corners, middles of the edges opposite to them, centre of a cell."""
 
 
-def _at_nodes(field: Any, domain: Any, cells: np.ndarray) -> np.ndarray:
-    """A field in cells at `_PLACES`, shape (cells, 7, components)."""
-    found = fem.Expression(field, _PLACES, jit_options=_compat.JIT_OPTIONS)
-    return found.eval(domain, cells).reshape(len(cells), len(_PLACES), -1) if len(cells) else np.zeros(
-        (0, len(_PLACES), int(np.prod(field.ufl_shape, dtype=int))))
+def in_own_cells(domain: Any, expression: Any, where: np.ndarray) -> np.ndarray:
+    """A UFL expression in this rank's own cells at places of the reference cell, shape (cells, places, components)."""
+    cells = np.arange(domain.topology.index_map(domain.topology.dim).size_local, dtype=np.int32)
+    shape = len(cells), len(where), int(np.prod(expression.ufl_shape, dtype=int))
+    found = fem.Expression(expression, where, jit_options=_compat.JIT_OPTIONS)
+    return found.eval(domain, cells).reshape(shape) if len(cells) else np.zeros(shape)
 
 
 def _shapes(by: np.ndarray) -> np.ndarray:

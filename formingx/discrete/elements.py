@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import basix
 import numpy as np
 import ufl
-from dolfinx import fem
 
 from ..mesh.triangles import shape_quality
+from .carry import in_own_cells
 
 _OUTLINE = [0, 5, 1, 3, 2, 4]          # nodes of a P2 triangle around its edge, DOLFINx order
 
@@ -43,18 +43,12 @@ def body(problem: Any, x: Any, control: float) -> Body | None:
     nodes = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
     where = ufl.as_vector([forms.X[0], forms.X[1]])
     F = ufl.as_vector([forms.F[i] for i in ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))])
-    cells = np.arange(domain.topology.index_map(2).size_local, dtype=np.int32)
-
-    def at(expression: Any, points: Any, n: int) -> np.ndarray:
-        if not len(cells):
-            return np.zeros((0, len(points), n))
-        return fem.Expression(expression, points).eval(domain, cells).reshape(len(cells), len(points), n)
-    F, X = at(F, gauss, 5), at(where, gauss, 2)
-    rest, moved, points = at(where, nodes, 2), at(where + forms.u, nodes, 2), at(where + forms.u, gauss, 2)
-    tags = np.zeros(len(cells), dtype=np.int64)
+    F, X, points = (in_own_cells(domain, of, gauss) for of in (F, where, where + forms.u))
+    rest, moved = (in_own_cells(domain, of, nodes) for of in (where, where + forms.u))
+    tags = np.zeros(len(X), dtype=np.int64)
     for tag in problem.scene.mesh.layers.values():
         found = problem.scene.mesh.cells.find(tag)
-        tags[found[found < len(cells)]] = tag
+        tags[found[found < len(tags)]] = tag
     J = (F[..., 0] * F[..., 3] - F[..., 1] * F[..., 2]) * F[..., 4]
     turned = np.sign(shape_quality(rest[:, :3]))                     # cells may be numbered clockwise
     local = (X, points, J, (F**2).sum(-1), tags, moved[:, _OUTLINE], turned * shape_quality(moved[:, :3]),

@@ -9,8 +9,8 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from .. import _compat
 from ..ranks import gathered
+from .carry import in_own_cells
 
 _NEIGHBOURS = 30
 """Points that a field is fitted to about an element, at most."""
@@ -51,7 +51,7 @@ class Preformed(NamedTuple):
             F, fields = forms.F, ufl.split(forms.w)[1:]
             values = [forms.X[0] + forms.u[0], forms.X[1] + forms.u[1], *(F[i] for i in _ENTRIES), *fields]
             where: Any = basix.make_quadrature(forms.domain.basix_cell(), forms.scene.quadrature_degree)[0]
-            rows: Any = _evaluated(forms, ufl.as_vector(values), where).reshape(-1, len(values))
+            rows: Any = in_own_cells(forms.domain, ufl.as_vector(values), where).reshape(-1, len(values))
         rest, J = state.measures, _det(rows[:, 2:7])
         rows = rows[(J > _LEAST) & (J < 1 / _LEAST)]         # what is crushed tells nothing
         rows[:, 2:7] /= np.cbrt(_det(rows[:, 2:7]))[:, None]
@@ -88,8 +88,8 @@ class Preformed(NamedTuple):
         """
         from scipy.spatial import cKDTree
         where: Any = basix.make_quadrature(forms.domain.basix_cell(), _DEGREE)[0]
-        inside = _evaluated(forms, forms.X, where)
-        corners = _evaluated(forms, forms.X, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+        inside = in_own_cells(forms.domain, forms.X, where)
+        corners = in_own_cells(forms.domain, forms.X, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
         points, values = gathered(forms.comm, self.points), gathered(forms.comm, values)
         if forms.scene.kinematics.axisymmetric:
             near = points[:, 0] < 2 * np.sqrt(np.ptp(points[:, 0]) * np.ptp(points[:, 1]) / max(len(corners), 1))
@@ -127,11 +127,3 @@ def _without_folds(F: np.ndarray) -> np.ndarray:
             break
         share[bad] *= 0.7
     return mean + share[:, None, None] * (F - mean)
-
-
-def _evaluated(forms: Any, expression: Any, where: np.ndarray) -> np.ndarray:
-    """In the own cells, shape (cells, places, components)."""
-    topology = forms.domain.topology
-    cells = np.arange(topology.index_map(topology.dim).size_local, dtype=np.int32)
-    found = fem.Expression(expression, where, jit_options=_compat.JIT_OPTIONS).eval(forms.domain, cells)
-    return found.reshape(len(cells), len(where), -1)
