@@ -1,0 +1,286 @@
+"""What engineers' runs cost, and where the time goes: moulds, plugs, bottles, with friction, time and heat.
+
+    ./fx python3 benchmarks/engineers.py [--against CHECKOUT] [--finest] [--only pot cup] [--json FILE]
+
+Each run is a process of its own. Its row: accepted states, failed steps, Newton iterations, jumps; seconds of processor
+time while paths are followed, in all and by part (contact: laws, arrivals, local problems; tangents; LU factors;
+solves; rest), forms compiled before; what made steps shorter or fail. `--against` puts the same of another version of
+the package beside it, `--finest` the largest difference of the walls, farther than a thickness from the rim, to one
+node a step in steps of at most `LARGEST`.
+"""
+
+import argparse
+import functools
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+import formingx as fx
+
+SECONDS = 1500                                               # that a run may take
+LARGEST = 0.02                                               # dimensionless, of the finest steps
+PARTS = ("contact", "tangents", "LU", "solves", "rest")
+
+
+def contact(finest, *given, **more):
+    """A contact; for finest steps one that takes a node a step."""
+    return fx.Contact(*given, **more, **({"nodes_per_step": 1} if finest else {}))
+
+
+def step(finest, target=8):
+    return fx.StepControl(target=target, length=LARGEST, largest=LARGEST) if finest else fx.StepControl(target=target)
+
+
+def disc(radius, thickness, elements, material, contacts, **more):
+    return fx.Scene(mesh=fx.mesh.disc(radius=radius, thickness=thickness, elements=elements), materials=material,
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")],
+                    contacts=contacts, **more)
+
+
+def plug_then_air(scene, travel, pressure, finest):
+    return fx.Process(scene).run([fx.Stage("plug", drive="plug", until=fx.travel(travel)),
+                                  fx.Stage("air", drive="air", until=fx.pressure(pressure))],
+                                 step=step(finest), progress=False)
+
+
+def pot(finest):
+    """The README's."""
+    tools = fx.tools.pot(mouth=38.0, base=28.0, depth=40.0, sheet=1.2, fillet=8.0, lip=3.0, nose=20.0)
+    return plug_then_air(disc(40.0, 1.2, (30, 1), fx.NeoHookean(c10=0.4), [
+        contact(finest, "top", tools.mould, "stick", separates=False, name="mould"),
+        contact(finest, "bottom", tools.plug, "none", moves=(0, 1), name="plug")]), 22.0, 0.09, finest)
+
+
+def study(finest):
+    """A run of demos/pot_study.py."""
+    mould = fx.tools.cup(radius=38.0, depth=60.0, mouth=1.2, draft=6.0, fillet=5.0, lip=2.0)
+    plug = fx.tools.male(radius=22.0, height=120.0, base=-120.0, draft=3.0, fillet=6.0)
+    return plug_then_air(disc(40.0, 1.2, (30, 1), fx.MooneyRivlin(c10=0.35, c01=0.05), [
+        contact(finest, "top", mould, "stick", separates=False, name="mould"),
+        contact(finest, "bottom", plug, 0.3, moves=(0, 1), name="plug")]), 48.0, 0.4, finest)
+
+
+def relaxing_pot(finest):
+    """A run of demos/relaxing_pot.py."""
+    mould = fx.tools.cup(radius=10.0, depth=10.0, mouth=0.3, fillet=1.0)
+    plug = fx.tools.male(radius=5.0, height=40.0, base=-40.0, fillet=1.5)
+    scene = disc(10.0, 0.3, (30, 1), fx.Viscoelastic(fx.NeoHookean(c10=6.5), branches=[(117.0, 1.0)]), [
+        contact(finest, "top", mould, "stick", name="mould"),
+        contact(finest, "bottom", plug, 0.3, moves=(0, 1), name="plug")])
+    return fx.Process(scene).run([
+        fx.Stage("plug", drive="plug", until=fx.travel(6.0), speed=6.0), fx.Stage("hold", duration=1.0),
+        fx.Stage("vacuum", drive="air", until=fx.pressure(160.0), step=step(finest)),
+        fx.Stage("in the mould", duration=5.0, without=["plug"])], accuracy=1e-2, progress=False,
+        step=step(True) if finest else None)
+
+
+def blown(friction, finest):
+    mesh = fx.mesh.parison(inner_radius=1.1, thickness=0.3, length=10.6, elements=(40, 1))
+    mould = fx.tools.bottle(radius=3.0, height=10.0, neck=1.5, shoulder=2.0, neck_height=1.5, base=-2.9, fillet=0.8,
+                            shoulder_fillet=0.8)
+    scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("neck")], loads=[fx.Pressure("inner")],
+                     contacts=[contact(finest, "outer", mould, friction)])
+    return fx.trace(scene, until=fx.pressure(200.0), step=step(finest), progress=False)
+
+
+def bottle(finest):
+    """demos/parison.py."""
+    return blown("stick", finest)
+
+
+def sliding_bottle(finest):
+    return blown(0.3, finest)
+
+
+def in_cup(friction, finest):
+    mould = fx.tools.cup(radius=10.0, depth=5.0, mouth=0.3, fillet=1.0)
+    scene = disc(10.0, 0.3, (60, 2), fx.MooneyRivlin(c10=50.0, c01=15.0), [contact(finest, "top", mould, friction)])
+    return fx.trace(scene, until=fx.pressure(160.0), step=step(finest), progress=False)
+
+
+def cup(finest):
+    """demos/cup.py."""
+    return in_cup("stick", finest)
+
+
+def slippery_cup(finest):
+    return in_cup("none", finest)
+
+
+def williams(finest):
+    """demos/williams_plug.py to 8 cm, with friction."""
+    tool = fx.tools.male(radius=1.905, height=60.0, base=-60.0, fillet=0.35).mirrored().moved(z=0.6985)
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=8.89, thickness=0.6985, elements=(120, 2), concentrate={1.23825: 0.2}),
+                     materials=fx.NeoHookean(c10=0.448), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[contact(finest, "top", tool, 0.3, moves=(0, -1))])
+    return fx.trace(scene, until=fx.travel(8.0), step=step(finest, 6), progress=False)
+
+
+def blister(finest, target=None):
+    """A cavity of 8 mm in a warm film that relaxes, plug and mould colder; lengths mm, stresses MPa; an invented film.
+
+    target: of `StepControl`, None: its default."""
+    tools = fx.tools.pot(mouth=4.0, base=3.5, depth=4.0, sheet=0.25, fillet=0.8, lip=0.4, plug=2.6, nose=0.8)
+    stiffness = fx.table({20: 500.0, 40: 300.0, 60: 100.0, 80: 20.0, 100: 3.0, 120: 1.0, 140: 0.6})
+
+    def warm(value):
+        return fx.of_temperature(lambda T: value * stiffness(T))
+    film = fx.Viscoelastic(fx.NeoHookean(c10=warm(0.177)), branches=[(warm(0.375), 0.216), (warm(0.288), 5.22)],
+                           shift=fx.WLF(9.82, 91.6, 120.0))
+    heat = fx.Cooling(fx.ThermalProperties(conductivity=0.17e-3, density=1.38e-3, heat_capacity=1.6), [], unit="C",
+                      tools={"plug": (0.4e-3, 60.0), "mould": (0.5e-3, 40.0)})
+    scene = disc(5.0, 0.25, (36, 1), film, [contact(finest, "top", tools.mould, "stick", name="mould"),
+                                            contact(finest, "bottom", tools.plug, 0.3, moves=(0, 1), name="plug")],
+                 temperature=120.0, heat=heat)
+    return fx.Process(scene).run([fx.Stage("plug", drive="plug", until=fx.travel(3.0), speed=30.0),
+                                  fx.Stage("air", drive="air", until=fx.pressure(0.3), duration=0.2),
+                                  fx.Stage("hold", duration=1.0)], accuracy="draft", progress=False,
+                                 step=step(finest, target or 8) if finest or target else None)
+
+
+RUNS = {run.__name__: run for run in (pot, study, relaxing_pot, bottle, cup, williams, blister, slippery_cup,
+                                      sliding_bottle)}
+USUAL = list(RUNS)
+RUNS |= {f"blister_{n}": functools.partial(blister, target=n) for n in (4, 8, 12)}
+
+
+class Clock:
+    """Processor time of functions of classes, each without what it calls of the others."""
+
+    def __init__(self):
+        self.seconds, self._on, self._last = Counter(), [], 0.0
+
+    def _switch(self):
+        now = time.process_time()
+        if self._on:
+            self.seconds[self._on[-1]] += now - self._last
+        self._last = now
+
+    def watch(self, part, owner, *names, within=True):
+        """Count calls as of a part; within: only while another part runs."""
+        for name in names:
+            if hasattr(owner, name):
+                setattr(owner, name, self._watched(getattr(owner, name), part, within))
+
+    def _watched(self, function, part, within):
+        @functools.wraps(function)
+        def timed(*given, **more):
+            if within and not self._on:
+                return function(*given, **more)
+            self._switch()
+            self._on.append(part)
+            try:
+                return function(*given, **more)
+            finally:
+                self._switch()
+                self._on.pop()
+        return timed
+
+
+def measured(name, finest):
+    """The row of one run, in this process."""
+    from formingx.discrete.contact.approach import Approach
+    from formingx.discrete.contact.face import FaceContact
+    from formingx.discrete.problem import Problem
+    from formingx.solve.linear import DirectSolver
+    from formingx.solve.local_contact import LocalSolve
+    from formingx.solve.path_following import Run
+    clock = Clock()
+    clock.watch("rest", Run, "follow", within=False)
+    for owner in (FaceContact, Approach):
+        clock.watch("contact", owner, *(n for n, f in vars(owner).items() if callable(f) and n[0] != "_"))
+    clock.watch("contact", LocalSolve, "correct")
+    clock.watch("tangents", Problem, "tangent")
+    clock.watch("LU", DirectSolver, "factorise")
+    clock.watch("solves", DirectSolver, "solve", "solve_all", "solve_transposed")
+    ended = ""
+    try:
+        path = RUNS[name](finest)
+    except fx.ConvergenceError as error:
+        path, ended = error.path, str(error)[:200]
+    counts, profile = path.counts, path.profile()
+    R, t = profile.reference_length, profile.thickness
+    inside = R < R[-1] - profile.original_thickness[0]
+    return {"states": counts.steps, "failures": counts.failures, "iterations": counts.iterations,
+            "jumps": len(path.jumps), "seconds": sum(clock.seconds.values()),
+            "parts": {part: clock.seconds[part] for part in PARTS}, "limits": counts.limits, "ended": ended,
+            "length": R[inside].tolist(), "wall": t[inside].tolist()}
+
+
+def in_child(name, finest, checkout):
+    """The row of one run with the package of a checkout; one that could not be made says why."""
+    with tempfile.TemporaryDirectory() as place:
+        file = Path(place) / "row.json"
+        command = [sys.executable, __file__, "--row", name, "--json", str(file), *["--finest"] * finest]
+        for _ in range(2 if not finest else 1):             # the first compiles forms
+            try:
+                done = subprocess.run(command, env=os.environ | {"PYTHONPATH": str(checkout)}, capture_output=True,
+                                      text=True, timeout=SECONDS)
+            except subprocess.TimeoutExpired:
+                return {"ended": f"took more than {SECONDS} s"}
+            if done.returncode:
+                return {"ended": (done.stderr.strip().splitlines() or ["it crashed"])[-1]}
+            row = json.loads(file.read_text())
+            if row["seconds"] > 20:
+                break
+        return row
+
+
+def apart(row, other):
+    """Largest relative difference of two walls."""
+    if row.get("ended") or other.get("ended"):
+        return None
+    return float(np.abs(np.array(row["wall"]) / np.interp(row["length"], other["length"], other["wall"]) - 1).max())
+
+
+def line(name, version, row):
+    if "states" not in row:
+        return f"{name:15}{version:8}{row['ended']}"
+    off = row.get("to_finest")
+    limits = ", ".join(f"{why} {n}" for why, n in Counter(row["limits"]).most_common(4))
+    return (f"{name:15}{version:8}{row['states']:7}{row['failures']:7}{row['iterations']:7}{row['jumps']:6}"
+            f"{row['seconds']:8.2f}" + "".join(f"{100 * row['parts'][p] / row['seconds']:9.0f}" for p in PARTS)
+            + (f"{off:9.1e}" if off is not None else f"{'-':>9}") + f"  {limits}  {row['ended']}")
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--against", type=Path, help="another checkout of the package, for the same runs")
+    options.add_argument("--finest", action="store_true", help="compare walls with one node a step in finest steps")
+    options.add_argument("--only", nargs="+", choices=RUNS, default=USUAL)
+    options.add_argument("--json", type=Path)
+    options.add_argument("--row", choices=RUNS, help=argparse.SUPPRESS)
+    args = options.parse_args()
+    if args.row:
+        args.json.write_text(json.dumps(measured(args.row, args.finest)))
+        return
+    versions = {"now": Path(fx.__file__).parents[1], **({"before": args.against.resolve()} if args.against else {})}
+    found = {}
+    print(f"{'run':15}{'':8} states failed   iter jumps       s" + "".join(f"{p + ' %':>9}" for p in PARTS)
+          + "   finest  limits of steps")
+    for name in args.only:
+        found[name] = rows = {version: in_child(name, False, checkout) for version, checkout in versions.items()}
+        if args.finest:
+            rows["finest"] = in_child(name, True, versions["now"])
+        for version, row in rows.items():
+            row["to_finest"] = apart(row, rows["finest"]) if args.finest and version != "finest" else None
+            print(line(name, version, row), flush=True)
+    for version in versions:
+        rows = [rows[version] for rows in found.values() if "states" in rows[version]]
+        states, failures, iterations, seconds = (sum(row[key] for row in rows) for key in (
+            "states", "failures", "iterations", "seconds"))
+        print(f"{'total':15}{version:8}{states:7}{failures:7}{iterations:7}{'':6}{seconds:8.2f}")
+    if args.json:
+        args.json.write_text(json.dumps(found, indent=1))
+
+
+if __name__ == "__main__":
+    main()
