@@ -208,7 +208,7 @@ def measured(name, finest):
         path, ended = error.path, str(error)[:200]
     counts, profile = path.counts, path.profile()
     R, t = profile.reference_length, profile.thickness
-    inside = R < R[-1] - profile.original_thickness[0]
+    inside = R[-1] - profile.original_thickness[0] > R
     return {"states": counts.steps, "failures": counts.failures, "iterations": counts.iterations,
             "jumps": len(path.jumps), "seconds": sum(clock.seconds.values()),
             "parts": {part: clock.seconds[part] for part in PARTS}, "limits": counts.limits, "ended": ended,
