@@ -24,44 +24,48 @@ def draw(thickness, elements):
     return fx.trace(scene, until=fx.travel(TRAVEL), through=through, progress=False)
 
 
-def hoop(path, thickness, state, R):
-    """Hoop force per radial length, both at rest, over shear modulus times thickness."""
-    z, weights = np.polynomial.legendre.leggauss(4)
-    points = np.array([(r, thickness * (1 + s) / 2) for r in R for s in z])
-    P = path.stress(state).at(points).first_piola[:, 2, 2].reshape(len(R), -1)
-    return P @ weights / 2 / 130.0
+def watch(path, thickness):
+    """(radii at rest, hoop resultants over shear modulus times thickness of all states, shape (states, n))."""
+    found = [path.hoop_resultants(state) for state in path.states]
+    return found[0].points[:, 0], np.array([one.resultant for one in found]) / (130.0 * thickness)
 
 
 def main():
     """Draw, count, and look where the hoop is compressed."""
     options = parser("flange", __doc__).parse_args()
     elements, modes = ((80, 1), range(7, 10)) if options.quick else ((200, 2), range(2, 25))
-    summary, at = {}, np.linspace(0.05, RADIUS - 0.05, 200)
-    drawing, (left, right) = figure(2, 4.8, 3.8)
+    summary = {}
+    drawing, (left, middle, right) = figure(3, 4.4, 3.8)
     for k, thickness in enumerate((0.3, 0.1) if options.quick else (0.3, 0.1, 0.05)):
         path = draw(thickness, elements)
         found = path.stability(modes, states="all")
         first, style = found.first, {"color": f"C{k}", "label": f"h = {thickness:g}"}
-        compressed = [state for state in path.states[1:] if hoop(path, thickness, state, at).min() < -1e-3]
-        ends = at[hoop(path, thickness, path.last, at) < 0]
+        at, hoop = watch(path, thickness)
+        compressed = path["travel"][1:][hoop[1:].min(1) < -1e-3]
+        ends = at[hoop[-1] < 0]
         numbers = summary[f"h_{thickness:g}"] = {"alarms": len(found.alarms)}
         if first is not None:
             numbers |= {"first_n": int(first.number), "first_travel": first.control}
             last, picture = first, thickness
         numbers["hoop_compressed"] = {
-            "first_state_at_travel": float(compressed[0].measures["travel"]),
+            "first_state_at_travel": float(compressed[0]),
             "at_end_from_radius": float(ends.min()), "at_end_to_radius": float(ends.max()),
-            "least_at_end_over_mu_h": float(hoop(path, thickness, path.last, at).min())}
+            "least_at_end_over_mu_h": float(hoop[-1].min())}
         say(f"h = {thickness:g}: {numbers}")
-        left.plot(at, hoop(path, thickness, path.last, at), **style)
+        left.plot(at, hoop[-1], **style)
         where = {n: found.first_of(n).control for n in modes if found.first_of(n) is not None}
         if where:
             right.plot(list(where), list(where.values()), "o-", **style)
+    shades = middle.pcolormesh(at, path["travel"], hoop, cmap="RdBu", vmin=-abs(hoop.min()), vmax=abs(hoop.min()),
+                               shading="gouraud", rasterized=True)
+    middle.contour(at, path["travel"], hoop, [0.0], colors="black", linewidths=1)
+    drawing.colorbar(shades, ax=middle, label="hoop resultant / (mu h)", extend="max")
     left.axhline(0, color="0.6", lw=0.8)
     left.set(xlabel="radius at rest", ylabel="hoop resultant / (mu h)", title=f"ball drawn down {TRAVEL:g}")
+    middle.set(xlabel="radius at rest", ylabel="travel", title=f"h = {thickness:g}: compressed where red")
     right.set(xlabel="waves round the axis", ylabel="travel at which they begin", title="wrinkles",
               xticks=range(4, 25, 4), ylim=(0, TRAVEL))
-    for axes in (left, right):
+    for axes in [left, right] if where else [left]:
         axes.legend(frameon=False)
     save(drawing, options.out / "flange.png")
     if not options.quick:

@@ -188,7 +188,7 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
         x_old = old.x.array_r[: old.n_owned].copy()
         touched = [(c.contact.on, c.positions(x_old, state.control)[c.touching(x_old, state.control)]
                     + c.travelled(state.control)) for c in old.contacts]
-    order = _around(outline, edges)
+    order = outline.around("trace: remesh")
     names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
     corners = _corners(edges[order], names, touched)
     layer, = scene.mesh.layers
@@ -233,17 +233,6 @@ def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> 
                                f" volume_ratio nearer to 1") from None
     problem.enter(first, record.last.x, control)
     return record.last.x
-
-
-def _around(outline: Outline, edges: np.ndarray) -> list[int]:
-    """Numbers of the edges one after the other round the body, from one where R or Z is least."""
-    after = {int(a): k for k, (a, _) in enumerate(outline.ends)}
-    order = [0]
-    while len(order) < len(edges):
-        order.append(after[int(outline.ends[order[-1], 1])])
-    if len(set(order)) < len(edges):
-        raise InputError("trace: remesh: the body has a hole, or several parts: must be one piece without holes")
-    return order
 
 
 def _corners(edges: np.ndarray, names: list[frozenset[str]], touched: list[tuple[str, np.ndarray]]) -> np.ndarray:

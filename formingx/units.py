@@ -17,7 +17,8 @@ _KINDS = (("pressure", "stress"), ("stress", "stress"), ("force", "force"), ("en
           ("power", "power"), ("volume", "volume"), ("area", "area"), ("travel", "length"),
           ("height", "length"), ("contact_length", "length"), ("arc_length", "length"), ("reference_length", "length"),
           ("penetration", "length"), ("displacement", "length"), ("radius", "length"), ("wall", "length"),
-          ("gap", "length"), ("thickness", "length"), ("process_time", "time"), ("temperature", "temperature"))
+          ("gap", "length"), ("resultant", "tension"),
+          ("thickness", "length"), ("process_time", "time"), ("temperature", "temperature"))
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,11 @@ class Units:
     def force(self) -> str:
         """The unit of forces, stress length^2: "N" of mm and MPa, "lbf" of in and psi; "" if one is not said."""
         return self._derived(_FORCES, 2)
+
+    @property
+    def tension(self) -> str:
+        """The unit of forces by length, stress length: "MPa mm"; "" if one is not said."""
+        return self._derived({}, 1).removesuffix("1")
 
     @property
     def energy(self) -> str:

@@ -273,6 +273,26 @@ def test_formed_is_the_deformed_body():
     assert again.forms.volume == pytest.approx(path.problem.forms.volume, rel=1e-5)
 
 
+def test_formed_of_new_elements():
+    """A blown sheet with new elements has its volume and its boundaries, and bears what the old one does."""
+    path = fx.trace(treloar(elements=(16, 2)), until=fx.pole_height(1.0), progress=False)
+    old, new = path.formed(), path.formed(size=0.03)
+    assert new.boundaries.keys() == old.boundaries.keys() and new.layers.keys() == old.layers.keys()
+    paths = [fx.trace(fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=2.0), supports=[
+        fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")]), until=fx.pressure(0.1),
+        progress=False) for mesh in (old, new)]
+    one, two = (p.problem.forms.volume for p in paths)
+    assert two == pytest.approx(one, rel=1e-8)
+    one, two = (p.last.measures["enclosed_volume"] for p in paths)
+    assert two == pytest.approx(one, rel=1e-3)
+    with pytest.raises(InputError, match="size = 0: must be"):
+        path.formed(size=0)
+    with pytest.raises(InputError, match="one layer"):
+        layers = fx.mesh.disc(radius=2.0, thickness={"a": 0.1, "b": 0.1}, elements=(4, 1))
+        fx.trace(fx.Scene(mesh=layers, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")], supports=[
+            fx.Symmetry("axis"), fx.Clamped("rim")]), until=fx.pressure(0.01), progress=False).formed(size=0.1)
+
+
 def inflate(mesh, ratio):
     """A tube inflated at its length until its inner radius would be so much larger, were it even."""
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.5), loads=[fx.Pressure("inner")],
@@ -281,14 +301,16 @@ def inflate(mesh, ratio):
                     step=fx.StepControl(largest=0.03))
 
 
-def test_imperfections_knock_down():
+def test_imperfections_knock_down(caplog):
     """A tube that bulges from the start bears less, by the power 2/3 of its imperfection (Koiter, 1945)."""
     mesh = fx.mesh.disc(radius=1.0, inner_radius=0.8, thickness=np.pi, elements=(2, 10))
     path = inflate(mesh, 2.02)
+    said = [record.getMessage() for record in caplog.records if "another path begins" in record.getMessage()]
+    caplog.clear()
     loss = path.stability([0]).first
     (before, behind), = path.branch_points
     assert before is loss.left and behind is loss.right
-    assert "another path begins" in str(fx.doctor(path))
+    assert len(said) == 1 and path.describe(before) in said[0] and said[0] in str(fx.doctor(path))
     bent = fx.imperfect(mesh, loss, 1e-2)
     assert np.abs(bent.nodes_of("inner")[:, 0] - 0.8).max() == pytest.approx(
         1e-2 * np.abs(loss.amplitudes[loss.points[:, 0] < 0.8 + 1e-9, 0]).max(), rel=1e-6)
@@ -296,9 +318,32 @@ def test_imperfections_knock_down():
     for amplitude in (2.5e-3, 5e-3, 1e-2):
         path = inflate(fx.imperfect(mesh, loss, amplitude), 2.1)
         drops.append(loss.control - max(limit.measures["pressure"] for limit in path.limit_points))
+    assert not caplog.records                               # a limit point is none
     assert min(drops) > 0 and np.diff(np.log(drops)) / np.log(2) == pytest.approx([2 / 3] * 2, abs=0.05)
     with pytest.raises(InputError, match="of another mesh"):
         fx.imperfect(fx.mesh.disc(radius=1.0, thickness=0.3, elements=(3, 1)), loss, 0.1)
+
+
+def test_hoop_resultants():
+    """Of an even disc pushed in at its rim, of two layers: h dW/dl = 2 c10 h (l - l^-5); of a membrane at its pole."""
+    mesh = fx.mesh.disc(radius=2.0, thickness={"one": 0.1, "two": 0.3}, elements=(4, (1, 2)))
+    scene = fx.Scene(mesh=mesh, materials={"one": fx.NeoHookean(c10=1.0), "two": fx.NeoHookean(c10=5.0)}, supports=[
+        fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.Displaced("rim", "r")])
+    path = fx.trace(scene, until=fx.travel(-0.2), progress=False)      # a stretch of 0.9
+    found = path.hoop_resultants()
+    assert found.resultant == pytest.approx(2 * (0.1 + 5 * 0.3) * (0.9 - 0.9**-5), rel=1e-8)
+    assert found.compressed.all() and found.least[0] == found.resultant.min()
+    assert np.ptp(path.hoop_resultants(path.states[0]).resultant) == 0
+    path = fx.trace(treloar((40, 1), model=fx.Membrane()), until=fx.pole_stretch(3.0), progress=False)
+    found = path.hoop_resultants()
+    c10, h = 2.0, 0.082
+    assert found.points[0, 0] < 0.1 and not found.compressed.any()
+    assert found.resultant[0] == pytest.approx(2 * c10 * h * (3 - 3.0**-5), rel=2e-3)
+    strip = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(2, 1)), kinematics=fx.PlaneStrain(),
+                     materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis", "r"),
+                     fx.Symmetry("bottom", "z"), fx.Displaced("rim", "r")])
+    with pytest.raises(InputError, match="plane strain"):
+        fx.trace(strip, until=fx.travel(0.1), progress=False).hoop_resultants()
 
 
 def test_a_run_stops_where_it_is_unstable():

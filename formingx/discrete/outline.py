@@ -9,6 +9,7 @@ import dolfinx.mesh
 import numpy as np
 from dolfinx import fem
 
+from ..errors import InputError
 from ..mesh.check import crossing, crossings
 from ..ranks import gathered
 
@@ -55,6 +56,16 @@ class Outline:
     def of(self, boundary: str) -> np.ndarray:
         """Which edges are of a boundary of the mesh, shape (m,); collective."""
         return self._gathered(np.isin(self._facets, self._forms.scene.mesh.facets_of(boundary)))
+
+    def around(self, who: str) -> list[int]:
+        """Numbers of the edges one after the other round the body; an InputError if it has holes, or several parts."""
+        after = {int(a): k for k, (a, _) in enumerate(self.ends)}
+        order = [0]
+        while len(order) < len(self.ends):
+            order.append(after[int(self.ends[order[-1], 1])])
+        if len(set(order)) < len(order):
+            raise InputError(f"{who}: the body has a hole, or several parts: must be one piece without holes")
+        return order
 
     def pieces(self, edges: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
         """(points, shape (n, 2), length; straight pieces between them, shape (parts m, 2)) along `edges()`."""

@@ -16,6 +16,7 @@ from ..results.path import Path
 from ..runs import doubts
 from ..scene.aims import unreachable
 from ..scene.scene import Scene
+from ..solve.diagnose import ANOTHER_PATH
 from ..solve.stage import Stage
 from ..tools.shapes import Arc
 from ..units import NONE, Units
@@ -79,9 +80,7 @@ def _run(path: Path) -> Iterator[Finding]:
         if severity == "serious":
             yield Finding("warning", "run", text)
     for left, right in path.branch_points:
-        yield Finding("warning", "run", f"between {path.describe(left)} and {path.describe(right)} another path begins,"
-                                        f" without a limit point: the body may take that one; `path.stability([0])`"
-                                        f" finds the mode, and where")
+        yield Finding("warning", "run", ANOTHER_PATH % (path.describe(left), path.describe(right)))
 
 
 def _driven(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:

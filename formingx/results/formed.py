@@ -8,24 +8,31 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from ..errors import InputError, finite, instance
+from ..discrete.outline import Outline
+from ..errors import InputError, finite, instance, positive
 from ..mesh.grid import Grid, counter_clockwise, gathered, to_mesh
 from ..mesh.mesh import Mesh
+from ..mesh.remeshed import remeshed
 
 _NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
 _TO_GRID = [0, 1, 2, 5, 3, 4]                               # middles of the edges 01, 12, 20
 
 
-def formed(problem: Any, state: Any) -> Mesh:
+def formed(problem: Any, state: Any, size: float | None = None) -> Mesh:
     """The deformed elements of a state, with the names of layers and boundaries; second-order geometry; collective.
 
+    size: of new elements in their place, length.
+
     Raises:
-        InputError: a membrane, or deformed elements that are no mesh (inside out, or one over another).
+        InputError: a membrane, or deformed elements that are no mesh (inside out, or one over another); new ones of
+            several layers, on several ranks, or round a hole.
     """
     forms, mesh = problem.forms, problem.scene.mesh
     domain, comm = mesh.domain, mesh.comm
     if forms.domain is not domain:
         raise InputError("Path.formed: a membrane has no elements across its thickness: form a solid, MixedPressure()")
+    if size is not None:
+        return _of_size(problem, state, positive("Path.formed: size", size))
     numbers = fem.functionspace(domain, ("Lagrange", 2)).dofmap
     cells = np.arange(domain.topology.index_map(2).size_local, dtype=np.int32)
     triangles = numbers.index_map.local_to_global(np.asarray(numbers.list)[cells].ravel().astype(np.int32))
@@ -60,6 +67,19 @@ def formed(problem: Any, state: Any) -> Mesh:
                     {name: np.array([row for p in parts for row in p[3][name]], dtype=np.int64).reshape(-1, 3)
                      for name in mesh.boundaries})
     return to_mesh(grid, comm, "Path.formed: the deformed mesh")
+
+
+def _of_size(problem: Any, state: Any, size: float) -> Mesh:
+    """The deformed outline, with new elements inside."""
+    mesh, outline = problem.scene.mesh, Outline(problem.forms)
+    if len(mesh.layers) > 1 or mesh.comm.size > 1:
+        raise InputError(f"Path.formed: size = {size:g}: new elements are made of one layer, on one rank: leave it out")
+    with problem.at(state):
+        edges = outline.edges()
+    of, order = {name: outline.of(name) for name in mesh.boundaries}, outline.around("Path.formed: size")
+    names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
+    (layer,), axisymmetric = mesh.layers, problem.scene.kinematics.axisymmetric
+    return remeshed(edges[order], names, np.zeros((0, 2)), size, size, layer, axisymmetric, mesh.comm)
 
 
 def imperfect(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:

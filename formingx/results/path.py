@@ -149,11 +149,25 @@ class Path(States):
         self._watch = self._watch or Watch(self)
         return self._watch.look(modes, states)
 
-    def formed(self, state: State | None = None) -> Any:
-        """The body of a state (default: the last) as a new `Mesh`, free of stress; an InputError if it is none."""
+    def hoop_resultants(self, state: State | None = None) -> Any:
+        """Forces round the axis along a sheet at a state (default: the last), `HoopResultants`: below 0 it may wrinkle.
+
+        A solid or a membrane; an InputError in plane strain, in space, and for a mesh that is no sheet.
+        """
+        self._section_only("hoop_resultants", "use path.wall().wrinkled")
+        from .evaluate.hoop import hoop_resultants
+        state = state or self.last
+        return hoop_resultants(self, self._segment(state).problem, state)
+
+    def formed(self, state: State | None = None, *, size: float | None = None) -> Any:
+        """The body of a state (default: the last) as a new `Mesh`, free of stress; an InputError if it is none.
+
+        size: of new elements, length, in place of the deformed ones: for a body of one layer without holes, on one
+        rank. (With the stresses that it has a body is let go by `released`.)
+        """
         self._section_only("formed", "use to_stl, or shell_model")
         from .formed import formed
-        return formed(self._segment(state or self.last).problem, state or self.last)
+        return formed(self._segment(state or self.last).problem, state or self.last, size)
 
     def column_factors(self, share: float | None, error: float | None) -> np.ndarray:
         """Wanted over present length of the mesh's columns, shape (n,), by which `formingx.mesh.adapted` goes."""

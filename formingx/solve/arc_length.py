@@ -280,6 +280,8 @@ class Curve:
         if before is not None and self._inner(state.direction, state.slope, state.x - before.x,
                                               control - before.control) < 0:
             state.direction, state.slope = -state.direction, -state.slope
+        if not (self.fixed_control or self.problem.has_history):
+            state.orientation = self.newton.solver.sign() * int(np.sign(state.slope))
         return state
 
     def _length_of(self, b: PETSc.Vec) -> float:

@@ -40,6 +40,10 @@ class Limits:
 
 _LIMITS = Limits()
 
+ANOTHER_PATH = ("between %s and %s another path begins, without a limit point: the body may take that one;"
+                " path.stability([0]) finds the mode, and where")
+"""Of two neighbours, described."""
+
 
 @dataclass(frozen=True)
 class Diagnosis:

@@ -20,7 +20,7 @@ from ..errors import ConvergenceError
 from ..measures.targets import Amplitude, Target
 from . import predictor
 from .arc_length import Predictor
-from .diagnose import Diagnosis, diagnose
+from .diagnose import ANOTHER_PATH, Diagnosis, diagnose
 from .equations import Array, Attempt, Measure
 from .newton import Failure, fixed, tangents
 from .progress import Aim, Progress
@@ -105,7 +105,8 @@ class Run:
                 if max_steps is not None and record.counts.steps - before >= max_steps:
                     self._give_up(f"{max_steps} states were accepted before it", pace=self.aim.pace(max_steps))
                 self._check_progress()
-                for state in self._next(self.states[-1]):
+                old = self.states[-1]
+                for state in self._next(old):
                     self._accept(state)
                     self._stop_if(self.aim.jumped_past(state))
                     if state.kind == "limit point" and self._at_fold == "stop":
@@ -115,6 +116,7 @@ class Run:
                     if not self.aim.is_open() and state.met is self.aim.until:
                         break
                 self._complete_step()
+                self._look_for_branch(old, record.last)
                 if record.ended:
                     break
                 self._stop_if(self.aim.turned_back())
@@ -124,6 +126,12 @@ class Run:
             raise
         finally:
             self._progress.close()
+
+    def _look_for_branch(self, old: State, new: State) -> None:
+        """Say so where another path begins within a step: as its factors are there, it costs nothing."""
+        usual = ["step", "target", *["start"] * (not self.problem.slack_at_rest)]
+        if old.orientation * new.orientation < 0 and old.kind in usual and new.kind in usual:
+            log.warning(ANOTHER_PATH, self.record.describe(old), self.record.describe(new))
 
     @property
     def _driven(self) -> str:

@@ -88,6 +88,7 @@ class Aim:
             left, rate = self._curve.aim(self.measure, self.until.value, start)
             if left * rate > 0:
                 start.direction, start.slope = -start.direction, -start.slope
+                start.orientation = -start.orientation
         return start
 
     def short_of_targets(self, old: State, by: float) -> float:

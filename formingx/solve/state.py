@@ -28,6 +28,8 @@ class State:
         stage: name of the stage of a process; setting: what the stage had set, as plain data (`Setting`).
         stepping: what a run goes on with: its next step, its counts and its target; empty inside a step.
         time: process time.
+        orientation: sign of the tangent's determinant times that of the slope: the same along a path, through limit
+            points too, until another path branches off; 0 if it is not known.
         verdict: why it is no state that a body can have, in words; "" but in a run that went on beyond (`Record`).
     """
 
@@ -46,6 +48,7 @@ class State:
     stepping: dict[str, Any] = field(default_factory=dict)
     time: float = 0.0
     jump: dict[str, Any] = field(default_factory=dict)
+    orientation: int = 0
     verdict: str = ""
 
     def __repr__(self) -> str:

@@ -51,19 +51,29 @@ class Tension:
             h = F[1, 1] * forms.thicknesses[terms.names[0]]
             resultants = [N + h * (F[i, i] * P[i, i] - F[1, 1] * P[1, 1]) for N, i in zip(resultants, (0, 2))]
         unit = forms.constant(forms.stress) * sum(forms.thicknesses.values())
-        self._found = fem.Expression(ufl.as_vector([*(N / unit for N in resultants), forms.X[0], forms.X[1]]),
+        at_rest = resultants[1] * forms.F[0, 0]
+        self._found = fem.Expression(ufl.as_vector([*(N / unit for N in resultants), forms.X[0], forms.X[1], at_rest]),
                                      forms.terms[0].places, jit_options=_compat.JIT_OPTIONS)
 
     def least(self, state: Any) -> Resultant:
         """Of a state; in plane strain along the section alone: nothing wrinkles across it; collective."""
+        values = self._values(state)
+        n = 2 if self._problem.scene.kinematics.axisymmetric else 1
+        k, i = np.unravel_index(np.argmin(values[:, :n]), (len(values), n))
+        return Resultant(("meridional", "hoop")[i], float(values[k, i]), (float(values[k, 2]), float(values[k, 3])))
+
+    def hoop(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
+        """(points (R, Z) from the axis to the rim, (n, 2), hoop resultants by length at rest, (n,)); collective."""
+        values = self._values(state)
+        values = values[np.argsort(values[:, 2])]
+        return values[:, 2:4], values[:, 4]
+
+    def _values(self, state: Any) -> np.ndarray:
         problem, domain = self._problem, self._problem.forms.domain
         with problem.at(state):
             cells = np.arange(domain.topology.index_map(1).size_local, dtype=np.int32)
-            values = self._found.eval(domain, cells).reshape(-1, 4) if len(cells) else np.zeros((0, 4))
-        values = np.concatenate(problem.comm.allgather(values))
-        n = 2 if problem.scene.kinematics.axisymmetric else 1
-        k, i = np.unravel_index(np.argmin(values[:, :n]), (len(values), n))
-        return Resultant(("meridional", "hoop")[i], float(values[k, i]), (float(values[k, 2]), float(values[k, 3])))
+            values = self._found.eval(domain, cells).reshape(-1, 5) if len(cells) else np.zeros((0, 5))
+        return np.concatenate(problem.comm.allgather(values))
 
 
 def first_compression(path: Any) -> tuple[int, Resultant] | None:

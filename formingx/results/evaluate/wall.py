@@ -102,7 +102,7 @@ class Walls:
         shares = {names[0]: np.ones(len(profile.bottom))}
         if len(names) > 1:
             if self._lines is None:
-                names, between = _between_layers(path.problem.scene.mesh, profile)
+                names, between = between_layers(path.problem.scene.mesh, profile)
                 self._lines = names, probe(path.problem, between.reshape(-1, 2))
             names, there = self._lines
             with path.problem.at(state) as problem:
@@ -113,8 +113,10 @@ class Walls:
         return Wall(profile, shares, path.problem.comm)
 
 
-def _between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
+def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
     """(layers from the bottom up, where the material lines across cross the k interfaces at rest, shape (k, n, 2))."""
+    if len(mesh.layers) == 1:
+        return list(mesh.layers), np.zeros((0, *profile.rest_bottom.shape))
     edges = _interfaces(mesh)
     across = profile.rest_top - profile.rest_bottom
     found = {pair: _crossing(profile.rest_bottom, across, lines) for pair, lines in edges.items()}
