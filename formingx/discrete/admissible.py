@@ -13,6 +13,7 @@ import basix.ufl
 import numpy as np
 
 from .. import _compat
+from ..mesh.nodes import of_cells, own_cells
 
 _MIDDLES = {basix.CellType.triangle: [[0.5, 0.5], [0, 0.5], [0.5, 0]], basix.CellType.interval: [[0.5]]}
 """Of the edges. (Corners are left out: where a free side turns onto a plate a corner is singular, and the determinant
@@ -52,12 +53,12 @@ class Admissible:
         beside: Any = basix.make_quadrature(cell, scene.quadrature_degree + 1)[0]
         self._n = len(inside)
         points = np.concatenate([inside, beside, np.array(_MIDDLES[cell], dtype=float)])
-        n = domain.topology.index_map(domain.topology.dim).size_local
+        n = len(own := own_cells(domain))
         self.dofs = [forms.space.sub(0).sub(i).dofmap.list[:n] for i in (0, 1)]
         shapes: Any = forms.displacement_element.tabulate(1, points)                    # (1 + dim, points, dofs)
         geometry = basix.ufl.element("Lagrange", domain.basix_cell(), _compat.coordinate_map(domain).degree)
         map_shapes: Any = geometry.tabulate(1, points)
-        nodes = domain.geometry.x[_compat.cell_nodes(domain)[:n], :2]
+        nodes = of_cells(domain, own)
         self._X = np.einsum("pk,ckx->cpx", map_shapes[0], nodes)
         self._values, self._on_axis = shapes[0], np.abs(self._X[..., 0]) <= 1e-12 * forms.length
         self._R = np.where(self._on_axis, 1.0, self._X[..., 0])

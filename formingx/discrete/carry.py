@@ -9,6 +9,7 @@ import ufl
 from dolfinx import fem
 
 from .. import _compat
+from ..mesh.nodes import of_cells, own_cells
 from ..ranks import gathered
 
 _NEIGHBOURS = 12
@@ -59,10 +60,10 @@ def take_fields(source: Any, state: Any, problem: Any) -> None:
     with source.at(state):
         fields = [there.u / here.length] + [there.stress / here.stress * p for p in ufl.split(there.w)[1:]]
         known = [in_own_cells(domain, f, _PLACES) for f in fields]
-    corners = gathered(source.comm, domain.geometry.x[_compat.cell_nodes(domain)[: len(known[0]), :3], :2])
+    corners = gathered(source.comm, of_cells(domain, own_cells(domain))[:, :3])
     rows = {key: k for k, key in enumerate(map(_key, corners))}
     known = [gathered(source.comm, values) for values in known]
-    mine = here.domain.geometry.x[_compat.cell_nodes(here.domain)[:, :3], :2]
+    mine = of_cells(here.domain, slice(None))[:, :3]
     found = np.array([rows[_key(c)] for c in mine], dtype=int)
     order = np.array([[np.flatnonzero(np.all(c == corner, axis=1))[0] for corner in corners[k]]
                       for c, k in zip(mine, found, strict=True)], dtype=int).reshape(-1, 3)
@@ -84,7 +85,7 @@ _PLACES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0], [1 /
 
 def in_own_cells(domain: Any, expression: Any, where: np.ndarray) -> np.ndarray:
     """A UFL expression in this rank's own cells at places of the reference cell, shape (cells, places, components)."""
-    cells = np.arange(domain.topology.index_map(domain.topology.dim).size_local, dtype=np.int32)
+    cells = own_cells(domain)
     shape = len(cells), len(where), int(np.prod(expression.ufl_shape, dtype=int))
     found = fem.Expression(expression, where, jit_options=_compat.JIT_OPTIONS)
     return found.eval(domain, cells).reshape(shape) if len(cells) else np.zeros(shape)

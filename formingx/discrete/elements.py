@@ -9,6 +9,7 @@ import numpy as np
 import ufl
 
 from ..mesh.triangles import shape_quality
+from ..ranks import gathered
 from .carry import in_own_cells
 
 _OUTLINE = [0, 5, 1, 3, 2, 4]          # nodes of a P2 triangle around its edge, DOLFINx order
@@ -53,4 +54,4 @@ def body(problem: Any, x: Any, control: float) -> Body | None:
     turned = np.sign(shape_quality(rest[:, :3]))                     # cells may be numbered clockwise
     local = (X, points, J, (F**2).sum(-1), tags, moved[:, _OUTLINE], turned * shape_quality(moved[:, :3]),
              turned * shape_quality(rest[:, :3]))
-    return Body(*(np.concatenate(part) for part in zip(*problem.comm.allgather(local), strict=True)))
+    return Body(*(gathered(problem.comm, part) for part in local))

@@ -14,6 +14,7 @@ from dolfinx import fem
 from ..errors import InputError
 from ..materials.constants import Varying
 from ..materials.tensors import isochoric
+from ..mesh.nodes import own_cells
 from .followed import Followed
 
 
@@ -36,8 +37,7 @@ class MaterialTerms:
     def __init__(self, forms: Any, material: Any, names: list[str]):
         self.forms, self.material, self.names = forms, material, names
         self.cells = forms.cells_of(names)
-        topology = forms.domain.topology
-        self.own_cells = self.cells[self.cells < topology.index_map(topology.dim).size_local]
+        self.own_cells = self.cells[self.cells < len(own_cells(forms.domain))]
         self.X = forms.X
         self._followed: list[Followed] = []
         cell, degree = forms.domain.basix_cell(), forms.scene.quadrature_degree

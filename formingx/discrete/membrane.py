@@ -20,6 +20,7 @@ from dolfinx import mesh as dolfinx_mesh
 from .. import _compat
 from ..errors import InputError
 from ..mesh.mesh import Mesh
+from ..mesh.nodes import of_cells, own_cells
 from ..physics.supports import Held
 from ..ranks import gathered
 from .formulation import Formulation
@@ -88,7 +89,7 @@ class MidSurface(Formulation):
 
     def temperatures(self, terms: Any, values: Any = None) -> np.ndarray:
         """That halfway between the faces of the layer."""
-        nodes = self.domain.geometry.x[_compat.cell_nodes(self.domain)[terms.cells], :2]
+        nodes = of_cells(self.domain, terms.cells)
         geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(self.domain).degree)
         shapes: Any = geometry.tabulate(0, terms.places)
         R, Z = np.einsum("qk,nkd->dnq", shapes[0], nodes)
@@ -122,7 +123,7 @@ class MidSurface(Formulation):
         points = np.column_stack([R, (self._low + self._high) / 2])
         if comm.rank:
             cells, points = cells[:0], points[:0]
-        element = basix.ufl.element("Lagrange", "interval", degree, shape=(2,))
+        element = basix.ufl.element("Lagrange", "interval", degree, shape=(points.shape[1],))
         domain = dolfinx_mesh.create_mesh(comm, cells=cells.astype(np.int64), x=points, e=element)
         domain.topology.create_connectivity(0, 1)
         ends, tags = [], []
@@ -142,7 +143,7 @@ class MidSurface(Formulation):
 
     def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
         element = basix.ufl.element("Lagrange", cell, 2)
-        return element, [basix.ufl.blocked_element(element, shape=(2,))]
+        return element, [basix.ufl.blocked_element(element, shape=(self.scene.kinematics.components,))]
 
     def _weight(self) -> Any:
         """The kinematic weight times the thickness normal to the mid-surface; the faces are measured along Z."""
@@ -175,15 +176,14 @@ class MidSurface(Formulation):
 
 def _faces(mesh: Mesh, layer: str, R: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest Z of a layer at each of the ascending R, shape (n,); (inf, -inf) where it is absent."""
-    geometry, owned = mesh.domain.geometry, mesh.domain.topology.index_map(2).size_local
     cells = mesh.cells.find(mesh.layers[layer])
-    nodes = _compat.cell_nodes(mesh.domain)[cells[cells < owned]]
+    nodes = of_cells(mesh.domain, cells[cells < len(own_cells(mesh.domain))])
     edges = [(1, 2, 3), (0, 2, 4), (0, 1, 5)]                                  # ends, and the node between them
     halves = [(a, b) for a, b, _ in edges]
     if nodes.shape[1] == 6:
         halves = [pair for a, b, m in edges for pair in ((a, m), (m, b))]
-    pieces = geometry.x[np.concatenate([nodes[:, pair] for pair in (*halves, *((b, a) for a, b in halves))]), :2]
-    pieces = gathered(mesh.comm, pieces.reshape(-1, 2, 2))
+    pieces = np.concatenate([nodes[:, pair] for pair in (*halves, *((b, a) for a, b in halves))])
+    pieces = gathered(mesh.comm, pieces)
     first = np.searchsorted(R, pieces[:, :, 0].min(axis=1) - near)
     last = np.searchsorted(R, pieces[:, :, 0].max(axis=1) + near)
     which = np.repeat(np.arange(len(pieces)), last - first)                    # every piece meets some of the R

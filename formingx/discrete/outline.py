@@ -34,7 +34,8 @@ class Outline:
         topology.create_connectivity(1, 2)
         self._facets = dolfinx.mesh.exterior_facet_indices(topology)
         vectors, numbers = forms.space.sub(0).collapse()
-        numbers, X = np.asarray(numbers, dtype=np.int64).reshape(-1, 2), vectors.tabulate_dof_coordinates()[:, :2]
+        n = forms.scene.kinematics.components
+        numbers, X = np.asarray(numbers, dtype=np.int64).reshape(-1, n), vectors.tabulate_dof_coordinates()[:, :n]
         nodes = np.zeros((len(self._facets), 3), dtype=np.int64)
         for k, facet in enumerate(self._facets):
             at = fem.locate_dofs_topological(vectors, 1, np.array([facet], dtype=np.int32), remote=False)

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from .. import _compat
 from ..errors import InputError
 from ..materials.tensors import IDENTITY, cofactor, deviator_squared, entries, inner, isochoric
+from ..ranks import gathered
 from .carry import Carrier
 
 _NOTHING = 3e-7
@@ -183,13 +184,12 @@ class PastStates:
 
     def save(self, memory: Memory) -> dict[str, Any]:
         """See `History`."""
-        gather = self._forms.comm.allgather
-        numbers = np.concatenate(gather(self._numbers))
+        numbers = gathered(self._forms.comm, self._numbers)
         order = np.argsort(numbers)
 
         def of_all(values: np.ndarray) -> np.ndarray:
             each = values.reshape(-1, len(self._own), len(self._terms.places)).transpose(1, 0, 2)
-            return np.concatenate(gather(each))[order]
+            return gathered(self._forms.comm, each)[order]
         states = [{"felt": of_all(s.felt) if self._aT else s.felt, "C": of_all(s.C)} for s in memory.states]
         return {"time": memory.time, "cells": numbers[order], "states": states,
                 **({} if memory.least is None else {"least": of_all(memory.least)})}

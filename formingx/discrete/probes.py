@@ -11,6 +11,7 @@ from mpi4py import MPI
 from .. import _compat
 from ..errors import InputError
 from ..mesh.locate import locate
+from ..mesh.nodes import of_cells
 from ..ranks import gathered
 
 
@@ -98,7 +99,7 @@ class MidSurfaceProbe(Probe):
     def __init__(self, problem: Any, points: np.ndarray):
         super().__init__(problem, points)
         element, domain = problem.forms.displacement_element, problem.forms.domain
-        nodes = domain.geometry.x[_compat.cell_nodes(domain)[self._cells], :2]
+        nodes = of_cells(domain, self._cells)
         geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(domain).degree, shape=())
         self._middle = np.einsum("kj,kji->ki", _basis(geometry, 0, self._reference), nodes)
         tangent = np.einsum("kj,kji->ki", _basis(geometry, 1, self._reference), nodes)       # dX/dxi

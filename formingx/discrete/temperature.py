@@ -39,7 +39,7 @@ class Temperature:
     def nodes(self, points: np.ndarray) -> np.ndarray:
         """Local numbers of the nodes of T that lie at points of this rank's cells, shape (..., 2), shape (...)."""
         from scipy.spatial import cKDTree
-        return cKDTree(self.T.function_space.tabulate_dof_coordinates()[:, :2]).query(points)[1]
+        return cKDTree(self.T.function_space.tabulate_dof_coordinates()[:, :points.shape[-1]]).query(points)[1]
 
     def at_nodes(self, nodes: np.ndarray) -> np.ndarray:
         """Temperatures at nodes of T, local numbers of any shape, without error."""

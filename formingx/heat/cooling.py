@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..discrete.carry import Carrier
 from ..errors import ConvergenceError, InputError, instance, known, positive, several
+from ..ranks import gathered
 from ..values.table import Table
 from ..values.temperature import ABSOLUTE_ZERO
 from . import stepping
@@ -237,7 +239,7 @@ class CoolingHistory:
 
     def save(self, memory: Memory) -> dict[str, Any]:
         """See `History`."""
-        plain = self._gathered
+        plain = partial(gathered, self._problem.comm)
         return {"time": memory.time, "step": memory.step, "points": plain(self._body.points),
                 "temperature": plain(memory.temperature),
                 **({} if memory.before is None else {"before": [memory.before[0], plain(memory.before[1])]}),
@@ -266,10 +268,6 @@ class CoolingHistory:
         power = None if memory.power is None else self._cooling.work_to_heat * self._body.assembled(self._dissipated)
         return Memory(memory.time, to_body(memory.temperature), lines, memory.step, power,
                       before and (before[0], to_body(before[1])))
-
-    def _gathered(self, own: np.ndarray) -> np.ndarray:
-        """Of all ranks, one after the other."""
-        return np.concatenate(self._problem.comm.allgather(own))
 
     def _take(self) -> None:
         """The temperature of the problem, and what depends on it."""

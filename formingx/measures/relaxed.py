@@ -11,6 +11,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from .. import _compat
+from ..mesh.nodes import own_cells
 
 _NONE = 1e-10
 """A stress, over the shear modulus, that is none."""
@@ -35,7 +36,7 @@ class PoleStressRatio:
         facets = np.concatenate([mesh.facets.find(tag) for tag in np.atleast_1d(mesh.boundaries["axis"])])
         cells = [domain.topology.connectivity(dim - 1, dim).links(f) for f in facets]
         near = np.unique(np.concatenate([np.zeros(0, np.int32), *cells]))
-        near = near[near < domain.topology.index_map(dim).size_local]
+        near = near[near < len(own_cells(domain))]
         self._problem, self._strain = problem, forms.constant(0.0)
         self._weights: Any = basix.make_quadrature(domain.basix_cell(), problem.scene.quadrature_degree)[1]
         self._parts = [(self._expression(terms), np.intersect1d(near, terms.cells).astype(np.int32))
@@ -92,7 +93,7 @@ class ElasticStretches:
         self._parts = []
         for terms in forms.terms:
             if stretches := terms.elastic_stretches(forms.elastic_F):
-                own = terms.cells[terms.cells < forms.domain.topology.index_map(forms.domain.topology.dim).size_local]
+                own = terms.cells[terms.cells < len(own_cells(forms.domain))]
                 self._parts.append((fem.Expression(ufl.as_vector(stretches), terms.places,
                                                    jit_options=_compat.JIT_OPTIONS), own, len(stretches)))
         self.count = max((count for *_, count in self._parts), default=0)

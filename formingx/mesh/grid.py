@@ -12,6 +12,7 @@ from .. import _compat
 from ..errors import InputError
 from .check import check_elements
 from .mesh import Mesh
+from .nodes import numbers_of_facets, own_cells
 
 # DOLFINx numbers a mid-edge node like the opposite corner; in a grid edges are 01, 12, 20
 _TO_DOLFINX, _FROM_DOLFINX = [0, 1, 2, 4, 5, 3], [0, 1, 2, 5, 3, 4]
@@ -53,15 +54,12 @@ def to_grid(mesh: Mesh) -> Grid:
 
 def gathered(mesh: Mesh) -> Grid:
     """The whole mesh as plain arrays, the same on all ranks; collective."""
-    from dolfinx.mesh import entities_to_geometry
     domain, comm = mesh.domain, mesh.comm
-    domain.topology.create_connectivity(1, 2)
-    own, X = domain.topology.index_map(2).size_local, domain.geometry.x
+    own, X = len(own_cells(domain)), domain.geometry.x
     numbers = domain.geometry.index_map().local_to_global(np.arange(len(X), dtype=np.int32))
     cells = numbers[np.asarray(_compat.cell_nodes(domain))[:own]]
     marks = {name: mesh.cells.find(tag) for name, tag in mesh.layers.items()}
-    ends = {name: entities_to_geometry(domain, 1, mesh.facets_of(name))[:, :2] if len(mesh.facets_of(name))
-            else np.zeros((0, 2), dtype=np.int32) for name in mesh.boundaries}
+    ends = {name: numbers_of_facets(domain, mesh.facets_of(name))[:, :2] for name in mesh.boundaries}
     parts = comm.allgather((numbers, X[:, :2], {name: cells[found[found < own]] for name, found in marks.items()},
                             {name: numbers[found] for name, found in ends.items()}))
     points = np.zeros((domain.geometry.index_map().size_global, 2))

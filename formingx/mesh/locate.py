@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from .. import _compat
 from ..errors import InputError
+from .nodes import own_cells
 
 OUTSIDE = 1e-3
 """So far outside a cell, in parts of it, a point still counts as in it: a curved edge is met to fourth order only."""
@@ -34,8 +35,8 @@ def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None 
         InputError: a point that lies in none of the cells.
     """
     comm, X, cmap, dim = mesh.comm, mesh.geometry.x, _compat.coordinate_map(mesh), mesh.topology.dim
-    nodes, owned = _compat.cell_nodes(mesh), mesh.topology.index_map(dim).size_local
-    cells = np.arange(owned, dtype=np.int32) if cells is None else cells[cells < owned]
+    nodes, own = _compat.cell_nodes(mesh), own_cells(mesh)
+    cells = own if cells is None else cells[cells < len(own)]
     padded = np.zeros((len(points), 3))
     padded[:, :2] = points
     found = np.full(len(points), -1)

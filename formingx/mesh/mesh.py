@@ -13,6 +13,7 @@ from .. import _compat
 from ..errors import InputError, known, pair
 from ..ranks import gathered
 from .check import check_elements
+from .nodes import numbers_of_facets, of_facets, own_cells
 
 
 class Columns(NamedTuple):
@@ -72,8 +73,7 @@ class Mesh:
             InputError: a coordinate that is not finite, an element that is flat or inside out, two that lie over each
                 other or meet without sharing their nodes; the message says where.
         """
-        geometry, n = self.domain.geometry, self.domain.topology.index_map(2).size_local
-        nodes = np.asarray(_compat.cell_nodes(self.domain))[:n]
+        geometry, nodes = self.domain.geometry, np.asarray(_compat.cell_nodes(self.domain))[own_cells(self.domain)]
         numbers = geometry.index_map().local_to_global(nodes.ravel().astype(np.int32)).reshape(nodes.shape)
         parts = self.comm.allgather((numbers, geometry.x[nodes, :2]))
         triangles = np.concatenate([part for part, _ in parts])[:, [0, 1, 2, 5, 3, 4][: nodes.shape[1]]]
@@ -102,7 +102,7 @@ class Mesh:
         Raises:
             InputError: a name that is not known or not new, no facet within, or one that is within in part only.
         """
-        from dolfinx.mesh import entities_to_geometry, meshtags
+        from dolfinx.mesh import meshtags
         who = f"with_part({name!r}, {of!r})"
         if not isinstance(name, str) or not name or name in self.boundaries:
             raise InputError(f"{who}: name = {name!r}: must be a word that no boundary has yet; there are"
@@ -114,9 +114,7 @@ class Mesh:
             raise InputError(f"{who}: within = {within!r}: the first must be below the second")
         domain, axis = self.domain, "rz".index(along)
         comm, facets = self.comm, self.facets_of(of)
-        domain.topology.create_connectivity(1, 2)
-        nodes = entities_to_geometry(domain, 1, facets) if len(facets) else np.zeros((0, 2), dtype=np.int32)
-        ends = domain.geometry.x[nodes[:, :2], axis]
+        ends = of_facets(domain, facets)[:, :2, axis]
         near = 1e-8 * comm.allreduce(np.abs(domain.geometry.x).max(initial=0.0), MPI.MAX)
         lowest, highest = ends.min(1), ends.max(1)
         inside = (lowest > low - near) & (highest < high + near)
@@ -152,14 +150,9 @@ class Mesh:
 
     def nodes_of(self, boundary: str) -> np.ndarray:
         """Coordinates of all geometry nodes of a boundary, sorted by R, then Z, shape (n, 2) (in space (n, 3))."""
-        from dolfinx.mesh import entities_to_geometry
-        domain = self.domain
-        facets = self.facets_of(boundary)
-        domain.topology.create_connectivity(1, 2)
-        nodes = np.unique(entities_to_geometry(domain, 1, facets)) if len(facets) else np.zeros(0, dtype=np.int64)
-        dim = domain.geometry.dim
-        local = domain.geometry.x[nodes, :dim].reshape(-1, dim)
-        points = gathered(self.comm, local)
+        domain, facets = self.domain, self.facets_of(boundary)
+        nodes = np.unique(numbers_of_facets(domain, facets))
+        points = gathered(self.comm, domain.geometry.x[nodes, :domain.geometry.dim])
         scale = np.ptp(points, axis=0).max() if len(points) else 1.0
         keys = np.round(points / (scale or 1.0), 12)
         _, first = np.unique(keys, axis=0, return_index=True)
@@ -174,18 +167,10 @@ class Mesh:
         Raises:
             InputError: the boundary is not one line with two ends.
         """
-        from dolfinx.mesh import entities_to_geometry
-        domain = self.domain
-        domain.topology.create_connectivity(1, 2)
-        domain.topology.create_connectivity(2, 1)
-        mid_edge = _compat.coordinate_map(domain).degree == 2
-        # of an edge: its two ends and, on second-order geometry, its middle
-        facets = self.facets_of(boundary)             # entities_to_geometry divides by zero if there are none
-        nodes = entities_to_geometry(domain, 1, facets) if len(facets) else np.zeros(0, dtype=np.int32)
-        nodes = nodes.reshape(-1, 3 if mid_edge else 2)
-        edges = gathered(self.comm, domain.geometry.x[nodes][..., :2])
-        corners, ends = np.unique(np.round(edges[:, :2].reshape(-1, 2) / max(np.ptp(edges, axis=(0, 1)).max(), 1e-300),
-                                           12), axis=0, return_inverse=True)
+        edges = gathered(self.comm, of_facets(self.domain, self.facets_of(boundary)))
+        size = max(np.ptp(edges, axis=(0, 1)).max(), 1e-300)
+        corners, ends = np.unique(np.round(edges[:, :2].reshape(-1, edges.shape[-1]) / size, 12), axis=0,
+                                  return_inverse=True)
         ends = ends.reshape(-1, 2)
         _, first = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)       # a ghost is there twice
         at: dict[int, list[int]] = {}
@@ -200,7 +185,7 @@ class Mesh:
             here = next(e for e in at[corner] if e != here)
             forward = ends[here, 0] == corner
             a, b = edges[here, [0, 1] if forward else [1, 0]]
-            line += [a, edges[here, 2] if mid_edge else (a + b) / 2]
+            line += [a, edges[here, 2] if edges.shape[1] == 3 else (a + b) / 2]
             corner = ends[here, 1 if forward else 0]
         if len(line) != 2 * len(first) or corner != tips[1]:
             raise InputError(f"boundary {boundary!r} must be one line with two ends, but is in several parts")

@@ -6,8 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import _compat
+from ..ranks import gathered
 from .mesh import Mesh
+from .nodes import of_cells, own_cells
 
 
 class Place(NamedTuple):
@@ -61,15 +62,13 @@ class Triangles:
 
     def __init__(self, mesh: Mesh):
         self._mesh = mesh
-        n = mesh.domain.topology.index_map(2).size_local
+        n = len(own := own_cells(mesh.domain))
         names = np.full(n, "", dtype=object)
         for name, tag in mesh.layers.items():
             found = mesh.cells.find(tag)
             names[found[found < n]] = name
-        corners = mesh.domain.geometry.x[_compat.cell_nodes(mesh.domain)[:n, :3], :2]
-        parts = mesh.comm.allgather((corners, names.tolist()))
-        self.corners = np.concatenate([c for c, _ in parts])
-        self.layer = np.array([name for _, part in parts for name in part])
+        self.corners = gathered(mesh.comm, of_cells(mesh.domain, own)[:, :3, :2])             # in space (x, y)
+        self.layer = gathered(mesh.comm, names).astype(str)
         edges = np.stack([np.hypot(*(self.corners[:, i] - self.corners[:, j]).T)
                           for i, j in ((0, 1), (1, 2), (2, 0))], 1)
         self.edge = edges.max(1)

@@ -12,6 +12,7 @@ from ..discrete.outline import Outline
 from ..errors import InputError, finite, instance, positive
 from ..mesh.grid import Grid, counter_clockwise, gathered, to_mesh
 from ..mesh.mesh import Mesh
+from ..mesh.nodes import own_cells
 from ..mesh.remeshed import remeshed
 
 _NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
@@ -34,7 +35,7 @@ def formed(problem: Any, state: Any, size: float | None = None) -> Mesh:
     if size is not None:
         return _of_size(problem, state, positive("Path.formed: size", size))
     numbers = fem.functionspace(domain, ("Lagrange", 2)).dofmap
-    cells = np.arange(domain.topology.index_map(2).size_local, dtype=np.int32)
+    cells = own_cells(domain)
     triangles = numbers.index_map.local_to_global(np.asarray(numbers.list)[cells].ravel().astype(np.int32))
     triangles = triangles.reshape(-1, 6)
     points = np.zeros((len(cells), 6, 2))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, count, finite, several
+from ..ranks import gathered
 from ..solve.record import Record
 from ..solve.stability import Kind, Located, Modes
 from ..solve.state import State
@@ -223,8 +224,7 @@ class Watch:
 
     def _loss(self, segment: Any, found: Located, fold: bool) -> Loss:
         comm, nodes = segment.problem.comm, self.of(segment).variation.nodes
-        points = np.concatenate(comm.allgather(nodes))
-        amplitudes = np.concatenate(comm.allgather(found.mode))
+        points, amplitudes = gathered(comm, nodes), gathered(comm, found.mode)
         size = np.linalg.norm(amplitudes, axis=1)
         amplitudes = amplitudes / size.max()
         if found.solved and not found.state.measures:

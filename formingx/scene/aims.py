@@ -114,7 +114,7 @@ def _room(scene: Scene, contact: Any) -> float:
     r, z = (start + (np.arange(np.ceil((end - start) / size) + 1) + 0.5) * size
             for start, end in ((0.0, corner[0]), (low, corner[1])))
     points = np.stack(np.meshgrid(r, z, indexing="ij"), -1)
-    free = contact.tool.signed_distance(points.reshape(-1, 2)).reshape(points.shape[:2]) < 0
+    free = contact.tool.signed_distance(points.reshape(-1, points.shape[-1])).reshape(points.shape[:2]) < 0
     free &= (points[..., 1] > top) | (points[..., 0] < edge)
     regions, _ = label(free)
     inside = (regions == regions[0, 0]) & free

@@ -13,6 +13,7 @@ from ..errors import InputError, finite, values
 from ..io import csv_files
 from ..mesh import Mesh
 from ..mesh.locate import locate
+from ..ranks import gathered
 from ..values.table import Table
 
 _WHAT = "a number, a table over R, a function of (R, Z), a CSV file, what fx.heat returned, or a DOLFINx Function"
@@ -30,10 +31,10 @@ def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperatu
     Raises:
         InputError: something else, a value that is not finite, a point outside a table or a file.
     """
-    parts = mesh.comm.allgather(points)
-    first = sum(len(part) for part in parts[: mesh.comm.rank])
+    comm: Any = mesh.comm
+    first = comm.scan(len(points)) - len(points)
     # all ranks look at all points, so that they raise the same errors
-    return _values(field, np.concatenate(parts), name)[first: first + len(points)]
+    return _values(field, gathered(mesh.comm, points), name)[first: first + len(points)]
 
 
 def _values(field: Any, points: np.ndarray, name: str) -> np.ndarray:

@@ -11,6 +11,7 @@ import numpy as np
 from .. import _compat
 from ..materials.constants import Sample
 from ..mesh.mesh import Mesh
+from ..mesh.nodes import of_cells, own_cells
 from .temperature import GivenTemperature
 
 
@@ -18,10 +19,10 @@ def sample(mesh: Mesh, layer: str, degree: int, temperature: GivenTemperature | 
     """The quadrature points of the energy, of a degree, in this rank's own cells of a layer, by their numbers."""
     domain = mesh.domain
     cells = mesh.cells.find(mesh.layers[layer])
-    cells = np.sort(cells[cells < domain.topology.index_map(2).size_local])
+    cells = np.sort(cells[cells < len(own_cells(domain))])
     places: Any = basix.make_quadrature(basix.CellType.triangle, degree)[0]
     geometry = basix.ufl.element("Lagrange", "triangle", _compat.coordinate_map(domain).degree)
     shapes: Any = geometry.tabulate(0, places)
-    nodes = domain.geometry.x[_compat.cell_nodes(domain)[cells], :2]      # in space (x, y)
+    nodes = of_cells(domain, cells)[..., :2]      # in space (x, y)
     T = None if temperature is None else temperature.in_cells(cells, places).ravel()
-    return Sample(np.einsum("qk,nkd->nqd", shapes[0], nodes).reshape(-1, 2), cells, places, domain, T)
+    return Sample(np.einsum("qk,nkd->nqd", shapes[0], nodes).reshape(-1, nodes.shape[-1]), cells, places, domain, T)

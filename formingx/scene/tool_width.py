@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from dolfinx.mesh import entities_to_geometry
 
 from ..errors import InputError
+from ..mesh.nodes import of_facets
 from ..mesh.triangles import Triangles
 from ..physics.contact import Contact
 from ..ranks import gathered
@@ -26,10 +26,7 @@ _MOVES = 200
 
 def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
     """An InputError if a tool would not be felt, or only when it is deep in the face."""
-    mesh.domain.topology.create_connectivity(1, 2)
-    facets = mesh.facets_of(contact.on)
-    nodes = entities_to_geometry(mesh.domain, 1, facets) if len(facets) else np.zeros((0, 2), dtype=int)
-    ends = gathered(mesh.comm, mesh.domain.geometry.x[nodes][:, :2, :2])
+    ends = gathered(mesh.comm, of_facets(mesh.domain, mesh.facets_of(contact.on))[:, :2])
     if contact.tool.closed:
         _check_width(contact, ends, axisymmetric)
     _check_first_touch(contact, ends, Triangles(mesh).thickness)

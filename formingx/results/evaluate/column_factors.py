@@ -46,7 +46,7 @@ def column_factors(path: Any, share: float | None, error: float | None) -> np.nd
 def _column_of(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
     """Numbers of the columns whose middle lines, shape (rows, n, 2), are nearest to points."""
     n = middles.shape[1]
-    return cKDTree(middles.reshape(-1, 2)).query(points)[1] % n
+    return cKDTree(middles.reshape(-1, middles.shape[-1])).query(points)[1] % n
 
 
 def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
@@ -73,7 +73,8 @@ def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
             for contact, face in zip(problem.contacts, faces):
                 if not contact.present:
                     continue
-                near = contact.contact.tool.nearest((points[face] - contact.travelled(state.control)).reshape(-1, 2))
+                at = points[face] - contact.travelled(state.control)
+                near = contact.contact.tool.nearest(at.reshape(-1, at.shape[-1]))
                 bend = np.abs(near.curvature)
                 radius = np.divide(1, bend, out=np.zeros(len(bend)), where=bend > 0) + np.sign(
                     near.curvature) * near.distance

@@ -10,6 +10,8 @@ import numpy as np
 from ...discrete.contact import resultants
 from ...discrete.tooling import Tooling
 from ...errors import InputError
+from ...mesh.nodes import of_facets
+from ...ranks import gathered
 from ..files.sheet import Sheet
 
 
@@ -55,7 +57,7 @@ class ContactFace:
         self._path, self._contact = path, contact
         self._at_nodes = contact.contact.points == "nodes"
         self.rest, _ = self._gathered(contact.points)
-        self.nodes = self._edge_points().reshape(-1, 2)
+        self.nodes = self._edge_points().reshape(-1, self.rest.shape[1])
         self.nearest = cKDTree(self.rest).query(self.nodes)[1]
         if self._at_nodes:
             self._edges = np.unique(self.nearest.reshape(-1, 3), axis=0)             # a ghost is there twice
@@ -72,13 +74,13 @@ class ContactFace:
             if contact in path.problem.present:
                 _, traction = resultants.traction(contact, fields, state.control)
         _, values = self._gathered(moved, gap)
-        points = values[:, :2]
+        points, gap = values[:, :-1], values[:, -1]
         if self._at_nodes:
             ratio = self.area_ratio(points)[:, None]
         else:
             _, ratio = self._gathered(contact.rule.area_ratio(fields))
         pressure, friction = (traction / ratio).T
-        return ContactTable(self.rest, points, values[:, 2], pressure, friction, path.problem.comm)
+        return ContactTable(self.rest, points, gap, pressure, friction, path.problem.comm)
 
     def area_ratio(self, points: np.ndarray) -> np.ndarray:
         """Deformed over reference area at the nodes, the mean of what the edges on both sides say, shape (n,)."""
@@ -92,22 +94,15 @@ class ContactFace:
 
     def _gathered(self, *columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(rest positions, columns side by side) of all ranks' nodes, by R, then Z."""
-        rows = np.column_stack([self._contact.points, *columns])
-        rows = np.concatenate(self._path.problem.comm.allgather(rows))
-        rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
-        return rows[:, :2], rows[:, 2:]
+        rows = gathered(self._path.problem.comm, np.column_stack([self._contact.points, *columns]))
+        rows, n = rows[np.lexsort((rows[:, 1], rows[:, 0]))], self._contact.points.shape[1]
+        return rows[:, :n], rows[:, n:]
 
     def _edge_points(self) -> np.ndarray:
         """The two ends and the middle of every edge of the face, shape (m, 3, 2); same on all ranks, ghosts twice."""
-        from dolfinx.mesh import entities_to_geometry
         mesh = self._path.problem.scene.mesh
-        mesh.domain.topology.create_connectivity(1, 2)
-        facets = mesh.facets_of(self._contact.contact.on)
-        nodes = entities_to_geometry(mesh.domain, 1, facets) if len(facets) else np.zeros((0, 2), dtype=int)
-        X = mesh.domain.geometry.x[nodes][..., :2]
-        if len(X) and X.shape[1] == 2:                           # straight edges
-            X = np.concatenate([X, X.mean(1, keepdims=True)], axis=1)
-        return np.concatenate([part.reshape(-1, 3, 2) for part in mesh.comm.allgather(X)])
+        X = gathered(mesh.comm, of_facets(mesh.domain, mesh.facets_of(self._contact.contact.on)))
+        return X if X.shape[1] == 3 else np.concatenate([X, X.mean(1, keepdims=True)], axis=1)      # straight edges
 
 
 def contact_of(path: Any, tool: Any, who: str) -> list[Any]:

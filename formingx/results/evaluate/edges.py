@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...ranks import gathered
+
 _TURN = 40.0
 """Degrees by which a tool may turn from one contact point to the next before a run warns: see tests/test_edges.py."""
 
@@ -39,8 +41,7 @@ def coarsest(path: Any, state: Any) -> Edge | None:
                 np.abs(law.normal), contact.law.mu)[0])
             slides &= contact.displacement(free).any(axis=1)
             normal = contact.contact.tool.nearest(x).normal
-            rows = np.column_stack([contact.points, contact.rule.lengths, x, normal, slides])
-            rows = np.concatenate(problem.comm.allgather(rows))
+            rows = gathered(problem.comm, np.column_stack([contact.points, contact.rule.lengths, x, normal, slides]))
             X, length, x, normal, slides = np.split(rows[np.lexsort((rows[:, 1], rows[:, 0]))], [2, 3, 5, 7], axis=1)
             by, turned = np.diff(x, axis=0), np.diff(normal, axis=0)
             near = np.hypot(*np.diff(X, axis=0).T) < 1.5 * (length[1:] + length[:-1])[:, 0]

@@ -124,7 +124,7 @@ def fine(line: np.ndarray, parts: int = 6) -> np.ndarray:
     a, m, b = line[:-1:2, None], line[1::2, None], line[2::2, None]
     xi = np.linspace(0, 1, parts, endpoint=False)[:, None]
     inner = (1 - xi) * (1 - 2 * xi) * a + 4 * xi * (1 - xi) * m + xi * (2 * xi - 1) * b
-    return np.vstack([inner.reshape(-1, 2), line[-1]])
+    return np.vstack([inner.reshape(-1, line.shape[1]), line[-1]])
 
 
 def _opposite(line: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -31,6 +31,8 @@ from petsc4py import PETSc
 from ... import _compat
 from ...errors import InputError, as_points, known, pair
 from ...mesh.locate import Place, locate
+from ...mesh.nodes import of_cells, own_cells
+from ...ranks import gathered
 from .patches import Patches
 from .stress_error import Fitted, StressError, StressPeak
 
@@ -142,7 +144,7 @@ class StressField:
         Every cell is of its own layer: at an interface each side has its own values. The points are not filled in.
         """
         recovery = self._recovery
-        owned = recovery.problem.forms.domain.topology.index_map(2).size_local
+        owned = len(own_cells(recovery.problem.forms.domain))
         column = np.zeros(owned, dtype=np.int64)
         for k, cells in enumerate(recovery.cells.values()):
             column[cells[cells < owned]] = k
@@ -170,8 +172,8 @@ class StressField:
         Raises:
             InputError: an unknown layer, or an `exact` that is no function or gives another shape.
         """
-        mine, gather = self._recovery.of_layer(layer), self._recovery.problem.comm.allgather
-        return StressError(*(np.concatenate(gather(v[mine])) for v in self._fitted.error(exact)))
+        mine, comm = self._recovery.of_layer(layer), self._recovery.problem.comm
+        return StressError(*(gathered(comm, v[mine]) for v in self._fitted.error(exact)))
 
     def error_in_cells(self) -> np.ndarray:
         """`StressError.mean` of this rank's cells, shape (m,), stress; collective."""
@@ -197,7 +199,7 @@ class StressField:
             R = fitted.points[:, :, 0].mean(1)
             mine &= (low <= R) & (high >= R)
         errors = np.sqrt(((fitted.smooth - fitted.raw) ** 2).sum((2, 3))).max(1, initial=0.0)
-        cells = [np.concatenate(comm.allgather(v[mine])) for v in (*self._recovery.at_corners(fitted), errors)]
+        cells = [gathered(comm, v[mine]) for v in (*self._recovery.at_corners(fitted), errors)]
         if not len(cells[0]):
             raise InputError(f"stress peak: radii = {radii!r}: no cell has its middle between them")
         peak = StressPeak.among(*cells)
@@ -271,8 +273,7 @@ class Stresses:
     def raw(self, state: Any, layer: str) -> Stress:
         """F and S at the quadrature points of a layer, all ranks."""
         points, values, _ = self._at_quadrature(state, layer)
-        gather = self.problem.comm.allgather
-        return _unpack(*(np.concatenate(gather(v)).reshape(-1, v.shape[-1]) for v in (points, values)))
+        return _unpack(*(gathered(self.problem.comm, v).reshape(-1, v.shape[-1]) for v in (points, values)))
 
     def fit(self, state: Any) -> Fitted:
         """F and S fitted to their values at the quadrature points, and what follows; collective."""
@@ -285,28 +286,28 @@ class Stresses:
             numbers = domain.geometry.index_map().local_to_global(corners.ravel()).reshape(-1, 3)
             layer = np.concatenate([np.full(len(self._owned(name)), k) for k, name in enumerate(self.cells)])[order]
             first = comm.exscan(own) or 0
-            points_of_all, numbers, layer = (np.concatenate(comm.allgather(v)) for v in (points, numbers, layer))
+            points_of_all, numbers, layer = (gathered(comm, v) for v in (points, numbers, layer))
             self._patches = Patches(points_of_all, numbers, layer, np.arange(first, first + own))
-        cubics = self._patches.fit(np.concatenate(comm.allgather(values)))
+        cubics = self._patches.fit(gathered(comm, values))
         return Fitted(points, volume, _cauchy(values), _cauchy(self._patches.at(cubics, points)), cubics)
 
     def at_corners(self, fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
         """The largest sigma_1 of sigma* at the corners of this rank's cells, (m,), and the corner (R, Z), (m, 2)."""
-        domain, own = self.problem.forms.domain, len(fitted.cubics)
-        X = domain.geometry.x[_compat.cell_nodes(domain)[:own, :3], :2]
+        own = own_cells(self.problem.forms.domain)
+        X = of_cells(self.problem.forms.domain, own)[:, :3]
         assert self._patches is not None
         largest = np.linalg.eigvalsh(_cauchy(self._patches.at(fitted.cubics, X)))[..., -1]
-        top = (np.arange(own), largest.argmax(1))
+        top = (own, largest.argmax(1))
         return largest[top], X[top]
 
     def of_layer(self, name: str | None) -> np.ndarray:
         """Which of this rank's own cells are of a layer (None: of any), shape (m,)."""
-        own = self.problem.forms.domain.topology.index_map(2).size_local
-        return np.isin(np.arange(own), self.cells[self.layer(name)]) if name is not None else np.ones(own, dtype=bool)
+        own = own_cells(self.problem.forms.domain)
+        return np.isin(own, self.cells[self.layer(name)]) if name is not None else np.ones(len(own), dtype=bool)
 
     def _owned(self, layer: str) -> np.ndarray:
         """This rank's own cells of a layer."""
-        return self.cells[layer][self.cells[layer] < self.problem.forms.domain.topology.index_map(2).size_local]
+        return self.cells[layer][self.cells[layer] < len(own_cells(self.problem.forms.domain))]
 
     def _at_quadrature(self, state: Any, layer: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(points, F and S, reference volumes) at the q quadrature points of this rank's m cells of a layer.

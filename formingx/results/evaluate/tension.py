@@ -12,7 +12,9 @@ import ufl
 from dolfinx import fem
 
 from ... import _compat
+from ...mesh.nodes import own_cells
 from ...physics.models import Membrane
+from ...ranks import gathered
 
 _COMPRESSED = 1e-3
 """Compressive resultant over shear modulus times thickness above which a membrane has no state."""
@@ -71,9 +73,9 @@ class Tension:
     def _values(self, state: Any) -> np.ndarray:
         problem, domain = self._problem, self._problem.forms.domain
         with problem.at(state):
-            cells = np.arange(domain.topology.index_map(1).size_local, dtype=np.int32)
+            cells = own_cells(domain)
             values = self._found.eval(domain, cells).reshape(-1, 5) if len(cells) else np.zeros((0, 5))
-        return np.concatenate(problem.comm.allgather(values))
+        return gathered(problem.comm, values)
 
 
 def first_compression(path: Any) -> tuple[int, Resultant] | None:

@@ -139,8 +139,7 @@ class Verdict:
         for contact, face in zip(self._problem.contacts, self._faces):
             if not contact.present:
                 continue
-            at = (points - contact.travelled(state.control)).reshape(-1, 2)
-            depth = contact.contact.tool.signed_distance(at).reshape(points.shape[:2])
+            depth = _depths(contact, points, state)
             most = _CUT * contact.thickness if own else _INSIDE * np.maximum(contact.thickness, length)
             share = np.where(face | (not own), depth.max(1) / most, 0.0)
             k = int(np.argmax(share))
@@ -153,13 +152,18 @@ class Verdict:
         for contact, face in zip(self._problem.contacts, self._faces):
             if not contact.present or contact.contact.points != "nodes" or not face.any():
                 continue
-            at = (edges - contact.travelled(state.control))[face].reshape(-1, 2)
-            depth = contact.contact.tool.signed_distance(at).reshape(-1, 3).max(1)
+            depth = _depths(contact, edges[face], state).max(1)
             grown = _lengths(edges[face]) / self._rest[face] * weight(edges[face, 2].T) / weight(rest[face, 2].T)
             share = depth * grown / (_SUNK * contact.thickness)
             k = int(np.argmax(share))
             if share[k] > 1:
                 yield Depth(share[k], depth[k], edges[face][k, 2], contact, _name(contact))
+
+
+def _depths(contact: Any, points: np.ndarray, state: State) -> np.ndarray:
+    """How deep points, shape (m, n, components), are in a tool, shape (m, n), length."""
+    at = points - contact.travelled(state.control)
+    return contact.contact.tool.signed_distance(at.reshape(-1, at.shape[-1])).reshape(at.shape[:2])
 
 
 def _off(contact: Any, state: State) -> float:

@@ -12,6 +12,8 @@ import numpy as np
 from ... import _compat
 from ...discrete.probes import probe
 from ...errors import InputError, finite
+from ...mesh.nodes import of_cells, of_facets
+from ...ranks import gathered
 from ..files.sheet import Sheet
 from .profile import Profile, distance_to_line
 
@@ -103,11 +105,11 @@ class Walls:
         if len(names) > 1:
             if self._lines is None:
                 names, between = between_layers(path.problem.scene.mesh, profile)
-                self._lines = names, probe(path.problem, between.reshape(-1, 2))
+                self._lines = names, probe(path.problem, between.reshape(-1, between.shape[-1]))
             names, there = self._lines
             with path.problem.at(state) as problem:
                 deformed = there.points + there.displacement(problem.x)
-            lines = [profile.bottom, *deformed.reshape(len(names) - 1, -1, 2), profile.top]
+            lines = [profile.bottom, *deformed.reshape(len(names) - 1, -1, deformed.shape[-1]), profile.top]
             lengths = np.array([np.hypot(*(b - a).T) for a, b in zip(lines, lines[1:])])
             shares = dict(zip(names, lengths / lengths.sum(0), strict=True))
         return Wall(profile, shares, path.problem.comm)
@@ -135,10 +137,9 @@ def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
 
 def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
     """{(layer, layer): straight pieces of the line between them at rest, shape (m, 2, 2)}; same on all ranks."""
-    from dolfinx.mesh import entities_to_geometry
     domain, topology = mesh.domain, mesh.domain.topology
     topology.create_connectivity(1, 2)
-    layer = np.full(topology.index_map(2).size_local + topology.index_map(2).num_ghosts, -1)
+    layer = np.full(len(_compat.cell_nodes(domain)), -1)
     names = list(mesh.layers)
     for k, tag in enumerate(mesh.layers.values()):
         layer[mesh.cells.find(tag)] = k
@@ -150,13 +151,9 @@ def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
             pairs.setdefault(tuple(sorted(layer[cells].tolist())), []).append(facet)
     found = {}
     for pair in sorted(set().union(*mesh.comm.allgather(set(pairs)))):
-        facets = np.array(pairs.get(pair, []), dtype=np.int32)
-        nodes = entities_to_geometry(domain, 1, facets) if len(facets) else np.zeros((0, 2), dtype=int)
-        chain = [0, 2, 1] if nodes.shape[1] == 3 else [0, 1]
-        points = domain.geometry.x[nodes][..., :2]
-        pieces = [points[:, [a, b]] for a, b in zip(chain, chain[1:])]
-        found[tuple(names[k] for k in pair)] = np.concatenate(
-            [part.reshape(-1, 2, 2) for part in mesh.comm.allgather(np.concatenate(pieces))])
+        points = gathered(mesh.comm, of_facets(domain, np.array(pairs.get(pair, []), dtype=np.int32)))
+        chain = [0, 2, 1] if points.shape[1] == 3 else [0, 1]
+        found[tuple(names[k] for k in pair)] = np.concatenate([points[:, [a, b]] for a, b in zip(chain, chain[1:])])
     return found
 
 
@@ -176,6 +173,5 @@ def _crossing(start: np.ndarray, across: np.ndarray, pieces: np.ndarray) -> np.n
 def _middle_of(mesh: Any, layer: str, profile: Profile) -> float:
     """Mean distance of a layer's nodes from the middle of the bottom face at rest: which of two is the lower."""
     cells = mesh.cells.find(mesh.layers[layer])
-    points = mesh.domain.geometry.x[_compat.cell_nodes(mesh.domain)[cells]].reshape(-1, 3)[:, :2]
-    points = np.concatenate(mesh.comm.allgather(points))
-    return float(distance_to_line(points, profile.rest_bottom).mean())
+    points = gathered(mesh.comm, of_cells(mesh.domain, cells))
+    return float(distance_to_line(points.reshape(-1, points.shape[-1]), profile.rest_bottom).mean())

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ... import _compat
 from ...materials.constants import Varying
 from ...materials.material import Material
+from ...mesh.nodes import of_cells, own_cells
 from ...scene.sampling import sample
 from ...scene.summary import text
 
@@ -85,8 +85,8 @@ def _sums_of_constants(scene: Any, layer: str) -> dict[str, float]:
 
 def _mesh(problem: Any) -> dict[str, Any]:
     mesh, domain, comm = problem.scene.mesh, problem.forms.domain, problem.comm
-    cells = domain.topology.index_map(domain.topology.dim).size_local
-    x = domain.geometry.x[_compat.cell_nodes(domain)[:cells]][:, :, :2] / problem.forms.length
+    cells = len(own := own_cells(domain))
+    x = of_cells(domain, own)[:, :, :2] / problem.forms.length
     number = domain.topology.original_cell_index[:cells]
     weights = np.sin(1.0 + number)[:, None] * np.sin(1.0 + np.arange(x.shape[1]))
     total = comm.allreduce(cells, MPI.SUM)

@@ -35,6 +35,7 @@ from mpi4py import MPI
 
 from ...errors import InputError
 from ...measures.relaxed import ElasticStretches
+from ...mesh.nodes import own_cells
 from .. import files
 from ..evaluate.contact_face import ContactFace
 
@@ -53,7 +54,7 @@ class Fields:
         self._path, self._problem = path, path.problem
         forms, domain = self._problem.forms, self._problem.forms.domain
         self.dimension = domain.topology.dim
-        self._cells = np.arange(domain.topology.index_map(self.dimension).size_local, dtype=np.int32)
+        self._cells = own_cells(domain)
         self._components = domain.geometry.dim
         self._where, self._u = (fem.Expression(ufl.as_vector([v[i] for i in range(self._components)]),
                                                _NODES[self.dimension]) for v in (forms.X, forms.u))
@@ -92,7 +93,8 @@ class Fields:
             profile = None                                  # not a sheet
         if profile is not None:
             if self._between is None:                           # a point stays on the line across that it is on at rest
-                self._between = _across(self.points.reshape(-1, 2), profile.rest_bottom, profile.rest_top)
+                points = self.points.reshape(-1, self.points.shape[-1])
+                self._between = _across(points, profile.rest_bottom, profile.rest_top)
             k, part = self._between
             for name, values in (("thickness", profile.thickness), ("thickness_ratio", profile.thickness_ratio)):
                 found[name] = (1 - part) * values[k] + part * values[k + 1]
@@ -110,7 +112,7 @@ class Fields:
         for k, contact in enumerate(self._problem.contacts):
             if k not in self._faces:
                 face = ContactFace(self._path, contact)
-                away, at = cKDTree(face.nodes).query(self.points.reshape(-1, 2))
+                away, at = cKDTree(face.nodes).query(self.points.reshape(-1, self.points.shape[-1]))
                 self._faces[k] = face, face.nearest[at], away < 1e-9 * self._problem.forms.length
             face, at, there = self._faces[k]
             pressure += np.where(there, face.of(state).pressure[at], 0.0).reshape(pressure.shape)

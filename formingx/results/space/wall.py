@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ... import _compat
 from ...discrete.surface import wrinkled
 from ...errors import InputError, direction, pair, positive, triple
+from ...mesh.nodes import of_cells, own_cells
+from ...ranks import gathered
 from ..files.sheet import Sheet
 
 
@@ -178,25 +179,23 @@ def wall_of(path: Any, state: Any) -> WallInSpace:
     """The wall in a state, nodes and triangles in an order that does not depend on ranks; collective."""
     problem = path.problem
     forms, domain, comm = problem.forms, problem.forms.domain, problem.comm
-    own = domain.topology.index_map(2).size_local
+    own = own_cells(domain)
     vectors, numbers = forms.space.sub(0).collapse()
     dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, 3)
     with problem.at(state):
         now = forms.length * forms.w.x.array[dofs]
-    cells = vectors.dofmap.list[:own]
+    cells = vectors.dofmap.list[own]
     X = vectors.tabulate_dof_coordinates()
-    nodes = _compat.cell_nodes(domain)[:own]
-    x = domain.geometry.x
-    h = {name: given(*x[nodes].mean(1)[:, :2].T) for name, given in problem.scene.thickness.items()}
-    parts = comm.allgather((domain.topology.original_cell_index[:own], X[cells], X[cells] + now[cells], h))
-    order = np.argsort(np.concatenate([part[0] for part in parts]))
-    rest, moved = (np.concatenate([part[k] for part in parts])[order].reshape(-1, 3) for k in (1, 2))
+    middles = of_cells(domain, own).mean(1)[:, :2].T
+    h = {name: given(*middles) for name, given in problem.scene.thickness.items()}
+    order = np.argsort(gathered(comm, domain.topology.original_cell_index[own]))
+    rest, moved = (gathered(comm, part)[order].reshape(-1, 3) for part in (X[cells], X[cells] + now[cells]))
     keys = np.round(rest / max(problem.scene.extent), 10)
     _, first, row = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     triangles = row.reshape(-1, 3)
     turned = _normals(rest[first][triangles])[:, 2] < 0
     triangles[turned] = triangles[turned][:, ::-1]
-    layers = {name: np.concatenate([part[3][name] for part in parts])[order] for name in h}
+    layers = {name: gathered(comm, values)[order] for name, values in h.items()}
     return WallInSpace(rest[first], moved[first], triangles, layers, comm)
 
 

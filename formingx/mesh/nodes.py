@@ -1,0 +1,35 @@
+"""Where this rank's cells and facets of a DOLFINx mesh have their nodes, in as many coordinates as the mesh has."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _compat
+
+
+def own_cells(domain: Any) -> np.ndarray:
+    """Numbers of the cells that are this rank's own, shape (m,), from 0 on."""
+    return np.arange(domain.topology.index_map(domain.topology.dim).size_local, dtype=np.int32)
+
+
+def of_cells(domain: Any, cells: Any) -> np.ndarray:
+    """Nodes of cells, their corners first, shape (cells, nodes, coordinates)."""
+    geometry = domain.geometry
+    return geometry.x[np.asarray(_compat.cell_nodes(domain))[cells], :geometry.dim]
+
+
+def of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
+    """Nodes of facets of a plane mesh or of a sheet, their ends first, shape (facets, 2 or 3, coordinates)."""
+    return domain.geometry.x[numbers_of_facets(domain, facets), :domain.geometry.dim]
+
+
+def numbers_of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
+    """The rows of `geometry.x` for that, shape (facets, 2 or 3)."""
+    from dolfinx.mesh import entities_to_geometry
+    domain.topology.create_connectivity(1, 2)
+    domain.topology.create_connectivity(2, 1)
+    if not len(facets):                                      # entities_to_geometry divides by zero
+        return np.zeros((0, 1 + _compat.coordinate_map(domain).degree), dtype=np.int32)
+    return entities_to_geometry(domain, 1, facets)
