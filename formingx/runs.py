@@ -192,6 +192,15 @@ class Process:
 
     Args:
         scene: with any number of things that can be driven.
+
+    >>> import formingx as fx
+    >>> air, plug = fx.Pressure("bottom"), fx.Contact("top", fx.tools.plane(2.0), "none", moves=(0, -1))
+    >>> scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(8, 1)), loads=[air], contacts=[plug],
+    ...                  materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    >>> path = fx.Process(scene).run([fx.Stage("blow", drive=air, until=fx.pole_height(1.0)),
+    ...                               fx.Stage("press", drive=plug, until=fx.travel(1.0))])
+    >>> round(float(path["pole_height"][-1]), 3), path.states[-1].stage
+    (0.501, 'press')
     """
 
     def __init__(self, scene: Scene):

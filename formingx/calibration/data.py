@@ -19,6 +19,11 @@ _TRELOAR_1944 = {
 
 
 def treloar1944() -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Treloar's (1944) vulcanised rubber: {test: (stretch, nominal stress in MPa)}, digitised from his curves."""
+    """Treloar's (1944) vulcanised rubber: {test: (stretch, nominal stress in MPa)}, digitised from his curves.
+
+    >>> import formingx as fx
+    >>> sorted(fx.treloar1944())
+    ['equibiaxial', 'pure_shear', 'uniaxial']
+    """
     points = {mode: np.array(text.split(), float).reshape(-1, 2) for mode, text in _TRELOAR_1944.items()}
     return {mode: (p[:, 0].copy(), p[:, 1].copy()) for mode, p in points.items()}

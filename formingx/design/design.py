@@ -50,6 +50,15 @@ class Design:
 
     Raises:
         InputError: an argument that is not allowed.
+
+    >>> import formingx as fx
+    >>> def build(thickness):
+    ...     return fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=thickness, elements=(8, 1)),
+    ...                     materials=fx.NeoHookean(c10=0.4), loads=[fx.Pressure("bottom")],
+    ...                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")]), fx.pole_height(4.0)
+    >>> effects = fx.Design(build, {"thickness": (0.5, 0.1, 1.0)}).run().sensitivities("pressure")
+    >>> effects.names, round(float(effects.by[0, 0]), 3)
+    (['thickness'], 0.046)
     """
 
     def __init__(self, build: Callable[..., Any], parameters: Mapping[str, Any], *, step: StepControl | None = None,

@@ -62,6 +62,10 @@ def along(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, sm
 
     Raises:
         InputError: an argument that is not allowed.
+
+    >>> import formingx as fx
+    >>> fx.along(3, start=2.0, low=1.0).start.tolist()
+    [2.0, 2.0, 2.0]
     """
     least = 4 if instance("along: smooth", smooth, bool, "True or False") else 2
     if count("along: knots", knots) < least:

@@ -52,6 +52,10 @@ def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
 
     Raises:
         InputError: a size or constant that is not allowed; no pressure leads from rest to this stretch.
+
+    >>> state = membrane_inflation(2.0, radius=1.25, thickness=0.082, c10=2.0)
+    >>> round(float(state.pressure), 4), round(float(state.height), 4)
+    (0.4906, 1.3538)
     """
     from scipy.integrate import solve_ivp
     radius, thickness = positive("radius", radius), positive("thickness", thickness)
@@ -139,7 +143,12 @@ def meridional_stretch(n: Any, l2: Any) -> Any:
 
 def membrane_limit_point(*, radius: float, thickness: float, c10: float,
                          c01: float = 0.0) -> tuple[float, MembraneState] | None:
-    """(pole stretch, state) of the first pressure maximum below a pole stretch of 12, or None if there is none."""
+    """(pole stretch, state) of the first pressure maximum below a pole stretch of 12, or None if there is none.
+
+    >>> stretch, state = membrane_limit_point(radius=1.25, thickness=0.082, c10=2.0)
+    >>> round(stretch, 3), round(float(state.pressure), 4)
+    (2.196, 0.4931)
+    """
     def state(stretch):
         return membrane_inflation(stretch, radius=radius, thickness=thickness, c10=c10, c01=c01)
 
@@ -208,6 +217,10 @@ def thick_wall(kind: str, inner_stretch: float, *, inner_radius: float, outer_ra
 
     Raises:
         InputError: a size or constant that is not allowed.
+
+    >>> state = thick_wall("sphere", 2.0, inner_radius=1.0, outer_radius=2.0, c10=1.0)
+    >>> round(float(state.pressure), 4)
+    1.6139
     """
     known("thick_wall: kind", kind, ("tube", "sphere"))
     A, B = positive("inner_radius", inner_radius), positive("outer_radius", outer_radius)

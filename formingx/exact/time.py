@@ -40,6 +40,11 @@ class Body:
         strain: called with s, gives e and de/ds of all points, each of shape (n,).
         weight: called with s, gives c and dc/ds, each of shape (n,).
         time, s: where it is. w: elastic strains, shape (n, branches, 3).
+
+    >>> bar = block("uniaxial", c10=0.5, branches=[(1.0, 2.0)])
+    >>> bar.jump(0.2)
+    >>> bar.hold([1.0, 10.0]).round(4).tolist()
+    [0.8545, 0.5541]
     """
 
     c10: float

@@ -54,6 +54,13 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
     Raises:
         InputError: something of this is not allowed.
         ConvergenceError: steps became too short, or too many.
+
+    >>> import formingx as fx
+    >>> sheet = fx.mesh.disc(radius=20.0, thickness=2.0, elements=(4, 2))
+    >>> polymer = fx.ThermalProperties(conductivity=0.2, density=1e-3, heat_capacity=2000.0)
+    >>> run = fx.heat(sheet, polymer, [fx.Convection("top", h=0.01, air=20.0)], start=180.0, times=[10.0], unit="C")
+    >>> [round(spot.temperature, 2) for spot in (run.coldest(), run.hottest())]
+    [171.33, 178.44]
     """
     if not isinstance(mesh, Mesh):
         raise InputError(f"heat: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")

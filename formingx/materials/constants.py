@@ -104,6 +104,11 @@ def entropic(value: float, reference: float, *, unit: str) -> OfTemperature:
 
     Args:
         value: at the temperature `reference`. unit: of temperatures, "C" or "K".
+
+    >>> import formingx as fx
+    >>> modulus = fx.entropic(1.0, 20.0, unit="C")
+    >>> float(modulus(313.15).round(6))
+    2.0
     """
     value, reference = finite("entropic: value", value), finite("entropic: reference", reference)
     known("entropic: unit", unit, ABSOLUTE_ZERO)

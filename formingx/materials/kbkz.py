@@ -46,6 +46,11 @@ class KBKZ(HistoryTests, Material):
         equilibrium: a material that does not relax, beside it, or None.
         shift: how relaxation times depend on the temperature of the scene, see `Viscoelastic`.
         irreversible: h of a past state is the least that it has been since then.
+
+    >>> import formingx as fx
+    >>> melt = fx.KBKZ([(0.1, 0.5), (0.02, 10.0)], damping=fx.PSM(alpha=14.4, beta=0.05))
+    >>> round(melt.shear_modulus, 12)
+    0.12
     """
 
     def __init__(self, spectrum: Any, damping: Damping | None = None, equilibrium: Material | None = None,

@@ -90,6 +90,11 @@ class Contact(Part):
 
     Raises:
         InputError: an argument that is not allowed.
+
+    >>> import formingx as fx
+    >>> plug = fx.Contact("top", fx.tools.cylinder(radius=20.0, z=2.0, fillet=4.0), 0.3, moves=(0, -1), name="plug")
+    >>> plug.driven
+    True
     """
 
     quantity = "travel"

@@ -16,7 +16,12 @@ __all__ = ["Arc", "Line", "Nearest", "Pot", "Tool", "bottle", "clamp_ring", "con
 
 
 def plane(z: float = 0.0) -> Tool:
-    """Everything above Z = z."""
+    """Everything above Z = z.
+
+    >>> import formingx as fx
+    >>> fx.tools.plane(5.0).signed_distance([[0.0, 4.0], [0.0, 7.0]]).tolist()
+    [-1.0, 2.0]
+    """
     z = finite("plane: z", z)
     return Tool([(0.0, z), (1.0, z)])
 
@@ -30,6 +35,11 @@ def cup(*, radius: float, depth: float, mouth: float = 0.0, draft: float = 0.0, 
         mouth: Z of the mouth and of the flange around it.
         draft: angle between the wall and the Z axis, degrees; the floor is narrower than the mouth.
         fillet, lip: radii of the edge between wall and floor, and of that between wall and flange.
+
+    >>> import formingx as fx
+    >>> mould = fx.tools.cup(radius=30.0, depth=20.0, draft=np.radians(5), fillet=3.0, lip=2.0)
+    >>> mould.signed_distance([[0.0, 19.0]]).round(6).tolist()
+    [-1.0]
     """
     radius, depth = positive("cup: radius", radius), positive("cup: depth", depth)
     mouth, floor = finite("cup: mouth", mouth), radius - depth * math.tan(_draft("cup", draft))
@@ -50,6 +60,11 @@ def male(*, radius: float, height: float, base: float = 0.0, draft: float = 0.0,
         base: Z of the base plate.
         draft: angle between the wall and the Z axis, degrees; the foot is wider than the top.
         fillet, foot: radii of the edge around the top, and of that between wall and base plate.
+
+    >>> import formingx as fx
+    >>> mould = fx.tools.male(radius=30.0, height=20.0, fillet=3.0)
+    >>> mould.signed_distance([[0.0, 25.0]]).tolist()
+    [-5.0]
     """
     radius, height = positive("male: radius", radius), positive("male: height", height)
     base, wide = finite("male: base", base), radius + height * math.tan(_draft("male", draft))
@@ -67,6 +82,11 @@ def bottle(*, radius: float, height: float, neck: float, shoulder: float, neck_h
         neck, neck_height: radius and height of the neck.
         base: Z of the bottom.
         fillet, shoulder_fillet: radii of the bottom edge and of both shoulder edges.
+
+    >>> import formingx as fx
+    >>> mould = fx.tools.bottle(radius=30.0, height=150.0, neck=12.0, shoulder=110.0, neck_height=130.0, fillet=5.0)
+    >>> mould.signed_distance([[0.0, 60.0]]).tolist()
+    [-30.0]
     """
     radius, height = positive("bottle: radius", radius), positive("bottle: height", height)
     neck, shoulder = positive("bottle: neck", neck), positive("bottle: shoulder", shoulder)
@@ -80,7 +100,13 @@ def bottle(*, radius: float, height: float, neck: float, shoulder: float, neck_h
 
 
 def cylinder(*, radius: float, z: float = 0.0, fillet: float = 0.0) -> Tool:
-    """A flat-ended plug that points down, its face at Z = z."""
+    """A flat-ended plug that points down, its face at Z = z.
+
+    >>> import formingx as fx
+    >>> plug = fx.tools.cylinder(radius=20.0, z=2.0, fillet=4.0)
+    >>> plug.signed_distance([[0.0, 0.0], [25.0, 30.0]]).tolist()
+    [-2.0, -5.0]
+    """
     radius, z = positive("cylinder: radius", radius), finite("cylinder: z", z)
     return Tool([(0.0, z), (radius, z), (radius, z + 2 * radius)],
                 [0.0, non_negative("cylinder: fillet", fillet), 0.0])
@@ -93,6 +119,11 @@ def cone(*, half_angle: float, z: float = 0.0, tip: float = 0.0, size: float = 1
         half_angle: between its surface and the Z axis, degrees, from 0.01 to below 90.
         z: of its lowest point; tip: radius of the rounded tip, length.
         size: a length to draw it at (the cone has no end).
+
+    >>> import formingx as fx
+    >>> plug = fx.tools.cone(half_angle=np.radians(30), z=1.0)
+    >>> plug.signed_distance([[0.0, 0.0]]).tolist()
+    [-1.0]
     """
     a = math.radians(positive("cone: half_angle", half_angle))
     if a >= math.pi / 2:
@@ -106,7 +137,12 @@ def cone(*, half_angle: float, z: float = 0.0, tip: float = 0.0, size: float = 1
 
 
 def sphere(*, radius: float, z: float = 0.0, r: float = 0.0) -> Tool:
-    """A ball (axisymmetric, r = 0) or a round bar (plane strain), its lowest point at (r, z)."""
+    """A ball (axisymmetric, r = 0) or a round bar (plane strain), its lowest point at (r, z).
+
+    >>> import formingx as fx
+    >>> fx.tools.sphere(radius=10.0, z=5.0).signed_distance([[0.0, 4.0], [0.0, 6.0]]).tolist()
+    [-1.0, 1.0]
+    """
     radius = positive("sphere: radius", radius)
     centre = np.array([finite("sphere: r", r), finite("sphere: z", z) + radius])
     return Tool.of_pieces([Arc(centre, radius, -math.pi / 2, TURN)], closed=True)
@@ -130,6 +166,11 @@ def clamp_ring(*, radius: float, width: float, fillet: float, z: float = 0.0, he
         width: from there outwards, more than the fillet.
         fillet: radius of the edges.
         height: of the ring, at least two fillets, as by default.
+
+    >>> import formingx as fx
+    >>> ring = fx.tools.clamp_ring(radius=50.0, width=20.0, fillet=2.0)
+    >>> ring.signed_distance([[60.0, -1.0]]).tolist()
+    [-1.0]
     """
     radius, z = positive("clamp_ring: radius", radius), finite("clamp_ring: z", z)
     fillet, width = positive("clamp_ring: fillet", fillet), positive("clamp_ring: width", width)

@@ -179,7 +179,12 @@ def revolved(profile: Tool) -> Swept:
 
 
 def extruded(profile: Tool, along: str = "y") -> Swept:
-    """A profile (r, z) drawn along y, r being x; or along x, r being y."""
+    """A profile (r, z) drawn along y, r being x; or along x, r being y.
+
+    >>> import formingx as fx
+    >>> fx.tools.extruded(fx.tools.sphere(radius=10.0)).signed_distance([[0.0, 55.0, -1.0]]).tolist()
+    [-1.0]
+    """
     known("extruded: along =", along, ("x", "y"))
     return Swept(instance("extruded: profile", profile, Tool, "a Tool"), "extruded", along=along)
 
@@ -195,6 +200,11 @@ def box(*, half: tuple[float, float], depth: float, corner: float = 0.0, fillet:
         fillet, lip: radii between wall and floor, and wall and flange (of a plug none).
         draft: angle between wall and z axis, degrees.
         plug: the solid is inside, and goes up from there.
+
+    >>> import formingx as fx
+    >>> tray = fx.tools.box(half=(60.0, 40.0), depth=20.0, corner=15.0, fillet=5.0)
+    >>> tray.signed_distance([[0.0, 0.0, -18.0]]).tolist()
+    [-2.0]
     """
     a, b = (positive("box: half", value) for value in pair("box: half", half))
     depth, corner, fillet = positive("box: depth", depth), non_negative("box: corner", corner), non_negative(

@@ -81,6 +81,11 @@ class Arrhenius:
         activation_energy: E, J/mol, above 0.
         reference: Tr, temperature.
         unit: of temperatures, "C" or "K".
+
+    >>> import formingx as fx
+    >>> slower = fx.Arrhenius(80e3, 180.0, unit="C")
+    >>> round(float(slower(170.0)), 4)
+    1.6147
     """
 
     def __init__(self, activation_energy: float, reference: float, *, unit: str):
