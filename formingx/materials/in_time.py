@@ -1,4 +1,4 @@
-"""Tests of a material whose stress depends on the history: a stretch that is held, a constant Hencky rate."""
+"""What materials have in common that relax to an equilibrium, and their tests in time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError, positive
+from ..errors import InputError, finite_array, instance, positive, several
 from .material import Material
 
 
@@ -20,12 +20,79 @@ def checked_shift(name: str, shift: Any) -> Callable:
     return shift
 
 
-class HistoryTests:
-    """What is left of a material that relaxes, and tests of it, by `stress(mode, stretches, times=, between=)`."""
+def checked_pairs(name: str, pairs: Any, what: str) -> list[list[Any]]:
+    """At least one pair, such as "mu, tau", or an InputError."""
+    found = several(name, pairs, f"({what})")
+    if not found:
+        raise InputError(f"{name} = {pairs!r}: must be at least one ({what})")
+    found = [several(f"{name}: number {k}", pair, what.replace(",", " and")) for k, pair in enumerate(found, 1)]
+    for k, pair in enumerate(found, 1):
+        if len(pair) != 2:
+            raise InputError(f"{name}: number {k} is {tuple(pair)!r}: must be ({what})")
+    return found
+
+
+class Relaxing(Material):
+    """A material that relaxes to an equilibrium; tests of it are by `stress(mode, stretches, times=, between=)`.
+
+    Args:
+        equilibrium: the material, without a history, that is left when all has relaxed, or None.
+
+    Subclasses add their own constants to `parameters` and check, and give `_modulus`.
+    """
 
     stress: Any
-    parameters: dict[str, Any]
-    _equilibrium: Material | None
+
+    def __init__(self, equilibrium: Material | None):
+        name = type(self).__name__
+        if equilibrium is not None:
+            instance(f"{name}: equilibrium", equilibrium, Material, "a material, or None")
+            if equilibrium.internal or equilibrium.integral:
+                raise InputError(f"{name}: equilibrium = {equilibrium}: must not relax itself, nor remember anything:"
+                                 f" give all branches here")
+        self._equilibrium = equilibrium
+        self.parameters = {} if equilibrium is None else dict(equilibrium.parameters)
+
+    def _modulus(self, times: Any) -> np.ndarray:
+        """G(t) without the equilibrium's, stress."""
+        raise NotImplementedError
+
+    def relaxation_modulus(self, times: ArrayLike) -> np.ndarray:
+        """G(t) = G_equilibrium + sum G exp(-t/tau) of small shear, at times of any shape; stress."""
+        rest = 0.0 if (left := self.equilibrium) is None else left.shear_modulus
+        return rest + self._modulus(finite_array("relaxation_modulus: times", times))
+
+    @property
+    def shear_modulus(self) -> float:
+        """That of the instantaneous response; stress."""
+        self._numbers()
+        return float(self.relaxation_modulus(0.0))
+
+    @property
+    def rest_stress(self) -> float:
+        """That of the equilibrium: what relaxes has none; stress."""
+        return 0.0 if (rest := self.equilibrium) is None else rest.rest_stress
+
+    @property
+    def largest_I1(self) -> float:
+        """That of the equilibrium."""
+        return np.inf if (rest := self.equilibrium) is None else rest.largest_I1
+
+    def check_constants(self, **constants: Any) -> None:
+        if self._equilibrium is not None:
+            self._equilibrium.check_constants(**{k: constants[k] for k in self._equilibrium.parameters})
+
+    def equilibrium_energy(self, F: Any, **constants: Any) -> Any:
+        return None if self._equilibrium is None else self._relaxed_energy(F, constants)
+
+    def _relaxed_energy(self, F: Any, constants: dict[str, Any]) -> Any:
+        if self._equilibrium is None:
+            return 0
+        return self._equilibrium.strain_energy(F, **{k: constants[k] for k in self._equilibrium.parameters})
+
+    def _relaxed_stress(self, mode: str, stretches: Any) -> Any:
+        """Nominal stress of the equilibrium."""
+        return 0.0 if (rest := self.equilibrium) is None else rest.stress(mode, stretches)
 
     @property
     def equilibrium(self) -> Material | None:

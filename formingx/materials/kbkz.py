@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError, finite_array, instance, known, positive, several
+from ..errors import InputError, instance, known, positive
 from . import branches
 from .constants import OfTemperature, Sample
 from .damping import Damping
 from .homogeneous import MODES
-from .in_time import HistoryTests, checked_shift
+from .in_time import Relaxing, checked_pairs, checked_shift
 from .material import Material
 from .past import Integral
 from .tensors import inner, isochoric
@@ -33,7 +33,7 @@ _STRAIN = 0.25
 """Longest logarithmic strain in a panel."""
 
 
-class KBKZ(HistoryTests, Material):
+class KBKZ(Relaxing):
     """The factorised K-BKZ equation, the body at rest before.
 
     In small strains G(t) = G_equilibrium + sum G_k exp(-t/tau_k); after a step of strain the stress is G(t) h times
@@ -55,28 +55,18 @@ class KBKZ(HistoryTests, Material):
 
     def __init__(self, spectrum: Any, damping: Damping | None = None, equilibrium: Material | None = None,
                  shift: Any = None, irreversible: bool = False):
-        pairs = several("KBKZ: spectrum", spectrum, "(G, tau)")
-        if not pairs:
-            raise InputError(f"KBKZ: spectrum = {spectrum!r}: must be at least one (G, tau)")
-        self.spectrum = []
-        for k, pair in enumerate(pairs, 1):
-            if len(values := several(f"KBKZ: spectrum: number {k}", pair, "G and tau")) != 2:
-                raise InputError(f"KBKZ: spectrum: number {k} is {pair!r}: must be (G, tau)")
-            self.spectrum.append((positive(f"KBKZ: G_{k}", values[0]), positive(f"KBKZ: tau_{k}", values[1])))
+        super().__init__(equilibrium)
+        self.spectrum = [(positive(f"KBKZ: G_{k}", G), positive(f"KBKZ: tau_{k}", tau))
+                         for k, (G, tau) in enumerate(checked_pairs("KBKZ: spectrum", spectrum, "G, tau"), 1)]
         G, tau = np.array(self.spectrum).T
         if len(G) > 2 and np.all(np.diff(G[np.argsort(tau)]) > 0) and np.ptp(np.log(G)) > 3:
             raise InputError(f"KBKZ: spectrum = {spectrum!r}: the moduli grow with the times, from {G.min():g} to"
                              f" {G.max():g}: must be (G, tau); of (eta, lambda) make KBKZ.of_viscosities(...)")
         if damping is not None:
             instance("KBKZ: damping", damping, Damping, "PSM(alpha, beta), Wagner(alpha, beta) or None")
-        if equilibrium is not None:
-            instance("KBKZ: equilibrium", equilibrium, Material, "a material, or None")
-            if equilibrium.internal or equilibrium.integral:
-                raise InputError(f"KBKZ: equilibrium = {equilibrium}: must not relax itself")
-        self.damping, self._equilibrium = damping, equilibrium
+        self.damping = damping
         self.integral = Integral(self.spectrum, damping, instance("KBKZ: irreversible", irreversible, bool,
                                                                   "True or False"), shift is not None)
-        self.parameters = {} if equilibrium is None else dict(equilibrium.parameters)
         if shift is not None:
             self.parameters["aT"] = OfTemperature(checked_shift("KBKZ", shift), repr(shift))
         self.check()
@@ -95,57 +85,25 @@ class KBKZ(HistoryTests, Material):
         """See `Material`."""
         return self.damping is None or self.damping.of_I1_alone
 
-    @property
-    def shear_modulus(self):
-        """That of the instantaneous response; stress."""
-        return float(self.relaxation_modulus(0.0))
-
     def shear_modulus_at(self, sample: Sample) -> np.ndarray:
         rest = 0.0 if self._equilibrium is None else self._equilibrium.shear_modulus_at(sample)
         return np.atleast_1d(sum(G for G, _ in self.spectrum) + rest)
 
-    @property
-    def rest_stress(self):
-        return 0.0 if (rest := self.equilibrium) is None else rest.rest_stress
-
-    @property
-    def largest_I1(self):
-        return np.inf if (rest := self.equilibrium) is None else rest.largest_I1
-
-    def check_constants(self, **constants):
-        if self._equilibrium is not None:
-            self._equilibrium.check_constants(**self._of_equilibrium(constants))
-
-    def _of_equilibrium(self, constants: dict[str, Any]) -> dict[str, Any]:
-        return {} if self._equilibrium is None else {k: constants[k] for k in self._equilibrium.parameters}
-
-    def equilibrium_energy(self, F, **constants):
-        return None if self._equilibrium is None else self._equilibrium.strain_energy(
-            F, **self._of_equilibrium(constants))
-
     def strain_energy(self, F, **constants):
         """That at once, of the network without damping: for moduli and stresses at rest."""
         G = sum(G for G, _ in self.spectrum)
-        return G / 2 * (inner(isochoric(F), (1, 1, 0, 1)) - 3) + (self.equilibrium_energy(F, **constants) or 0)
+        return G / 2 * (inner(isochoric(F), (1, 1, 0, 1)) - 3) + self._relaxed_energy(F, constants)
 
     def step_energy(self, F, internal, time_step, **constants):
         """A UFL scalar whose derivative by F is the stress at the end of a step; no energy."""
-        return self.integral.potential(isochoric(F), internal, time_step) + (
-            self.equilibrium_energy(F, **constants) or 0)
+        return self.integral.potential(isochoric(F), internal, time_step) + self._relaxed_energy(F, constants)
 
     def stored_energy(self, F, internal, **constants):
         """As `step_energy` where no time passes: its derivative is the stress; its value means nothing."""
         return self.step_energy(F, internal, 0.0, **constants)
 
-    def relaxation_modulus(self, times: ArrayLike) -> np.ndarray:
-        """G(t) = G_equilibrium + sum G exp(-t/tau) of small shear, at times of any shape; stress."""
-        rest = 0.0 if (left := self.equilibrium) is None else left.shear_modulus
-        return rest + self._modulus(finite_array("relaxation_modulus: times", times))
-
-    def _modulus(self, times: Any) -> np.ndarray:
-        """`relaxation_modulus` without the equilibrium."""
-        t = np.asarray(times, float)
-        return sum((G * np.exp(-t / tau) for G, tau in self.spectrum), np.zeros(t.shape))
+    def _modulus(self, times):
+        return sum(G * np.exp(-np.asarray(times, float) / tau) for G, tau in self.spectrum)
 
     def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), times: ArrayLike | None = None,
                between: str = "stretch", *, true: bool = False) -> np.ndarray:
@@ -168,10 +126,11 @@ class KBKZ(HistoryTests, Material):
             if mode == "biaxial":
                 return self._biaxial(l) * (l if true else 1.0)
             branches.checked(f"{self}: stress", mode, np.zeros(l.size), l.ravel(), between)
-            return (self._modulus(0.0) * self._strained(mode, l) / l + self._relaxed(mode, l)) * (l if true else 1.0)
+            at_once = self._modulus(0.0) * self._strained(mode, l) / l
+            return (at_once + self._relaxed_stress(mode, l)) * (l if true else 1.0)
         t, l = branches.checked(f"{self}: stress", mode, times, stretches, between)
         found = np.array([self._at(mode, t[:n + 1], l[:n + 1], between) for n in range(len(t))]) / l
-        return (found + self._relaxed(mode, l)) * (l if true else 1.0)
+        return (found + self._relaxed_stress(mode, l)) * (l if true else 1.0)
 
     def _biaxial(self, l: np.ndarray) -> np.ndarray:
         """Nominal stresses of a step to (l1, l2), shape (2, ...)."""
@@ -179,8 +138,7 @@ class KBKZ(HistoryTests, Material):
             raise InputError(f"{self}: stress: stretches of a biaxial test must be (l1, l2), each above 0")
         squares = np.stack([*l**2, 1 / (l[0] * l[1])**2])
         h = 1.0 if self.damping is None else self.damping(squares.sum(0), (1 / squares).sum(0))
-        rest = 0.0 if (left := self.equilibrium) is None else left.stress("biaxial", l)
-        return self._modulus(0.0) * h * (squares[:2] - squares[2]) / l + rest
+        return self._modulus(0.0) * h * (squares[:2] - squares[2]) / l + self._relaxed_stress("biaxial", l)
 
     def rupture_stretch(self, mode: str) -> float:
         """The stretch at which h (B_11 - B_33) of a step of strain is largest; infinity without a maximum up to 100.
@@ -190,13 +148,9 @@ class KBKZ(HistoryTests, Material):
         """
         known(f"{self}: rupture_stretch: mode", mode, MODES)
         l = np.geomspace(1, 100, 4000)
-        bears = self._modulus(0.0) * self._strained(mode, l) + self._relaxed(mode, l) * l
+        bears = self._modulus(0.0) * self._strained(mode, l) + self._relaxed_stress(mode, l) * l
         falls = np.flatnonzero(bears[1:] < bears[:-1])
         return float(l[falls[0]]) if len(falls) else np.inf
-
-    def _relaxed(self, mode: str, stretches: Any) -> Any:
-        """Nominal stress of the equilibrium."""
-        return 0.0 if (rest := self.equilibrium) is None else rest.stress(mode, stretches)
 
     def _at(self, mode: str, times: np.ndarray, stretches: np.ndarray, between: str) -> float:
         """tau_1 - tau_3 at the last of the times."""

@@ -19,18 +19,18 @@ import numpy as np
 import ufl
 from numpy.typing import ArrayLike
 
-from ..errors import InputError, finite_array, instance, known, positive, several
+from ..errors import InputError, known, positive
 from ..figures import Axes, figure
 from ..physics import kinematics
 from . import branches as tests
 from .constants import OfTemperature, Sample
 from .homogeneous import MODES
-from .in_time import HistoryTests, checked_shift
+from .in_time import Relaxing, checked_pairs, checked_shift
 from .material import Material, brief
 from .tensors import IDENTITY, Entries, cofactor, determinant, deviator_squared, entries, inner, isochoric, plus
 
 
-class RelaxingMaterial(HistoryTests, Material):
+class RelaxingMaterial(Relaxing):
     """An equilibrium energy and relaxing branches, whatever the law of the branches.
 
     The constants are those of the equilibrium energy, then mu_1, tau_1, mu_2, ... As a material without time
@@ -47,19 +47,9 @@ class RelaxingMaterial(HistoryTests, Material):
     _remembers = True               # the last state's C is needed, too
 
     def __init__(self, equilibrium: Material | None, branches: Any, shift: Any = None):
+        super().__init__(equilibrium)
         name = type(self).__name__
-        if equilibrium is not None:
-            instance(f"{name}: equilibrium", equilibrium, Material, "a material, or None")
-            if isinstance(equilibrium, RelaxingMaterial):
-                raise InputError(f"{name}: equilibrium = {equilibrium}: must not relax itself; give all branches here")
-        pairs = several(f"{name}: branches", branches, "(mu, tau)")
-        if not pairs:
-            raise InputError(f"{name}: branches = {branches!r}: must be at least one (mu, tau)")
-        self._equilibrium = equilibrium
-        self.parameters = {} if equilibrium is None else dict(equilibrium.parameters)
-        for k, pair in enumerate(pairs, 1):
-            if len(values := several(f"{name}: branches: number {k}", pair, "mu and tau")) != 2:
-                raise InputError(f"{name}: branches: number {k} is {pair!r}: must be (mu, tau)")
+        for k, values in enumerate(checked_pairs(f"{name}: branches", branches, "mu, tau"), 1):
             for constant, value in zip((f"mu_{k}", f"tau_{k}"), values):
                 if constant in self.parameters:
                     raise InputError(f"{name}: the equilibrium energy has a constant {constant!r}: that is the name of"
@@ -78,28 +68,12 @@ class RelaxingMaterial(HistoryTests, Material):
         for k, mu, tau in self._branches(constants):
             positive(f"{type(self).__name__}: mu_{k}", mu)
             positive(f"{type(self).__name__}: tau_{k}", tau)
-        if self._equilibrium is not None:
-            self._equilibrium.check_constants(**{k: constants[k] for k in self._equilibrium.parameters})
+        super().check_constants(**constants)
 
     @property
     def branches(self) -> list[tuple[float, float]]:
         """[(mu, tau), ...]."""
         return [(mu, tau) for _, mu, tau in self._branches(self.parameters)]
-
-    @property
-    def largest_I1(self):
-        return math.inf if (rest := self.equilibrium) is None else rest.largest_I1
-
-    @property
-    def shear_modulus(self):
-        """That of the instantaneous response; stress."""
-        self._numbers()
-        return float(self.relaxation_modulus(0.0))
-
-    @property
-    def rest_stress(self):
-        """That of the equilibrium energy: the branches have none; stress."""
-        return 0.0 if (rest := self.equilibrium) is None else rest.rest_stress
 
     @property
     def internal(self) -> dict[str, tuple]:  # type: ignore[override]  # read only here
@@ -111,9 +85,6 @@ class RelaxingMaterial(HistoryTests, Material):
     def of_flow(self) -> tuple[str, ...]:
         """See `Material`: the relaxation times."""
         return tuple(f"tau_{k}" for k, *_ in self._branches(self.parameters))
-
-    def equilibrium_energy(self, F, **constants):
-        return None if self._equilibrium is None else self._relaxed_energy(F, constants)
 
     def elastic_stretches(self, F, internal, **constants):
         """See `Material`: the roots of the eigenvalues of F M F^T, M = Cv^-1 or A, J^(-1/3) F for F."""
@@ -170,11 +141,8 @@ class RelaxingMaterial(HistoryTests, Material):
             after[name] = self._advanced(C, past, entries(internal[name]), time_step / tau)
         return {name: ufl.as_vector(value) if isinstance(value, tuple) else value for name, value in after.items()}
 
-    def relaxation_modulus(self, times: ArrayLike) -> np.ndarray:
-        """G(t) = G_equilibrium + sum mu exp(-t/tau) of small shear, at times of any shape; stress."""
-        t = finite_array("relaxation_modulus: times", times)
-        modulus: Any = 0.0 if (rest := self.equilibrium) is None else rest.shear_modulus
-        return modulus + sum(mu * np.exp(-t / tau) for mu, tau in self.branches)
+    def _modulus(self, times):
+        return sum(mu * np.exp(-times / tau) for mu, tau in self.branches)
 
     def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), times: ArrayLike | None = None,
                between: str = "stretch", *, true: bool = False) -> np.ndarray:
@@ -194,9 +162,8 @@ class RelaxingMaterial(HistoryTests, Material):
         if times is None:
             return super().stress(mode, stretches, true=true)
         t, l = tests.checked(f"{self}: stress", mode, times, stretches, between)
-        P = np.zeros(len(l)) if (rest := self.equilibrium) is None else rest.stress(mode, l)
         mu, tau = np.array(self.branches).T
-        P = P + self.unit_stress(mode, tau, t, l, between) @ mu
+        P = self._relaxed_stress(mode, l) + self.unit_stress(mode, tau, t, l, between) @ mu
         return P * l if true else P
 
     @classmethod
@@ -242,11 +209,6 @@ class RelaxingMaterial(HistoryTests, Material):
             return list(np.exp(coordinates))
         n = len(rest.parameters)
         return [*rest.constants_at(coordinates[:n]), *np.exp(coordinates[n:])]
-
-    def _relaxed_energy(self, F: Any, constants: dict[str, Any]) -> Any:
-        if self._equilibrium is None:
-            return 0
-        return self._equilibrium.strain_energy(F, **{k: constants[k] for k in self._equilibrium.parameters})
 
     def _branches(self, constants: dict[str, Any]) -> Iterator[tuple[int, Any, Any]]:
         """(number, mu, tau) of every branch."""
