@@ -1,7 +1,5 @@
 """The errors that formingx raises, and the checks that raise them."""
 
-from __future__ import annotations
-
 import math
 import os
 import sys

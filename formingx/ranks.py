@@ -1,7 +1,5 @@
 """What every rank has of an array, put together."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

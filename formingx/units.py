@@ -1,7 +1,5 @@
 """Names of the units that a script is written in: for labels, and to weigh a part. Numbers stay as they are."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

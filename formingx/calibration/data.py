@@ -1,7 +1,5 @@
 """Published test data to fit materials to."""
 
-from __future__ import annotations
-
 import numpy as np
 
 # L. R. G. Treloar, "Stress-strain data for vulcanised rubber under various types of deformation", Trans. Faraday Soc.

@@ -1,7 +1,5 @@
 """Constants of a material from tests."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Data and fitted material in one picture."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

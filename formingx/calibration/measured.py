@@ -1,7 +1,5 @@
 """Tests from a file: columns test, stretch, stress, and time if there is any."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """How well tests fix the constants of a fit: standard errors, and which constants are left open."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """What `doctor` says of a body that cools."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Looks a scene over before it is run: what it finds is measured on the scene, and a good scene gives nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What `doctor` finds, and its report."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

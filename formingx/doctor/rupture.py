@@ -1,7 +1,5 @@
 """What `doctor` says of damped melts: how far a part is drawn, against the stretch beyond which they bear no more."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A script looked over before it runs: executed up to its first run, whose scene and targets `doctor` looks at."""
 
-from __future__ import annotations
-
 import os
 import runpy
 import sys

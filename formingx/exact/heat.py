@@ -6,8 +6,6 @@ transform and Talbot's inversion (Abate and Valko, Int. J. Numer. Methods Eng. 6
 and a stiff solver, for faces that radiate.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -13,8 +13,6 @@ Thick wall (Green & Adkins, Large Elastic Deformations, 1970; Mooney energy): l 
 tube: g = 2 (c10 + c01) (ln l - l^-2/2), sphere: g = -c10 (4/l + l^-4) + c01 (4 l - 2 l^-2).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

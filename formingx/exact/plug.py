@@ -15,8 +15,6 @@ counts: its middle surface bends with kappa = 1/(fillet + h/2), friction acts h/
 mu N fillet/(fillet + h/2) (moments about the centre of the edge), and the travel is that of the plug's face.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass

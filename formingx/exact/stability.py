@@ -9,8 +9,6 @@ and on a face under a fluid pressure P its traction is P L_ji N_j. A bifurcation
 conditions on one face leave a determinant of 0 on the other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

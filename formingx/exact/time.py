@@ -14,8 +14,6 @@ points, c(s) T::
 Where s is driven the branches are integrated; where the load is held, its rate, zero, gives ds/dt.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Empty figures, drawn without a screen and shown by notebooks, and the tools of a scene in them."""
 
-from __future__ import annotations
-
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np

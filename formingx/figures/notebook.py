@@ -3,8 +3,6 @@
 matplotlib's own do so only if pyplot makes them, which keeps them open and asks for a screen.
 """
 
-from __future__ import annotations
-
 import io
 
 from matplotlib.axes import Axes

@@ -5,8 +5,6 @@ mesh's unit of length among them. What is said to be "a number or a table over R
 reference radius.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from ..errors import InputError, finite, non_negative, positive

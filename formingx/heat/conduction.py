@@ -8,8 +8,6 @@ A body without displacement has no F in its forms. All forms are divided by the 
 sums up to 1 and R is in degrees per time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 

@@ -6,8 +6,6 @@ implicit stage T + c dT/dt = known the line answers linearly, w_face = free - z 
 g (free - T), g = conductance/(1 + z conductance), and the line is out of the equations of the body.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any, NamedTuple
 

@@ -6,8 +6,6 @@ profiles, which are deeper, are met as well. Edges are cut, those that neighbour
 into rows between the cuts of their edges, in the shape of the element that they are part of.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

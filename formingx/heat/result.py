@@ -1,7 +1,5 @@
 """What a heating run gives back."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Heating and cooling over time: `heat`."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Mapping, Sequence
 from functools import partial

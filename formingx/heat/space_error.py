@@ -5,8 +5,6 @@ run has taken: (M + t K) e = t (R(T) - M dT/dt). For what varies on a short leng
 of Makridakis and Nochetto, SIAM J. Numer. Anal. 41 (2003) 1585-1594.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from dolfinx import fem
 

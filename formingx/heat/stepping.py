@@ -5,8 +5,6 @@ Shampine, Appl. Numer. Math. 20 (1996) 21-37. A jump of temperature at a face di
 ringing, as it does with the trapezoidal rule.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables that other programs write: CSV with named columns, and their units."""
 
-from __future__ import annotations
-
 import csv
 import os
 import re

@@ -1,7 +1,5 @@
 """Numbers as files write them: decimal digits, a point, an exponent; nothing else that Python takes for a number."""
 
-from __future__ import annotations
-
 import re
 
 _WHOLE = r"[+-]?[0-9]+"

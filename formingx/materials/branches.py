@@ -4,8 +4,6 @@ In principal direction i a branch has the elastic logarithmic strain w_i, part o
 Kirchhoff stress mu exp(2 w_i). It flows by dw_i/dt = de_i/dt - f_i(w)/(2 tau), where f is its material's law.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """A material's card: a page with what it does in three tests, at rates and temperatures of forming, and its limits."""
 
-from __future__ import annotations
-
 import base64
 import html
 import io

@@ -5,8 +5,6 @@ expression of the scene's mesh (a DOLFINx `Function` is one), a `table` over the
 returns, or an object of a class made from `Varying`.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """How much of a past state's stress is left, h(I1, I2), for `KBKZ`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

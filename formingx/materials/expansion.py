@@ -1,7 +1,5 @@
 """Thermal expansion: how large a material is without stress, by its temperature."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

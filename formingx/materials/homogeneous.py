@@ -3,8 +3,6 @@
 UFL differentiates the energy once; numpy evaluates the derivatives, so that a fit of constants costs no compilation.
 """
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Callable
 from typing import Any, NamedTuple

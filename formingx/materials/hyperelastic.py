@@ -1,7 +1,5 @@
 """The strain energies that formingx knows, and the user's own."""
 
-from __future__ import annotations
-
 import inspect
 import itertools
 import math

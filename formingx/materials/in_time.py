@@ -1,7 +1,5 @@
 """What materials have in common that relax to an equilibrium, and their tests in time."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable
 from typing import Any

@@ -3,8 +3,6 @@
 Membrane theory of shapes that stay what they are. The layers share the stretches, so their forces add up.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

@@ -11,8 +11,6 @@ step of time, exact where it is refreshed, with the consistent tangent. A symmet
 22, 12, 33); arrays are of shape (4, n).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Published constants of materials, each with its source: to begin with, not to design with."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from .damping import PSM

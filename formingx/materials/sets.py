@@ -1,7 +1,5 @@
 """A material that sets: as it cools a glassy network is born, free of stress in the shape that the body has then."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

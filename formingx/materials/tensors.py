@@ -1,7 +1,5 @@
 """Symmetric tensors with one principal direction out of the plane, as their entries 11, 22, 12, 33 (UFL or NumPy)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ..physics import kinematics

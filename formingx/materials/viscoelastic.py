@@ -9,8 +9,6 @@ the elastic energy, and for dt without bound it has no branch.
 A symmetric tensor with the block structure of F (`physics.kinematics`) is kept as its entries (11, 22, 12, 33).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """The measures that every run records: the columns of a path."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Forces as targets: of the body on what a run drives, a support or a tool."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How far a body has relaxed: its stress at the pole over that which is left, elastic strains of branches."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import basix

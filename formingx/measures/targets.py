@@ -1,7 +1,5 @@
 """What a run can aim at: pole height, stretch, volume, pressure, travel, time."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

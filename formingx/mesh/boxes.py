@@ -1,7 +1,5 @@
 """Which of many boxes overlap, found in a tree of boxes around boxes: n log n where few do, wherever they lie."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Discs, spheres, parisons, and bodies between two lines."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any

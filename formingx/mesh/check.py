@@ -1,7 +1,5 @@
 """Whether elements cover the body once: none flat or turned inside out, none over another, no gap, all in one piece."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The files of meshes: gmsh's own and plain text."""
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

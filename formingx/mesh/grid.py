@@ -1,7 +1,5 @@
 """A mesh as plain arrays, and the way from there to a distributed mesh and back."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Where points lie in a mesh: the cell and the place in it, on one rank each."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ gmsh itself takes a file for a script unless it begins as a mesh, and scripts ca
 and names or it is refused: nothing in it can run.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterator, Sequence

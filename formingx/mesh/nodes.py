@@ -1,7 +1,5 @@
 """Where this rank's cells and facets of a DOLFINx mesh have their nodes, in as many coordinates as the mesh has."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

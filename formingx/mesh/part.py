@@ -1,7 +1,5 @@
 """A part of a mesh: what is left of a sheet that is trimmed."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .grid import Grid, gathered, to_mesh

@@ -1,7 +1,5 @@
 """A mesh of what lies inside a closed outline of curved edges, by gmsh: small elements at corners, names kept."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

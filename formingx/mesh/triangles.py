@@ -1,7 +1,5 @@
 """The triangles of a mesh at rest: their sizes and shapes, and where in the body one is."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A gmsh model for the time of a mesh, in a session that a script has open, or in one of its own."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any

@@ -1,7 +1,5 @@
 """Whether a run can come to what it aims at: before anything is solved."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Whether the tools of a process can move as its stages say: before anything is solved."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A temperature all over a body: a number, a function, a table, a file, or the end of an earlier run."""
 
-from __future__ import annotations
-
 import os
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Quadrature points of a layer in the mesh: where constants that vary over the body are looked at."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import basix

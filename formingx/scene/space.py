@@ -1,7 +1,5 @@
 """What a scene in space may have, and what is not proven there and so refused."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """A scene in words."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 from typing import Any

@@ -1,7 +1,5 @@
 """The temperature of a body as a scene gives it: a field on the mesh that constants may depend on."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

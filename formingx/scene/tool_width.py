@@ -1,7 +1,5 @@
 """Whether the contact points of a face feel a tool: one that fits between two of them, or is deep in between first."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A smooth curve as circular arcs that touch it at their ends, with its tangents there (biarcs), to a tolerance."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

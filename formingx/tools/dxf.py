@@ -1,7 +1,5 @@
 """The curves of a DXF drawing: lines, arcs, circles, polylines with bulges, ellipses and splines."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections import Counter

@@ -3,8 +3,6 @@
 ezdxf gives what a damaged curve lacks a usual value, such as (0, 0) for an end, and leaves out what it does not know.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 

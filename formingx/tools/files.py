@@ -1,7 +1,5 @@
 """Profiles of tools from files: drawings and meshes, read as data, so that nothing in a file runs."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Callable, Sequence

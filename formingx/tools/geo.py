@@ -5,8 +5,6 @@ points, lines, circles, and numbers given a name; loops, surfaces, physical grou
 tool needs none of them; any other statement is refused.
 """
 
-from __future__ import annotations
-
 import ast
 import math
 import operator

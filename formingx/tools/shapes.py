@@ -1,7 +1,5 @@
 """Ready-made shapes of rigid tools; `read` takes a tool's profile from a file."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """What contact asks of a rigid tool."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np

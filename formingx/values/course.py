@@ -1,7 +1,5 @@
 """A function of time as a table that a machine can follow."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A quantity given by a few points of another, such as a modulus at some temperatures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any

@@ -1,7 +1,5 @@
 """Functions of the temperature, and time-temperature superposition: how much slower a material relaxes at another."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Plain data with arrays in it, as JSON beside one file of bytes, which is read at once."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

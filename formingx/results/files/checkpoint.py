@@ -10,8 +10,6 @@ remember, by node or by cell, likewise. Of format 4, which is read, too, fields 
 adios4dolfinx, and all else is in state.json.
 """
 
-from __future__ import annotations
-
 import errno
 import json
 import logging

@@ -1,7 +1,5 @@
 """A scene as plain data: to tell whether two scenes are the same, and for people to read."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -17,8 +17,6 @@ Every triangle gets six nodes of its own, so that nothing is smeared over an int
 A membrane has displacement and thickness only. Rank 0 writes.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A bar for what takes long after a run: a report, a checkpoint that is written or read."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable, Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """Columns of numbers as files that other programs open: CSV, and Excel."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -3,8 +3,6 @@
 G. Dhondt, CalculiX CrunchiX User's Manual: S8R and S6 elements, *SHELL SECTION with *NODAL THICKNESS.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

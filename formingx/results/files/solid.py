@@ -3,8 +3,6 @@
 STL: 3D Systems (1988), binary. glTF 2.0: Khronos, ISO/IEC 12113:2022, binary (GLB); lengths are those of the script.
 """
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

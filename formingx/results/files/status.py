@@ -1,7 +1,5 @@
 """Where a run stands that writes a checkpoint: read from its last states, while it goes on."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Files that people open: CSV of a path and of a profile, JSON summaries. Rank 0 writes, whole files or none."""
 
-from __future__ import annotations
-
 import csv
 import errno
 import json

@@ -3,8 +3,6 @@
 The curve is that of what the stage drives: a plug's force against its travel, a pressure against the pole's height.
 """
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from typing import Any

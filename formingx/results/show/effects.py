@@ -1,7 +1,5 @@
 """What a study found, drawn: main effects, Pareto fronts, and a page of both."""
 
-from __future__ import annotations
-
 import html
 import itertools
 from typing import Any

@@ -1,7 +1,5 @@
 """The drawings of a report as data for plotly.js: sections, surfaces and curves; `report.js` puts them on the page."""
 
-from __future__ import annotations
-
 import base64
 import functools
 import gzip

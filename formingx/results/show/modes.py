@@ -1,7 +1,5 @@
 """Modes of a body drawn: in space, its whole surface, and over the section."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

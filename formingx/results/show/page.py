@@ -1,7 +1,5 @@
 """Pieces of an HTML page."""
 
-from __future__ import annotations
-
 import base64
 import html
 import io

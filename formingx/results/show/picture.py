@@ -1,7 +1,5 @@
 """A picture or a film that was written to a file, which shows itself at the end of a notebook's cell."""
 
-from __future__ import annotations
-
 import base64
 import os
 from pathlib import Path

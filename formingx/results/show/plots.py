@@ -1,7 +1,5 @@
 """Curves with matplotlib, drawn without a screen."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ...figures import figure

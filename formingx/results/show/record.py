@@ -1,7 +1,5 @@
 """A run as plain data, made from a path or from a checkpoint alone: what reports and pictures are made of."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field

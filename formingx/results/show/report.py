@@ -4,8 +4,6 @@ First the answer, then the process as moving drawings, then inputs, warnings and
 made from paths or from checkpoints alone; plotly.js and the data are in the file, packed.
 """
 
-from __future__ import annotations
-
 import datetime
 import html
 import importlib.metadata

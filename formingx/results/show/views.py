@@ -1,7 +1,5 @@
 """Three-dimensional pictures with pyvista, drawn without a screen."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os
