@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from .errors import ConvergenceError, instance, known, positive
+from .errors import ConvergenceError, InputError, instance, known, positive
 from .measures.targets import travel as travel_to
 from .mesh.mesh import Mesh
 from .physics.contact import Contact
 from .physics.supports import Displaced, Symmetry
 from .results.path import Path
-from .results.stability import Loss, Stability
+from .results.stability import Loss, Stability, wave_numbers
 from .runs import trace
 from .scene.scene import Scene
 from .solve.stepping import StepControl
@@ -122,24 +122,26 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
         step: default `StepControl(largest=0.004)`.
 
     Raises:
-        InputError: an argument that is not allowed.
+        InputError: an argument that is not allowed; the foot does not come to the floor.
         ConvergenceError: not even the first state was found.
     """
     instance("top_load: body", body, Mesh, "a mesh, such as path.formed()")
     known("top_load: neck", neck, body.boundaries)
     known("top_load: foot", foot, body.boundaries)
-    travel, modes = positive("top_load: travel", travel), list(modes)
+    travel = positive("top_load: travel", travel)
     if floor is None:
         floor = plane(float(body.nodes_of(foot)[:, 1].min())).reversed()
     scene = Scene(mesh=body, materials=material,
                   supports=[*[Symmetry("axis")] * ("axis" in body.boundaries), Symmetry(neck, "r"),
                             Displaced(neck, "z")],
                   contacts=[Contact(foot, floor, "none", **_FOOT)])
-    ended = ""
+    modes, ended = wave_numbers(scene.kinematics, modes), ""
     try:
         path = trace(scene, until=travel_to(-travel), progress=False, step=step or StepControl(largest=_STEP))
     except ConvergenceError as error:
         if error.path is None or len(error.path.states) < 2:
             raise
         path, ended = error.path, str(error).split(". ")[0]
+    if not path["contact_length"].any():
+        raise InputError(f"top_load: floor = {floor!r}: {foot!r} does not come to it within travel = {travel:g}")
     return TopLoad(path, path.stability(modes, "all"), -path["travel"], path["support_force"], ended)

@@ -240,6 +240,8 @@ def test_membrane_and_loads_that_do_not_know():
         path.stability([2])
     with pytest.raises(InputError, match="whole"):
         path.stability([2.5])
+    with pytest.raises(InputError, match="at least one"):
+        path.stability([2], states=[])
 
 
 RANKS = """
@@ -372,6 +374,11 @@ def test_top_load_of_a_tube():
     assert 0 < found.energy <= whole * (1 + 1e-12)
     with pytest.raises(InputError, match="top_load: neck"):
         fx.top_load(mesh, material=fx.NeoHookean(c10=1.0), travel=0.8, modes=[1])
+    ends = {"neck": "top", "foot": "bottom", "material": fx.NeoHookean(c10=1.0)}
+    with pytest.raises(InputError, match="must be at least 0"):        # before anything is run
+        fx.top_load(mesh, travel=0.8, modes=[-2], **ends)
+    with pytest.raises(InputError, match="'bottom' does not come to it"):
+        fx.top_load(mesh, travel=0.05, modes=[1], floor=fx.tools.plane(-9.0).reversed(), **ends)
 
 
 def test_branches_of_a_tube_are_images_of_each_other():

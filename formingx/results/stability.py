@@ -170,7 +170,7 @@ class Watch:
 
     def look(self, modes: Iterable[float], states: Any) -> Stability:
         """See `Path.stability`."""
-        numbers = _numbers(self._path.problem, modes)
+        numbers = wave_numbers(self._path.problem.scene.kinematics, modes)
         chosen = _chosen(self._path, states)
         counts: dict[Kind, list[int]] = {}
         losses: list[Loss] = []
@@ -246,7 +246,7 @@ class Unstable:
 
     def watch(self, path: Any) -> None:
         """From now on look at the last state whenever a step of the path is complete."""
-        watch, numbers = Watch(path), _numbers(path.problem, self.modes)
+        watch, numbers = Watch(path), wave_numbers(path.problem.scene.kinematics, self.modes)
         first: dict[Kind, int] = {}
 
         def look() -> None:
@@ -272,12 +272,13 @@ def unstable(modes: Iterable[float] = range(9)) -> Unstable:
     return Unstable(modes)
 
 
-def _numbers(problem: Any, modes: Any) -> list[float]:
+def wave_numbers(kinematics: Any, modes: Any) -> list[float]:
+    """`modes` of `Path.stability` as a list, each once, or an InputError."""
     try:
         numbers = [finite("stability: modes", n) for n in modes]
     except TypeError:
         raise InputError(f"stability: modes = {modes!r}: must be several numbers of waves, such as range(9)") from None
-    axisymmetric = problem.scene.kinematics.axisymmetric
+    axisymmetric = kinematics.axisymmetric
     for n in numbers:
         if n < 0 or axisymmetric and n != int(n):
             raise InputError(f"stability: modes: {n:g}: must be at least 0" + ", and whole: waves round the axis"
@@ -294,6 +295,8 @@ def _chosen(path: Any, states: Any) -> list[State]:
         given = several("stability: states", [states] if isinstance(states, State) else states, "states of the path")
         if any(all(s is not one for one in path.states) for s in given):
             raise InputError("stability: states: must be of this path")
+        if not given:
+            raise InputError("stability: states: must be at least one")
         return sorted(given, key=path.states.index)
     everything = isinstance(states, str) and states == "all"
     number = len(there) if everything else min(count("stability: states", states), len(there))
