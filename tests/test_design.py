@@ -83,6 +83,25 @@ def test_bad_input_is_told_in_words():
                          ((1, 3, 0), "below the second")):
         with pytest.raises(fx.InputError, match=words):
             fx.Design(disc, {"c": wrong})
+    with pytest.raises(fx.InputError, match="c = 'x': must be a number"):
+        design.run({"c": "x"})
+    run = fx.Design(disc, {"height": 0.3}).run()
+    for wrong in (3, None, lambda path: "x", lambda path: np.nan):
+        with pytest.raises(fx.InputError, match="must be 'wall', 'volume', a column"):
+            run.derivative(wrong)
+    for wrong in (-0.1, np.nan):
+        with pytest.raises(fx.InputError, match="spread: height"):
+            run.spread({"height": wrong})
+
+
+def test_what_is_not_reached_is_said():
+    """A wall, a volume and a least wall beyond the bounds."""
+    design = fx.Design(programmed, {"h": fx.along(2, start=0.0, low=-0.3, high=0.3)})
+    assert "within the bounds, would be 0.9 % better" in design.fit(wall=1.0, volume=None).why
+    assert "the volume that was asked for, 99, was not reached" in str(design.fit(even=True, volume=99.0, runs=4))
+    answer = design.least_weight(least_wall=1.0)
+    assert "least wall that was asked for, 1, was not reached" in str(answer)
+    assert answer.best.vector.min() > 0.2                              # as thick as may be, not as light
 
 
 def cup(b, fillet=0.2):

@@ -25,7 +25,8 @@ class Answer:
     Attributes:
         before, best: the first and the best `DesignRun`; runs: all that were taken, in order; failed: why others made
             no path, in words; inside: which places of the wall counted, shape (k,); why: the search ended; foretold:
-            the wall that the run before the best foretold for it, shape (k,), length.
+            the wall that the run before the best foretold for it, shape (k,), length; lack: a volume or a least wall
+            that was asked for and not reached, in words, or "".
     """
 
     before: DesignRun
@@ -35,6 +36,7 @@ class Answer:
     inside: np.ndarray
     why: str
     foretold: np.ndarray
+    lack: str = ""
 
     @property
     def values(self) -> dict[str, Any]:
@@ -78,7 +80,8 @@ class Answer:
         lines += [f"the wall was foretold to {100 * off:.2g} % by the run before"]
         lines += [f"bounds: {', '.join(met)}" for met in [self.at_bounds()] if met]
         lines += [f"no effect: {', '.join(none)}" for none in [self.without_effect()] if none]
-        return "\n".join([*lines, *(f"failed: {text}" for text in self.failed)])
+        lines += [f"the best run: {text}" for kind, text in self.best.path.doubts() if kind == "serious"]
+        return "\n".join([*lines, *[self.lack] * bool(self.lack), *(f"failed: {text}" for text in self.failed)])
 
     def plot_wall(self, axes: Any = None) -> Any:
         """Draw the wall before and after over the reference length; returns the matplotlib axes."""

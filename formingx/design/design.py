@@ -27,6 +27,9 @@ _HELD = 1e2
 _SPARE = 1e-6
 """Part of the volume by which what is kept stays below it."""
 
+_KEPT = 5e-3
+"""Part by which a volume or a least wall may be missed, unsaid."""
+
 _DAMPED = 1e-6
 """Of what has most effect: smaller effects count as none."""
 
@@ -149,8 +152,10 @@ class Design:
             step = lsq_linear(np.vstack([by * size, held]), np.append(-left, 0 * size), tol=1e-12,
                               bounds=((low - best.vector) / size, (high - best.vector) / size)).x * size
             gain = np.sqrt(np.mean((by @ step) ** 2))
-            if gain < good or np.sum((left + by @ step) ** 2) > (1 - _WORTH) * np.sum(left**2):
-                why = f"the next step would change the wall by {gain:.1e}"
+            better = 1 - np.sum((left + by @ step) ** 2) / np.sum(left**2)
+            if gain < good or better < _WORTH:
+                why = f"the next step would change the wall by {gain:.1e}" if gain < good else (
+                    f"the next step, within the bounds, would be {100 * max(better, 0.0):.1f} % better")
                 break
             share, new = 1.0, None
             while share >= _SHORTEST and len(taken) + len(notes) < most:
@@ -172,7 +177,7 @@ class Design:
                 why = f"the last run was {100 * gained:.1f} % better"
                 break
             log.info("design: run %d, cost %.3g", len(taken), aim.cost(best))
-        return Answer(first, best, taken, notes, aim.inside, why, foretold)
+        return Answer(first, best, taken, notes, aim.inside, why, foretold, _lack("volume", aim.held, best.volume))
 
     def least_weight(self, least_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
         """Search for the least volume of the body with a wall nowhere less than so much (SciPy's SLSQP).
@@ -190,11 +195,12 @@ class Design:
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
         first = self._run(self.parameters.start.copy())
         inside = _inside(first, within)
+        unit = min(least, first.wall[inside].min())
         best, taken, foretold, reach, why = first, [first], first.wall, 0.25, f"{most} runs were taken"
         notes: list[str] = []
 
         def cost(run: DesignRun) -> float:
-            return run.volume / first.volume + 10 * max(least - run.wall[inside].min(), 0.0) / least
+            return run.volume / first.volume + 10 * max(least - run.wall[inside].min(), 0.0) / unit
         while len(taken) + len(notes) < most:
             try:
                 wall, by = best.derivative("wall")
@@ -205,8 +211,8 @@ class Design:
                 break
             grows = best.derivative("volume")[1][0] / first.volume
             n = len(size)
-            # the wall's lack, in parts of the least wall, is one more unknown: there is a solution at any rate
-            rows = np.column_stack([-by[inside] * size, -np.full(inside.sum(), least)])
+            # the wall's lack is one more unknown: there is a solution at any rate
+            rows = np.column_stack([-by[inside] * size, -np.full(inside.sum(), unit)])
             room = [(max((a - v) / s, -reach), min((b - v) / s, reach))
                     for a, b, v, s in zip(low, high, best.vector, size)]
             found = linprog(np.append(grows * size, 10.0), A_ub=rows, b_ub=wall[inside] - least,
@@ -228,14 +234,23 @@ class Design:
             if reach < 1e-4:
                 why = "no shorter step is better"
                 break
-        return Answer(first, best, taken, notes, inside, why, foretold)
+        thinnest = best.wall[inside].min()
+        return Answer(first, best, taken, notes, inside, why, foretold,
+                      _lack("least wall", least, min(thinnest, least)))
+
+
+def _lack(what: str, wanted: float | None, found: float) -> str:
+    """What was asked for and not reached, in words, or ""."""
+    if wanted is None or abs(found / wanted - 1) < _KEPT:
+        return ""
+    return f"the {what} that was asked for, {wanted:.5g}, was not reached: {found:.5g}"
 
 
 class _Aim:
     """A wanted wall as least squares: relative deviations, and that of the volume where it is held."""
 
     def __init__(self, run: DesignRun, wall: Any, within: tuple[float, float] | None, held: float | None):
-        self.inside, self._held = _inside(run, within), held
+        self.inside, self.held = _inside(run, within), held
         self._even = wall is None
         if not self._even:
             s = run.profile.reference_length[self.inside]
@@ -253,10 +268,10 @@ class _Aim:
         slopes = by / np.reshape(wanted, (-1, 1))
         if self._even:
             slopes -= np.outer(wall / wanted**2, by.mean(0))
-        if self._held is not None:
-            grows = run.derivative("volume")[1][0] / self._held
+        if self.held is not None:
+            grows = run.derivative("volume")[1][0] / self.held
             weight = _HELD * np.sqrt(len(left))
-            left = np.append(left, weight * (run.volume / self._held - 1))
+            left = np.append(left, weight * (run.volume / self.held - 1))
             slopes = np.vstack([slopes, weight * grows])
         return left, slopes
 
@@ -264,7 +279,7 @@ class _Aim:
         """Mean square of the relative deviations, and of the volume's."""
         wall = run.wall[self.inside]
         left = np.mean((wall / (wall.mean() if self._even else self._wanted) - 1) ** 2)
-        return float(left + (0.0 if self._held is None else (run.volume / self._held - 1) ** 2))
+        return float(left + (0.0 if self.held is None else (run.volume / self.held - 1) ** 2))
 
 
 def _inside(run: DesignRun, within: tuple[float, float] | None) -> np.ndarray:

@@ -125,9 +125,10 @@ class Parameters:
             n = len(one.start)
             if name in values:
                 given = values[name]
-                given = given.values if isinstance(given, Knots) else np.atleast_1d(np.asarray(given, dtype=float))
-                if given.shape not in ((n,), (1,)) or not np.all(np.isfinite(given)):
-                    raise InputError(f"Design: {name} = {values[name]!r}: must be {n} finite number{'s' * (n > 1)}")
+                given = given.values if isinstance(given, Knots) else np.atleast_1d(given)
+                if given.shape not in ((n,), (1,)):
+                    raise InputError(f"Design: {name} = {values[name]!r}: must be {n} number{'s' * (n > 1)}")
+                given = [finite(f"Design: {name}", one) for one in given.tolist()]
                 found[first: first + n] = given
             first += n
         return found

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, non_negative
 from ..results.evaluate.profile import Profile, Profiles
 from ..results.path import Path
 from ..solve.arc_length import Curve
@@ -113,10 +113,11 @@ class DesignRun:
         Raises:
             InputError: the run has no derivative, or the measure looks at more than the last state.
         """
+        here = self._here(measure)
         found = {one: np.atleast_1d(self._at(one, measure))
                  for *pair, _ in self._pairs for one in pair}
         by = [(found[above] - found[below]) / apart for above, below, apart in self._pairs]
-        return self._here(measure), np.stack(by, axis=-1)
+        return here, np.stack(by, axis=-1)
 
     def sensitivities(self, measure: Any = "wall") -> Effects:
         """`derivative` as a table, of the wall over the reference length."""
@@ -136,7 +137,7 @@ class DesignRun:
             mine = [k for k, one in enumerate(self._parameters.names) if one == name or one.startswith(f"{name}[")]
             if not mine:
                 raise InputError(f"spread: parameter {name!r} is not known; known: {', '.join(self.values)}")
-            sizes[mine] = size
+            sizes[mine] = non_negative(f"spread: {name}", size)
         return np.sqrt((by**2) @ sizes**2)
 
     def _here(self, measure: Any) -> np.ndarray:
@@ -144,7 +145,14 @@ class DesignRun:
             if measure in ("wall", "volume"):
                 return np.atleast_1d(getattr(self, measure))
             return self.path[measure][-1:]
-        whole = np.atleast_1d(np.asarray(measure(self.path), dtype=float))
+        found = measure(self.path) if callable(measure) else None
+        try:
+            whole = np.atleast_1d(np.asarray(found, dtype=float))
+        except (TypeError, ValueError):
+            whole = np.array(np.nan)
+        if not np.all(np.isfinite(whole)):
+            raise InputError(f"Design: measure {measure!r} is {found!r}: must be 'wall', 'volume', a column of the"
+                             f" path, or a function of it that gives finite numbers")
         short = _of_one(self.path.last, Record(self.path.problem, self.path.record.curve))
         if not np.allclose(whole, measure(short), rtol=1e-9, atol=0):
             raise InputError("Design: a measure must be one of the last state alone: this function of the path looks at"
