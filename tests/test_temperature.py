@@ -80,7 +80,7 @@ def test_constants_follow_a_temperature_that_changes():
     """The stiffness of the forms is that of the new temperature; one outside the table is refused."""
     here = scene(fx.NeoHookean(c10=fx.table(HOT)), 150.0, fx.MixedPressure())
     problem = Problem(here)
-    c10 = problem.forms.coefficients["sheet", "c10"]
+    c10 = problem.forms.terms[0].constants["c10"]
     assert np.allclose(c10.x.array, 0.6)
     problem.temperature.T.x.array[:] = 130.0
     problem.forms.take_temperature()
@@ -151,7 +151,7 @@ def test_a_sheet_cools_while_it_waits():
     alone = fx.heat(scene.mesh, SHEET, [fx.Convection("top", h=100.0, air=20.0)], start=150.0, times=2.0, unit="C",
                     tolerance=0.01)
     points = np.array([[0.0, 0.0], [0.01, 1e-3]])
-    c10 = path.problem.forms.coefficients["sheet", "c10"].ufl_operands[0]        # times how it goes on in a step
+    c10 = path.problem.forms.terms[0].constants["c10"].ufl_operands[0]        # times how it goes on in a step
     with path.problem.at(path.last):
         assert path.problem.temperature.at(points) == pytest.approx(alone.at(points)[-1], abs=0.05)
         stiffer = c10.x.array.max()

@@ -7,7 +7,6 @@ import pytest
 import ufl
 from conftest import run_json
 from dolfinx import fem
-from petsc4py import PETSc
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from test_derivatives import difference, random_state, residual
@@ -349,41 +348,6 @@ def test_a_scene_without_time_compiles_no_derivative_by_it():
                      supports=[SYMMETRY, fx.Clamped("rim"), fx.Displaced("bottom")])
     forms = Problem(scene).forms
     assert forms.control_derivative is None and not forms.histories and forms.energy is forms.potential
-
-
-def test_a_constant_can_be_set():
-    """The residual is then that of a scene with the new value, what the energy leaves at rest included."""
-    def problem(c10):
-        return Problem(layered({"low": fx.MooneyRivlin(c10=c10, c01=0.1), "high": fx.NeoHookean(c10=5.0)}))
-    one, two = problem(1.0), problem(2.0)
-    x, _ = random_state(one)
-    one.forms.set_constant("low", "c10", 2.0)
-    assert one.forms.coefficients["low", "c10"].value == 2.0
-    assert np.array_equal(residual(one, 0.3)(x), residual(two, 0.3)(x))
-    with pytest.raises(fx.InputError, match="at least 0"):
-        one.forms.set_constant("low", "c10", -1.0)
-
-
-def test_gradient_by_a_constant():
-    """d(displacement)/d(c10) at a pressure, by the tangent, against scenes with other constants."""
-    def inflated(c10):
-        return fx.solve(layered({"low": fx.MooneyRivlin(c10=c10, c01=0.1), "high": fx.NeoHookean(c10=2.0)}), to=0.1)
-    path, h = inflated(1.0), 1e-4
-    problem, x, point = path.problem, vector(path), [(0.0, 0.0)]
-    by_constant = problem.forms.compile(problem.forms.constant_derivative("low", "c10"))
-    tangent, right, dx = problem.tangent(x, path.last.control), x.duplicate(), x.duplicate()
-    values = -problem.assemble(by_constant)
-    values[problem.held] = 0
-    problem.fill(right, values)
-    solver = PETSc.KSP().create(problem.comm)
-    solver.setOperators(tangent)
-    solver.setType("preonly")
-    solver.getPC().setType("lu")
-    solver.getPC().setFactorSolverType("mumps")
-    solver.solve(right, dx)
-    exact = problem.forms.probe(problem, point).displacement(dx)[0, 1]
-    plus, minus = (displacement(inflated(1.0 + s), point)[0, 1] for s in (h, -h))
-    assert exact == pytest.approx((plus - minus) / (2 * h), rel=1e-6) and exact < 0
 
 
 def test_block_on_springs():

@@ -48,7 +48,6 @@ class Formulation(ABC):
         scales: the user's value (pressure, travel, ...) over the amplitude (`Setting`), for every thing of the scene;
             last, 1 for the time. control_scale: that of the only driven thing, or L.
         terms: of each material of the scene its `MaterialTerms`.
-        coefficients: {(layer, name): `Constant` or UFL coefficient} of the materials' constants.
         histories: what the forms depend on besides fields, control and time (`History`).
         potential: of a step, over stress times volume (UFL, rank 0); energy: the energy stored, likewise: the same
             without histories. dissipation: power, over stress times volume (UFL, rank 0), damage_energy: energy,
@@ -147,8 +146,6 @@ class Formulation(ABC):
         """Coefficients, histories and energies."""
         self._terms = {name: terms for material, names in self._groups()
                        for terms in [MaterialTerms(self, material, names)] for name in names}
-        self.coefficients = {(layer, name): c for layer, terms in self._terms.items()
-                             for name, c in terms.constants.items()}
         self.terms = list(dict.fromkeys(self._terms.values()))
         self._pasts = [PastStates(self, terms) for terms in self.terms if terms.held]
         changing = [terms for terms in self.terms if terms.internal]
@@ -188,9 +185,9 @@ class Formulation(ABC):
         """What strains the material of a deformation gradient F (UFL, shape (3, 3)): all but thermal expansion."""
         return F if self._free is None else self._free.elastic(F)
 
-    def temperatures(self, terms: MaterialTerms, values: Any = None) -> np.ndarray:
-        """The temperature (or other values of it) at the quadrature points of a material, (cells, points)."""
-        return self.temperature.in_cells(terms.cells, terms.places, values)
+    def temperatures(self, terms: MaterialTerms) -> np.ndarray:
+        """The temperature at the quadrature points of a material, (cells, points)."""
+        return self.temperature.in_cells(terms.cells, terms.places)
 
     def take_temperature(self) -> None:
         """The temperature has changed: constants follow it; scales stay as they are; collective.
@@ -266,19 +263,6 @@ class Formulation(ABC):
     def thickness(self, boundary: str) -> float:
         """Volume of the body over the area of a boundary, length."""
         return self.volume / self.integral(self.scene.kinematics.weight(self.X) * self.face(boundary, 2)[1])
-
-    def set_constant(self, layer: str, name: str, value: float) -> None:
-        """Give a material's constant, in all layers of that material, another value; scales stay as they are.
-
-        Raises:
-            InputError: the constant is not a number, or the material does not allow the value.
-        """
-        self._terms[layer].set(name, value)
-
-    def constant_derivative(self, layer: str, name: str) -> Any:
-        """dresidual/dconstant (UFL, rank 1) of a material's constant; of one that varies, for the same added to all."""
-        v, instead = self._terms[layer].as_variable(name)
-        return ufl.derivative(ufl.diff(ufl.replace(self.potential, instead), v), self.w, self.test_function())
 
     @property
     def clock(self) -> float:

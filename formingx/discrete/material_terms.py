@@ -151,22 +151,6 @@ class MaterialTerms:
     def _time_step(self) -> Any:
         return self.forms.time - self.start
 
-    def set(self, name: str, value: float) -> None:
-        """Give a constant that is a number another value; the rest stress follows."""
-        if self.material.varies:
-            raise InputError(f"{self.material}: has constants that vary: make another scene for other values")
-        values = {n: float(c.value) for n, c in self.constants.items()} | {name: value}
-        self.rest_stress.value = self.material.with_constants(values.values()).rest_stress
-        self.constants[name].value = value
-
-    def as_variable(self, name: str) -> tuple[Any, dict[Any, Any]]:
-        """(a constant as a UFL variable v, {what is in the forms: what is there instead as a function of v})."""
-        v = ufl.variable(self.constants[name])
-        instead = {self.constants[name]: v}
-        if not self.material.varies:
-            instead[self.rest_stress] = self._rest_stress(self.constants | {name: v})
-        return v, instead
-
     def _rest_stress(self, constants: dict[str, Any]) -> Any:
         """dW/dF11 at F = I (UFL scalar)."""
         F = ufl.variable(ufl.Identity(3))

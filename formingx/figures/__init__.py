@@ -33,9 +33,8 @@ def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: An
     return drawing, axes[0] if len(axes) == 1 else axes
 
 
-def tools(axes: Any, placed: Any, low: Any, high: Any, mirror: bool = False, colour: str = "0.35",
-          filled: bool = True) -> None:
-    """Rigid tools, as far as they reach into the box from `low` to `high`, (r, z); their solid grey if `filled`.
+def tools(axes: Any, placed: Any, low: Any, high: Any, mirror: bool = False) -> None:
+    """Rigid tools, as far as they reach into the box from `low` to `high`, (r, z); their solid grey.
 
     placed: [(tool, its shift (r, z))]; mirror: with their mirror images at r = 0.
     """
@@ -47,6 +46,5 @@ def tools(axes: Any, placed: Any, low: Any, high: Any, mirror: bool = False, col
         depth = tool.signed_distance(points.reshape(-1, 2) - shift).reshape(points.shape[:2])
         if depth.max() <= 0 or depth.min() >= 0:
             continue
-        if filled:
-            axes.contourf(r, z, depth, levels=[0, np.inf], colors=["0.88"], zorder=0.5)
-        axes.contour(r, z, depth, levels=[0], colors=[colour], linewidths=1.5, zorder=1.5)
+        axes.contourf(r, z, depth, levels=[0, np.inf], colors=["0.88"], zorder=0.5)
+        axes.contour(r, z, depth, levels=[0], colors=["0.35"], linewidths=1.5, zorder=1.5)

@@ -64,9 +64,9 @@ class Inflated:
         return np.sum(each, axis=0)
 
 
-def first_peak(pressure: Callable[[np.ndarray], np.ndarray], most: float = 20.0) -> Peak | None:
-    """The first maximum of a pressure over stretches from 1 to `most`; None: it only grows."""
-    stretches = np.geomspace(1.0 + 1e-6, most, 2000)
+def first_peak(pressure: Callable[[np.ndarray], np.ndarray]) -> Peak | None:
+    """The first maximum of a pressure over stretches from 1 to 20; None: it only grows."""
+    stretches = np.geomspace(1.0 + 1e-6, 20.0, 2000)
     found = pressure(stretches)
     found = found[: int(np.argmin(np.append(np.isfinite(found), False)))]    # up to what can be stretched
     falls = np.flatnonzero(found[1:] < found[:-1] * (1 - 1e-12))

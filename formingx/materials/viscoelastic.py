@@ -284,19 +284,6 @@ class Viscoelastic(RelaxingMaterial):
         self._remembers = order == 2
         super().__init__(equilibrium, branches, shift)
 
-    def step_error(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
-        """How far a step of first order is from one of second; a UFL scalar, stress.
-
-        The norm of the deviator of the difference in Kirchhoff stress, for a choice of steps in time.
-        """
-        C, difference = isochoric(F), (0, 0, 0, 0)
-        for k, mu, tau in self._branches(constants):
-            Cv = entries(internal[f"Cv_{k}"])
-            second = cofactor(self._advanced(C, entries(internal["C"]), Cv, time_step / tau))
-            first = cofactor(self._advanced(C, None, Cv, time_step / tau))
-            difference = plus(difference, plus(second, first, -1), mu)
-        return ufl.sqrt(ufl.max_value(deviator_squared(C, difference), 0))
-
     def _metric(self, Cv):
         return cofactor(Cv)
 

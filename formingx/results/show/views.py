@@ -15,7 +15,7 @@ from .. import files
 from ..evaluate.profile import distance_to_line
 
 
-def revolved(profile: Any, file: Any, comm: Any, title: str = "thickness / original") -> None:
+def revolved(profile: Any, file: Any, comm: Any) -> None:
     """The sheet revolved about the axis by three quarters, coloured by thickness ratio, as a PNG (rank 0 draws).
 
     A sheet that is more than twice as high as wide (a parison) is cut along the middle.
@@ -27,10 +27,10 @@ def revolved(profile: Any, file: Any, comm: Any, title: str = "thickness / origi
     tall = high[1] - low[1] > 4 * high[0]
     turn = (0.0, np.pi) if tall else (0.0, 1.5 * np.pi)
     _view(profile, np.linspace(*turn, 181), lambda p, a: (p[:, 0] * np.cos(a), p[:, 0] * np.sin(a), p[:, 1]),
-          (1.2, -3.4, 1.2) if tall else (2.0, -3.4, 1.9), file, comm, title)
+          (1.2, -3.4, 1.2) if tall else (2.0, -3.4, 1.9), file, comm)
 
 
-def extruded(profile: Any, file: Any, comm: Any, title: str = "thickness / original") -> None:
+def extruded(profile: Any, file: Any, comm: Any) -> None:
     """A sheet in plane strain as a long part, coloured by thickness ratio, as a PNG (rank 0 draws).
 
     A half sheet, which begins at R = 0, is drawn whole; it is half as long again as it is wide.
@@ -44,7 +44,7 @@ def extruded(profile: Any, file: Any, comm: Any, title: str = "thickness / origi
     else:
         width = high[0] - low[0]
     _view(profile, np.linspace(-0.75 * width, 0.75 * width, 2), lambda p, y: (p[:, 0], np.full(len(p), y), p[:, 1]),
-          (1.9, -3.4, 1.7), file, comm, title)
+          (1.9, -3.4, 1.7), file, comm)
 
 
 def _bounds(profile: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -59,13 +59,13 @@ def _mirrored(profile: Any) -> Any:
     return type(profile)(*(whole(p) for p in (profile.rest_bottom, profile.rest_top, profile.bottom, profile.top)))
 
 
-def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any, comm: Any, title: str) -> None:
+def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any, comm: Any) -> None:
     """Draw the section swept through `stations`; place(points (n, 2), station) gives its x, y, z there, each (n,)."""
     file = files.named("view3d", file, ".png")
-    files.on_root(comm, lambda: _draw(profile, stations, place, camera, file, title))
+    files.on_root(comm, lambda: _draw(profile, stations, place, camera, file))
 
 
-def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any, title: str) -> None:
+def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any) -> None:
     import pyvista
 
     def swept(line, values):
@@ -80,7 +80,7 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
     line = np.vstack([profile.bottom, rim, profile.top[::-1]])
     values = np.concatenate([ratio, np.full(len(rim), ratio[-1]), beyond[::-1]])
     with plotted(file) as plotter:
-        shades = shading(values, title)
+        shades = shading(values)
         plotter.add_mesh(swept(line, values), **shades, specular=0.25, split_sharp_edges=True)
         for s in (stations[0], stations[-1]):          # the cut faces
             faces = [np.column_stack(place(side, s)) for side in (profile.bottom, profile.top)]
@@ -110,10 +110,10 @@ def plotted(file: Any, height: int = 800) -> Iterator[Any]:
     files.replace(file, lambda stream: stream.write(picture.getvalue()), "wb")
 
 
-def shading(values: np.ndarray, title: str = "thickness / original") -> dict[str, Any]:
+def shading(values: np.ndarray) -> dict[str, Any]:
     """How `add_mesh` shows the array "ratio" of a surface: colours of all its values, a bar beside it, light."""
     middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), 0.01) / 2     # a flat sheet is of one colour
-    bar = {"title": title + "\n", "color": "black", "vertical": True, "position_x": 0.85, "position_y": 0.2,
+    bar = {"title": "thickness / original\n", "color": "black", "vertical": True, "position_x": 0.85, "position_y": 0.2,
            "height": 0.6, "width": 0.07, "title_font_size": 20, "label_font_size": 18, "fmt": "%.2f", "n_labels": 5}
     return {"scalars": "ratio", "cmap": "viridis_r", "clim": (middle - half, middle + half), "scalar_bar_args": bar,
             "smooth_shading": True, "ambient": 0.45, "diffuse": 0.65, "specular_power": 20}
