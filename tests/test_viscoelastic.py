@@ -233,20 +233,6 @@ def test_order_in_time_of_steps_far_longer_than_tau():
     assert errors[0] < 0.02 and np.log2(errors[:-1] / errors[1:]) == pytest.approx(2, abs=0.15), errors
 
 
-def test_step_error_is_the_difference_of_the_two_orders():
-    second, first = Evaluated(Viscoelastic(RUBBER, P1)), Evaluated(Viscoelastic(RUBBER, P1, order=1))
-    state = second.run(shear_history, np.linspace(0, 0.6, 4))
-    one = {name: v for name, v in state.items() if name != "C"}
-
-    def kirchhoff(material, internal):
-        P = material("stress", SHEAR, internal, 0.2)
-        tau = np.array([[P[0], P[1], 0], [P[2], P[3], 0], [0, 0, P[4]]]) @ SHEAR.T
-        return tau
-    assert second("step_error", SHEAR, state, 0.2) == pytest.approx(
-        np.linalg.norm(kirchhoff(second, state) - kirchhoff(first, one)), rel=1e-10)
-    assert second("step_error", SHEAR, state, 0.0) < 1e-7
-
-
 @pytest.mark.parametrize("law", [Viscoelastic, TransientNetwork])
 def test_energy_balance(law):
     """Work = stored + dissipated along F(t), each by its own integral."""
