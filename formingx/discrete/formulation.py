@@ -185,9 +185,9 @@ class Formulation(ABC):
         """What strains the material of a deformation gradient F (UFL, shape (3, 3)): all but thermal expansion."""
         return F if self._free is None else self._free.elastic(F)
 
-    def temperatures(self, terms: MaterialTerms) -> np.ndarray:
-        """The temperature at the quadrature points of a material, (cells, points)."""
-        return self.temperature.in_cells(terms.cells, terms.places)
+    def temperatures(self, terms: MaterialTerms, values: Any = None) -> np.ndarray:
+        """The temperature (or other values of it) at the quadrature points of a material, (cells, points)."""
+        return self.temperature.in_cells(terms.cells, terms.places, values)
 
     def take_temperature(self) -> None:
         """The temperature has changed: constants follow it; scales stay as they are; collective.

@@ -87,7 +87,7 @@ class MidSurface(Formulation):
         topology = self.domain.topology
         return np.arange(topology.index_map(1).size_local + topology.index_map(1).num_ghosts, dtype=np.int32)
 
-    def temperatures(self, terms: Any) -> np.ndarray:
+    def temperatures(self, terms: Any, values: Any = None) -> np.ndarray:
         """That halfway between the faces of the layer."""
         nodes = of_cells(self.domain, terms.cells)
         geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(self.domain).degree)
