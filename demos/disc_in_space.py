@@ -1,7 +1,8 @@
 """Treloar's disc as a membrane in space, against the membrane of revolution (Adkins and Rivlin 1952).
 
 Neo-Hookean, radius 1, a quarter of the disc in P1 triangles: states with the pole as high as the exact membrane has it
-at a pole stretch. Errors are of second order in the size of the triangles.
+at a pole stretch. Triangles that are flat are too stiff by the square of their size, so two sizes tell of what is
+left: extrapolated from 0.1 and 0.05, whose pressures are 1.2 and 0.3 % off at stretch 3, that is off by 1e-4.
 """
 
 import numpy as np
@@ -52,9 +53,13 @@ def main():
         say(f"size {size:g}: {numbers['unknowns']} unknowns, {numbers['iterations']} iterations; at pole stretch"
             f" {', '.join(off)} the pressure is off by {', '.join(off.values())}, the wall at the pole by"
             f" {', '.join(thin.values())}")
-    coarse, fine = (summary[f"size_{size:g}"]["pressure_over_axisymmetric"] for size in sizes[-2:])
-    order = np.log(sizes[-2] / sizes[-1])
-    summary["order_of_pressure"] = {s: np.log((coarse[s] - 1) / (fine[s] - 1)) / order for s in fine}
+    coarse, fine = (summary[f"size_{size:g}"]["pressure_over_axisymmetric"] for size in sizes[:2])
+    finer = sizes[0] / sizes[1]
+    summary["order_of_pressure"] = {s: np.log((coarse[s] - 1) / (fine[s] - 1)) / np.log(finer) for s in fine}
+    summary["extrapolated"] = {"pressure_over_axisymmetric": {
+        s: fine[s] + (fine[s] - coarse[s]) / (finer**2 - 1) for s in fine}}
+    say("pressure extrapolated from the first two: off by " + ", ".join(
+        f"{ratio - 1:.1e}" for ratio in summary["extrapolated"]["pressure_over_axisymmetric"].values()))
     path.to_csv(args.out / "disc.csv")
     if not args.quick:
         path.view3d(args.out / "disc_3d.png", grid=0.1)

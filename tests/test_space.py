@@ -51,6 +51,7 @@ def test_disc_converges_to_the_membrane_of_revolution(tmp_path):
     for s, bound in (("1.5", 8e-4), ("2", 2e-3), ("3", 4e-3)):
         assert abs(fine["pressure_over_axisymmetric"][s] - 1) < bound
         assert found["order_of_pressure"][s] > 1.8
+        assert abs(found["extrapolated"]["pressure_over_axisymmetric"][s] - 1) < 2e-4
         assert abs(fine["pole_thickness_over_axisymmetric"][s] - 1) < 4 * bound
     assert abs(fine["limit_pressure_over_axisymmetric"] - 1) < 2.5e-3
     assert fine["failures"] == 0 and fine["iterations"] <= 35
