@@ -1,8 +1,9 @@
 """A tray with ribs, draft and a boss, from an STL file: a plug draws the sheet down, then vacuum; the sheet relaxes.
 
 The mould is drawn here as a height over the plane, 150 mm by 90 mm at its mouth and 35 mm deep, its walls at 10 degrees
-to the axis, with ribs and a boss (an F) on its floor, and written as a closed solid. Lengths in mm, stresses in MPa,
-times in s.
+to the axis, with ribs and a boss (an F) on its floor, and written as a closed solid. The least wall, in a corner, needs
+small triangles there: after sheets of one size the mesh is adapted, twice, so that the wall changes by at most a fifth
+from one triangle to the next. Lengths in mm, stresses in MPa, times in s.
 """
 
 import numpy as np
@@ -17,7 +18,8 @@ SHEET, THICKNESS, DENSITY = (170.0, 110.0), 1.5, 1.05
 MATERIAL = fx.Viscoelastic(fx.NeoHookean(c10=0.03), [(0.15, 0.5)])
 BARS = [((-50, 0), (2.0, 26.0), 5.0), ((-30, 0), (2.0, 26.0), 5.0),                 # ribs: middle, half widths, height
         ((20, 0), (3.0, 14.0), 3.0), ((30, 11), (12.0, 3.0), 3.0), ((27, -1), (9.0, 3.0), 3.0)]    # an F
-PLUG_TRAVEL, SEAL, VACUUM = 24.0, 0.02, 0.08
+UNITS = fx.Units(length="mm", stress="MPa", time="s")
+PLUG_TRAVEL, SEAL, VACUUM, CHANGE = 24.0, 0.02, 0.08, 0.2
 
 
 def rounded(a, b, radius):
@@ -59,9 +61,13 @@ def write_mould(file, step):
     write_stl(np.vstack([top, low]), triangles, file)
 
 
-def form(size, mould):
+def flat(size):
+    """The sheet, of triangles of one size."""
+    return fx.mesh.sheet(fx.mesh.rectangle(*SHEET, corner=25), size=size)
+
+
+def form(sheet, mould):
     """The path of plug and vacuum."""
-    sheet = fx.mesh.sheet(fx.mesh.rectangle(*SHEET, corner=25), size=size)
     plug = fx.tools.box(half=(52, 27), depth=30, corner=15, fillet=8, draft=5, mouth=30.5, plug=True)
     contacts = [fx.Contact("bottom", mould, "stick", name="mould", nodes_per_step=2),
                 fx.Contact("top", plug, "stick", moves=(0, 0, -1), name="plug", nodes_per_step=2)]
@@ -73,35 +79,43 @@ def form(size, mould):
     return fx.Process(scene).run(stages)
 
 
+def numbers(path):
+    """What the summary holds of one path."""
+    part, wall = path.part(density=DENSITY, trim=-0.5, units=UNITS), path.wall()
+    return {"least_wall_mm": part.least_wall, "least_at_mm": list(part.least_at), "weight_g": part.weight,
+            "draw_ratio": part.draw_ratio, "touching": path.filling("mould").touching[-1],
+            "plug_force_N": float(np.abs(path["plug_force"]).max()), "states": len(path),
+            "iterations": path.counts.iterations, "failures": path.counts.failures, "triangles": len(wall.wall),
+            "smallest_triangle_mm2": float(wall.area_at_rest.min()), "unknowns": path.problem.n_unknowns,
+            "seconds": path.counts.seconds}
+
+
 def main():
     options = parser("ribbed_tray", __doc__.splitlines()[0])
-    options.add_argument("--sizes", type=float, nargs="+", default=[8.0, 5.0, 3.0], help="of the triangles, mm")
+    options.add_argument("--sizes", type=float, nargs="+", default=[8.0, 5.0], help="of the triangles, mm")
+    options.add_argument("--adapted", type=int, default=2, help="how often the mesh is then made by what a run showed")
     args = options.parse_args()
-    sizes, step = ([16.0], 3.0) if args.quick else (args.sizes, 1.25)
+    sizes, more, step = ([16.0], 0, 3.0) if args.quick else (args.sizes, args.adapted, 1.25)
     if COMM.rank == 0:
         args.out.mkdir(parents=True, exist_ok=True)
         write_mould(args.out / "mould.stl", step)
     COMM.Barrier()
-    mould, units = fx.tools.solid(args.out / "mould.stl"), fx.Units(length="mm", stress="MPa", time="s")
+    mould = fx.tools.solid(args.out / "mould.stl")
     summary = {"mould": {"triangles": mould.triangles, **mould.undercuts()}}
-    for size in sizes:
-        path = form(size, mould)
-        part = path.part(density=DENSITY, trim=-0.5, units=units)
-        summary[f"size_{size:g}"] = {
-            "least_wall_mm": part.least_wall, "least_at_mm": list(part.least_at), "weight_g": part.weight,
-            "draw_ratio": part.draw_ratio, "touching": path.filling("mould").touching[-1],
-            "plug_force_N": float(np.abs(path["plug_force"]).max()), "states": len(path),
-            "iterations": path.counts.iterations, "failures": path.counts.failures,
-            "unknowns": path.problem.n_unknowns, "seconds": path.counts.seconds}
-        say(f"size {size:g} mm: {path.counts.iterations} iterations, {path.counts.failures} failures,"
-            f" {path.counts.seconds:.0f} s", str(part), "")
-    path.wall().to_csv(args.out / "wall.csv", units)
+    path = None
+    for name in [*(f"size_{size:g}" for size in sizes), *(f"adapted_{k + 1}" for k in range(more))]:
+        size = name.removeprefix("size_")
+        path = form(fx.mesh.adapted(path, share=None, error=CHANGE) if size == name else flat(float(size)), mould)
+        summary[name], part = numbers(path), path.part(density=DENSITY, trim=-0.5, units=UNITS)
+        say(f"{name}: {summary[name]['triangles']} triangles, {path.counts.iterations} iterations,"
+            f" {path.counts.failures} failures, {path.counts.seconds:.0f} s", str(part), "")
+    path.wall().to_csv(args.out / "wall.csv", UNITS)
     path.to_csv(args.out / "ribbed_tray.csv")
     path.to_stl(args.out / "part.stl")
     if not args.quick:
         path.view3d(args.out / "ribbed_tray.png")
         path.view3d(args.out / "printed_grid.png", grid=10.0)
-        path.report(args.out / "report.html", "Ribbed tray", units=units, density=DENSITY, trim=-0.5)
+        path.report(args.out / "report.html", "Ribbed tray", units=UNITS, density=DENSITY, trim=-0.5)
     summarise(args.out, {**summary, "versions": files.versions()})
 
 

@@ -17,6 +17,7 @@ from .heat import cooling
 from .measures.columns import Measure
 from .measures.targets import Amplitude, Target
 from .mesh.adapted import adapted, of_columns
+from .mesh.sheet import Sheet
 from .physics.contact import Contact
 from .remeshing import Remesh
 from .results.evaluate import edges, snaps, tension, volume
@@ -309,7 +310,8 @@ def _after_pilot(who: str, pilot: Any, start: Any, resume: bool, scene: Scene, c
     options = {} if pilot is True else dict(pilot)
     for name in options:
         known(f"{who}: pilot", name, ("share", "error"))
-    before = len(of_columns(scene.mesh).ends) - 1
+    if not isinstance(scene.mesh, Sheet):
+        of_columns(scene.mesh)                              # or it says why not
     try:
         first = run(scene, None)
     except ConvergenceError as error:
@@ -318,8 +320,8 @@ def _after_pilot(who: str, pilot: Any, start: Any, resume: bool, scene: Scene, c
         first = error.path
         log.warning("the pilot run ended early, at %s; the mesh is made by what it has", first.describe(first.last))
     made = adapted(first, **options)
-    log.info("pilot run: %d states on %d columns of elements; adapted: %d", len(first), before,
-             len(of_columns(made).ends) - 1)
+    log.info("pilot run: %d states on %d elements; adapted: %d", len(first), *(
+        mesh.domain.topology.index_map(2).size_global for mesh in (scene.mesh, made)))
     path = run(scene.with_mesh(made), checkpoint)
     path.pilot = first
     return path

@@ -77,6 +77,10 @@ class StepLimit:
                 return Cut("contact arriving", part)
         return None
 
+    def let_go(self, new: Any) -> bool:
+        """Let go of what pulls at a tool in space at a state that was found; False if nothing does."""
+        return any([c.face.let_go(new.x[: self._n], new.control) for c in self._present])
+
     def passes_through(self, old: Any, new: Any) -> bool:
         """True if a contact point goes through its tool on the straight way from one state to another."""
         n = self._n

@@ -1,4 +1,4 @@
-"""A mesh whose columns have the sizes that a run asks for: the next run begins on it from rest, nothing is carried."""
+"""A mesh of the sizes that a run asks for, of columns or in space: the next run begins on it from rest."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InputError, positive
 from .mesh import Columns, Mesh
+from .sheet import Sheet
 
 _GROWTH = 0.25
 """By how much a column may be longer than its neighbour, over the neighbour."""
@@ -23,15 +24,16 @@ def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = Non
 
     A column is as long, at rest, as the strictest of its states allows, and at most 1.25 times its neighbour. What lies
     through the sheet stays: elements, layers and their interfaces. For meshes of `disc`, `sphere`, `parison` and
-    `from_lines`; collective.
+    `from_lines`; of a `sheet` in space triangles are made smaller, to a quarter at the least, never larger. Collective.
 
     Args:
         path: a run, on coarse elements for one (a pilot run), as far as it came.
         share: by how much a column may turn as the sheet bends, radians; where one lies on a fillet of a tool, its
-            length there over the radius of the fillet. None: it does not count.
+            length there over the radius of the fillet. In space: from triangle to triangle. None: it does not count.
         error: the estimated error of the stress, over all the body, relative (`StressError.relative`), that no state is
             to be above; columns share it, as an error of the second order. (More of them do not help where too few
-            elements lie through the sheet.) None: it does not count.
+            elements lie through the sheet.) In space: the change of the wall from triangle to triangle, relative. None:
+            it does not count.
 
     Raises:
         InputError: an argument that is not allowed; a mesh that is not one of columns; nothing asks for a size: the
@@ -49,7 +51,10 @@ def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = Non
     """
     share = None if share is None else positive("adapted: share", share)
     error = None if error is None else positive("adapted: error", error)
-    columns = of_columns(path.problem.scene.mesh)
+    mesh = path.problem.scene.mesh
+    if isinstance(mesh, Sheet):
+        return _sheet(mesh, *path.wanted_sizes(share, error))
+    columns = of_columns(mesh)
     factors = path.column_factors(share, error)
     if not np.any(np.isfinite(factors)):
         raise InputError("adapted: no state asks for a size: nothing bends or touches a fillet, and error is None: give"
@@ -57,12 +62,26 @@ def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = Non
     return columns.make(_ends(columns, factors))
 
 
+def _sheet(mesh: Sheet, points: np.ndarray, sizes: np.ndarray) -> Mesh:
+    """With triangles of sizes at points, linear between these."""
+    from scipy.interpolate import LinearNDInterpolator
+    from scipy.spatial import cKDTree
+    if mesh.of_size is None:
+        raise InputError("adapted: the sheet is not one of fx.mesh.sheet: its outline is not known")
+    inside, near = LinearNDInterpolator(points, sizes), cKDTree(points)
+
+    def size(x: float, y: float) -> float:
+        found = float(inside(x, y))
+        return found if np.isfinite(found) else float(sizes[near.query((x, y))[1]])
+    return mesh.of_size(size)
+
+
 def of_columns(mesh: Mesh) -> Columns:
     """The columns of a mesh; an InputError if it has none, or its nodes were moved."""
     columns = mesh.columns
     if columns is None:
-        raise InputError("adapted: the mesh is not one of columns: make it by disc, sphere, parison or from_lines"
-                         " (a sheet in space: give mesh.sheet another size)")
+        raise InputError("adapted: the mesh is not one of columns: make it by disc, sphere, parison or from_lines,"
+                         " or, in space, by sheet")
     nodes = np.concatenate(list(columns.place(columns.ends)[[0, -1]]))
     off = max(np.min(np.linalg.norm(nodes[:, None] - mesh.nodes_of(name), axis=2), axis=1).reshape(2, -1)[k].max()
               for k, name in enumerate(columns.faces))

@@ -25,7 +25,12 @@ class Sheet(Mesh):
 
     Beside the boundaries that its outline names there are its faces, "bottom" and "top" (towards +z): as a boundary
     each has all edges. A membrane has one surface only; on which face a pressure acts says which way it pushes.
+
+    Attributes:
+        of_size: the same sheet of triangles of another size (or function of x and y).
     """
+
+    of_size: Callable[[Any], Sheet] | None = None
 
     def __str__(self) -> str:
         x, n = self.domain.geometry.x, self.domain.topology.index_map(2).size_global
@@ -136,7 +141,8 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
     words = several("sheet: layers", layers, "names")
     plain = to_mesh(lambda: _grid(edges, size), comm, "sheet")
     return Sheet(**{**vars(plain), "layers": dict.fromkeys(words, 1),
-                    "boundaries": plain.boundaries | {"bottom": (), "top": ()}})
+                    "boundaries": plain.boundaries | {"bottom": (), "top": ()},
+                    "of_size": lambda size: sheet(edges, size, layers=words, comm=comm)})
 
 
 def _grid(edges: list[Edge], size: Any) -> Grid:

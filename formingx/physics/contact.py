@@ -73,8 +73,8 @@ class Contact(Part):
         ramp: theta over thickness of the sheet; default 1e-7 where points slide, 1e-5 where they stick or are held.
         elastic_slip: g_s over thickness of the sheet: how far a point goes under Coulomb's law before it slides.
         separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
-            start); with "stick" or "none". Default True; in space what has touched is always held, until a stage leaves
-            the tool out: there it is False.
+            start); with "stick" or "none". Default True; in space False: there it is held until a stage leaves the tool
+            out, or, with True, until it pulls (of materials that do not relax).
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge); in space so many
             hundredths of all nodes.
             What sticks or gives off heat depends on when it touched: with 4, a run takes half the iterations, and
@@ -114,10 +114,7 @@ class Contact(Part):
         held = tool.components == 3
         self.separates = instance(f"{name}: separates", not held if separates is None else separates, bool,
                                   "True or False")
-        if held and self.separates:
-            raise InputError(f"{name}: separates = True: in space what has touched is held, until a stage leaves the"
-                             f" tool out (without=[...]): must be False, or left out")
-        usual = _HELD if not self.separates else _STICK if self.sticks else _SLIDES
+        usual = _HELD if held or not self.separates else _STICK if self.sticks else _SLIDES
         self.penalty = positive(f"{name}: penalty", usual[0] if penalty is None else penalty)
         self.ramp = positive(f"{name}: ramp", usual[1] if ramp is None else ramp)
         self.elastic_slip = positive(f"{name}: elastic_slip", elastic_slip)
@@ -195,7 +192,7 @@ class Contact(Part):
         """
         theta, elastic_slip = self.ramp * thickness, self.elastic_slip * thickness
         if self.lagged:
-            return LaggedStick(self.tool, k, theta)
+            return LaggedStick(self.tool, k, theta, self.separates)
         foot = (1 - _AT_FOOT * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)
         return Law(self.tool, self.friction_at(temperature), k, theta, elastic_slip, shift, self.separates,

@@ -6,8 +6,10 @@ Within a step nothing changes: the law is linear, and Newton's method meets no k
 asks the tool. The price is an error of first order in how far points move in the step in which they arrive: with 1 % of
 the points to a step, walls are within 0.1 % of those of exact stick. The tool must give its signed distance alone.
 
-What is held stays so until a stage leaves the tool out: letting go where a point pulls was tried, lagged too; round a
-plug's edge points then let go and touch again at each step, and the run came to a stop.
+What is held stays so until a stage leaves the tool out. With `separates=True` points that pull at it are let go of
+at the end of each step, until none does, the control standing still; a body that snaps off comes to rest by a jump.
+That is proven of elastic sheets. Of relaxing ones it is refused: slack under the plug, points let go and touch again
+at each step, and the run comes to a stop.
 """
 
 from __future__ import annotations
@@ -22,6 +24,13 @@ from .contact_law import Motion, Touch, Tractions
 
 _BISECTIONS = 30
 
+_PULLS = 0.01
+"""Part, out of the tool, of the way by which the penalty gives way, from which on a point pulls (sheared along a facet
+it goes out round its edges)."""
+
+_NONE = 1e-3
+"""Such a way over theta that is as good as none."""
+
 
 class LaggedStick:
     """The `ContactLaw` of this module.
@@ -32,6 +41,7 @@ class LaggedStick:
     Args:
         tool: with its signed distance.
         k: penalty, stress/length; theta: distance from which on a point counts as touching, length.
+        separates: points let go that pull, see `pulling`.
     """
 
     has_friction = False
@@ -39,13 +49,13 @@ class LaggedStick:
     elastic_slip = 0.0
     mu = np.inf
 
-    def __init__(self, tool: RigidTool, k: Any, theta: float):
-        self.tool, self.k, self.theta = tool, k, theta
+    def __init__(self, tool: RigidTool, k: Any, theta: float, separates: bool = False):
+        self.tool, self.k, self.theta, self.separates = tool, k, theta, separates
         self._found: list[tuple[np.ndarray, np.ndarray]] = []           # distances asked for last, and where
 
     def part(self, points: np.ndarray | slice) -> LaggedStick:
         """See `ContactLaw`."""
-        return LaggedStick(self.tool, self.k, self.theta)
+        return LaggedStick(self.tool, self.k, self.theta, self.separates)
 
     def with_friction(self, mu: np.ndarray | float) -> LaggedStick:
         """See `ContactLaw`."""
@@ -54,6 +64,12 @@ class LaggedStick:
     def held(self, old: Touch) -> np.ndarray:
         """Which points are held, shape (n,)."""
         return old.distance > -self.theta
+
+    def pulling(self, x: np.ndarray, old: Touch) -> np.ndarray:
+        """Which held points pull at a tool that separates, shape (n,): the penalty gives way, they are outside."""
+        away = np.linalg.norm(x - old.position, axis=1)
+        most = np.maximum(_PULLS * away, _NONE * self.theta)
+        return self.separates & self.held(old) & (-self.distance(x) > most)
 
     def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
         """See `ContactLaw`."""
@@ -73,7 +89,7 @@ class LaggedStick:
         """What touches from the start is held from the start."""
         d = self.distance(x)
         held = d > -self.theta
-        return Touch(x.copy(), np.where(held, 0.0, d), np.zeros(len(x)), np.zeros_like(x))
+        return Touch(x.copy(), np.where(held, 0.0, d), np.zeros(len(x)), x.copy())
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
@@ -125,4 +141,4 @@ class LaggedStick:
                 low, high = np.where(inside, low, middle), np.where(inside, middle, high)
             position[rows] = a + high[:, None] * (b - a)
         free = np.minimum(d, -2 * self.theta)
-        return Touch(position, np.where(held | new, 0.0, free), np.zeros(len(x)), np.zeros_like(x))
+        return Touch(position, np.where(held | new, 0.0, free), np.zeros(len(x)), x.copy())

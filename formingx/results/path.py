@@ -171,9 +171,14 @@ class Path(States):
 
     def column_factors(self, share: float | None, error: float | None) -> np.ndarray:
         """Wanted over present length of the mesh's columns, shape (n,), by which `formingx.mesh.adapted` goes."""
-        self._section_only("adapted", "use a smaller size in fx.mesh.sheet")
+        self._section_only("column_factors", "use fx.mesh.adapted")
         from .evaluate.column_factors import column_factors
         return column_factors(self, share, error)
+
+    def wanted_sizes(self, share: float | None, error: float | None) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes of a flat sheet in space, (n, 2), and sizes of triangles there, (n,), by `formingx.mesh.adapted`."""
+        from .space.sizes import wanted_sizes
+        return wanted_sizes(self, share, error)
 
     def wall(self, state: State | None = None) -> Any:
         """The wall of the part at a state (default: the last), place by place: to_csv, to_excel.

@@ -35,7 +35,7 @@ def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None
                     scene.check_travel(tools[i], where[i])
                 except InputError as error:
                     raise InputError(f"{plan.stage.who}: {error}") from None
-            for part in np.linspace(0, 1, _LOOKS):
+            for part in np.linspace(0, 1, _LOOKS) if where != stands else [1.0]:
                 now = {i: stands[i] + part * (where[i] - stands[i]) for i in tools}
                 _check_overlap(scene, plan.stage.who, present, outlines, now)
             stands = where

@@ -119,13 +119,15 @@ class Scene:
     temperature: GivenTemperature | None = None
     heat: Any = None
     expansion: Mapping[str, ThermalExpansion] = MappingProxyType({})
+    thickness: Mapping[str, Any] = MappingProxyType({})
 
     def with_mesh(self, mesh: Mesh, preformed: Any = None) -> Scene:
         """The same scene on another mesh of the body: with the same names of layers and boundaries."""
         return Scene(mesh=mesh, materials=self.materials, supports=self.supports, loads=self.loads,
                      contacts=self.contacts, model=self.model, kinematics=self.kinematics,
                      quadrature_degree=self.quadrature_degree, heat=self.heat, expansion=self.expansion or None,
-                     preformed=preformed, temperature=None if self.temperature is None else self.temperature.given)
+                     thickness=self.thickness or None, preformed=preformed,
+                     temperature=None if self.temperature is None else self.temperature.given)
 
     @property
     def things(self) -> list[Part]:

@@ -87,6 +87,9 @@ def check_contact(scene: Any, contact: Any) -> None:
     if not contact.sticks:
         raise InputError(f"{contact!r}: in space a sheet sticks where it touches: must be 'stick'; sliding, with"
                          f" friction or without, is not proven there")
+    if contact.separates and any(material.internal or material.integral for material in scene.materials.values()):
+        raise InputError(f"{contact!r}: separates = True: in space a sheet that relaxes is held where it touches, until"
+                         f" a stage leaves the tool out (without=[...]): leave separates out")
     if contact.points != "nodes":
         raise InputError(f"{contact!r}: points = {contact.points!r}: in space contact acts at 'nodes'")
     size, length = float(np.ptp(tool.bounds, axis=0).max()), float(max(scene.extent))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -14,6 +15,8 @@ from .arc_length import Curve
 from .equations import Attempt, Findings
 from .linear import DirectSolver, condition
 from .state import State
+
+log = logging.getLogger("formingx")
 
 
 @dataclass(frozen=True)
@@ -171,6 +174,13 @@ def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, St
     found = _changes(states, usable, _signs(curve, solver))
     solver.destroy()
     return found
+
+
+def warn_of_branch(record: Any, old: State) -> None:
+    """Say so where another path begins within the step from a state to the last: their factors told, at no cost."""
+    new, usual = record.last, ["step", "target", *["start"] * (not record.equations.slack_at_rest)]
+    if old.orientation * new.orientation < 0 and old.kind in usual and new.kind in usual:
+        log.warning(ANOTHER_PATH, record.describe(old), record.describe(new))
 
 
 def _signs(curve: Curve, solver: DirectSolver) -> Callable[[State], int]:

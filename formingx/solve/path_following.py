@@ -20,12 +20,12 @@ from ..errors import ConvergenceError
 from ..measures.targets import Amplitude, Target
 from . import predictor
 from .arc_length import Predictor
-from .diagnose import ANOTHER_PATH, Diagnosis, diagnose
+from .diagnose import Diagnosis, diagnose, warn_of_branch
 from .equations import Array, Attempt, Measure
 from .newton import Failure, fixed, tangents
 from .progress import Aim, Progress
 from .record import Record, Unusable
-from .snap_through import NoEquilibrium, SnapThrough, at_limit_points, snap_through, snaps, was_passed
+from .snap_through import NoEquilibrium, SnapThrough, at_limit_points, let_go, snap_through, snaps, was_passed
 from .state import State
 from .stepping import Cutback, StepControl, TimeError
 
@@ -116,7 +116,7 @@ class Run:
                     if not self.aim.is_open() and state.met is self.aim.until:
                         break
                 self._complete_step()
-                self._look_for_branch(old, record.last)
+                warn_of_branch(record, old)
                 if record.ended:
                     break
                 self._stop_if(self.aim.turned_back())
@@ -126,12 +126,6 @@ class Run:
             raise
         finally:
             self._progress.close()
-
-    def _look_for_branch(self, old: State, new: State) -> None:
-        """Say so where another path begins within a step: as its factors are there, it costs nothing."""
-        usual = ["step", "target", *["start"] * (not self.problem.slack_at_rest)]
-        if old.orientation * new.orientation < 0 and old.kind in usual and new.kind in usual:
-            log.warning(ANOTHER_PATH, self.record.describe(old), self.record.describe(new))
 
     @property
     def _driven(self) -> str:
@@ -287,8 +281,13 @@ class Run:
             raise Cutback(cut.why, max(cut.part, 0.1)) if cut.part else _Astray(cut.why, [])
         if was_passed(self.curve, self.states[:-1], old, new):
             raise _Astray("the iteration fell back to a part of the path that was passed", [])
-        error = self._error_in_time(new)
-        states, self._ahead = self._sorted_into(old, new), self.settings.snap_through.ahead
+        error, memory = self._error_in_time(new), self.problem.memory
+        try:
+            new = let_go(self.curve, limit, old, new, lambda state: self._jump(state, 0.0)) if limit else new
+            states, self._ahead = self._sorted_into(old, new), self.settings.snap_through.ahead
+        except Failure:
+            self.problem.memory = memory
+            raise
         if target is None and length == self.step.length:   # not one that contact has made shorter
             self.step.accepted(tangents(new.history), error)
         return states

@@ -19,11 +19,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from petsc4py import PETSc
 
-from ..discrete.step_limit import Way
+from ..discrete.step_limit import StepLimit, Way
 from .arc_length import Curve
 from .equations import Array, Equations, Viscosity
 from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
 from .state import State
+
+_SWEEPS = 30               # in which a body lets go of a tool in space
 
 
 @dataclass(frozen=True)
@@ -280,3 +282,21 @@ def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) ->
             if curve.distance(new, replace(new, x=x, control=control)) < near:
                 return True
     return False
+
+
+def let_go(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callable[[State], State]) -> State:
+    """A new state at the same control, without what pulls at tools in space; by `jump` where the body snaps off.
+
+    Raises:
+        Failure: no such state was found.
+    """
+    for _ in range(_SWEEPS):
+        if not limit.let_go(new):
+            return new
+        try:
+            found = curve.solve(new.x, new.control, fixed(new.control), new.kind, old)
+            sense = float(np.sign(found.slope * new.slope)) or 1.0        # points may have gone back, not the control
+            new = replace(found, direction=sense * found.direction, slope=sense * found.slope, met=new.met)
+        except Failure:
+            new = jump(new)
+    raise Failure("what lets go of a tool in space touches it again and again", [])

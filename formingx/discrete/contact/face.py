@@ -260,10 +260,27 @@ class FaceContact:
         """See `History`. (A tool that is away remembers nothing new.)"""
         if self._memory is None or not self.present:
             return
-        before, theta = self._memory.touch.distance, self.law.theta
-        touch = self.law.tractions(self.positions(x, control), self._memory.touch).touch
+        old, theta = self._memory.touch, self.law.theta
+        touch = self.law.tractions(self.positions(x, control), old).touch
         penalty = self._penalty if self.contact.present_area else self._memory.penalty
-        self._take(Memory(touch, (before <= -theta) & (touch.distance > -theta), penalty))
+        arrived = (old.distance <= -theta) & (touch.distance > -theta)
+        if self.contact.lagged:                             # where another stage begins nothing has moved
+            moved = np.abs(touch.arrival - old.arrival).max(1, initial=0.0)
+            arrived |= self._memory.arrived & (moved < 1e-12 * self._length)
+        self._take(Memory(touch, arrived, penalty))
+
+    def let_go(self, fields: np.ndarray, control: float) -> bool:
+        """Let go of points that pull at a tool in space at a state; False if there are none; collective."""
+        if self._memory is None or not (self.contact.lagged and self.contact.separates):
+            return False
+        touch, x = self._memory.touch, self.positions(fields, control)
+        free = self.law.pulling(x, touch) & ~self._memory.arrived
+        found = bool(self.comm.allreduce(int(free.sum())))
+        if found:
+            self._take(self._memory._replace(touch=touch._replace(
+                position=np.where(free[:, None], x, touch.position),
+                distance=np.where(free, -2 * self.law.theta, touch.distance))))
+        return found
 
     def get(self) -> Memory | None:
         """See `History`; None without friction."""

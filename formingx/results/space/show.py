@@ -37,7 +37,7 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
         below = wall.now[:, 2].min() < -wall.now[:, 2].max()            # look into the part
         camera = np.array([0.8, -2.0, 3.6] if below else [1.7, -2.4, 1.7])
         lift = 0.004 * np.ptp(wall.now, axis=0).max() * camera / np.linalg.norm(camera)         # else lines flicker
-        values = wall.at_nodes / wall._to_nodes(wall.thickness_at_rest)
+        values = wall.at_nodes / wall.to_nodes(wall.thickness_at_rest)
         faces = np.column_stack([np.full(len(wall.triangles), 3), wall.triangles]).ravel()
         with plotted(file) as plotter:
             for side in mirrored:
@@ -67,7 +67,7 @@ def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     side = np.concatenate([np.column_stack([rim[:, 1], rim[:, 0], rim[:, 0] + n]),
                            np.column_stack([rim[:, 1], rim[:, 0] + n, rim[:, 1] + n])])
     triangles = np.concatenate([wall.triangles[:, ::-1], wall.triangles + n, side[:, ::-1]])
-    ratio = wall._to_nodes(wall.ratio)
+    ratio = wall.to_nodes(wall.ratio)
     return np.vstack([wall.now - normal, wall.now + normal]), triangles, np.concatenate([ratio, ratio])
 
 

@@ -79,7 +79,7 @@ class WallInSpace(Sheet):
     @cached_property
     def at_nodes(self) -> np.ndarray:
         """The wall at the nodes, shape (n,), length: of the triangles around each, by their areas."""
-        return self._to_nodes(self.wall)
+        return self.to_nodes(self.wall)
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
@@ -168,7 +168,8 @@ class WallInSpace(Sheet):
                     found.append(line)
         return found
 
-    def _to_nodes(self, values: np.ndarray) -> np.ndarray:
+    def to_nodes(self, values: np.ndarray) -> np.ndarray:
+        """Values of triangles, shape (m,), as those of nodes, (n,): means over those around, by their areas at rest."""
         total, weight = np.zeros(len(self.rest)), np.zeros(len(self.rest))
         np.add.at(total, self.triangles.ravel(), np.repeat(values * self.area_at_rest, 3))
         np.add.at(weight, self.triangles.ravel(), np.repeat(self.area_at_rest, 3))
