@@ -158,13 +158,14 @@ class _Carrier:
         late = arrived & (np.isnan(touch.arrival[:, 0]) | (not face.contact.sticks) & (distance < law.theta))
         velocity = face.moved(before.direction, before.slope)
         start = face.positions(before.x[:n], before.control)
-        gap = law.distance(np.where(np.isnan(touch.arrival), start, touch.arrival))
-        early = arrived & ~late
+        early = np.flatnonzero(arrived & ~late)
+        if len(early):
+            gap = law.part(early).distance(touch.arrival[early])
         for one in self.neighbours:
-            mine = one.problem.contacts[number]
-            there = mine.positions(one.x[:n], one.control) + touch.arrival - start
-            arrival = touch.arrival.copy()
-            arrival[early] = _onto(mine.law, np.where(early[:, None], there, start), velocity, gap)[early]
+            mine, arrival = one.problem.contacts[number], touch.arrival.copy()
+            if len(early):
+                there = mine.positions(one.x[:n], one.control)[early] + touch.arrival[early] - start[early]
+                arrival[early] = _onto(mine.law.part(early), there, velocity[early], gap)
             mine.expect_arrivals(arrival)
         return late
 
@@ -177,17 +178,19 @@ class _Carrier:
                 continue
             run = state.memory[self.problem.histories.index(face)]
             free = run.touch.distance <= -face.law.theta
-            late = self._late[number] if self._late else np.zeros(len(free), dtype=bool)
+            late = np.flatnonzero(self._late[number] if self._late else 0 * free)
+            free[late] = True
             for one in self.neighbours:
                 mine = one.problem.contacts[number]
                 memory = mine.get()
                 assert memory is not None
                 touch = memory.touch._replace(distance=run.touch.distance,
-                                              slip=np.where(free | late, run.touch.slip, memory.touch.slip))
-                if np.any(late):
-                    found = _onto(mine.law, mine.positions(one.x[:n], one.control), self._velocity[number],
-                                  run.touch.distance)
-                    touch = touch._replace(position=np.where(late[:, None], found, touch.position))
+                                              slip=np.where(free, run.touch.slip, memory.touch.slip))
+                if len(late):
+                    touch = touch._replace(position=touch.position.copy())
+                    touch.position[late] = _onto(
+                        mine.law.part(late), mine.positions(one.x[:n], one.control)[late], self._velocity[number][late],
+                        run.touch.distance[late])
                 mine.put(memory._replace(touch=touch, arrived=run.arrived))
         for one in self.neighbours:
             one.memory = one.problem.memory
@@ -228,27 +231,27 @@ class _Carrier:
             most = self.problem.comm.allgather(float(size.max(initial=0.0)))
             if max(most) > 0:
                 mine = int(np.argmax(size)) if int(np.argmax(most)) == self.problem.comm.rank else None
-                found = [_gap(p, p.contacts[number], mine) for p in (
-                    self.problem, *(one.problem for one in self.neighbours))]
-                return found[0], found[1:]
+                return _gap(self.problem, face, mine, True), [
+                    _gap(one.problem, one.problem.contacts[number], mine, False) for one in self.neighbours]
         return None, []
 
 
-def _gap(problem: Any, face: Any, point: int | None) -> Any:
-    """The distance of a point of a face from its tool, as a constraint; its number on the rank that has it, else None.
-    """
+def _gap(problem: Any, face: Any, point: int | None, sloped: bool) -> Any:
+    """The distance of a point of a face from its tool, as a constraint, `sloped`: with its gradient; the point's number
+    on the rank that has it, else None."""
+    mine = np.array([] if point is None else [point], dtype=int)
+    law = face.law.part(mine)
+
     def c(x: Any, control: float, gradient: Any) -> tuple[float, float]:
-        forces, rate, found = np.zeros_like(face.points), 0.0, 0.0
-        near = face.law.nearest(face.positions(x.array_r[: problem.n_owned], control))
-        if point is not None:
-            forces[point] = near.normal[point]
-            found = float(near.distance[point])
-            rate = float(near.normal[point] @ face.moved(np.zeros(len(x.array_r)), 1.0)[point])
-        values = np.zeros(problem.n_owned)
-        face.add(values, problem.forms.length * forces)
-        problem.fill(gradient, values)
-        found, rate = problem.comm.allreduce(np.array([found, rate]))
-        return float(found), float(rate)
+        near = law.nearest(face.positions(x.array_r[: problem.n_owned], control)[mine])
+        found, rate = float(near.distance.sum()), 0.0
+        if sloped:
+            forces, values = np.zeros_like(face.points), np.zeros(problem.n_owned)
+            forces[mine] = near.normal
+            rate = float((near.normal * face.moved(np.zeros(len(x.array_r)), 1.0)[mine]).sum())
+            face.add(values, problem.forms.length * forces)
+            problem.fill(gradient, values)
+        return (found, rate) if problem.comm.size == 1 else tuple(problem.comm.allreduce(np.array([found, rate])))
     return c
 
 
@@ -259,11 +262,8 @@ def _kind(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[int]]:
 
 def _onto(law: Any, x: np.ndarray, velocity: np.ndarray, gap: np.ndarray) -> np.ndarray:
     """Points x moved along a velocity to where their distance from a tool is `gap`; they are near it. Shape (n, 2)."""
-    x = np.where(np.isfinite(x), x, 0.0)
-    for _ in range(3):
-        near = law.nearest(x)
-        rate = np.einsum("ni,ni->n", near.normal, velocity)
-        sure = abs(rate) > 1e-3 * np.linalg.norm(velocity, axis=1)
-        by = np.divide(gap - near.distance, rate, out=np.zeros(len(x)), where=sure)
-        x = x + by[:, None] * velocity
-    return x
+    near = law.nearest(x)
+    rate = np.einsum("ni,ni->n", near.normal, velocity)
+    sure = abs(rate) > 1e-3 * np.linalg.norm(velocity, axis=1)
+    by = np.divide(gap - near.distance, rate, out=np.zeros(len(x)), where=sure)
+    return x + by[:, None] * velocity

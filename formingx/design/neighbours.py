@@ -72,11 +72,12 @@ class Neighbour:
         return State(self.x, self.control, like.direction, like.slope, memory=self.memory, stage=like.stage,
                      kind=like.kind, time=self.problem.time_at(self.control))
 
-    def residual(self) -> np.ndarray:
-        """F at its state, own part, shape (n,)."""
+    def residual(self, left_over: np.ndarray) -> np.ndarray:
+        """F at its state less what is left over of the run's, own part, shape (n,)."""
         self.problem.x.array_w[:] = self.x
         self.problem.residual(self.problem.x, self.control, self.F)
-        return self.F.array_r.copy()
+        self.F.array_w[:] -= left_over
+        return np.array(self.F.array_r)
 
     def constraint(self, equation: Any) -> float:
         """What is left over of an equation at its state."""
@@ -127,9 +128,14 @@ def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: 
     size, enough = _norm(problem, state.x) + abs(state.control), _ENOUGH_IN_CONTACT if problem.has_kinks else _ENOUGH
     todo, first = list(range(len(neighbours))), np.full(len(neighbours), np.inf)
     for iteration in range(_MOST):
-        rows = np.column_stack([neighbours[k].residual() - left_over for k in todo])
+        rows = np.column_stack([neighbours[k].residual(left_over) for k in todo])
         left = np.array([constraint(k) for k in todo])
-        dx = -newton.solver.solve_all(rows)
+        if len(todo) > 1:
+            dx = -newton.solver.solve_all(rows)
+        else:
+            one = neighbours[todo[0]]
+            newton.solver.solve(one.F, one.gradient)
+            dx = -one.gradient.array_r[:, None]
         steps = -(left + problem.comm.allreduce(g @ dx)) / slope
         dx += np.outer(b, steps)
         good = True

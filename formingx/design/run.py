@@ -20,10 +20,11 @@ from .neighbours import Apart, Neighbour
 from .parameters import Parameters
 
 _SMOOTH = 1e-5
-"""Change of a parameter, over its size, to the neighbours of a scene without contact."""
+"""Change of a parameter, over its size, to the neighbours of a scene without contact, one above and one below."""
 
 _CLOSER = (1e-8, 1e-9, 1e-10)
-"""With contact, which acts within a thin ramp: one after the other until all are found."""
+"""To one neighbour, with contact, which acts within a thin ramp: one after the other until all are found. (What a
+difference to one side leaves out is nothing there.)"""
 
 
 @dataclass(frozen=True)
@@ -76,14 +77,17 @@ class DesignRun:
         return float(self.path.problem.forms.volume)
 
     @cached_property
-    def _pairs(self) -> list[tuple[Neighbour, Neighbour, float]]:
-        """For each parameter a neighbour above and one below, solved for to the last state; how far apart they are."""
-        closest, reason = (_CLOSER if self.path.problem.contacts else (_SMOOTH,)), ""
-        for size in closest:
-            steps = size * self._parameters.size
-            made = [(self._beside(k, step), self._beside(k, -step), 2 * step) for k, step in enumerate(steps)]
+    def _neighbours(self) -> list[tuple[list[Neighbour], float]]:
+        """For each parameter neighbours, solved for to the last state: one above, or one above and one below; how far
+        the first is from the last, or from the run."""
+        contact, reason = bool(self.path.problem.contacts), ""
+        for size in _CLOSER if contact else (_SMOOTH,):
+            made = []
+            for k, step in enumerate(size * self._parameters.size):
+                ways = (-1.0 if self.vector[k] + step > self._parameters.high[k] else 1.0,) if contact else (1.0, -1.0)
+                made.append(([self._beside(k, way * step) for way in ways], ways[0] * step * len(ways)))
             try:
-                carry(self.path, self._end, [one for *pair, _ in made for one in pair])
+                carry(self.path, self._end, [one for beside, _ in made for one in beside])
             except Apart as failure:
                 reason = failure.reason
             except Failure as failure:
@@ -113,10 +117,10 @@ class DesignRun:
         Raises:
             InputError: the run has no derivative, or the measure looks at more than the last state.
         """
-        here = self._here(measure)
-        found = {one: np.atleast_1d(self._at(one, measure))
-                 for *pair, _ in self._pairs for one in pair}
-        by = [(found[above] - found[below]) / apart for above, below, apart in self._pairs]
+        here, by = self._here(measure), []
+        for beside, apart in self._neighbours:
+            first, *other = (np.atleast_1d(self._at(one, measure)) for one in beside)
+            by.append((first - (other[0] if other else here)) / apart)
         return here, np.stack(by, axis=-1)
 
     def sensitivities(self, measure: Any = "wall") -> Effects:

@@ -60,7 +60,6 @@ class Problem(Histories, Units):
         forms: its fields, forms and scales (a `Formulation`).
         comm: communicator.
         x: a vector of unknowns; inside `at` those of the state.
-        matrix: the tangent, refilled by `tangent`.
         contacts: the scene's contacts (`FaceContact`); present: of those that take part now.
         histories: what F depends on besides x and control (`History`); limit: what a step may bring (`StepLimit`).
         setting: the `Setting` that x and control are seen under; see `enter`.
@@ -75,10 +74,7 @@ class Problem(Histories, Units):
         index_map = forms.space.dofmap.index_map
         self._n = index_map.size_local
         self._buffer = la.vector(index_map, 1)
-        tangent = ufl.derivative(forms.residual, forms.w, ufl.TrialFunction(forms.space))
         self._residual = forms.compile(forms.residual)
-        self._by_control, self._by_time = (form and forms.compile(form)
-                                           for form in (forms.control_derivative, forms.time_derivative))
         self.contacts = [FaceContact(forms, contact, self.assemble) for contact in scene.contacts]
         if scene.heat is not None:                              # after the materials, which heat it
             forms.histories.append(scene.heat.history(self))
@@ -87,19 +83,44 @@ class Problem(Histories, Units):
         self.limit = StepLimit(self)
         self.admissible = forms.admissible()
         self._constraints = Constraints(forms, self.assemble)
-        self._by_motion = self._lift = None
         self._movable = [k for k, thing in enumerate(scene.things) if thing in scene.supports and thing.driven]
-        if self._constraints.can_move:
-            self._lift = fem.Function(forms.space)              # held unknowns move the others through the tangent
-            self._by_motion = forms.compile(ufl.action(tangent, self._lift))
-        self._matrix = ExtendedMatrix(forms.compile(tangent), index_map, [e.bc for e in self._constraints.entries],
-                                      [row for _, row in self._constraints.means], self.comm, self.symmetric)
-        self.matrix = self._matrix.mat
-        self.x = self.matrix.createVecRight()
+        self._lift = fem.Function(forms.space) if self._constraints.can_move else None
+        last = self.comm.rank == self.comm.size - 1             # it has the multipliers
+        self.x = PETSc.Vec().createMPI((self._n + last * len(self._constraints.means), None), comm=self.comm)
         self._stage: Any = None
         self.enter(Setting.first(scene), np.zeros(self.x.getLocalSize()), 0.0)
-        self._metric = np.maximum(self.assemble(forms.compile(forms.metric_row())), 0)
         self.force_scale = 0.0
+
+    # made when first asked for: a neighbour of a run (`design`) has its residual alone
+
+    @cached_property
+    def _tangent(self) -> Any:
+        return ufl.derivative(self.forms.residual, self.forms.w, ufl.TrialFunction(self.forms.space))
+
+    @cached_property
+    def _matrix(self) -> ExtendedMatrix:
+        constraints = self._constraints
+        made = ExtendedMatrix(self.forms.compile(self._tangent), self.forms.space.dofmap.index_map,
+                              [e.bc for e in constraints.entries], [row for _, row in constraints.means], self.comm,
+                              self.symmetric)
+        made.hold(self._stage.active.bcs, self._stage.active.rows)
+        return made
+
+    @property
+    def matrix(self) -> PETSc.Mat:
+        """The tangent, refilled by `tangent`."""
+        return self._matrix.mat
+
+    @cached_property
+    def _metric(self) -> np.ndarray:
+        return np.asarray(np.maximum(self.assemble(self.forms.compile(self.forms.metric_row())), 0))
+
+    @cached_property
+    def _by_control(self) -> list[Any]:
+        """Derivatives of the residual by the control: by loads, by the time, by held unknowns that it moves."""
+        forms = self.forms
+        found = [form and forms.compile(form) for form in (forms.control_derivative, forms.time_derivative)]
+        return [*found, forms.compile(ufl.action(self._tangent, self._lift)) if self._lift else None]
 
     @property
     def n_unknowns(self) -> int:
@@ -315,11 +336,12 @@ class Problem(Histories, Units):
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, ahead: bool = False) -> None:
         """out = dF/dcontrol at (x, control); `ahead`: as in `tangent`."""
         self.set_state(x, control)
-        values = self.assemble(self._by_control) if self._by_control else np.zeros(self._n)
-        if self._by_time and self.setting.rate[-1]:
-            values += self.assemble(self._by_time)
-        if self._by_motion and any(self.setting.rate[k] for k in self._movable):    # the same on all ranks
-            values += self.assemble(self._by_motion)
+        by_loads, by_time, by_motion = self._by_control
+        values = self.assemble(by_loads) if by_loads else np.zeros(self._n)
+        if by_time and self.setting.rate[-1]:
+            values += self.assemble(by_time)
+        if by_motion and any(self.setting.rate[k] for k in self._movable):      # the same on all ranks
+            values += self.assemble(by_motion)
         for contact in self.present:
             contact.add_control_derivative(values, x.array_r[: self._n], control, ahead)
         values[self.held] = -self._stage.rate
@@ -392,7 +414,8 @@ class Problem(Histories, Units):
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
-        self._matrix.destroy()
+        if "_matrix" in vars(self):
+            self._matrix.destroy()
         self.x.destroy()
 
     def enter(self, setting: Setting, x: np.ndarray, control: float) -> None:
@@ -429,7 +452,7 @@ class Problem(Histories, Units):
             i = number[id(contact.contact)]
             contact.enter(setting.base[i], setting.rate[i], i not in setting.off)
         self.present = [contact for contact in self.contacts if contact.present]
-        if before is None or before.active is not stage.active:
+        if "_matrix" in vars(self) and (before is None or before.active is not stage.active):
             self._matrix.hold(stage.active.bcs, stage.active.rows)
         if self._lift is not None:
             self._lift.x.array[:] = 0

@@ -3,6 +3,7 @@
 UFL differentiates the energy once; numpy evaluates the derivatives, so that a fit of constants costs no compilation.
 """
 
+import functools
 import operator
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -20,6 +21,11 @@ MODES = {"uniaxial": -0.5, "pure_shear": 0.0, "equibiaxial": 1.0}
 """Tests by name: the stretches are l, l^k and l^(-1-k), with k the value here; the last direction is free of stress."""
 
 
+_DOMAIN = ufl.Mesh(basix.ufl.element("Lagrange", "triangle", 1, shape=(2,)))
+_STRETCHES = [ufl.variable(ufl.Constant(_DOMAIN)) for _ in range(3)]
+_CONSTANTS: list[Any] = []                                   # as many as an energy has had
+
+
 class Response:
     """First and second derivatives of an energy by the principal stretches.
 
@@ -29,17 +35,14 @@ class Response:
     """
 
     def __init__(self, energy: Callable, names: Any):
-        mesh = ufl.Mesh(basix.ufl.element("Lagrange", "triangle", 1, shape=(2,)))
-        inputs = [ufl.Constant(mesh) for _ in range(3 + len(names))]
-        l = [ufl.variable(c) for c in inputs[:3]]
+        while len(_CONSTANTS) < len(names):
+            _CONSTANTS.append(ufl.Constant(_DOMAIN))
+        l = _STRETCHES
         F = ufl.as_tensor([[l[0], 0, 0], [0, l[1], 0], [0, 0, l[2]]])
-        W = ufl.as_ufl(energy(F, **dict(zip(names, inputs[3:], strict=True))))
+        W = ufl.as_ufl(energy(F, **dict(zip(names, _CONSTANTS))))
         if W.ufl_shape != ():
             raise InputError(f"a strain energy must be a scalar, this one has the shape {W.ufl_shape}")
-        W = expand_indices(expand_derivatives(W))
-        first = [expand_derivatives(ufl.diff(W, x)) for x in l]
-        second = [expand_derivatives(ufl.diff(first[i], l[j])) for i in range(3) for j in range(i, 3)]
-        self._first, self._all = _Program(inputs, first), _Program(inputs, first + second)
+        self._first, self._all = _programs(W, len(names))
 
     @np.errstate(all="ignore")
     def stress(self, stretches: Any, constants: Any) -> np.ndarray:
@@ -172,6 +175,16 @@ class _Program:
         for operation, operands in self._steps:
             values.append(operation(*[values[i] for i in operands]))
         return np.stack([np.broadcast_to(values[i], stretches.shape[1:]) for i in self._outputs]).astype(float)
+
+
+@functools.lru_cache
+def _programs(W: Any, n: int) -> tuple[_Program, _Program]:
+    """First, and first and second derivatives of an energy of `_STRETCHES` and n of `_CONSTANTS`; of one once."""
+    inputs = [*(x.ufl_operands[0] for x in _STRETCHES), *_CONSTANTS[:n]]
+    W = expand_indices(expand_derivatives(W))
+    first = [expand_derivatives(ufl.diff(W, x)) for x in _STRETCHES]
+    second = [expand_derivatives(ufl.diff(first[i], _STRETCHES[j])) for i in range(3) for j in range(i, 3)]
+    return _Program(inputs, first), _Program(inputs, first + second)
 
 
 _OPERATIONS: dict[type, Callable] = {
