@@ -31,13 +31,16 @@ class Probe:
         forms = problem.forms
         place = locate(forms.domain, forms.nearest(points), forms.length)
         self._components = forms.scene.kinematics.components
-        subs = [forms.space.sub(0).sub(i).dofmap for i in range(self._components)]
+        self._subs = [forms.space.sub(0).sub(i).dofmap for i in range(self._components)]
         self._problem, self.points = problem, points
         self._mine, self._cells, self._reference = place
-        dim = forms.displacement_element.dim
-        self._dofs = np.array([[sub.cell_dofs(c) for sub in subs] for c in place.cells],
-                              dtype=np.int64).reshape(len(place.mine), self._components, dim)
+        self._dofs = self._dofs_of(place.cells)
         self._weights = _basis(forms.displacement_element, 0, self._reference)
+
+    def _dofs_of(self, cells: np.ndarray) -> np.ndarray:
+        """Local numbers of the unknowns of cells, component by component, shape (m, components, dim)."""
+        return np.array([[sub.cell_dofs(c) for sub in self._subs] for c in cells], dtype=np.int64).reshape(
+            len(cells), self._components, self._problem.forms.displacement_element.dim)
 
     def displacement(self, x: Any) -> np.ndarray:
         """u at the points in the user's unit, shape (n, components), all ranks."""
@@ -113,6 +116,30 @@ class MidSurfaceProbe(Probe):
             far = int(np.argmax(nodes[k, :2, 0]))      # leave an error of the fourth order
             h = nodes[k, far, 0]
             self._slopes[k, 0, [far, 2]] = -1 / (3 * h), 8 / (3 * h)
+        self._take_ends(element, geometry)
+
+    def _take_ends(self, element: Any, geometry: Any) -> None:
+        """Of points where two elements meet, whose slopes differ, the mean of both counts."""
+        forms, domain = self._problem.forms, self._problem.forms.domain
+        owned = domain.topology.index_map(1).size_local
+        nodes = domain.geometry.x[_compat.cell_nodes(domain)[:owned], :2]
+        R = forms.nearest(self.points)[:, 0]
+        at, cells, end = np.nonzero(np.abs(R[:, None, None] - nodes[None, :, :2, 0]) < 1e-9 * forms.length)
+        meet = self._problem.comm.allreduce(np.bincount(at, minlength=len(R))) == 2
+        at, cells, end = (part[meet[at]] for part in (at, cells, end))
+        tangent = np.einsum("kj,kji->ki", _basis(geometry, 1, end[:, None].astype(float)), nodes[cells])
+        speed = np.hypot(*tangent.T)[:, None] * np.where(tangent[:, :1] > 0, 1.0, -1.0)
+        self._ends = at, self._dofs_of(cells), _basis(element, 1, end[:, None].astype(float)) / speed
+        self._meet = meet[self._mine]
+        both = self._at_ends(tangent / speed)[self._mine]
+        self._shorter = np.where(self._meet, np.hypot(*both.T), 1.0)[:, None]               # the mean of two directions
+        self._tangent = np.where(self._meet[:, None], both / self._shorter, self._tangent)
+
+    def _at_ends(self, values: np.ndarray) -> np.ndarray:
+        """Means of values on both sides of points where elements meet, of all points, shape (n, 2), all ranks."""
+        total = np.zeros((len(self.points), 2))
+        np.add.at(total, self._ends[0], values / 2)
+        return self._problem.comm.allreduce(total, MPI.SUM)
 
     def across(self) -> tuple[np.ndarray, float]:
         """See `Probe.across`: at the pole the membrane stays normal to the axis, and is stretched by 1 + du_r/dR."""
@@ -132,6 +159,9 @@ class MidSurfaceProbe(Probe):
     def _local(self, values: np.ndarray) -> np.ndarray:
         u, du = super()._local(values), np.einsum("kij,kij->ki", self._slopes, values)
         forms = self._problem.forms
+        _, dofs, slopes = self._ends
+        both = self._at_ends(np.einsum("kj,kij->ki", slopes, forms.w.x.array[dofs]))[self._mine] / self._shorter
+        du = np.where(self._meet[:, None], both, du)
         t = self._tangent + forms.length * du
         l1 = np.hypot(*t.T)
         l2 = np.ones_like(l1)
