@@ -26,7 +26,7 @@ def relative(profile, R):
 
 def sheet(model, elements, stretch, h0=None, c=None):
     """The scene of a sheet with profiles of thickness or constant, and its target."""
-    mesh = fx.mesh.disc(radius=1.0, elements=elements,
+    mesh = fx.mesh.disc(radius=1.0, elements=elements, concentrate={0.0: 0.5, 1.0: 0.15},   # the rim turns, a solid's
                         thickness=THICKNESS if h0 is None else lambda R: THICKNESS * relative(h0, R))
     c10 = C if c is None else lambda R, Z: C * relative(c, R)
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=c10), model=MODELS[model](),

@@ -34,7 +34,7 @@ _DAMPED = 1e-6
 """Of what has most effect: smaller effects count as none."""
 
 _WORTH = 0.02
-"""Of the sum of squares: a run that is better by less is the last."""
+"""Of the sum of squares: after two runs that are better by less nothing more is looked for."""
 
 _SHORTEST = 1 / 64
 """Part of a step of a search below which nothing better is looked for."""
@@ -135,7 +135,7 @@ class Design:
         """Gauss-Newton steps from the best run so far, halved where a run is worse or fails."""
         from scipy.optimize import lsq_linear
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
-        best, taken, foretold = first, [first], first.wall
+        best, taken, foretold, before = first, [first], first.wall, 1.0
         notes: list[str] = []
         why = f"{most} runs were taken"
         while len(taken) + len(notes) < most:
@@ -173,9 +173,10 @@ class Design:
             foretold = best.wall + share * (best.derivative("wall")[1] @ step)
             gained = 1 - aim.cost(new) / aim.cost(best)
             best = new
-            if gained < _WORTH:
+            if max(gained, before) < _WORTH:                 # a first step may lead far beyond, to what is hardly better
                 why = f"the last run was {100 * gained:.1f} % better"
                 break
+            before = gained
             log.info("design: run %d, cost %.3g", len(taken), aim.cost(best))
         return Answer(first, best, taken, notes, aim.inside, why, foretold, _lack("volume", aim.held, best.volume))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,10 +24,12 @@ class Knots:
 
     def __call__(self, s: Any) -> Any:
         s = np.clip(s, 0.0, 1.0)
-        if self.smooth:
-            from scipy.interpolate import CubicSpline
-            return CubicSpline(self.places, self.values)(s)
-        return np.interp(s, self.places, self.values)
+        return self._spline(s) if self.smooth else np.interp(s, self.places, self.values)
+
+    @cached_property
+    def _spline(self) -> Any:
+        from scipy.interpolate import CubicSpline
+        return CubicSpline(self.places, self.values)
 
     def __len__(self) -> int:
         return len(self.values)
