@@ -284,6 +284,6 @@ def test_compression_is_said(material, stretch, caplog, tmp_path):
 
 def test_where_elements_meet_the_wall_is_the_mean_of_both():
     """Which of them a point counts to is left to round-off: the wall is not."""
-    walls = [trace(sheet(10, thickness=lambda R, k=k: 0.01 * (1 + 1e-12 * np.sin(k * R))), fx.pole_stretch(1.5))
+    walls = [trace(sheet(10, thickness=lambda R, k=k: 0.01 * (1 + 1e-6 * np.sin(k * R))), fx.pole_stretch(1.5))
              .profile().thickness for k in (0, 37, 61, 83)]
-    assert abs(np.array(walls) / walls[0] - 1).max() < 1e-8
+    assert abs(np.array(walls) / walls[0] - 1).max() < 1e-5

@@ -23,8 +23,8 @@ _SMOOTH = 1e-5
 """Change of a parameter, over its size, to the neighbours of a scene without contact, one above and one below."""
 
 _CLOSER = (1e-8, 1e-9, 1e-10)
-"""To one neighbour, with contact, which acts within a thin ramp: one after the other until all are found. (What a
-difference to one side leaves out is nothing there.)"""
+"""With contact, which acts within a thin ramp, to one neighbour: one change after the other until all are found. (So
+near, a difference to one side leaves nothing out.)"""
 
 
 @dataclass(frozen=True)
