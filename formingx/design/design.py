@@ -173,7 +173,7 @@ class Design:
             foretold = best.wall + share * (best.derivative("wall")[1] @ step)
             gained = 1 - aim.cost(new) / aim.cost(best)
             best = new
-            if max(gained, before) < _WORTH:                 # a first step may lead far beyond, to what is hardly better
+            if max(gained, before) < _WORTH:     # a first step may lead beyond, to what is hardly better
                 why = f"the last run was {100 * gained:.1f} % better"
                 break
             before = gained

@@ -106,7 +106,7 @@ class Problem(Histories, Units):
         made.hold(self._stage.active.bcs, self._stage.active.rows)
         return made
 
-    @property
+    @cached_property
     def matrix(self) -> PETSc.Mat:
         """The tangent, refilled by `tangent`."""
         return self._matrix.mat
