@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-import ufl
 from dolfinx import fem, la
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -27,10 +26,10 @@ from .examine import Examination
 from .formulations import formulate
 from .histories import Histories
 from .history import History
-from .matrix import ExtendedMatrix
 from .schedule import Setting
 from .step_error import StepError
 from .step_limit import StepLimit
+from .tangent import Tangent
 from .temperature import Temperature
 from .units import Units
 from .viscosity import Viscosity
@@ -83,44 +82,26 @@ class Problem(Histories, Units):
         self.limit = StepLimit(self)
         self.admissible = forms.admissible()
         self._constraints = Constraints(forms, self.assemble)
-        self._movable = [k for k, thing in enumerate(scene.things) if thing in scene.supports and thing.driven]
-        self._lift = fem.Function(forms.space) if self._constraints.can_move else None
         last = self.comm.rank == self.comm.size - 1             # it has the multipliers
         self.x = PETSc.Vec().createMPI((self._n + last * len(self._constraints.means), None), comm=self.comm)
         self._stage: Any = None
         self.enter(Setting.first(scene), np.zeros(self.x.getLocalSize()), 0.0)
         self.force_scale = 0.0
 
-    # made when first asked for: a neighbour of a run (`design`) has its residual alone
-
     @cached_property
-    def _tangent(self) -> Any:
-        return ufl.derivative(self.forms.residual, self.forms.w, ufl.TrialFunction(self.forms.space))
-
-    @cached_property
-    def _matrix(self) -> ExtendedMatrix:
-        constraints = self._constraints
-        made = ExtendedMatrix(self.forms.compile(self._tangent), self.forms.space.dofmap.index_map,
-                              [e.bc for e in constraints.entries], [row for _, row in constraints.means], self.comm,
-                              self.symmetric)
-        made.hold(self._stage.active.bcs, self._stage.active.rows)
+    def _tangent(self) -> Tangent:
+        made, stage = Tangent(self.forms, self._constraints, self.symmetric), self._stage
+        made.enter(stage.active, stage.setting.rate, True)
         return made
 
     @cached_property
     def matrix(self) -> PETSc.Mat:
         """The tangent, refilled by `tangent`."""
-        return self._matrix.mat
+        return self._tangent.matrix.mat
 
     @cached_property
     def _metric(self) -> np.ndarray:
         return np.asarray(np.maximum(self.assemble(self.forms.compile(self.forms.metric_row())), 0))
-
-    @cached_property
-    def _by_control(self) -> list[Any]:
-        """Derivatives of the residual by the control: by loads, by the time, by held unknowns that it moves."""
-        forms = self.forms
-        found = [form and forms.compile(form) for form in (forms.control_derivative, forms.time_derivative)]
-        return [*found, forms.compile(ufl.action(self._tangent, self._lift)) if self._lift else None]
 
     @property
     def n_unknowns(self) -> int:
@@ -311,7 +292,7 @@ class Problem(Histories, Units):
         """
         self.set_state(x, control)
         fields = x.array_r[: self._n]
-        return self._matrix.fill([(c.rule.dofs, c.tangent(fields, control, ahead)) for c in self.present])
+        return self._tangent.matrix.fill([(c.rule.dofs, c.tangent(fields, control, ahead)) for c in self.present])
 
     def viscosity(self) -> Viscosity:
         """That of the body as it is held now; to be destroyed."""
@@ -336,12 +317,7 @@ class Problem(Histories, Units):
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, ahead: bool = False) -> None:
         """out = dF/dcontrol at (x, control); `ahead`: as in `tangent`."""
         self.set_state(x, control)
-        by_loads, by_time, by_motion = self._by_control
-        values = self.assemble(by_loads) if by_loads else np.zeros(self._n)
-        if by_time and self.setting.rate[-1]:
-            values += self.assemble(by_time)
-        if by_motion and any(self.setting.rate[k] for k in self._movable):      # the same on all ranks
-            values += self.assemble(by_motion)
+        values = self._tangent.by_control(self.setting.rate, self.assemble, self._n)
         for contact in self.present:
             contact.add_control_derivative(values, x.array_r[: self._n], control, ahead)
         values[self.held] = -self._stage.rate
@@ -414,8 +390,8 @@ class Problem(Histories, Units):
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
-        if "_matrix" in vars(self):
-            self._matrix.destroy()
+        if "_tangent" in vars(self):
+            self._tangent.matrix.destroy()
         self.x.destroy()
 
     def enter(self, setting: Setting, x: np.ndarray, control: float) -> None:
@@ -452,11 +428,8 @@ class Problem(Histories, Units):
             i = number[id(contact.contact)]
             contact.enter(setting.base[i], setting.rate[i], i not in setting.off)
         self.present = [contact for contact in self.contacts if contact.present]
-        if "_matrix" in vars(self) and (before is None or before.active is not stage.active):
-            self._matrix.hold(stage.active.bcs, stage.active.rows)
-        if self._lift is not None:
-            self._lift.x.array[:] = 0
-            self._lift.x.array[stage.active.dofs] = np.append(setting.rate, 0.0)[stage.active.driver]
+        if "_tangent" in vars(self):
+            self._tangent.enter(stage.active, setting.rate, before is None or before.active is not stage.active)
 
     def _dot(self, a: np.ndarray, b: np.ndarray) -> float:
         own = float(np.dot(a, b))

@@ -1,0 +1,52 @@
+"""Derivatives of a scene's residual, but for contact: the tangent as a matrix, and by the control."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from .constraints import Constraints
+from .matrix import ExtendedMatrix
+
+
+class Tangent:
+    """dF/dx and dF/dcontrol of forms and what supports hold; made when first asked for: a neighbour has none.
+
+    Args:
+        forms: the `Formulation`; symmetric: dF/dx is.
+
+    Attributes:
+        matrix: an `ExtendedMatrix`.
+    """
+
+    def __init__(self, forms: Any, constraints: Constraints, symmetric: bool):
+        scene, tangent = forms.scene, ufl.derivative(forms.residual, forms.w, ufl.TrialFunction(forms.space))
+        self.matrix = ExtendedMatrix(forms.compile(tangent), forms.space.dofmap.index_map,
+                                     [e.bc for e in constraints.entries], [row for _, row in constraints.means],
+                                     forms.comm, symmetric)
+        self._by_load, self._by_time = (form and forms.compile(form)
+                                        for form in (forms.control_derivative, forms.time_derivative))
+        self._movable = [k for k, thing in enumerate(scene.things) if thing in scene.supports and thing.driven]
+        self._by_motion = self._lift = None
+        if constraints.can_move:
+            self._lift = fem.Function(forms.space)              # held unknowns move the others through the tangent
+            self._by_motion = forms.compile(ufl.action(tangent, self._lift))
+
+    def enter(self, active: Any, rate: list[float], anew: bool) -> None:
+        """Take a stage: the `Active` that it holds, anew if that changes, and the rates of things by the control."""
+        if anew:
+            self.matrix.hold(active.bcs, active.rows)
+        if self._lift is not None:
+            self._lift.x.array[:] = 0
+            self._lift.x.array[active.dofs] = np.append(rate, 0.0)[active.driver]
+
+    def by_control(self, rate: list[float], assemble: Callable[[Any], np.ndarray], n: int) -> np.ndarray:
+        """Of n owned fields, by loads, by way of the time, and by held unknowns that move."""
+        values = assemble(self._by_load) if self._by_load else np.zeros(n)
+        if self._by_time and rate[-1]:
+            values += assemble(self._by_time)
+        if self._by_motion and any(rate[k] for k in self._movable):             # the same on all ranks
+            values += assemble(self._by_motion)
+        return values
