@@ -59,6 +59,7 @@ class Problem(Histories, Units):
         forms: its fields, forms and scales (a `Formulation`).
         comm: communicator.
         x: a vector of unknowns; inside `at` those of the state.
+        matrix: the tangent, refilled by `tangent`.
         contacts: the scene's contacts (`FaceContact`); present: of those that take part now.
         histories: what F depends on besides x and control (`History`); limit: what a step may bring (`StepLimit`).
         setting: the `Setting` that x and control are seen under; see `enter`.
@@ -94,10 +95,7 @@ class Problem(Histories, Units):
         made.enter(stage.active, stage.setting.rate, True)
         return made
 
-    @cached_property
-    def matrix(self) -> PETSc.Mat:
-        """The tangent, refilled by `tangent`."""
-        return self._tangent.matrix.mat
+    matrix: PETSc.Mat = cached_property(lambda self: self._tangent.matrix.mat)  # type: ignore[assignment]
 
     @cached_property
     def _metric(self) -> np.ndarray:

@@ -161,6 +161,7 @@ class Residual(Protocol):
 
     comm: MPI.Intracomm
     x: PETSc.Vec
+    matrix: PETSc.Mat
     force_scale: float
 
     @property
@@ -170,11 +171,6 @@ class Residual(Protocol):
 
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         """out = F(x, control); sets `force_scale`."""
-
-    @property
-    def matrix(self) -> PETSc.Mat:
-        """See `tangent`."""
-        ...
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> PETSc.Mat:
         """dF/dx in `matrix`; `ahead`: as it is beyond an accepted state, where F has a kink there."""
