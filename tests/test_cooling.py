@@ -100,8 +100,8 @@ def test_what_gives_off_heat_touches_node_by_node(monkeypatch):
     assert drawn_over() > 1.01
 
 
-def press(scene, **options):
-    push = fx.Stage("push", drive="plug", until=fx.travel(0.15), duration=0.5)
+def press(scene, travel=0.15, **options):
+    push = fx.Stage("push", drive="plug", until=fx.travel(travel), duration=0.5)
     return fx.Process(scene).run([push, fx.Stage("hold", duration=0.5)], progress=False, accuracy="draft", **options)
 
 
@@ -129,7 +129,7 @@ import json, sys
 sys.path.insert(0, "tests")
 from test_cooling import press, pressed, told
 scene = pressed()
-found = told(press(scene))
+found = told(press(scene, 0.06))
 if scene.mesh.comm.rank == 0:
     print(json.dumps(found))
 """
