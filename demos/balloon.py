@@ -83,9 +83,7 @@ def draw(flows, creeps):
 
 
 def main():
-    options = parser("balloon", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=8, help="elements along the meridian")
-    options.add_argument("--accuracy", type=float, default=2e-5, help="relative error in time")
+    options = parser("balloon", __doc__, elements=8, accuracy=2e-5)
     args = options.parse_args()
     n, accuracy = (4, 1e-4) if args.quick else (args.elements, args.accuracy)
     summary: dict = {}

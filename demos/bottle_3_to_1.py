@@ -38,9 +38,7 @@ def section(axes, profile, side, colour):
 
 
 def main():
-    options = parser("bottle_3_to_1", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=60, help="elements along the meridian")
-    options.add_argument("--layers", type=int, default=2, help="elements through the wall")
+    options = parser("bottle_3_to_1", __doc__, elements=60, layers=2)
     args = options.parse_args()
     elements = (30, 1) if args.quick else (args.elements, args.layers)
     summary = {}

@@ -49,7 +49,7 @@ def draw_tool(axes, _, run):
 
 
 def main():
-    args = parser("chilling", __doc__.splitlines()[0]).parse_args()
+    args = parser("chilling", __doc__).parse_args()
     mesh, tolerance = slab(THICKNESS, 10 if args.quick else 24), 1e-3 if args.quick else 5e-5
     summary, errors, runs = {}, {}, {}
     for name, (conductivity, capacity) in TOOLS.items():

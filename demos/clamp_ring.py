@@ -111,7 +111,7 @@ def stressed(axes, path, held):
 
 
 def main():
-    options = parser("clamp_ring", __doc__.splitlines()[0])
+    options = parser("clamp_ring", __doc__)
     options.add_argument("--refinements", nargs="+", type=int, default=[1, 2, 3], help="numbers n of the meshes")
     args = options.parse_args()
     logging.getLogger("formingx").setLevel(logging.ERROR)      # the table says which peaks have not converged

@@ -170,10 +170,7 @@ def draw(found, shapes, factorial):
 
 
 def main():
-    options = parser("cold_plug", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=40, help="elements along the radius")
-    options.add_argument("--layers", type=int, default=2, help="elements through the thickness")
-    options.add_argument("--accuracy", type=float, default=1e-2, help="relative error in time")
+    options = parser("cold_plug", __doc__, elements=40, layers=2, accuracy=1e-2)
     args = options.parse_args()
     elements, accuracy = ((20, 1), 2e-2) if args.quick else ((args.elements, args.layers), args.accuracy)
     cases = cases_of(args.quick)

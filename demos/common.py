@@ -14,12 +14,19 @@ from formingx.results import files
 COMM = MPI.COMM_WORLD
 
 
-def parser(name: str, description: str) -> argparse.ArgumentParser:
-    """Options that all demos share: --out, --quick."""
-    options = argparse.ArgumentParser(prog=f"demos/{name}.py", description=description,
+def parser(name: str, about: str, elements: int | None = None, layers: int | None = None,
+           accuracy: float | None = None) -> argparse.ArgumentParser:
+    """Options that all demos share, --out and --quick, and those for which a default is given; about: its docstring."""
+    options = argparse.ArgumentParser(prog=f"demos/{name}.py", description=about.splitlines()[0],
                                       formatter_class=argparse.ArgumentDefaultsHelpFormatter)
     options.add_argument("--out", type=Path, default=Path("results") / name, help="folder for results")
     options.add_argument("--quick", action="store_true", help="coarse mesh, no 3-D view: seconds")
+    if elements is not None:
+        options.add_argument("--elements", type=int, default=elements, help="elements along the sheet")
+    if layers is not None:
+        options.add_argument("--layers", type=int, default=layers, help="elements through its thickness, or each layer")
+    if accuracy is not None:
+        options.add_argument("--accuracy", type=float, default=accuracy, help="relative error in time")
     return options
 
 

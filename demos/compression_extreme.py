@@ -57,7 +57,7 @@ def stuck(elements, size, corner, ratios):
 
 
 def main():
-    args = parser("compression_extreme", __doc__.splitlines()[0]).parse_args()
+    args = parser("compression_extreme", __doc__).parse_args()
     grids, paths = {}, {}
     for elements in GRIDS:
         name = "x".join(map(str, elements))

@@ -26,7 +26,7 @@ def exact_stress(h):
 
 
 def main():
-    args = parser("compression_homogeneous", __doc__.splitlines()[0]).parse_args()
+    args = parser("compression_homogeneous", __doc__).parse_args()
     elements = (2, 2)                                        # eight triangles, as the thesis
     scene = block(fx.NeoHookean(c10=I1_CONSTANT), "none", elements, penalty=2e7, ramp=1e-8)      # to see 1e-4 of (7.7)
     path, end = press(scene, [HALF_HEIGHT - PRESSED])

@@ -46,7 +46,7 @@ def compress(elements, friction="stick"):
 
 
 def main():
-    options = parser("compression_roll_over", __doc__.splitlines()[0])
+    options = parser("compression_roll_over", __doc__)
     options.add_argument("--friction", type=str, default="stick", help="stick, none, or a coefficient of friction")
     args = options.parse_args()
     friction = args.friction if args.friction in ("stick", "none") else float(args.friction)

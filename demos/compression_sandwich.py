@@ -16,8 +16,7 @@ RATIOS = (1.1, 1.2, 1.3, 1.47)
 
 
 def main():
-    options = parser("compression_sandwich", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=12, help="elements along the radius")
+    options = parser("compression_sandwich", __doc__, elements=12)
     args = options.parse_args()
     elements = (6, 4) if args.quick else (args.elements, 8)
     soft, stiff = fx.MooneyRivlin(c10=1.0, c01=0.1), fx.MooneyRivlin(c10=10.0, c01=1.0)

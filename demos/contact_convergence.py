@@ -16,8 +16,7 @@ def errors(state):
 
 
 def main():
-    options = parser("contact_convergence", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=40, help="elements along the radius")
+    options = parser("contact_convergence", __doc__, elements=40)
     options.add_argument("--friction", default="stick", help="stick, none or a coefficient")
     args = options.parse_args()
     friction = args.friction if args.friction in ("stick", "none") else float(args.friction)

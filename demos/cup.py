@@ -48,9 +48,7 @@ def key_numbers(path, mould):
 
 
 def main():
-    options = parser("cup", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=60, help="elements along the radius")
-    options.add_argument("--layers", type=int, default=2, help="elements through the thickness")
+    options = parser("cup", __doc__, elements=60, layers=2)
     args = options.parse_args()
     elements = (20, 1) if args.quick else (args.elements, args.layers)
     summary = {}

@@ -43,7 +43,7 @@ def least_walls(path, pressures) -> dict:
 
 
 def main():
-    args = parser("cup_adapted", __doc__.splitlines()[0]).parse_args()
+    args = parser("cup_adapted", __doc__).parse_args()
     pressures = PRESSURES[:1] if args.quick else PRESSURES
     uniform, shares = ((20, 40), (0.5,)) if args.quick else ((*UNIFORM, REFERENCE), SHARES)
     runs = {"uniform": [form(disc(n), pressures) for n in uniform], "adapted": []}

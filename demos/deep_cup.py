@@ -49,9 +49,7 @@ def key_numbers(path, mould):
 
 
 def main():
-    options = parser("deep_cup", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=60, help="elements along the radius")
-    options.add_argument("--layers", type=int, default=2, help="elements through the thickness")
+    options = parser("deep_cup", __doc__, elements=60, layers=2)
     options.add_argument("--depth", type=float, default=10.0, help="of the cup, cm")
     options.add_argument("--draft", type=float, default=5.0, help="angle of the wall, degrees")
     options.add_argument("--fillet", type=float, default=2.0, help="radius of the bottom edge, cm")

@@ -37,8 +37,7 @@ def bottle(wall, elements=(60, 1)):
 
 
 def main():
-    options = parser("even_bottle", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=60, help="along the meridian")
+    options = parser("even_bottle", __doc__, elements=60)
     options.add_argument("--runs", type=int, default=6, help="at most so many")
     args = options.parse_args()
     elements = (24 if args.quick else args.elements, 1)

@@ -53,8 +53,7 @@ def numbers(answer, name):
 
 
 def main():
-    options = parser("even_disc", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=80, help="elements along the radius")
+    options = parser("even_disc", __doc__, elements=80)
     options.add_argument("--knots", type=int, default=21, help="of the splines")
     args = options.parse_args()
     elements, knots = ((14, 1), 8) if args.quick else ((args.elements, 1), args.knots)

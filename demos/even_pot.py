@@ -51,7 +51,7 @@ def cv(path):
 
 
 def main():
-    options = parser("even_pot", __doc__.splitlines()[0])
+    options = parser("even_pot", __doc__)
     options.add_argument("--runs", type=int, default=8, help="of the search with derivatives, at most")
     options.add_argument("--search", type=int, default=32, help="runs of Nelder and Mead's search")
     args = options.parse_args()

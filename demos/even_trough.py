@@ -61,8 +61,7 @@ def arc(answer):
 
 
 def main():
-    options = parser("even_trough", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=60, help="along the half width")
+    options = parser("even_trough", __doc__, elements=60)
     options.add_argument("--knots", type=int, default=21, help="of the table")
     options.add_argument("--runs", type=int, default=6, help="of each search, at most")
     args = options.parse_args()

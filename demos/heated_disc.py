@@ -97,7 +97,7 @@ def draw(paths, file):
 
 
 def main():
-    args = parser("heated_disc", __doc__.splitlines()[0]).parse_args()
+    args = parser("heated_disc", __doc__).parse_args()
     quick = {"membrane": (40, 1), "solid": (40, 1)} if args.quick else ELEMENTS
     exact = {case: theory(modulus) for case, modulus in CASES.items()}
     summary, errors, paths = {}, {}, {}

@@ -63,7 +63,7 @@ def by_absorption(mesh, tolerance):
 
 
 def main():
-    args = parser("heating", __doc__.splitlines()[0]).parse_args()
+    args = parser("heating", __doc__).parse_args()
     mesh, tolerance = slab(THICKNESS, 8 if args.quick else 20), 1e-3 if args.quick else 5e-5
     faces = {"top": 1.0, "mid": 0.5, "bottom": 0.0}
     cases = {

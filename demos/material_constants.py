@@ -158,9 +158,7 @@ def draw(paths, out, quick):
 
 
 def main():
-    options = parser("material_constants", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=40, help="elements along the radius")
-    options.add_argument("--layers", type=int, default=2, help="elements through the thickness")
+    options = parser("material_constants", __doc__, elements=40, layers=2)
     args = options.parse_args()
     elements = (10, 1) if args.quick else (args.elements, args.layers)
     paths, numbers = {}, {}

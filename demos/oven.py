@@ -51,9 +51,7 @@ def draw(axes, path, thickness, colour):
 
 
 def main():
-    options = parser("oven", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=16, help="elements along the radius")
-    options.add_argument("--accuracy", type=float, default=1e-2, help="relative error in time")
+    options = parser("oven", __doc__, elements=16, accuracy=1e-2)
     args = options.parse_args()
     elements, accuracy = ((8, [2, 1, 2]), 2e-2) if args.quick else ((args.elements, [1, 2, 2, 1]), args.accuracy)
     summary = {"sag_mm": {}, "time_to_limit_s": {}, "temperature_C": {}, "wall": {}, "cost": {}}

@@ -73,9 +73,7 @@ def touching(path, state):
 
 
 def main():
-    options = parser("parison", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=90, help="elements along the meridian")
-    options.add_argument("--layers", type=int, default=2, help="elements through the wall")
+    options = parser("parison", __doc__, elements=90, layers=2)
     args = options.parse_args()
     elements = (40, 1) if args.quick else (args.elements, args.layers)
     summary = {}

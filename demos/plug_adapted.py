@@ -28,7 +28,7 @@ COMPARED = 0.3, FILLET                      # the case that has uniform columns 
 
 
 def main():
-    args = parser("plug_adapted", __doc__.splitlines()[0]).parse_args()
+    args = parser("plug_adapted", __doc__).parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     cases = [(mu, FILLET, TRAVELS) for mu in FRICTIONS] + [(0.3, SHARP, SHARP_TRAVELS)]
     if args.quick:

@@ -88,9 +88,7 @@ def case(arguments):
 
 
 def main():
-    options = parser("plug_and_vacuum", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=60, help="elements along the radius")
-    options.add_argument("--layers", type=int, default=2, help="elements through the thickness")
+    options = parser("plug_and_vacuum", __doc__, elements=60, layers=2)
     options.add_argument("--radius", type=float, default=5.0, help="of the plug, cm")
     args = options.parse_args()
     elements = (30, 1) if args.quick else (args.elements, args.layers)

@@ -72,7 +72,7 @@ def key_numbers(path, state, corners) -> dict:
 
 
 def main():
-    options = parser("plug_stress", __doc__.splitlines()[0])
+    options = parser("plug_stress", __doc__)
     options.add_argument("--fillet", type=float, default=0.35, help="radius of the plug's edge, cm")
     options.add_argument("--travels", type=float, nargs="+", default=[4.8, 6.0], help="of the plug, cm; pictures of"
                          " the last")

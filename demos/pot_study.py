@@ -57,7 +57,7 @@ MEASURES = {"evenness": evenness, "least_wall": least_wall, "plug_force": plug_f
 
 
 def main():
-    options = parser("pot_study", __doc__.splitlines()[0])
+    options = parser("pot_study", __doc__)
     options.add_argument("--workers", type=int, help="processes at a time; default one for each core")
     options.add_argument("--search", type=int, default=15, help="runs of the search on top")
     args = options.parse_args()

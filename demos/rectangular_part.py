@@ -35,9 +35,7 @@ def stuck_membrane(half_width, depth, fillet, points=400):
 
 
 def main():
-    options = parser("rectangular_part", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=60, help="elements along the half width")
-    options.add_argument("--layers", type=int, default=2, help="elements through the thickness")
+    options = parser("rectangular_part", __doc__, elements=60, layers=2)
     args = options.parse_args()
     elements = (20, 1) if args.quick else (args.elements, args.layers)
     R, ratio = stuck_membrane(cup.RADIUS, cup.DEPTH, cup.FILLET)

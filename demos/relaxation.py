@@ -100,7 +100,7 @@ def over_time(path):
 
 
 def main():
-    options = parser("relaxation", __doc__.splitlines()[0])
+    options = parser("relaxation", __doc__)
     options.add_argument("--accuracy", type=float, help="relative error in time; default 5e-7, quick 2e-3")
     args = options.parse_args()
     accuracy = args.accuracy or (2e-3 if args.quick else 5e-7)

@@ -107,10 +107,7 @@ def draw(paths, found):
 
 
 def main():
-    options = parser("relaxing_pot", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=30, help="elements along the radius")
-    options.add_argument("--layers", type=int, default=1, help="elements through the thickness")
-    options.add_argument("--accuracy", type=float, default=1e-2, help="relative error in time")
+    options = parser("relaxing_pot", __doc__, elements=30, layers=1, accuracy=1e-2)
     args = options.parse_args()
     elements = (20, 1) if args.quick else (args.elements, args.layers)
     speeds, holds = ((6,), (0, 1)) if args.quick else (SPEEDS, HOLDS)

@@ -91,7 +91,7 @@ def numbers(path):
 
 
 def main():
-    options = parser("ribbed_tray", __doc__.splitlines()[0])
+    options = parser("ribbed_tray", __doc__)
     options.add_argument("--sizes", type=float, nargs="+", default=[8.0, 5.0], help="of the triangles, mm")
     options.add_argument("--adapted", type=int, default=2, help="how often the mesh is then made by what a run showed")
     args = options.parse_args()

@@ -48,7 +48,7 @@ def exact(mode, modulus):
 
 
 def main():
-    args = parser("set_block", __doc__.splitlines()[0]).parse_args()
+    args = parser("set_block", __doc__).parse_args()
     summary = {mode: {} for mode in MODES}
     figure, axes = plots.figure()
     at = np.geomspace(0.1, 1e4, 100)

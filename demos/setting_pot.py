@@ -59,9 +59,7 @@ def draw(axes, wall, colour, label):
 
 
 def main():
-    options = parser("setting_pot", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=30, help="elements along the radius")
-    options.add_argument("--accuracy", type=float, default=1e-2, help="relative error in time")
+    options = parser("setting_pot", __doc__, elements=30, accuracy=1e-2)
     args = options.parse_args()
     elements = (8, [1, 1]) if args.quick else (args.elements, [4, 2, 1])
     summary = {}

@@ -232,7 +232,7 @@ def draw_curves(kind, path, targets, out, grids=None):
 
 
 def main():
-    options = parser("thick_cylinder", __doc__.splitlines()[0])
+    options = parser("thick_cylinder", __doc__)
     options.add_argument("--elements", type=int, default=16, help="elements through the wall; also a quarter, a half")
     args = options.parse_args()
     n = 12 if args.quick else args.elements

@@ -95,7 +95,7 @@ def key_numbers(sheet, law, path, end, travels) -> dict:
 
 
 def main():
-    options = parser("throne_plug", __doc__.splitlines()[0])
+    options = parser("throne_plug", __doc__)
     options.add_argument("--fillet", type=float, default=FILLETS[0], help="radius of the edge over the plug's")
     options.add_argument("--refine", type=int, default=1, help="elements along the radius multiplied by this")
     args = options.parse_args()

@@ -140,9 +140,7 @@ def draw(paths, out, quick):
 
 
 def main():
-    options = parser("two_layer", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=40, help="elements along the radius")
-    options.add_argument("--layers", type=int, default=2, help="elements through each layer")
+    options = parser("two_layer", __doc__, elements=40, layers=2)
     options.add_argument("--stack", type=int, nargs="+", choices=CONSTANTS, metavar="MATERIAL", default=None,
                          help="one more case: materials 1, 2 or 3 of its layers, from the bottom up")
     args = options.parse_args()

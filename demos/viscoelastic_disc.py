@@ -64,9 +64,7 @@ def draw(paths):
 
 
 def main():
-    options = parser("viscoelastic_disc", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=40, help="elements along the radius")
-    options.add_argument("--accuracy", type=float, default=1e-4, help="relative error in time")
+    options = parser("viscoelastic_disc", __doc__, elements=40, accuracy=1e-4)
     args = options.parse_args()
     n, accuracy = (24, 3e-4) if args.quick else (args.elements, args.accuracy)
     summary: dict = {}

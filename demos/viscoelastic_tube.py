@@ -82,9 +82,7 @@ def draw(paths):
 
 
 def main():
-    options = parser("viscoelastic_tube", __doc__.splitlines()[0])
-    options.add_argument("--elements", type=int, default=14, help="elements through the wall")
-    options.add_argument("--accuracy", type=float, default=3e-5, help="relative error in time")
+    options = parser("viscoelastic_tube", __doc__, elements=14, accuracy=3e-5)
     args = options.parse_args()
     n, accuracy = (4, 2e-3) if args.quick else (args.elements, args.accuracy)
     summary: dict = {"sphere": {}}

@@ -28,7 +28,7 @@ QUICK = {"held": ((40, 2), None), "frictionless": ((50, 2), 2.0)}
 
 
 def main():
-    options = parser("williams_plug", __doc__.splitlines()[0])
+    options = parser("williams_plug", __doc__)
     options.add_argument("--fillet", type=float, default=0.35, help="radius of the plug's edge, cm")
     options.add_argument("--refine", type=int, default=1, help="all elements divided by this")
     args = options.parse_args()
