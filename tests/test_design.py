@@ -200,3 +200,17 @@ def test_least_weight():
     assert answer.best.wall.min() == pytest.approx(0.012, rel=2e-3)
     assert answer.best.volume < 0.95 * answer.before.volume
     assert answer.best.wall.max() < 0.0125
+
+
+def test_report(tmp_path):
+    """One file, of a search and of a run: before and after, what the knots could bring, bounds, effects, pictures."""
+    design = fx.Design(lambda h, idle: programmed(h), {"h": fx.along(4, 0.0, -0.04, 1.0), "idle": (1.0, 0.0, 2.0)})
+    answer = design.fit(even=True, runs=3)
+    assert answer.attainable() <= answer.cv[1] + 1e-6
+    text = answer.report(tmp_path / "answer.html", "Even <cap>", deviations={"h": 0.01}).read_text()
+    for word in ("Even &lt;cap&gt;", "unevenness", "At bounds: h[", "lowest", "Without effect on the wall: idle"):
+        assert word in text, word
+    assert text.count("data:image/png") == 4 and "http" not in text.split("<body>")[1]
+    assert "data:image/png" in answer.best.report(tmp_path / "run.html").read_text()
+    axes = answer.best.sensitivities("wall").plot()
+    assert [label.get_text() for label in axes.get_yticklabels()] == answer.best.parameters.names

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -55,16 +57,26 @@ class Answer:
 
     def at_bounds(self) -> list[str]:
         """The parameters that stand at a bound."""
-        p, v = self.best._parameters, self.best.vector
+        p, v = self.best.parameters, self.best.vector
         near = 1e-6 * p.size
         return [f"{name} at its {'lowest' if x <= a + h else 'highest'}, {x:.6g}"
                 for name, x, a, b, h in zip(p.names, v, p.low, p.high, near) if x <= a + h or x >= b - h]
 
     def without_effect(self) -> list[str]:
         """Parameters whose whole range, foretold by the derivatives, changes the wall by less than its scatter."""
-        by = self.before.derivative("wall")[1][self.inside] * self.before._parameters.size
+        by = self.before.derivative("wall")[1][self.inside] * self.before.parameters.size
         mean = self.before.wall[self.inside].mean()
-        return [name for name, d in zip(self.before._parameters.names, abs(by).max(0) / mean) if d < _SCATTER]
+        return [name for name, d in zip(self.before.parameters.names, abs(by).max(0) / mean) if d < _SCATTER]
+
+    def attainable(self) -> float:
+        """The unevenness to which these parameters could bring the wall within their bounds, whatever the volume, as
+        the derivatives of the best run foretell."""
+        from scipy.optimize import lsq_linear
+        p, v, (wall, by) = self.best.parameters, self.best.vector, self.best.derivative("wall")
+        wall, by, mean = wall[self.inside], by[self.inside] * p.size, wall[self.inside].mean()
+        found = lsq_linear((by - np.outer(wall / mean, by.mean(0))) / mean, 1 - wall / mean,
+                           bounds=((p.low - v) / p.size - 1e-12, (p.high - v) / p.size + 1e-12))
+        return float(np.sqrt(2 * found.cost / len(wall)))
 
     def __str__(self) -> str:
         (a, b), before, after = self.cv, self.before.wall[self.inside], self.best.wall[self.inside]
@@ -75,7 +87,7 @@ class Answer:
                  f"{'least wall':24}{before.min():12.5g}{after.min():12.5g}",
                  f"{'mean wall':24}{before.mean():12.5g}{after.mean():12.5g}",
                  f"{'volume':24}{self.before.volume:12.5g}{self.best.volume:12.5g}"]
-        p = self.best._parameters
+        p = self.best.parameters
         lines += [f"{name:24}{x:12.5g}{y:12.5g}" for name, x, y in zip(p.names, self.before.vector, self.best.vector)]
         lines += [f"the wall was foretold to {100 * off:.2g} % by the run before"]
         lines += [f"bounds: {', '.join(met)}" for met in [self.at_bounds()] if met]
@@ -87,7 +99,7 @@ class Answer:
         """Draw the wall before and after over the reference length; returns the matplotlib axes."""
         if axes is None:
             from ..figures import figure
-            axes = figure()[1]
+            axes = figure(width=7)[1]
         for run, label, colour in ((self.before, "before", "0.6"), (self.best, "after", "C0")):
             axes.plot(run.profile.reference_length, run.wall, color=colour, label=label)
         axes.set_xlabel("reference length")
@@ -95,3 +107,17 @@ class Answer:
         axes.set_ylim(bottom=0)
         axes.legend()
         return axes
+
+    def report(self, file: Any = "design.html", title: str = "", *,
+               deviations: Mapping[str, float] | None = None) -> FilePath:
+        """Write one HTML file: what was found, how sure it is, walls before and after, the pattern, and which parameter
+        changes the wall where (rank 0 writes); returns where it is.
+
+        deviations: {parameter: its standard deviation}, as of constants that were fitted: the wall is drawn with its
+            `spread`.
+
+        Raises:
+            InputError: the best run has no derivative. OSError: the file cannot be written.
+        """
+        from .report import of_answer
+        return of_answer(self, file, title, deviations)

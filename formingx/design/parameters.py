@@ -112,6 +112,11 @@ class Parameters:
     def __len__(self) -> int:
         return len(self.names)
 
+    @property
+    def profiles(self) -> dict[str, tuple[float, float]]:
+        """Bounds of those that are profiles, by name."""
+        return {name: (one.low, one.high) for name, one in self._given.items() if one.profile}
+
     def values(self, vector: np.ndarray) -> dict[str, Any]:
         """What the user's function is called with."""
         parts = np.split(vector, np.cumsum([len(one.start) for one in self._given.values()])[:-1])

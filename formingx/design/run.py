@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -31,11 +32,13 @@ near, a difference to one side leaves nothing out.)"""
 class Effects:
     """Derivatives of one measure: of shape (m,) by n parameters.
 
-    names: of the parameters; places: what the rows are at (a length, or nothing); value: shape (m,); by: (m, n).
+    names: of the parameters; sizes: their ranges (else their starts), shape (n,); places: what the rows are at (a
+    length, or nothing); value: shape (m,); by: (m, n).
     """
 
     measure: str
     names: list[str]
+    sizes: np.ndarray
     places: np.ndarray
     value: np.ndarray
     by: np.ndarray
@@ -47,17 +50,34 @@ class Effects:
                   for k in rows]
         return "\n".join(lines)
 
+    def plot(self, axes: Any = None) -> Any:
+        """Draw a heat map: by how much the measure changes, to first order, where a parameter goes over a tenth of its
+        range; returns the matplotlib axes."""
+        from ..figures import figure
+        axes = axes if axes is not None else figure()[1]
+        tenth, n = (self.by * self.sizes / 10).T, len(self.names)
+        most, places = abs(tenth).max() or 1.0, self.places if len(self.places) > 1 else np.array([0.0, 1.0])
+        edges = np.concatenate([places[:1], (places[1:] + places[:-1]) / 2, places[-1:]])
+        drawn = axes.pcolormesh(edges, np.arange(n + 1) - 0.5, tenth if len(self.places) > 1 else tenth.repeat(2, 1),
+                                cmap="RdBu_r", vmin=-most, vmax=most)
+        axes.set(yticks=range(n), yticklabels=self.names, xlabel="reference length" if self.measure == "wall" else "")
+        axes.invert_yaxis()
+        axes.grid(False)
+        axes.figure.colorbar(drawn, ax=axes, label=f"change of the {self.measure}").outline.set_visible(False)
+        return axes
+
 
 class DesignRun:
     """A run of what the user's function makes of some values.
 
     Attributes:
-        vector: the numbers of the parameters, shape (n,); values: the same by name; path: the `Path`.
+        vector: the numbers of the parameters, shape (n,); values: the same by name; parameters: what they are
+            (`Parameters`); path: the `Path`.
     """
 
     def __init__(self, make: Callable[[np.ndarray], tuple[Any, Any]], parameters: Parameters, vector: np.ndarray,
                  path: Path, end: Any, tolerances: Tolerances | None):
-        self._make, self._parameters, self.vector, self.path, self._end = make, parameters, vector, path, end
+        self._make, self.parameters, self.vector, self.path, self._end = make, parameters, vector, path, end
         self._tolerances = tolerances or Tolerances()
         self.values = parameters.values(vector)
 
@@ -83,8 +103,8 @@ class DesignRun:
         contact, reason = bool(self.path.problem.contacts), ""
         for size in _CLOSER if contact else (_SMOOTH,):
             made = []
-            for k, step in enumerate(size * self._parameters.size):
-                ways = (-1.0 if self.vector[k] + step > self._parameters.high[k] else 1.0,) if contact else (1.0, -1.0)
+            for k, step in enumerate(size * self.parameters.size):
+                ways = (-1.0 if self.vector[k] + step > self.parameters.high[k] else 1.0,) if contact else (1.0, -1.0)
                 made.append(([self._beside(k, way * step) for way in ways], ways[0] * step * len(ways)))
             try:
                 carry(self.path, self._end, [one for beside, _ in made for one in beside])
@@ -99,7 +119,7 @@ class DesignRun:
 
     def _beside(self, k: int, step: float) -> Neighbour:
         """A neighbour, one parameter changed; not solved for."""
-        moved, name = self.vector.copy(), self._parameters.names[k]
+        moved, name = self.vector.copy(), self.parameters.names[k]
         moved[k] += step
         try:
             return Neighbour(*self._make(moved), self.path.problem, name)
@@ -128,7 +148,7 @@ class DesignRun:
         value, by = self.derivative(measure)
         places = self.profile.reference_length if measure == "wall" else np.arange(float(len(value)))
         name = measure if isinstance(measure, str) else getattr(measure, "__name__", "measure")
-        return Effects(name, self._parameters.names, places, value, by)
+        return Effects(name, self.parameters.names, self.parameters.size, places, value, by)
 
     def spread(self, deviations: Mapping[str, float], measure: Any = "wall") -> np.ndarray:
         """Standard deviation of a measure, to first order, where parameters scatter independently, shape (m,).
@@ -136,13 +156,26 @@ class DesignRun:
         deviations: {parameter: its standard deviation}; of a profile that of every knot.
         """
         by = self.derivative(measure)[1]
-        sizes = np.zeros(len(self._parameters))
+        sizes = np.zeros(len(self.parameters))
         for name, size in deviations.items():
-            mine = [k for k, one in enumerate(self._parameters.names) if one == name or one.startswith(f"{name}[")]
+            mine = [k for k, one in enumerate(self.parameters.names) if one == name or one.startswith(f"{name}[")]
             if not mine:
                 raise InputError(f"spread: parameter {name!r} is not known; known: {', '.join(self.values)}")
             sizes[mine] = non_negative(f"spread: {name}", size)
         return np.sqrt((by**2) @ sizes**2)
+
+    def report(self, file: Any = "design.html", title: str = "", *,
+               deviations: Mapping[str, float] | None = None) -> FilePath:
+        """Write one HTML file: the part, its wall, and what changes it (rank 0 writes); returns where it is.
+
+        deviations: {parameter: its standard deviation}, as of constants that were fitted: the wall is drawn with its
+            `spread`.
+
+        Raises:
+            InputError: the run has no derivative. OSError: the file cannot be written.
+        """
+        from .report import of_run
+        return of_run(self, file, title, deviations)
 
     def _here(self, measure: Any) -> np.ndarray:
         if isinstance(measure, str):
