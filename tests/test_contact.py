@@ -56,7 +56,7 @@ def test_stiffness_is_derivative_of_force(mu, slip, touched):
 @pytest.mark.parametrize("touched", [True, False])
 def test_a_tool_that_holds(mu, touched):
     """Stiffness is the derivative of the force; what has touched is pulled back, what has not is free."""
-    law = Law(TOOL, mu, K, THETA, SLIP, separates=False)
+    law = Law(TOOL, mu, K, THETA, SLIP, pulls=True)
     x, tangent = points_near(TOOL, [-5 * THETA, -(1 + 1e-3) * THETA, -0.5 * THETA, 2 * THETA])
     before = x - 0.01 * tangent
     old = Touch(before, np.full(len(x), -0.5 * THETA if touched else -2 * THETA), np.full(len(x), 1e-4), before)

@@ -204,3 +204,17 @@ def test_a_body_that_lies_on_a_tool_has_a_tangent_that_goes_with_it():
         pole = -problem.forms.length * start.direction[path.problem.contacts[0].rule.dofs[:, 1]].min()
         moved = problem.forms.length * sum(problem.setting.rate) * start.slope
     assert pole == pytest.approx(moved, rel=0.1)
+
+
+def test_what_a_bond_holds():
+    """A block is pulled by a tool that it is stuck to: the penalty is a spring; let go, the bond keeps nothing."""
+    tool = fx.Contact("top", tools.plane(1.0), "none", separates=False, penalty=5.0, moves=(0, 1), name="tool")
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(2, 2)), materials=RUBBER, contacts=[tool],
+                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z")], kinematics=fx.PlaneStrain())
+    path = fx.Process(scene).run([Stage("pull", drive=tool, until=fx.travel(0.5)), Stage("let go", without=[tool])],
+                                 progress=False)
+    books, pulled = path.work(), path.states.index(path.state("pull"))
+    force = path["tool_force"][pulled]
+    assert books["bonds"][pulled] == pytest.approx(force**2 / (2 * 5.0), rel=1e-4)
+    assert books["tool"][pulled] == pytest.approx(books["strain_energy"][pulled] + books["bonds"][pulled], rel=1e-4)
+    assert abs(books["bonds"][-1]) < 1e-8 and np.abs(books["unbalanced"]).max() < 1e-3 * books["tool"][pulled]

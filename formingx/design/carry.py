@@ -43,8 +43,8 @@ class _Carrier:
             raise Failure("it changed its mesh on the way", [])
         if path.ended:
             raise Failure(path.ended, [])
-        if not all(hasattr(face.law, "without") for face in path.problem.contacts):
-            raise Failure("contact in space, or by a law of one's own without `without`, is not carried along", [])
+        if any(face.contact.lagged for face in path.problem.contacts):
+            raise Failure("contact in space is not carried along", [])
         self.path, self.neighbours = path, neighbours
         self.problem, self.curve = path.problem, path.record.curve
         self._single = isinstance(end, Target)

@@ -36,7 +36,7 @@ from ..tools.solid import SolidTool
 from ..tools.tool import RigidTool
 from ..values.table import Table
 from ..values.temperature import FunctionOfTemperature
-from .contact_law import ContactLaw, Motion, Touch, Tractions
+from .contact_law import ContactLaw, Motion, NormalLaw, Touch, Tractions, outer
 from .lagged_stick import LaggedStick
 from .part import Part
 
@@ -49,9 +49,6 @@ _ELASTIC_SLIP = 1e-3
 _SLIDES, _STICK, _HELD = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
 """Penalty and ramp of what slides, of what sticks until pulled off, and of what never lets go, where stiffer costs
 iterations."""
-
-_FAR = 1e30
-"""A length beyond all others, which may still be multiplied with 0."""
 
 _MOST_POINTS = 100
 """Gauss points on a facet."""
@@ -195,8 +192,8 @@ class Contact(Part):
             return LaggedStick(self.tool, k, theta, self.separates)
         foot = (1 - _AT_FOOT * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)
-        return Law(self.tool, self.friction_at(temperature), k, theta, elastic_slip, shift, self.separates,
-                   self.shear_limit)
+        return Law(self.tool, self.friction_at(temperature), k, theta, elastic_slip, shift,
+                   not self.separates, self.shear_limit)
 
     def __repr__(self) -> str:
         return f"Contact({self.on!r}, {self.tool!r}, {self.friction!r})"
@@ -228,46 +225,30 @@ def _points(name: str, points: Any) -> str | int:
     return number
 
 
-class Law:
+class Law(NormalLaw):
     """The `ContactLaw` of this module: a penalty with a ramp, and friction.
 
     mu, k: of friction, of the penalty, a number, or one for each point, shape (n,). elastic_slip: g_s, length, not used
     by stick.
     shear_limit: (pressure, shape (n,), mu): see `Contact.shear_limit`.
 
-    Distances are less by `shift`, shape (n,), length: a point that touches from the start begins at the foot of the
-    ramp, free of stress.
+    pulls: what touches is held for ever.
     """
 
     def __init__(self, tool: RigidTool, mu: np.ndarray | float, k: np.ndarray | float, theta: float,
-                 elastic_slip: float, shift: np.ndarray | float = 0.0, separates: bool = True,
+                 elastic_slip: float, shift: np.ndarray | float = 0.0, pulls: bool = False,
                  shear_limit: Callable | None = None):
+        super().__init__(tool, k, theta, shift)
         self.shear_limit = shear_limit or (lambda pressure, mu: (mu * pressure, mu))
+        self.mu, self.elastic_slip, self.pulls = mu, elastic_slip, pulls
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
-        self.tool, self.mu, self.k, self.theta, self.elastic_slip = tool, mu, k, theta, elastic_slip
-        self.shift, self.separates = shift, separates
-        self._near: tuple[np.ndarray, Nearest] | None = None        # points last asked for, and what was found
+        self.remembers = self.has_friction or pulls
         self._slid: tuple[Nearest, Touch, tuple] | None = None      # of what is near, and remembered: the slip
-
-    def part(self, points: np.ndarray | slice) -> Law:
-        """The law of some of its points."""
-        shift = self.shift[points] if isinstance(self.shift, np.ndarray) else self.shift
-        mu, k = (value[points] if isinstance(value, np.ndarray) else value for value in (self.mu, self.k))
-        return Law(self.tool, mu, k, self.theta, self.elastic_slip, shift, self.separates, self.shear_limit)
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
         """The same law with other coefficients of friction."""
-        return Law(self.tool, mu, self.k, self.theta, self.elastic_slip, self.shift, self.separates, self.shear_limit)
-
-    def without(self, points: np.ndarray) -> Law:
-        """The same law, of which some points (a mask, shape (n,)) are far away."""
-        return Law(self.tool, self.mu, self.k, self.theta, self.elastic_slip, self.shift + np.where(points, _FAR, 0.0),
-                   self.separates, self.shear_limit)
-
-    @property
-    def remembers(self) -> bool:
-        """True if tractions depend on what points remember."""
-        return self.has_friction or not self.separates
+        has_friction = np.ndim(mu) > 0 or bool(mu > 0)
+        return self._with(mu=mu, has_friction=has_friction, remembers=has_friction or self.pulls)
 
     def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
         """Which points at x touch, or are held, shape (n,)."""
@@ -275,39 +256,28 @@ class Law:
 
     def _held(self, old: Touch | None) -> np.ndarray | bool:
         """Which points may not let go, shape (n,)."""
-        return False if self.separates or old is None else old.distance > -self.theta
-
-    def distance(self, x: np.ndarray) -> np.ndarray:
-        """Signed distance of points x, shape (n, 2) or several places of each (m, n, 2), less the shift, length."""
-        if x.ndim == 2:
-            return self.nearest(x).distance
-        return self.tool.signed_distance(x).reshape(x.shape[:-1]) - self.shift
-
-    def nearest(self, x: np.ndarray) -> Nearest:
-        """`Tool.nearest` at points x, shape (n, 2), the distances less the shift; found once for the same points."""
-        if self._near is None or not np.array_equal(x, self._near[0]):
-            near = self.tool.nearest(x)
-            self._near = x.copy(), near._replace(distance=near.distance - self.shift)
-        return self._near[1]
+        return False if not self.pulls or old is None else old.distance > -self.theta
 
     def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
         """F(d), eq. (5.13) if the body separates from the tool, and its derivative."""
-        if not self.separates:
+        if self.pulls:
             slope = np.where(held | (d > -self.theta), 1.0, 0.0)
             return slope * (d + self.theta), slope
         slope = np.minimum(np.maximum((d + self.theta) / (2 * self.theta), 0.0), 1.0)      # np.clip is slow
         return np.where(d < self.theta, self.theta * slope**2, d), slope
 
-    def energy(self, x: np.ndarray) -> np.ndarray:
-        """Energy of the normal traction per unit reference area at points x, shape (n,), stress times length."""
+    def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
+        """Of the normal traction, see `ContactLaw`."""
         d, theta = self.distance(x), self.theta
+        if self.pulls:
+            return self.k * np.where(self._held(old) | (d > -theta), (d + theta) ** 2 / 2, 0.0)
         inside = np.clip(d + theta, 0.0, 2 * theta)
         return self.k * np.where(d < theta, inside**3 / (12 * theta), d**2 / 2 + theta**2 / 6)
 
     def start(self, x: np.ndarray) -> Touch:
         """What points at x remember before anything has happened."""
         d = self.distance(x)
-        if not self.separates:                              # at the foot of the ramp it is held, free of stress
+        if self.pulls:                                      # at the foot of the ramp it is held, free of stress
             d = np.where(np.abs(d / self.theta + 1) < _AT_FOOT, -(1 - _AT_FOOT) * self.theta, d)
         return _touch(x.copy(), d, np.zeros(len(x)))
 
@@ -334,8 +304,8 @@ class Law:
         zero: np.ndarray = np.zeros(len(x))
         kept_at = np.where(held, np.maximum(d, 0.0), d) if self.remembers else d            # held for ever
         if not self.has_friction:
-            return Tractions(force, N, zero, zero, lambda: _outer(n, (k * slope)[:, None] * n)
-                             + _outer(t, (pressed * bend)[:, None] * t), lambda: _touch(x, kept_at, zero))
+            return Tractions(force, N, zero, zero, lambda: outer(n, (k * slope)[:, None] * n)
+                             + outer(t, (pressed * bend)[:, None] * t), lambda: _touch(x, kept_at, zero))
         assert old is not None
         g, dg = self._slip(x, near, old)
         foretold = g if expected is None else expected.slip
@@ -353,8 +323,8 @@ class Law:
         force = force + T[:, None] * t
 
         def stiffness() -> np.ndarray:
-            return (_outer(n, (k * slope)[:, None] * n - (bent * bend)[:, None] * t)
-                    + _outer(t, (pressed * bend)[:, None] * t + dT))
+            return (outer(n, (k * slope)[:, None] * n - (bent * bend)[:, None] * t)
+                    + outer(t, (pressed * bend)[:, None] * t + dT))
 
         def touch() -> Touch:
             kept = np.divide(T, s, out=zero.copy(), where=s > 0)
@@ -366,7 +336,7 @@ class Law:
         """Stiffness T/g of elastic slip at distances d, and its derivative by them, shape (n,) each."""
         sticks, k = np.asarray(self.mu >= _STICKS), self.k
         limit, grows = self.shear_limit(pressed, np.where(sticks, 0.0, self.mu))
-        rising = (np.abs(d) < self.theta) * k / (2 * self.theta) * self.separates
+        rising = (np.abs(d) < self.theta) * k / (2 * self.theta) * (not self.pulls)
         return (np.where(sticks, k * slope, limit / self.elastic_slip),
                 np.where(sticks, rising, grows / self.elastic_slip * k * slope))
 
@@ -376,8 +346,7 @@ class Law:
         That of the normal traction, N n_r/r (r: `radius`, infinite in plane strain), and what holds a point that
         sticks; nothing holds one that slides.
         """
-        near, found = self.nearest(x), self.tractions(x, old)
-        turned = np.divide(found.normal * near.normal[:, 0], radius, out=np.zeros(len(x)), where=radius > 0)
+        turned, near, found = super().stiffness_round(x, old, radius), self.nearest(x), self.tractions(x, old)
         if not self.has_friction:
             return turned
         F, slope = self.ramp(near.distance, self._held(old))
@@ -421,7 +390,3 @@ class Law:
 
 def _touch(x: np.ndarray, d: np.ndarray, slip: np.ndarray) -> Touch:
     return Touch(x, d, slip, x)
-
-
-def _outer(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return a[:, :, None] * b[:, None, :]

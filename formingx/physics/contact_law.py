@@ -5,13 +5,18 @@ Positions, motions and tractions of n points have c components each, 2 in the pl
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from ..tools.shapes import Nearest
+from ..tools.tool import RigidTool
+
+_FAR = 1e30
+"""A length beyond all others, which may still be multiplied with 0."""
 
 
 class Touch(NamedTuple):
@@ -87,20 +92,23 @@ class ContactLaw(Protocol):
         stiffness_ahead     there: the tangent of the path, with the points that have just touched;
         distance, nearest, ramp     limits of the next step: when points arrive, and whether that was foreseen.
 
-    What only `formingx.physics.contact.Law` has, and others may: `without`, for derivatives of runs with contact
-    (`formingx.Design`); `shift`, for a mesh that is made again on the way (`trace(remesh=)`).
-
     Attributes:
         theta: half-width of the ramp: at -theta contact begins, length; elastic_slip: before a point slides, length.
-        has_friction: tractions depend on slip; remembers: on `Touch`.
+        shift: what distances are less by, length, a number or one for each point, shape (n,).
+        has_friction: tractions depend on slip; remembers: on `Touch`; pulls: the body may pull at the tool, and what
+            `energy` says is held by the bond (`Path.work`).
     """
 
     theta: float
     elastic_slip: float
+    shift: np.ndarray | float
     has_friction: bool
 
     @property
     def remembers(self) -> bool: ...
+
+    @property
+    def pulls(self) -> bool: ...
 
     def start(self, x: np.ndarray) -> Touch:
         """What points at x remember before anything has happened."""
@@ -130,11 +138,113 @@ class ContactLaw(Protocol):
     def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Normal traction over the penalty at distances d, and its derivative."""
 
-    def energy(self, x: np.ndarray) -> np.ndarray:
-        """What penetration holds per unit reference area, shape (n,), stress length."""
+    def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
+        """What the normal tractions hold per unit reference area, shape (n,), stress length."""
 
     def part(self, points: np.ndarray | slice) -> ContactLaw:
         """The law of some of the points."""
 
+    def without(self, points: np.ndarray) -> ContactLaw:
+        """The same law, of which some points (a mask, shape (n,)) touch nothing."""
+
     def with_friction(self, mu: np.ndarray | float) -> ContactLaw:
         """The same law with other coefficients of friction."""
+
+
+class NormalLaw:
+    """A `ContactLaw` without friction or memory: subclasses give `ramp` and `stored`.
+
+    Args:
+        tool: with its signed distance.
+        k: the penalty, stress/length, a number or one for each point, shape (n,).
+        theta, shift: see `ContactLaw`. With a shift a point that touches from the start begins at the foot of the ramp,
+            free of stress.
+    """
+
+    has_friction = remembers = pulls = False
+    elastic_slip = 0.0
+
+    def __init__(self, tool: RigidTool, k: np.ndarray | float, theta: float, shift: np.ndarray | float = 0.0):
+        self.tool, self.k, self.theta, self.shift = tool, k, theta, shift
+        self._near: tuple[np.ndarray, Nearest] | None = None        # points last asked for, and what was found
+
+    def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """See `ContactLaw`."""
+        raise NotImplementedError
+
+    def stored(self, d: np.ndarray) -> np.ndarray:
+        """The integral of the ramp over the distance, 0 where there is no contact, shape (n,), length^2."""
+        raise NotImplementedError
+
+    def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
+        """See `ContactLaw`."""
+        return self.k * self.stored(self.distance(x))
+
+    def distance(self, x: np.ndarray) -> np.ndarray:
+        """See `ContactLaw`."""
+        if x.ndim == 2:
+            return self.nearest(x).distance
+        return self.tool.signed_distance(x).reshape(x.shape[:-1]) - self.shift
+
+    def nearest(self, x: np.ndarray) -> Nearest:
+        """See `ContactLaw`; found once for the same points."""
+        if self._near is None or not np.array_equal(x, self._near[0]):
+            near = self.tool.nearest(x)
+            self._near = x.copy(), near._replace(distance=near.distance - self.shift)
+        return self._near[1]
+
+    def start(self, x: np.ndarray) -> Touch:
+        """See `ContactLaw`."""
+        return Touch(x.copy(), self.distance(x), np.zeros(len(x)), x.copy())
+
+    def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
+        """See `ContactLaw`."""
+        return self.distance(x) > -self.theta
+
+    def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
+        """See `ContactLaw`."""
+        near = self.nearest(x)
+        return Motion(x, near.distance, near.normal, np.zeros(len(x)), 0 * x)
+
+    def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
+                  expected: Motion | None = None) -> Tractions:
+        """See `ContactLaw`."""
+        near, none = self.nearest(x), np.zeros(len(x))
+        n, t, at = near.normal, near.tangent, near.distance if expected is None else expected.distance
+        F, slope = self.ramp(at)
+        N = self.k * (F + slope * (near.distance - at))
+        return Tractions(N[:, None] * n, N, none, none, lambda: outer(n, (self.k * slope)[:, None] * n)
+                         + outer(t, (self.k * F * near.curvature)[:, None] * t), lambda: self.start(x))
+
+    def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
+        """See `ContactLaw`."""
+        return self.tractions(x, old).stiffness
+
+    def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
+        """See `ContactLaw`: N n_r/r, r being `radius`, infinite in plane strain."""
+        turned = self.tractions(x, old).normal * self.nearest(x).normal[:, 0]
+        return np.divide(turned, radius, out=np.zeros(len(x)), where=radius > 0)
+
+    def part(self, points: np.ndarray | slice) -> Any:
+        """See `ContactLaw`."""
+        arrays = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return self._with(**{name: value[points] for name, value in arrays.items()})
+
+    def without(self, points: np.ndarray) -> Any:
+        """See `ContactLaw`."""
+        return self._with(shift=self.shift + np.where(points, _FAR, 0.0))
+
+    def with_friction(self, mu: np.ndarray | float) -> Any:
+        """See `ContactLaw`."""
+        return self
+
+    def _with(self, **other: Any) -> Any:
+        """The same law with other attributes."""
+        law = copy.copy(self)
+        vars(law).update(other, _near=None)
+        return law
+
+
+def outer(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a b^T of n vectors, shape (n, c, c)."""
+    return a[:, :, None] * b[:, None, :]

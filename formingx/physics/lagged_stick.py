@@ -45,8 +45,9 @@ class LaggedStick:
     """
 
     has_friction = False
-    remembers = True
+    remembers = pulls = True
     elastic_slip = 0.0
+    shift: np.ndarray | float = 0.0
     mu = np.inf
 
     def __init__(self, tool: RigidTool, k: Any, theta: float, separates: bool = False):
@@ -56,6 +57,10 @@ class LaggedStick:
     def part(self, points: np.ndarray | slice) -> LaggedStick:
         """See `ContactLaw`."""
         return LaggedStick(self.tool, self.k, self.theta, self.separates)
+
+    def without(self, points: np.ndarray) -> LaggedStick:
+        """See `ContactLaw`; not needed."""
+        raise NotImplementedError
 
     def with_friction(self, mu: np.ndarray | float) -> LaggedStick:
         """See `ContactLaw`."""
@@ -121,7 +126,7 @@ class LaggedStick:
         """See `ContactLaw`; there is none."""
         return np.zeros(len(d)), np.zeros(len(d))
 
-    def energy(self, x: np.ndarray) -> np.ndarray:
+    def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
         """See `ContactLaw`; nothing is held by penetration."""
         return np.zeros(len(x))
 

@@ -281,7 +281,8 @@ class Path(States):
         Work done on the body by each load (its column; of a fixed one "pressure_on_bottom"), each driven support (its
         name, or "support") and each tool that moves; by forces that a stage leaves without balance, as they fade
         ("change"). Energy of changes of temperature ("heat"). Where it went: "strain_energy", above that at first;
-        "dissipated_energy" in materials; "friction"; "jumps". "unbalanced": the error of the integrals, and of the run.
+        "dissipated_energy" in materials; "friction"; "jumps"; "bonds" to tools that the body may pull at, above that at
+        first. "unbalanced": the error of the integrals, and of the run.
         """
         self._section_only("work")
         from .evaluate.work import work

@@ -36,8 +36,8 @@ def pressing(face: FaceContact, fields: np.ndarray, control: float) -> float:
 
 
 def energy(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """What penetration holds, stress length^3 (per depth: length^2)."""
-    return _sum(face, face.rule.area * face.law.energy(face.positions(fields, control)))
+    """What the normal tractions hold, stress length^3 (per depth: length^2)."""
+    return _sum(face, face.rule.area * face.law.energy(face.positions(fields, control), face.touch))
 
 
 def traction(face: FaceContact, fields: np.ndarray, control: float) -> tuple[np.ndarray, np.ndarray]:

@@ -24,7 +24,7 @@ from ...discrete.tooling import Tooling
 from ...errors import InputError
 from ...solve.newton import Failure
 
-_LOSSES = "friction", "jumps"
+_LOSSES = "friction", "jumps", "bonds"
 _GAUSS = tuple((1 + s) / 2 for s in (-(0.6**0.5), 0.0, 0.6**0.5)), (5 / 18, 8 / 18, 5 / 18)
 _FOOT = 0.06           # of half the width of the ramp: points nearer to its foot are at it
 _SMALL = 1e-5          # of the arc length of a state: half of a difference quotient
@@ -152,9 +152,13 @@ class Ledger:
             found["friction"] = self._friction(a, b)
         if self._problem.scene.heat is not None:
             found["heat"] = self._warmed(a, b)
+        if any(c.law.pulls for c in self._problem.contacts):
+            found["bonds"] = self._bonds(b) - self._bonds(a)
         if a.setting != b.setting:                          # the same body, seen under another setting
             if self._problem.forms.elastic_supports:
                 found["change"] = self._energy_at(b) - self._energy_at(a)
+            if "bonds" in found:                            # what is left out lets go of what it held
+                found["change"] = found.get("change", 0.0) + found["bonds"]
             return found
         straight = b.kind == "jump" or self._flows(a, b)    # no tangents of the way
         h = self._curve.distance(a, b)
@@ -268,6 +272,11 @@ class Ledger:
         """Stored energy at a state."""
         with self._problem.at(state) as problem:
             return self._energy * problem.assemble_scalar(self._stored)
+
+    def _bonds(self, state: Any) -> float:
+        """What tools hold that the body may pull at."""
+        with self._problem.at(state) as at:
+            return sum(resultants.energy(c, state.x[: at.n_owned], state.control) for c in at.present if c.law.pulls)
 
     def _sum(self, values: Any) -> float:
         return float(self._problem.comm.allreduce(float(np.sum(values)), MPI.SUM))
