@@ -221,6 +221,10 @@ def test_tool_files_are_looked_over(tmp_path):
         fx.tools.solid(tmp_path / "turned.stl")
     with pytest.raises(fx.InputError, match="units of length the same"):
         disc(contacts=[fx.Contact("bottom", fx.tools.solid(tmp_path / "box.stl", scale=25.4).moved(z=-30))])
+    assert r"Symmetry('y0', 'y')" in str(fx.doctor(disc(supports=HELD[:2]))) and fx.doctor(disc()).healthy
+    floor = fx.tools.revolved(fx.tools.plane(-1.0).reversed())                   # a plane is 1 long in drawings
+    fx.Scene(mesh=fx.mesh.sheet(fx.mesh.circle(50.0, part="quarter"), 20.0), thickness=0.5, materials=MATERIALS[0],
+             supports=HELD, loads=[fx.Pressure("top")], contacts=[fx.Contact("bottom", floor)])
 
 
 def plug_above(separates):
@@ -304,6 +308,16 @@ def test_moulds_from_files_fill(make, tmp_path):
     (lambda: disc(material=MATERIALS[3], contacts=[plug_above(True)]), "separates = True: in space a sheet that relax"),
     (lambda: fx.Design(lambda h: (disc(thickness=h), fx.pressure(0.001)), {"h": (0.01, 0.005, 0.02)}).fit(even=True),
      "in space has no profile"),
+    (lambda: fx.trace(disc(), until=fx.pole_height(0.1), progress=False), r"take displacement\(..., at="),
+    (lambda: fx.mesh.sheet([(0, 0), (1, 1), (1, 0), (0, 1)], 0.1), r"crosses or touches itself near \(0.5, 0.5\)"),
+    (lambda: fx.mesh.sheet([(0, 0), (2, 0), (1, 0), (1, 1)], 0.1), "crosses or touches itself near"),
+    (lambda: fx.mesh.sheet([(0, 0), (1, 0), (1, 0), (0, 1)], 0.1), r"the corner \(1, 0\) is there twice"),
+    (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), 0.3, names=["a"]), "1 names for 4 edges"),
+    (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), 0.3, layers=["a", "a"]), "layers.*each another"),
+    (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), lambda x, y: x), r"size at \(-.*: must be greater than 0"),
+    (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), lambda x: x), "the function fails: TypeError"),
+    (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), lambda x, y: 1e-5 + x * x), "more than 500000 triangles"),
+    (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), lambda x, y: np.nan if 1e-3 < x < 0.02 else 0.03), "size at.*nan"),
 ])
 def test_what_is_not_proven_is_refused(make, words):
     with pytest.raises(fx.InputError, match=words):

@@ -62,7 +62,7 @@ def doctor(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Seque
         instance("doctor: stages: stage", stage, Stage, "a formingx.Stage")
     body = Body(scene, targets, stages, units)
     targets = [*targets, *(target for stage in stages for target in (*stage.through, stage.until) if target)]
-    checks = (_driven, _elements, _locking, _layers, _fillets, _contact_penalties, _volume_penalty, _units)
+    checks = (_driven, _edges, _elements, _locking, _layers, _fillets, _contact_penalties, _volume_penalty, _units)
     findings = [finding for check in checks for finding in check(scene, body, targets)]
     findings += [Finding("warning", about, text) for check in doctor_sizes.CHECKS for about, text in check(body)]
     findings += [Finding("warning", about, text) for about, text in doctor_cooling.springs_back(scene)]
@@ -85,6 +85,14 @@ def _driven(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
     if not scene.drivable:
         yield Finding("warning", "loads", "nothing is driven: only a process that waits can run; give one load no"
                                           " value, as Pressure('bottom'), or add a Displaced support")
+
+
+def _edges(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
+    """Edges of a sheet in space that nothing holds: a flat membrane has no stiffness across them."""
+    if scene.kinematics.components == 3:
+        for name in set(scene.mesh.boundaries) - {"bottom", "top", *(support.on for support in scene.supports)}:
+            yield Finding("warning", f"boundary {name!r}", f"nothing holds this edge of the sheet: where a whole one was"
+                          f" cut (part='quarter'), it needs Symmetry({name!r}, {'y' if name == 'y0' else 'x'!r})")
 
 
 def _elements(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:

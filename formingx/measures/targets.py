@@ -280,7 +280,8 @@ def _pole(problem):
     """Z of the bottom and the top of the axis."""
     mesh = problem.scene.mesh
     if "axis" not in mesh.boundaries:
-        raise InputError(f"the pole needs a boundary named 'axis'; the mesh has {list(mesh.boundaries)}")
+        raise InputError(f"the pole needs a boundary named 'axis'; the mesh has {list(mesh.boundaries)}: elsewhere take"
+                         f" displacement(..., at=..., component=...)")
     nodes = mesh.nodes_of("axis")
     return float(nodes[:, 1].min()), float(nodes[:, 1].max())
 

@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from ..errors import InputError, instance, known, non_negative, pair, positive, several
 from . import with_gmsh
+from .check import crossing
 from .grid import Grid, counter_clockwise, to_mesh
 from .mesh import Mesh
 
@@ -124,37 +125,103 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
         corners = [pair("sheet: outline: corner", point) for point in edges]
         if len(corners) < 3:
             raise InputError(f"sheet: outline = {outline!r}: must have at least three corners")
-        called = list(names) if names is not None else ["rim"] * len(corners)
-        if len(called) != len(corners):
-            raise InputError(f"sheet: names: {len(called)} names for {len(corners)} edges: must be one for each")
-        edges = [Edge(a, b, None, name) for a, b, name in zip(corners, [*corners[1:], corners[0]], called)]
-    elif names is not None:
-        edges = [edge._replace(name=name) for edge, name in zip(edges, names, strict=True)]
+        edges = [Edge(a, b, None, "rim") for a, b in zip(corners, [*corners[1:], corners[0]])]
+    if names is not None:
+        called = several("sheet: names", names, "words")
+        if len(called) != len(edges):
+            raise InputError(f"sheet: names: {len(called)} names for {len(edges)} edges: must be one for each")
+        edges = [edge._replace(name=name) for edge, name in zip(edges, called)]
     for edge in edges:
         if instance("sheet: names: name", edge.name, str, "a word") in ("bottom", "top", ""):
             raise InputError(f"sheet: names: name = {edge.name!r}: must be a word, not that of a face")
-    x = np.array([edge.start for edge in edges])
-    area = abs(np.sum(x[:, 0] * np.roll(x[:, 1], -1) - x[:, 1] * np.roll(x[:, 0], -1))) / 2
-    if not callable(size) and area / (0.4 * positive("sheet: size", size) ** 2) > _MOST:
+    x = _chords(edges)
+    asked = _Size(size)
+    areas, sizes = asked.over(x)
+    if np.sum(areas / (0.4 * sizes**2)) > _MOST:
         raise InputError(f"sheet: size = {size!r}: would make more than {_MOST} triangles of the sheet, whose area is"
-                         f" {area:.4g}")
+                         f" {areas.sum():.4g}")
     words = several("sheet: layers", layers, "names")
-    plain = to_mesh(lambda: _grid(edges, size), comm, "sheet")
+    if not words or len(set(words)) < len(words):
+        raise InputError(f"sheet: layers = {layers!r}: must be at least one name, and each another")
+    plain = to_mesh(lambda: _grid(edges, asked), comm, "sheet")
     return Sheet(**{**vars(plain), "layers": dict.fromkeys(words, 1),
                     "boundaries": plain.boundaries | {"bottom": (), "top": ()},
                     "of_size": lambda size: sheet(edges, size, layers=words, comm=comm)})
 
 
-def _grid(edges: list[Edge], size: Any) -> Grid:
+def _chords(edges: list[Edge]) -> np.ndarray:
+    """Corners of the outline, arcs as chords, shape (n, 2).
+
+    Raises:
+        InputError: it crosses or touches itself (gmsh may work on that for ever).
+    """
+    points = []
+    for edge in edges:
+        a, b = np.array(edge.start), np.array(edge.end)
+        if not np.any(a != b):
+            raise InputError(f"sheet: outline: the corner ({a[0]:.6g}, {a[1]:.6g}) is there twice, one after the other")
+        line = a + np.linspace(0, 1, 2 if edge.centre is None else 9)[:-1, None] * (b - a)
+        if edge.centre is not None:
+            away = line - edge.centre
+            line = edge.centre + away * (math.dist(a, edge.centre) / np.linalg.norm(away, axis=1))[:, None]
+        points.append(line)
+    x = np.concatenate(points)
+    if (place := crossing(x, np.column_stack([np.arange(len(x)), np.roll(np.arange(len(x)), -1)]))) is not None:
+        raise InputError(f"sheet: outline: crosses or touches itself near ({place[0]:.6g}, {place[1]:.6g})")
+    return x
+
+
+class _Size:
+    """What a user asks for; as a function for gmsh, which swallows errors: the first is kept in `refused`."""
+
+    def __init__(self, size: Any):
+        self._size = size
+        self.everywhere = None if callable(size) else positive("sheet: size", size)
+        self.refused: InputError | None = None
+
+    def __call__(self, x: float, y: float) -> float:
+        where = f"sheet: size at ({x:.6g}, {y:.6g})"
+        try:
+            return positive(where, float(self._size(x, y)))
+        except InputError:
+            raise
+        except Exception as error:
+            raise InputError(f"{where}: the function fails: {type(error).__name__}: {error}") from error
+
+    def kept(self, dim: int, tag: int, x: float, y: float, z: float, size: float) -> float:
+        try:
+            return self(x, y)
+        except InputError as error:
+            self.refused = self.refused or error
+            return 1e22
+
+    def over(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Areas that make up the outline with corners x, and the sizes there, shape (m,) each."""
+        y = np.roll(x, -1, axis=0)
+        area = abs(np.sum(x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0])) / 2
+        if self.everywhere:
+            return np.array([area]), np.array([self.everywhere])
+        low, high = x.min(0), x.max(0)
+        p = np.stack(np.meshgrid(*(a + (b - a) * (np.arange(40) + 0.5) / 40 for a, b in zip(low, high))), -1)
+        p = p.reshape(-1, 1, 2)
+        above = (x[:, 1] > p[..., 1]) != (y[:, 1] > p[..., 1])              # edges that a line along x crosses
+        slope = np.divide(y[:, 0] - x[:, 0], y[:, 1] - x[:, 1], out=np.zeros(len(x)), where=y[:, 1] != x[:, 1])
+        inside = np.sum(above & (p[..., 0] < x[:, 0] + (p[..., 1] - x[:, 1]) * slope), axis=1) % 2 == 1
+        places = [*p[inside, 0], *x]
+        return np.full(len(places), area / len(places)), np.array([self(*place) for place in np.array(places).tolist()])
+
+
+def _grid(edges: list[Edge], size: _Size) -> Grid:
     """The triangles, on one rank."""
     options = {"General.NumThreads": 1, "Mesh.MeshSizeExtendFromBoundary": 0}
-    if not callable(size):
-        options |= {"Mesh.MeshSizeMin": size, "Mesh.MeshSizeMax": size}
+    if size.everywhere:
+        options |= {"Mesh.MeshSizeMin": size.everywhere, "Mesh.MeshSizeMax": size.everywhere}
     with with_gmsh.model("sheet", options) as gmsh:
         geo, points = gmsh.model.geo, {}
+        span = max(abs(v) for e in edges for v in e.start)
 
         def point(at: tuple[float, float]) -> int:
-            key = tuple(np.round(at, 12))
+            key = tuple(np.round(np.array(at) / span, 12))
             if key not in points:
                 points[key] = geo.addPoint(*at, 0.0)
             return points[key]
@@ -165,15 +232,14 @@ def _grid(edges: list[Edge], size: Any) -> Grid:
         for name in dict.fromkeys(e.name for e in edges):
             group = gmsh.model.addPhysicalGroup(1, [t for t, e in zip(tags, edges) if e.name == name])
             gmsh.model.setPhysicalName(1, group, name)
-        if callable(size):
-            gmsh.model.mesh.setSizeCallback(
-                lambda dim, tag, x, y, z, lc: positive(f"sheet: size at ({x:g}, {y:g})", float(size(x, y))))
+        if not size.everywhere:
+            gmsh.model.mesh.setSizeCallback(size.kept)
         try:
             gmsh.model.mesh.generate(2)
-        except InputError:
-            raise
         except Exception as error:
-            raise InputError(f"sheet: gmsh makes no mesh of this outline: {error}") from None
+            raise size.refused or InputError(f"sheet: gmsh makes no mesh of this outline: {error}") from None
+        if size.refused:
+            raise size.refused
         numbers, X, _ = gmsh.model.mesh.getNodes()
         row = np.zeros(int(numbers.max()) + 1, dtype=np.int64)
         row[numbers.astype(np.int64)] = np.arange(len(numbers))

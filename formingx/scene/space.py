@@ -93,7 +93,7 @@ def check_contact(scene: Any, contact: Any) -> None:
     if contact.points != "nodes":
         raise InputError(f"{contact!r}: points = {contact.points!r}: in space contact acts at 'nodes'")
     size, length = float(np.ptp(tool.bounds, axis=0).max()), float(max(scene.extent))
-    if np.isfinite(size) and not 1 / _LARGER < length / size < _LARGER:
+    if tool.sized and np.isfinite(size) and not 1 / _LARGER < length / size < _LARGER:
         raise InputError(f"{contact!r}: the tool is {size:.4g} large, the sheet {length:.4g}: are the units of length"
                          f" the same (mm, cm, inches)?")
     points = gathered(mesh.comm, mesh.domain.geometry.x)

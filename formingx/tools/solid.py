@@ -21,6 +21,8 @@ class SolidTool:
     """A tool in space: `signed_distance` (positive inside), `bounds`, `surface`, `moved`."""
 
     components = 3
+    sized = True
+    """False for a plane, whose drawing has no size."""
     _shift: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     def signed_distance(self, x: np.ndarray) -> np.ndarray:
@@ -64,6 +66,7 @@ class Swept(SolidTool):
     def __init__(self, profile: Tool, kind: str, half: tuple[float, float] = (0.0, 0.0), corner: float = 0.0,
                  along: str = "y"):
         self.profile, self.kind, self.half, self.corner, self.along = profile, kind, half, corner, along
+        self.sized = len(profile.pieces) > 1
 
     def _distance(self, x):
         if self.kind == "revolved":
