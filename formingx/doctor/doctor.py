@@ -90,9 +90,9 @@ def _driven(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
 def _edges(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
     """Edges of a sheet in space that nothing holds: a flat membrane has no stiffness across them."""
     if scene.kinematics.components == 3:
-        for name in set(scene.mesh.boundaries) - {"bottom", "top", *(support.on for support in scene.supports)}:
-            yield Finding("warning", f"boundary {name!r}", f"nothing holds this edge of the sheet: where a whole one was"
-                          f" cut (part='quarter'), it needs Symmetry({name!r}, {'y' if name == 'y0' else 'x'!r})")
+        for name in sorted({*scene.mesh.boundaries} - {"bottom", "top", *(support.on for support in scene.supports)}):
+            yield Finding("warning", f"boundary {name!r}", f"nothing holds this edge of the sheet: where a whole one"
+                          f" was cut (part='quarter'), it needs Symmetry({name!r}, {'y' if name == 'y0' else 'x'!r})")
 
 
 def _elements(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
