@@ -213,7 +213,7 @@ class _Size:
 
 def _grid(edges: list[Edge], size: _Size) -> Grid:
     """The triangles, on one rank."""
-    options = {"General.NumThreads": 1, "Mesh.MeshSizeExtendFromBoundary": 0}
+    options = {"General.NumThreads": 1.0, "Mesh.MeshSizeExtendFromBoundary": 0.0}
     if size.everywhere:
         options |= {"Mesh.MeshSizeMin": size.everywhere, "Mesh.MeshSizeMax": size.everywhere}
     with with_gmsh.model("sheet", options) as gmsh:
