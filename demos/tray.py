@@ -2,7 +2,8 @@
 
 Half widths 1 and 1.5, depth 1, corners 0.3 in plan, fillet 0.2 at the floor; neo-Hookean sheet of the same outline,
 thickness 0.02, rim fixed, to p a/(c10 h) = 60. The trough is a strip of a long one, deep as its half width: its law is
-h/h0 = (2/pi) r^(4/pi - 1), r from the sharp corner along floor or wall (`rectangular_part` solves it as a solid).
+h/h0 = (2/pi) r^(4/pi - 1), r from the sharp corner along floor or wall (`rectangular_part` solves it as a solid). Last,
+the same tray without friction.
 """
 
 import numpy as np
@@ -17,18 +18,19 @@ PLACES = {"floor": (0, 0, -1), "long_wall": (1, 0, -0.5), "bottom_edge": (0.9414
           "corner": (0.8862, 1.3862, -0.9155)}
 
 
-def fill(sheet, tool, supports):
-    """The path to the last pressure."""
+def fill(sheet, tool, supports, **contact):
+    """The path to the last pressure; contact: more of its arguments."""
+    contact = {"friction": "stick", "separates": False} | contact
     scene = fx.Scene(mesh=sheet, thickness=THICKNESS, materials=fx.NeoHookean(c10=C10), loads=[fx.Pressure("top")],
                      supports=[fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), *supports],
-                     contacts=[fx.Contact("bottom", tool, "stick", separates=False, name="mould")])
+                     contacts=[fx.Contact("bottom", tool, name="mould", **contact)])
     return fx.trace(scene, until=fx.pressure(PRESSURE * C10 * THICKNESS))
 
 
-def tray(size, tool):
+def tray(size, tool, **contact):
     """The path of a quarter of the tray."""
     sheet = fx.mesh.sheet(fx.mesh.rectangle(2.0, 3.0, corner=0.3, part="quarter"), size=size)
-    return fill(sheet, tool, [fx.Symmetry("y0", "y")])
+    return fill(sheet, tool, [fx.Symmetry("y0", "y")], **contact)
 
 
 def key_numbers(path):
@@ -80,6 +82,11 @@ def main():
         off = {k: summary["stl"][name][k] / numbers[k] - 1 for k in (*PLACES, "least")}
         say("  from STL, over the exact tool: " + ", ".join(f"{k} {v:+.2%}" for k, v in off.items())
             + f"; {summary['stl'][name]['seconds']:.1f} s")
+    summary["frictionless"] = {}
+    for size in sizes[:2]:
+        slid = summary["frictionless"][f"size_{size:g}"] = key_numbers(tray(
+            size, mould, friction="none", separates=True, nodes_per_step=3))
+        say(f"without friction, size {size:g}: " + ", ".join(f"{k} {v:.5g}" for k, v in slid.items()))
     path.wall().to_csv(args.out / "wall.csv")
     if not args.quick:
         path.view3d(args.out / "tray_3d.png", grid=0.1)

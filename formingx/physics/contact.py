@@ -37,7 +37,7 @@ from ..tools.tool import RigidTool
 from ..values.table import Table
 from ..values.temperature import FunctionOfTemperature
 from .contact_law import ContactLaw, Motion, NormalLaw, Touch, Tractions, outer
-from .lagged_stick import LaggedStick
+from .lagged_stick import LaggedSlide, LaggedStick
 from .part import Part
 
 _STICKS = 100.0
@@ -49,6 +49,9 @@ _ELASTIC_SLIP = 1e-3
 _SLIDES, _STICK, _HELD = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
 """Penalty and ramp of what slides, of what sticks until pulled off, and of what never lets go, where stiffer costs
 iterations."""
+
+_STEP = 1e-2
+"""Of differences of a distance in space, over thickness."""
 
 _MOST_POINTS = 100
 """Gauss points on a facet."""
@@ -70,8 +73,8 @@ class Contact(Part):
         ramp: theta over thickness of the sheet; default 1e-7 where points slide, 1e-5 where they stick or are held.
         elastic_slip: g_s over thickness of the sheet: how far a point goes under Coulomb's law before it slides.
         separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
-            start); with "stick" or "none". Default True; in space False: there it is held until a stage leaves the tool
-            out, or, with True, until it pulls (of materials that do not relax).
+            start); with "stick" or "none". Default True; in space, where it sticks, False: it is held until a stage
+            leaves the tool out, or, with True, until it pulls (of materials that do not relax).
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge); in space so many
             hundredths of all nodes.
             What sticks or gives off heat depends on when it touched: with 4, a run takes half the iterations, and
@@ -109,7 +112,8 @@ class Contact(Part):
         self.on, self.tool, self.friction = instance("Contact: on", on, str, "the name of a boundary"), tool, friction
         self.mu = _coefficient(f"{name}: friction", friction)
         held = tool.components == 3
-        self.separates = instance(f"{name}: separates", not held if separates is None else separates, bool,
+        usually = not held or isinstance(self.mu, float) and self.mu == 0
+        self.separates = instance(f"{name}: separates", usually if separates is None else separates, bool,
                                   "True or False")
         usual = _HELD if held or not self.separates else _STICK if self.sticks else _SLIDES
         self.penalty = positive(f"{name}: penalty", usual[0] if penalty is None else penalty)
@@ -189,7 +193,8 @@ class Contact(Part):
         """
         theta, elastic_slip = self.ramp * thickness, self.elastic_slip * thickness
         if self.lagged:
-            return LaggedStick(self.tool, k, theta, self.separates)
+            return LaggedStick(self.tool, k, theta, self.separates) if self.sticks else LaggedSlide(
+                self.tool, k, theta, _STEP * thickness)
         foot = (1 - _AT_FOOT * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)
         return Law(self.tool, self.friction_at(temperature), k, theta, elastic_slip, shift,

@@ -1,4 +1,4 @@
-"""Stick in space, lagged by a step: what touches is held where it crossed the tool, from the next step on.
+"""Contact in space, lagged by a step: what touches is held where it crossed the tool, from the next step on.
 
 A point whose straight way between two accepted states leads into the tool is held by an isotropic penalty, in the
 steps after, at the place where that way crossed the surface (as the user's guide of Polyflow describes of its contact).
@@ -147,3 +147,61 @@ class LaggedStick:
             position[rows] = a + high[:, None] * (b - a)
         free = np.minimum(d, -2 * self.theta)
         return Touch(position, np.where(held | new, 0.0, free), np.zeros(len(x)), x.copy())
+
+
+class LaggedSlide(LaggedStick):
+    """The `ContactLaw` without friction: which points touch is lagged as there, and they stay on the surface of a tool.
+
+    Of a point that touches the traction is k d grad d, d its signed distance: what the body does to the tool. In a step
+    it pulls as well as it pushes, so that Newton's method meets no kink; at its end what pulls lets go.
+
+    Args:
+        step: of the differences by which the distance has a gradient and a curvature, length.
+    """
+
+    def __init__(self, tool: RigidTool, k: Any, theta: float, step: float):
+        super().__init__(tool, k, theta, True)
+        self.step = step
+        self._last: tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
+
+    def part(self, points: np.ndarray | slice) -> LaggedSlide:
+        """See `ContactLaw`."""
+        return LaggedSlide(self.tool, self.k, self.theta, self.step)
+
+    def pulling(self, x: np.ndarray, old: Touch) -> np.ndarray:
+        """Which points that touch pull, shape (n,): they are outside the tool."""
+        return self.held(old) & (self.distance(x) < -_NONE * self.theta)
+
+    def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
+                  expected: Motion | None = None) -> Tractions:
+        """See `ContactLaw`."""
+        assert old is not None
+        held, zero, force = self.held(old), np.zeros(len(x)), np.zeros_like(x)
+        d, gradient, _ = self._derivatives(x[held])
+        force[held] = self.k * d[:, None] * gradient
+        return Tractions(force, held.astype(float), zero, zero, lambda: self.stiffness_ahead(x, old, held),
+                         lambda: self._touch(x, old, held))
+
+    def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
+        """See `ContactLaw`."""
+        assert old is not None
+        held, stiffness = self.held(old), np.zeros((*x.shape, x.shape[1]))
+        d, gradient, curvature = self._derivatives(x[held])
+        stiffness[held] = self.k * (gradient[:, :, None] * gradient[:, None] + d[:, None, None] * curvature)
+        return stiffness
+
+    def _derivatives(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Distances of points, shape (n,), their gradients, (n, 3), and second derivatives, (n, 3, 3)."""
+        if self._last is None or not np.array_equal(self._last[0], x):
+            e = self.step * np.eye(3)
+            pairs = [(0, 1), (0, 2), (1, 2)]
+            ways = np.array([0 * e[0], *e, *-e, *(e[i] + e[j] for i, j in pairs), *(-e[i] - e[j] for i, j in pairs)])
+            d = self.tool.signed_distance((x + ways[:, None]).reshape(-1, 3)).reshape(len(ways), -1)
+            gradient, second = ((d[1:4] - d[4:7]) / (2 * self.step)).T, d[1:4] + d[4:7] - 2 * d[0]
+            curvature = np.zeros((len(x), 3, 3))
+            for k, (i, j) in enumerate(pairs):
+                curvature[:, i, i], curvature[:, j, j] = second[i], second[j]
+                curvature[:, i, j] = curvature[:, j, i] = (d[7 + k] + d[10 + k] - 2 * d[0] - second[i] - second[j]) / 2
+            size = np.maximum(np.linalg.norm(gradient, axis=1, keepdims=True), 0.1)    # less where two sides meet
+            self._last = x.copy(), (d[0], gradient / size, curvature / self.step**2)
+        return self._last[1]

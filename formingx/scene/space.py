@@ -11,6 +11,7 @@ from ..mesh.sheet import Sheet
 from ..physics.loads import Pressure, Spin
 from ..physics.supports import PinnedNode
 from ..ranks import gathered
+from ..tools.solid import Swept
 
 _LARGER = 9.0
 """Sheet over tool, or tool over sheet, that looks like another unit of length. (The sheet may be a quarter.)"""
@@ -84,12 +85,15 @@ def check_contact(scene: Any, contact: Any) -> None:
     mesh, tool = scene.mesh, contact.tool
     if contact.on not in ("bottom", "top"):
         raise InputError(f"{contact!r}: a sheet in space touches with its 'bottom' or its 'top'")
-    if not contact.sticks:
-        raise InputError(f"{contact!r}: in space a sheet sticks where it touches: must be 'stick'; sliding, with"
-                         f" friction or without, is not proven there")
+    if not contact.sticks and (contact.friction_by_temperature or contact.mu > 0 or not contact.separates):
+        raise InputError(f"{contact!r}: in space a sheet sticks where it touches, or slides without friction: must be"
+                         f" 'stick' or 'none', that with separates=True; Coulomb's law is not proven there")
+    if not contact.sticks and not isinstance(tool, Swept):
+        raise InputError(f"{contact!r}: sliding over a tool of flat triangles is not proven, as their edges stop a"
+                         f" sheet: must be 'stick', or one of box, revolved and extruded")
     if contact.separates and any(material.internal or material.integral for material in scene.materials.values()):
         raise InputError(f"{contact!r}: separates = True: in space a sheet that relaxes is held where it touches, until"
-                         f" a stage leaves the tool out (without=[...]): leave separates out")
+                         f" a stage leaves the tool out (without=[...]): must be 'stick', with separates left out")
     if contact.points != "nodes":
         raise InputError(f"{contact!r}: points = {contact.points!r}: in space contact acts at 'nodes'")
     size, length = float(np.ptp(tool.bounds, axis=0).max()), float(max(scene.extent))

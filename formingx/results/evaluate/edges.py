@@ -34,7 +34,7 @@ def coarsest(path: Any, state: Any) -> Edge | None:
         free = np.ones(len(fields))
         free[problem.held] = 0
         for contact in problem.present:
-            if contact.contact.sticks or not contact.contact.separates:
+            if contact.contact.lagged or contact.contact.sticks or not contact.contact.separates:
                 continue
             x, law = contact.positions(fields, state.control), contact.tractions(fields, state.control)
             slides = (law.normal != 0) & (np.abs(law.tangential) >= 0.99 * contact.law.shear_limit(
