@@ -43,13 +43,32 @@ def test_derivatives_are_those_of_whole_runs():
     assert volume == pytest.approx(np.pi * 0.05, rel=1e-9) and by[0] == pytest.approx([0, np.pi, 0], abs=1e-8)
 
 
-def test_taylor():
-    """What the derivative leaves out is of second order, over three decades."""
-    design = fx.Design(disc, {"c": (0.0, -1, 1)})
+def pushed(b, mu="none"):
+    """A ball pushes a sheet."""
+    mesh = fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1))
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=lambda R, Z: 0.5 * (1 + b * R**2)),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", fx.tools.sphere(radius=0.8, z=0.05), mu, moves=(0, -1))])
+    return scene, fx.travel(0.25)
+
+
+def blown(b):
+    """A sheet that relaxes as it is inflated."""
+    mesh = fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1))
+    relaxes = fx.Viscoelastic(fx.NeoHookean(c10=lambda R, Z: 0.5 * (1 + b * R**2)), branches=[(1.0, 1.0)])
+    scene = fx.Scene(mesh=mesh, materials=relaxes, supports=CAN["supports"], loads=[fx.Pressure("bottom", name="air")])
+    return scene, [fx.Stage("blow", drive="air", until=fx.pressure(0.03), duration=1.0)]
+
+
+@pytest.mark.parametrize("build", (lambda b: disc(c=b), pushed, blown, lambda b: pushed(0.0, 0.3 + b)),
+                         ids=("elastic", "contact", "relaxing", "friction"))
+def test_taylor(build):
+    """What the derivative leaves out is of second order, over three decades: in time, in contact, of friction too."""
+    design = fx.Design(build, {"b": (0.0, -1, 1)})
     run = design.run()
     wall, by = run.derivative("wall")
     steps = np.array([1e-1, 1e-2, 1e-3])
-    left = [np.linalg.norm(design.run({"c": t}).wall - wall - t * by[:, 0]) for t in steps]
+    left = [np.linalg.norm(design.run({"b": t}).wall - wall - t * by[:, 0]) for t in steps]
     assert np.diff(np.log(left)) / np.diff(np.log(steps)) == pytest.approx(2.0, abs=0.05)
 
 

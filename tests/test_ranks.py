@@ -125,3 +125,21 @@ def test_ranks_agree_on_a_process_and_on_verdicts():
     for key in ("last", "walls"):
         assert two[key] == pytest.approx(one[key], rel=1e-6)
     assert two["ledger"] == pytest.approx(one["ledger"], abs=1e-6 * abs(one["last"][2]))
+
+
+DESIGN = """
+import json, sys
+sys.path.insert(0, "tests")
+import formingx as fx
+from test_design import cup
+run = fx.Design(cup, {"b": (0.0, -1, 1)}).run()
+wall, by = run.derivative("wall")
+if run.path.problem.comm.rank == 0:
+    print(json.dumps([*wall, *by.ravel()]))
+"""
+
+
+def test_derivatives_of_designs():
+    """Of a sheet that sticks, too: by differences of 1e-8, whose round-off is all that they differ by."""
+    one, two = (run_json(DESIGN, ranks) for ranks in (1, 2))
+    assert two == pytest.approx(one, abs=1e-7)

@@ -9,6 +9,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from ..errors import InputError, non_negative
 from ..results.evaluate.profile import Profile, Profiles
@@ -85,6 +86,10 @@ class DesignRun:
     def profile(self) -> Profile:
         """Of the last state."""
         return self.path.profile()
+
+    @cached_property
+    def _profiles(self) -> Profiles:
+        return Profiles(self.path.problem)
 
     @property
     def wall(self) -> np.ndarray:
@@ -201,7 +206,9 @@ class DesignRun:
             return one.problem.forms.volume
         state = one.state(self.path.last)
         if measure == "wall":
-            return Profiles(one.problem).of(state).thickness
+            mine, its = (problem.scene.mesh.domain.geometry.x for problem in (self.path.problem, one.problem))
+            same = self.path.problem.comm.allreduce(np.array_equal(mine, its), MPI.LAND)
+            return (self._profiles if same else Profiles(one.problem)).of(state).thickness
         if one.path is None:
             one.path = _of_one(state, Record(one.problem, Curve(one.problem, self._tolerances)))
         return one.path[measure] if isinstance(measure, str) else np.asarray(measure(one.path), dtype=float)
