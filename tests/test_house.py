@@ -78,6 +78,9 @@ def test_tuned_numbers_have_a_name_each():
              if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple) and name not in codes
              and isinstance(node.value, ast.Tuple) and all(isinstance(n, ast.Constant | ast.UnaryOp) and isinstance(
                  ast.literal_eval(n), int | float) for n in node.value.elts)}
+    found |= {(name, ast.unparse(node.targets[0])) for name, node in tops if name.startswith("solve.")
+              and isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant)
+              and isinstance(node.value.value, int | float) and ast.unparse(node.targets[0]) != "SAME_TIME"}
     assert found == set()
 
 

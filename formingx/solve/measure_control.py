@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,7 +22,30 @@ from .record import Record
 from .state import State
 from .stepping import SAME_TIME, Cutback, StepControl
 
-_STILL = 1e-7          # relative: a change that is none
+
+@dataclass(frozen=True)
+class FlowSteps:
+    """How steps along a course in time are taken.
+
+    Attributes:
+        stretched: a step goes to the next time that must be hit if that is no more than so many steps away: no last
+            step is much shorter than the others.
+        cut: largest part that is left of a step that is too long: more would be the same step again.
+        still: relative change of what is driven that is none, but for round-off.
+        located: error of the time of a limit point, over the step that it lies in.
+        met: deviation from a target, relative, of the state that is solved for where it was passed.
+        contact: least part of the way of a step to where new contact limits it, else the step is too long.
+    """
+
+    stretched: float = 1.5
+    cut: float = 0.6
+    still: float = 1e-7
+    located: float = 1e-4
+    met: float = 1e-8
+    contact: float = 0.5
+
+
+_STEPS = FlowSteps()
 
 
 class Flow(Run):
@@ -43,9 +67,6 @@ class Flow(Run):
         super().__init__(record, [*targets, (end, end.bind(record.equations))], step, "follow", accuracy, label)
         self._measure, self._course, self._times, self._duration = measure, course, times, times[-1] - times[0]
 
-    def _facing_target(self, start: State) -> State:
-        return start
-
     def _accept(self, state: State) -> None:
         self.problem.clock = state.time
         super()._accept(state)
@@ -56,15 +77,15 @@ class Flow(Run):
         while True:
             left = event - old.time
             dt = min(self.step.length * self._duration, left)
-            dt = left if left < 1.5 * dt else dt             # no last step much shorter than the others
+            dt = left if left < _STEPS.stretched * dt else dt
             try:
                 new = self._at(old, event if dt == left else old.time + dt)
                 error = self._error_in_time(new)
-                if dt < 1.5 * self.step.length * self._duration:
+                if dt < _STEPS.stretched * self.step.length * self._duration:
                     self.step.accepted(tangents(new.history), error)
                 return [self._met_before(old, self._limit_before(old, new))]
             except Cutback as cut:
-                self.step.length = min(cut.part, 0.6) * dt / self._duration     # else 1.5 of it is the same step again
+                self.step.length = min(cut.part, _STEPS.cut) * dt / self._duration
                 self._failed(str(cut), self.step.length)
                 if self.step.length < self.step.smallest:
                     self._give_up(f"the step in time became shorter than {self.step.smallest * self._duration:.3g}:"
@@ -89,7 +110,7 @@ class Flow(Run):
         x, control = self._predicted(old, time, value)
         by, slope = x - old.x, control - old.control
         way, limit = Way(old.x, old.control, by, slope, 1.0), problem.limit
-        if limit and limit.length(way) < 0.5:
+        if limit and limit.length(way) < _STEPS.contact:
             raise Failure("too much would come into contact in one step", [])
         if limit:
             limit.prepare(way)
@@ -110,8 +131,8 @@ class Flow(Run):
             _rate([*predictor.before(self.states[:-1], old.time, 2), old]),
             _rate([*predictor.before(self.states, new.time, 2), new])) if self.problem.relaxes else (
             old.slope, new.slope)                            # else a path, whose tangents say it
-        still = _STILL * max(abs(old.control), abs(new.control)) / (new.time - old.time)
-        if before * after >= 0 or min(abs(before), abs(after)) < still or self.curve.distance(old, new) < _STILL:
+        still = _STEPS.still * max(abs(old.control), abs(new.control)) / (new.time - old.time)
+        if before * after >= 0 or min(abs(before), abs(after)) < still or self.curve.distance(old, new) < _STEPS.still:
             return new
         tried: list[State] = []
 
@@ -120,7 +141,8 @@ class Flow(Run):
             return -float(np.sign(before)) * tried[-1].control
         from scipy.optimize import minimize_scalar
         with contextlib.suppress(Failure):                   # then there is no state of its own
-            minimize_scalar(below, bounds=(old.time, new.time), options={"xatol": 1e-4 * (new.time - old.time)})
+            error = _STEPS.located * (new.time - old.time)
+            minimize_scalar(below, bounds=(old.time, new.time), options={"xatol": error})
             new = max(tried, key=lambda state: np.sign(before) * state.control)
             new.kind = "limit point"
         return new
@@ -174,8 +196,8 @@ class Flow(Run):
             return self.curve.value(bound, found[time].x, found[time].control) - target.value
         time = _root(off, low, high)
         state = found.get(time) or self._at(old, time)
-        left = abs(off(time))
-        if not is_met(target, bound.size, off(time) + target.value) and left > 1e-8 * max(abs(target.value), 1e-8):
+        left, most = abs(off(time)), _STEPS.met * max(abs(target.value), _STEPS.met)
+        if not is_met(target, bound.size, off(time) + target.value) and left > most:
             raise Failure(f"{target} was passed but could not be solved for", [])
         state.met = target
         return state

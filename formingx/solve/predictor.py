@@ -9,18 +9,18 @@ import numpy as np
 from .equations import Array
 from .state import State
 
-CUBIC, QUADRATIC = 4, 3
-"""States that a cubic, and a parabola, go through."""
-
-_CLOSE = 0.1
-"""States closer than this part of the step ahead are not told apart: what they are not exact in would be magnified."""
+CUBIC, QUADRATIC = 4, 3                             # states that a cubic, and a parabola, go through
 
 
-def before(states: Sequence[State], time: float, most: int) -> list[State]:
-    """The last states, at most so many, on whose polynomial a time lies ahead: in order, from the last jump on."""
+def before(states: Sequence[State], time: float, most: int, close: float = 0.1) -> list[State]:
+    """The last states, at most so many, on whose polynomial a time lies ahead: in order, from the last jump on.
+
+    Those closer than the part `close` of the step ahead are not told apart: what they are not exact in would be
+    magnified.
+    """
     found: list[State] = []
     for state in reversed(states):
-        if not found or state.time < found[0].time - _CLOSE * (time - states[-1].time):
+        if not found or state.time < found[0].time - close * (time - states[-1].time):
             found.insert(0, state)
         if len(found) == most or state.kind == "jump":
             break

@@ -25,8 +25,6 @@ from .equations import Array, Equations, Viscosity
 from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
 from .state import State
 
-_SWEEPS = 30               # in which a body lets go of a tool in space
-
 
 @dataclass(frozen=True)
 class SnapThrough:
@@ -55,6 +53,7 @@ class SnapThrough:
         solutions, too_far: viscous solutions, and a distance, after which the body counts as never coming to rest.
             (Where a sheet is drawn over an edge point by point hundreds of short ones are needed.)
         near_rest: viscous forces below which the state at rest is looked for.
+        sweeps: solutions in which a body lets go of a tool in space.
         at_rest: viscous forces below which the body rests, though where a point is at a kink of its law of friction the
             iteration without them may go to and fro.
     """
@@ -80,6 +79,7 @@ class SnapThrough:
     too_far: float = 10.0
     near_rest: float = 1e-3
     at_rest: float = 1e-10
+    sweeps: int = 30
 
 
 class NoEquilibrium(Failure):
@@ -290,7 +290,7 @@ def let_go(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callabl
     Raises:
         Failure: no such state was found.
     """
-    for _ in range(_SWEEPS):
+    for _ in range(SnapThrough.sweeps):
         if not limit.let_go(new):
             return new
         try:
