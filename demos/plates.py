@@ -16,12 +16,12 @@ NEWTON = 100.0                                               # N in one MPa cm2
 
 
 def block(materials, friction, elements, *, roll_over=False, layers=HALF_HEIGHT, radius=RADIUS, kinematics=None,
-          **options):
+          model=None, **options):
     """A block under a plate that moves down. friction: "stick", "none", mu; roll_over: the side may touch the plate."""
     mesh = fx.mesh.disc(radius=radius, thickness=layers, elements=elements)
     height = sum(layers.values()) if isinstance(layers, dict) else layers
     faces = ("top", "rim") if roll_over else ("top",)
-    return fx.Scene(mesh=mesh, materials=materials, kinematics=kinematics,
+    return fx.Scene(mesh=mesh, materials=materials, kinematics=kinematics, model=model,
                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")],
                     contacts=[fx.Contact(face, fx.tools.plane(height), friction, moves=(0, -1), **options)
                               for face in faces])

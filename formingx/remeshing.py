@@ -14,12 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from .discrete.contact.taken_over import Worn, take_over
 from .discrete.outline import Outline
 from .discrete.preformed import Preformed
 from .discrete.problem import Problem
 from .errors import ConvergenceError, InputError, instance, pair, positive
 from .measures.targets import Amplitude, Target
-from .mesh.remeshed import remeshed
+from .mesh.remeshed import enclosed, remeshed
 from .physics.contact import Contact
 from .physics.supports import Clamped, Symmetry
 from .solve.arc_length import Curve
@@ -36,6 +37,9 @@ _SHARES = (1.0, 0.9, 1.1, 0.8)
 
 _GOOD = 0.4
 """Part of the way from the limits of J to 1 that is good."""
+
+_POCKET = 0.25
+"""Of the size of an element: a pocket between the body and a tool that is not so deep is closed."""
 
 _WORN = "the mesh is worn"
 """Why a run ends whose mesh is to be made again."""
@@ -186,23 +190,24 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
         edges = outline.edges()
         of = {name: outline.of(name) for name in scene.mesh.boundaries}
         x_old = old.x.array_r[: old.n_owned].copy()
-        touched = [(c.contact.on, c.positions(x_old, state.control)[c.touching(x_old, state.control)]
-                    + c.travelled(state.control)) for c in old.contacts]
+        worn = [(c, Worn.of(c, x_old, state.control), c.travelled(state.control)) for c in old.contacts]
+    touched = [(c.contact.on, w.position[w.touches] + by) for c, w, by in worn]
     order = outline.around("trace: remesh")
     names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
-    corners = _corners(edges[order], names, touched)
-    layer, = scene.mesh.layers
     sizes = share * remesh.size, share * (remesh.corner or remesh.size / 3)
-    mesh = remeshed(edges[order], names, corners, *sizes, layer,
-                    scene.kinematics.axisymmetric, scene.mesh.comm)
+    volume = enclosed(edges[order], scene.kinematics.axisymmetric)
+    edges = _without_pockets(edges[order], np.concatenate([points for _, points in touched]), _POCKET * sizes[1])
+    corners = _corners(edges, names, touched)
+    layer, = scene.mesh.layers
+    mesh = remeshed(edges, names, corners, *sizes, layer, scene.kinematics.axisymmetric, scene.mesh.comm, volume,
+                    lambda x, names: _outside(x, names, worn))
     made = scene.with_mesh(mesh, Preformed.of(old, state))
     problem = Problem(made)
     control = state.control * old.scales[driven] / problem.scales[driven]
     curve = Curve(problem, tolerances)
     x = made.preformed.unknowns(problem)
-    with old.at(state):
-        for new, contact in zip(problem.contacts, old.contacts, strict=True):
-            new.go_on_from(contact, (x_old, state.control), (x[: problem.n_owned], control))
+    for new, (_, before, _) in zip(problem.contacts, worn, strict=True):
+        take_over(new, before, x[: problem.n_owned], control)
     volume = problem.forms.volume / old.forms.volume / (1 + state.measures["mass_error"]) - 1
     x = _balanced(problem, curve, x, control)
     start = curve.resume(x, control)
@@ -233,6 +238,29 @@ def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> 
                                f" volume_ratio nearer to 1") from None
     problem.enter(first, record.last.x, control)
     return record.last.x
+
+
+def _without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np.ndarray:
+    """An outline, shape (m, 3, 2), whose nodes between two that touch lie on the line between these, if within a depth
+    of it: where a side rolls onto a plate, a node between may stay behind in a crease."""
+    nodes, n = edges[:, [0, 2]].reshape(-1, 2).copy(), 2 * len(edges)
+    close = 1e-6 * np.ptp(nodes, axis=0).max()
+    on = np.flatnonzero(np.linalg.norm(nodes[:, None] - touched[None], axis=2).min(1, initial=np.inf) < close)
+    for a, b in zip(on, np.roll(on, -1)):
+        between, along = (a + np.arange(1, (b - a) % n)) % n, nodes[b] - nodes[a]
+        by, length = nodes[between] - nodes[a], np.linalg.norm(along)
+        if length > 0 and np.abs(by[:, 0] * along[1] - by[:, 1] * along[0]).max(initial=0.0) < depth * length:
+            nodes[between] = nodes[a] + np.linspace(0, 1, len(between) + 2)[1:-1, None] * along
+    return np.stack([nodes[::2], np.roll(nodes[::2], -1, axis=0), nodes[1::2]], axis=1)
+
+
+def _outside(x: np.ndarray, names: frozenset[str], worn: list[tuple[Any, Worn, np.ndarray]]) -> np.ndarray:
+    """Points of an outline, shape (n, 2), no deeper in tools than what touched beside them: edges cut corners."""
+    for contact, before, by in worn:
+        if contact.contact.on in names:
+            near = contact.contact.tool.nearest(x - by)
+            x = x - before.moved_in(x - by, near.distance)[:, None] * near.normal
+    return x
 
 
 def _corners(edges: np.ndarray, names: list[frozenset[str]], touched: list[tuple[str, np.ndarray]]) -> np.ndarray:

@@ -18,8 +18,8 @@ _NEIGHBOURS = 30
 _FEWEST = 14
 """Of them that lie within its reach, at least."""
 
-_DEGREE = 4
-"""Of the quadrature at whose points that fit is made linear in the element."""
+_SIX = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
+"""Corners of a cell, middles of the edges opposite to them."""
 
 _LEAST = 0.5
 """det F of a point, or of a fit, that is believed."""
@@ -58,10 +58,11 @@ class Preformed(NamedTuple):
         return cls(rows[:, :2], rows[:, 2:7], rows[:, 7:], rest.get("pole_height", 0.0), rest.get("pole_stretch", 1.0))
 
     def gradient(self, forms: Any) -> Any:
-        """F_old on the elements of a formulation (UFL, shape (3, 3)): linear in each, then scaled to det F_old = 1."""
-        space = fem.functionspace(forms.domain, ("DG", 1, (5,)))
+        """F_old on the elements of a formulation (UFL, shape (3, 3)): quadratic in each, scaled to det F_old = 1."""
+        space = fem.functionspace(forms.domain, ("DG", 2, (5,)))
         field = fem.Function(space)
-        fitted = _without_folds(self._fitted(forms, self.F, np.array([1, -1, -1, 1, 1])))
+        fitted = self._fitted(forms, self.F, np.array([1, -1, -1, 1, 1]), _SIX)
+        fitted = _without_folds(fitted, self._nearest(forms))
         field.x.array.reshape(-1, 5)[space.dofmap.list[: len(fitted)]] = fitted
         field.x.scatter_forward()
         rr, rz, zr, zz, hoop = ufl.split(field)
@@ -72,23 +73,29 @@ class Preformed(NamedTuple):
         """The unknowns of the body as it stands, own part: no displacement, its pressures."""
         x, forms = np.zeros(problem.x.getLocalSize()), problem.forms
         if self.pressures.shape[1]:
-            fitted = self._fitted(forms, self.pressures, np.ones(self.pressures.shape[1]))
+            fitted = self._fitted(forms, self.pressures, np.ones(self.pressures.shape[1]), _SIX[:3])
             values = np.zeros(len(forms.w.x.array))
             for k in range(self.pressures.shape[1]):
                 values[forms.space.sub(1 + k).dofmap.list[: len(fitted)]] = fitted[..., k]
             x[: problem.n_owned] = values[: problem.n_owned]
         return x
 
-    def _fitted(self, forms: Any, values: np.ndarray, parity: np.ndarray) -> np.ndarray:
-        """What is linear in each own cell, fitted to what is near: its values at the corners, (cells, 3, components).
+    def _nearest(self, forms: Any) -> np.ndarray:
+        """F of the point nearest to the middle of each own cell, shape (cells, 5)."""
+        from scipy.spatial import cKDTree
+        middle = in_own_cells(forms.domain, forms.X, np.array([[1 / 3, 1 / 3]]))[:, 0]
+        return gathered(forms.comm, self.F)[cKDTree(gathered(forms.comm, self.points)).query(middle)[1]]
+
+    def _fitted(self, forms: Any, values: np.ndarray, parity: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """What is quadratic in each own cell, fitted to what is near: its values at places of it, shape (n, 2), in
+        each, shape (cells, n, components).
 
         parity: 1 or -1: what becomes of a component beyond the axis, where the body is seen in a mirror; there the
         hoop is stretched as the radius. Quadratic least squares, weights falling with the distance from the middle:
         jumps between the old elements are smoothed.
         """
         from scipy.spatial import cKDTree
-        where: Any = basix.make_quadrature(forms.domain.basix_cell(), _DEGREE)[0]
-        inside = in_own_cells(forms.domain, forms.X, where)
+        inside = in_own_cells(forms.domain, forms.X, places)
         corners = in_own_cells(forms.domain, forms.X, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
         points, values = gathered(forms.comm, self.points), gathered(forms.comm, values)
         if forms.scene.kinematics.axisymmetric:
@@ -102,9 +109,9 @@ class Preformed(NamedTuple):
         by, at = (np.stack([np.ones_like(r), r, z, r * r, r * z, z * z], -1) for r, z in (
             np.moveaxis((x - middle[:, None]) / size[..., None], -1, 0) for x in (points[rows], inside)))
         fit = np.linalg.pinv(weight[..., None] * by, rcond=1e-3) * weight[:, None]
-        found = np.linalg.pinv(np.column_stack([1 - where.sum(1), where])) @ (at @ (fit @ values[rows]))
+        found = at @ (fit @ values[rows])
         if forms.scene.kinematics.axisymmetric and values.shape[1] == 5:
-            axis = corners[..., 0] < 1e-9 * forms.length
+            axis = inside[..., 0] < 1e-9 * forms.length
             found[axis] *= (1, 0, 0, 1, 1)
             found[axis, 0] = found[axis, 4] = (found[axis, 0] + found[axis, 4]) / 2
         return found
@@ -115,15 +122,16 @@ def _det(F: np.ndarray) -> np.ndarray:
     return (F[..., 0] * F[..., 3] - F[..., 1] * F[..., 2]) * F[..., 4]
 
 
-def _without_folds(F: np.ndarray) -> np.ndarray:
-    """Linear fields, by their values at the corners, shape (cells, 3, 5), as steep as leaves det F to be believed."""
-    mean = F.mean(1, keepdims=True)
-    places = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4
-    share = np.ones(len(F))
-    for _ in range(20):
-        there = places @ (mean + share[:, None, None] * (F - mean))
-        bad = ((_det(there) < _LEAST * _det(mean)) | (there[..., 4] <= 0)).any(1)
+def _without_folds(F: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """Quadratic fields, by their values at `_SIX`, shape (cells, 6, 5), as near to constant ones, shape (cells, 5), as
+    it takes for det F to be believed: where F turns within an element, as beside a corner, its entries are no fit."""
+    near, by = near[:, None], F - near[:, None]
+    a, b, c = (np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4).T
+    shapes = np.column_stack([*(s * (2 * s - 1) for s in (a, b, c)), 4 * b * c, 4 * a * c, 4 * a * b])
+    for k in range(12):
+        there = near + shapes @ by
+        bad = ((_det(there) < _LEAST) | (there[..., 4] <= 0)).any(1)
         if not bad.any():
             break
-        share[bad] *= 0.7
-    return mean + share[:, None, None] * (F - mean)
+        by[bad] *= 0.7 if k < 11 else 0.0
+    return near + by

@@ -124,6 +124,7 @@ class Solid(Formulation):
 
     def _energy(self, of: Any) -> Any:
         self._eps, energy = self.constant(self.scene.model.eps), 0
+        self._volume_stiffness = self.constant(self.scene.model.volume_stiffness)
         for material, names in self.bodies:
             for density, metadata in self.energy_densities(material, names, self.F, of):
                 energy += self.weighted(self._scale * density, names, metadata)
@@ -146,6 +147,8 @@ class Solid(Formulation):
         if model.stress_free:
             W -= terms.rest_stress * ufl.ln(J)
         modulus = self.constant(max(self.scene.shear_modulus(name) for name in names))
+        if model.volume_stiffness:
+            W += self._volume_stiffness * modulus * (J - 1) ** 2 / 2
         p = self.constant(self.stress) * pressures[self.pressure_of[names[0]]] if self.pressure_of else None
         return [(W, {}), *model.terms(J, p, modulus, self._eps)]
 

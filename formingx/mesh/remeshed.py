@@ -1,6 +1,6 @@
 """A mesh of what lies inside a closed outline of curved edges, by gmsh: small elements at corners, names kept."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,8 @@ _FINE = 16                 # straight pieces of an edge, to measure its length
 
 
 def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.ndarray, size: float, corner: float,
-             layer: str, axisymmetric: bool, comm: Any) -> Mesh:
+             layer: str, axisymmetric: bool, comm: Any, volume: float | None = None,
+             outside: Callable[[np.ndarray, frozenset[str]], np.ndarray] = lambda points, names: points) -> Mesh:
     """Six-node triangles inside an outline, with second-order geometry along it; on one rank.
 
     Args:
@@ -25,15 +26,18 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
             middle, shape (m, 3, 2), length.
         names: the boundaries that each belongs to.
         corners: where elements are `corner` long, shape (k, 2); `size` elsewhere, lengths.
-        axisymmetric: R is scaled so that the volume of revolution (else: the area) is that inside the outline.
+        axisymmetric, volume: R is scaled so that the volume of revolution (else: the area) is this, by default that
+            inside the outline.
+        outside: (points, shape (n, 2), names of their boundaries) -> where they may be, outside tools, length.
     """
-    turns = [k for k in range(len(edges)) if names[k] != names[k - 1]] or [0]
+    turns = [k for k in range(len(edges)) if names[k] != names[k - 1] or (corners == edges[k, 0]).all(1).any()] or [0]
     ends, middles, named = [], [], []
     for first, last in zip(turns, [*turns[1:], turns[0] + len(edges)]):
         part = edges[np.arange(first, last) % len(edges)]
         points, between = _along(part, corners, size, corner)
-        ends.append(points[:-1])
-        middles.append(between)
+        here = names[first % len(edges)]
+        ends += [outside(points[:1], here | names[first - 1]), outside(points[1:-1], here)]
+        middles.append(outside(between, here))
         named += [names[first % len(edges)]] * len(between)
     ring, middle = np.concatenate(ends), np.concatenate(middles)
     n = len(ring)
@@ -75,7 +79,7 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
             boundaries[name].append([i, j, between_nodes(i, j)])
     new = np.stack([nodes[on_ring], nodes[np.roll(on_ring, -1)],
                     nodes[[between_nodes(int(i), int(j)) for i, j in zip(on_ring, np.roll(on_ring, -1))]]], 1)
-    share = enclosed(edges, axisymmetric) / enclosed(new, axisymmetric)
+    share = (volume or enclosed(edges, axisymmetric)) / enclosed(new, axisymmetric)
     nodes[:, 0] *= np.sqrt(share) if axisymmetric else share
     return to_mesh(lambda: Grid(nodes, np.arange(1, len(nodes) + 1), {layer: six},
                                 {name: np.array(rows) for name, rows in boundaries.items()}), comm, "remesh")

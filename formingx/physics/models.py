@@ -36,9 +36,11 @@ class Locking(NamedTuple):
 
 
 class Model:
-    """How a scene is modelled. Attributes: solid: True if the body has bending and a stress through its thickness."""
+    """How a scene is modelled. Attributes: solid: True if the body has bending and a stress through its thickness;
+    volume_stiffness: see `MixedPressure`."""
 
     solid = True
+    volume_stiffness = 0.0
 
     def check(self, scene: Any) -> None:
         """Raise an InputError if the scene has what this model cannot have."""
@@ -115,15 +117,21 @@ class MixedPressure(Model):
             bubble (Crouzeix and Raviart 1973). Both of these keep the volume of each element. Triangles of "P1dg" must
             not be slim across a thick sheet: its inf-sup constant falls as their width over height, and it locks
             (`locking`); a scene whose triangles would make it wrong by 5 % is refused.
+        volume_stiffness: by so many shear moduli J is held at 1 at each point besides: an energy of k (J - 1)^2/2.
+            Pressures keep the volume of an element, not of its parts; where they differ in it by more than the shear
+            modulus, as in a block that is pressed very flat, they crush one part and open another. 10 for one; then
+            thin sheets on coarse meshes are stiffer. (The grad-div stabilisation of mixed methods: Olshanskii and
+            Reusken, Mathematics of Computation 73, 2004.)
     """
 
     stress_free = True
 
-    def __init__(self, *, eps: float = 0.0, space: str = "P1dg"):
+    def __init__(self, *, eps: float = 0.0, space: str = "P1dg", volume_stiffness: float = 0.0):
         self.eps = non_negative("MixedPressure: eps", eps)
         if self.eps > 1:
             raise InputError(f"MixedPressure: eps = {eps!r}: must be at most 1 (thesis: 2e-2 to 1e-7)")
         known("MixedPressure: space", space, _SPACES)
+        self.volume_stiffness = non_negative("MixedPressure: volume_stiffness", volume_stiffness)
         self.space, self.pressure = space, _SPACES[space]
 
     def check(self, scene):

@@ -53,7 +53,7 @@ class FaceContact:
         self.points, self.thickness = self.rule.points, solid.thickness(contact.on)
         self._warm = solid.temperature.nodes(self.rule.nodes) if contact.friction_by_temperature else None
         self._penalty = np.ones(len(self.points))
-        self._shift: np.ndarray | None = None               # what distances count less, of a mesh made on the way
+        self._shift: np.ndarray | None = None
         self.law = self._law(1.0)
         self._scale = solid.length / (solid.stress * solid.volume) * self.rule.area
         self._way = solid.length * np.array(contact.moves or np.zeros(self.points.shape[1]))
@@ -66,31 +66,10 @@ class FaceContact:
         """Take a stage: the travel is base + rate * control (`Setting`), if the contact takes part."""
         self._base, self._rate, self.present = base, rate, present
 
-    def go_on_from(self, source: FaceContact, there: tuple, here: tuple) -> None:
-        """Take over what the same face of the body carries on another mesh, of which this one's is what it is now.
-
-        Pressure and friction per present area stay as they are, however deep the new points are in the tool: distances
-        count from where they have that pressure. there, here: (owned unknowns, control); collective.
-        """
-        found, x, law = source.tractions(*there), self.positions(*here), self.law
-        area = source.rule.area_ratio(there[0])[:, None]
-        carrier = Carrier(self.comm, source.positions(*there), x)
-        touched = carrier.all(source.touching(*there))[carrier.nearest]
-        pressure, friction = carrier.fitted(np.column_stack([found.normal, found.tangential]) / area).T
-        theta = law.theta
-        over = np.where(touched, np.maximum(pressure, 0.0), 0.0) / (self._penalty_at_rest * theta)
-        depth = theta * np.where(over > 1, over, 2 * np.sqrt(over) - 1)
-        d = self.contact.tool.signed_distance(x)
-        self._shift = np.where(touched, d - depth, np.maximum(d + theta, 0.0))
+    def shift_distances(self, by: np.ndarray) -> None:
+        """Distances count less from now on, shape (n,), length: of a mesh that is made on the way."""
+        self._shift = by
         self.law = self._law(self._penalty)
-        if self._memory is not None and source.touch is not None:
-            none, small = np.zeros(len(x)), 1e-9 * theta
-            held = self.law.tractions(x, Touch(x, depth, none + small, x)).tangential
-            slip = np.divide(friction * small, held, out=none.copy(), where=touched & (held != 0))
-            most = 2 * np.abs(carrier.all(source.touch.slip)).max(initial=0.0) * self.thickness / source.thickness
-            slip = np.clip(slip, -most, most)                # where next to nothing presses, nothing can hold
-            self._take(Memory(Touch(x, np.where(touched, depth, np.minimum(d - self._shift, -(1 + 1e-9) * theta)), slip,
-                                    x), np.zeros(len(x), dtype=bool), self._penalty))
 
     def _temperatures(self) -> np.ndarray | None:
         """Of the body at the points now, shape (n,); None where friction does not depend on them."""

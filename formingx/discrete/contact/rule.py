@@ -91,7 +91,7 @@ class Lobatto(Rule):
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
         """The mean of what the edges on both sides of a node say; on the axis the stretch is the same both ways."""
         now = gathered(self._comm, self.points + self._length * self.displacement(fields))
-        rest, edges = gathered(self._comm, self.points), self._edges
+        rest, edges = gathered(self._comm, self.points), self.edges
         ratio = np.linalg.norm(_along(now[edges]), axis=-1) / np.linalg.norm(_along(rest[edges]), axis=-1)
         weight, wider = (np.broadcast_to(np.transpose(self._weight(x[edges].T)), ratio.shape) for x in (rest, now))
         ratio *= np.divide(wider, weight, out=ratio.copy(), where=weight > 1e-9 * weight.max())
@@ -99,8 +99,13 @@ class Lobatto(Rule):
         first = sum(self._comm.allgather(len(self.points))[:self._comm.rank])
         return (np.bincount(edges.ravel(), ratio.ravel(), len(rest)) / count)[first:][:len(self.points)]
 
+    @property
+    def has_area(self) -> np.ndarray:
+        """Which points have a `lumped` area: all but a node on the axis, shape (n,)."""
+        return self.lumped > 1e-9 * self.lumped.max()
+
     @cached_property
-    def _edges(self) -> np.ndarray:
+    def edges(self) -> np.ndarray:
         """Two ends and the middle of each edge of the face, all ranks', as rows of all ranks' points, shape (m, 3)."""
         from scipy.spatial import cKDTree
         X = gathered(self._comm, self._X[_nodes_of(self._facets, self._vectors, self._X)])
