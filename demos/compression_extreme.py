@@ -5,7 +5,7 @@ wall is a 20th and the area 20 times what they were, so the plate is held by pre
 (`Contact(present_area=True)`); by the penalty of the block at rest it would sink in by 2 % of the wall and more.
 
 Stuck: the block of `compression_roll_over`, whose elements at the corner that rolls in are crushed from H/h = 4 on:
-where the volume ratio at a quadrature point leaves 0.6 to 1.5, the deformed body becomes the reference of a new mesh
+where the volume ratio at a quadrature point leaves 0.75 to 1.3, the deformed body becomes the reference of a new mesh
 (`trace(remesh=)`). "stuck": elements of 0.025 cm, "stuck_coarse": twice as large. The pressure, up to 60 times the
 shear modulus, changes within an element by more than that modulus: each point's volume is held besides
 (`MixedPressure(volume_stiffness=10)`).
@@ -22,7 +22,7 @@ from formingx.results.show import plots
 
 RATIOS, GRIDS = (5, 10, 20), ((2, 2), (8, 8))
 STUCK = (3.4, 5.23, 6.5, 8.0)
-MESHES = {"stuck": ((24, 16), 0.025), "stuck_coarse": ((12, 8), 0.05)}      # at first; size of elements then, cm
+MESHES = {"stuck": ((16, 8), 0.025), "stuck_coarse": ((8, 4), 0.05)}      # at first; size of elements then, cm
 
 
 def travel(ratio):
@@ -43,7 +43,8 @@ def stuck(elements, size, ratios):
     """(path, numbers) of the stuck block, remeshed on the way."""
     scene = block(fx.MooneyRivlin(c10=1.0, c01=0.1), "stick", elements, roll_over=True,
                   model=fx.MixedPressure(volume_stiffness=10.0))
-    path, end = press(scene, [travel(r) for r in ratios], progress=False, remesh=fx.Remesh(size=size, corner=size),
+    path, end = press(scene, [travel(r) for r in ratios], progress=False,
+                      remesh=fx.Remesh(size=size, corner=size, volume_ratio=(0.75, 1.3)),
                       record={"least_J": lambda problem: problem.admissible.volume_ratios()[0]})
     met = {f"{r:g}": path.met(fx.travel(travel(r))) for r in ratios}
     least = [state.measures["least_J"] for state in path.states]
