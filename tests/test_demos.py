@@ -301,7 +301,7 @@ def test_compression_extreme_quick(tmp_path):
 
 @pytest.mark.slow
 def test_compression_extreme(tmp_path):
-    """The remeshed block beside 24 x 16 and 32 x 24 fixed elements (96476 and 96248 N at 5.23), and at 8, where no fixed
+    """The remeshed block beside 24 x 16 and 32 x 24 fixed elements (96476, 96248 N at 5.23), and at 8, where no fixed
     mesh comes, beside elements twice as large."""
     found = summary("compression_extreme", tmp_path)
     fine, coarse = found["stuck"], found["stuck_coarse"]
@@ -309,7 +309,7 @@ def test_compression_extreme(tmp_path):
     assert fine["force_N"]["3.4"] == pytest.approx(23818, rel=7e-3)
     assert fine["force_N"]["5.23"] == pytest.approx(96360, rel=5e-3)
     assert fine["least_J"] > 0.4 and fine["remeshes"] >= 2
-    for name, by in (("5.23", 0.015), ("6.5", 0.02), ("8", 0.06)):
+    for name, by in (("5.23", 0.015), ("6.5", 0.02), ("8", 0.04)):
         assert fine["force_N"][name] == pytest.approx(coarse["force_N"][name], rel=by)
 
 

@@ -6,19 +6,21 @@ area is a rule's choice (`Lobatto`), the pressure is that beside it, and there i
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ...physics.contact_law import Touch
 from .face import FaceContact, Memory
+from .rule import Lobatto
 
 
 class Worn(NamedTuple):
     """A face in contact as a state leaves it: its n points in m pairs of neighbours.
 
     position, distance: seen from the tool, shapes (n, 2), (n,), length; touches: shape (n,); traction: pressure and
-    friction over present area, shape (n, 2), stress; pairs: shape (m, 2); slip: the largest elastic slip over thickness.
+    friction over present area, shape (n, 2), stress; pairs: shape (m, 2); slip: the largest elastic slip, over
+    thickness.
     """
 
     position: np.ndarray
@@ -32,6 +34,7 @@ class Worn(NamedTuple):
     def of(cls, face: FaceContact, fields: np.ndarray, control: float) -> Worn:
         """fields: owned unknowns."""
         found, rule, x = face.tractions(fields, control), face.rule, face.positions(fields, control)
+        assert isinstance(rule, Lobatto)
         share = np.divide(rule.area, rule.lumped, out=np.zeros_like(rule.area), where=rule.has_area)
         traction = np.column_stack([found.normal, found.tangential]) * (share / rule.area_ratio(fields))[:, None]
         pairs = np.concatenate([rule.edges[:, [0, 2]], rule.edges[:, [2, 1]]])
@@ -73,6 +76,7 @@ def take_over(face: FaceContact, worn: Worn, fields: np.ndarray, control: float)
     """A face carries the same pressure and friction per present area as on the mesh before, however deep it lies in the
     tool: distances count from where it has that pressure. fields: owned unknowns."""
     x, law, rule = face.positions(fields, control), face.law, face.rule
+    assert isinstance(rule, Lobatto)
     theta, d = law.theta, face.contact.tool.signed_distance(x)
     pressure, friction, touches = worn.at(x)
     share = np.where(rule.has_area, rule.lumped / rule.area, 0.0)
