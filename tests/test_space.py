@@ -283,6 +283,25 @@ def test_trough_without_friction():
     assert np.all(fine < (0.01, 0.01, 0.05)) and np.all(coarse > 2.5 * fine)
 
 
+def test_sliding_tractions_have_their_stiffness():
+    """On floor, wall, fillet and corner of a box, outside and inside it by a little: difference quotients."""
+    law = fx.Contact("bottom", fx.tools.box(half=(1.0, 1.5), depth=1.0, corner=0.3, fillet=0.2), "none").law(
+        100.0, 0.02, np.zeros((1, 3)))
+    turn, off = np.radians(40.0), np.array([-1e-3, 2e-3, 1e-3, -2e-3])[:, None]
+    ring = 0.1 + 0.2 * np.sin(turn)                          # of the fillet, round the corner
+    at = np.array([(0.2, 0.1, -1.0), (1.0, 0.3, -0.5), (0.8 + 0.2 * np.sin(turn), 0.0, -0.8 - 0.2 * np.cos(turn)),
+                   (0.7 + ring * np.sqrt(0.5), 1.2 + ring * np.sqrt(0.5), -0.8 - 0.2 * np.cos(turn))])
+    outward = np.array([(0, 0, -1), (1, 0, 0), (np.sin(turn), 0, -np.cos(turn)),
+                        (np.sin(turn) * np.sqrt(0.5), np.sin(turn) * np.sqrt(0.5), -np.cos(turn))])
+    x = at + off * outward
+    old = law.start(x)._replace(distance=np.zeros(4))                        # all are held
+    found = law.tractions(x, old)
+    np.testing.assert_allclose(found.force, 100.0 * off * outward, rtol=1e-3, atol=1e-6)
+    for j, e in enumerate(1e-6 * np.eye(3)):
+        quotient = (law.tractions(x + e, old).force - law.tractions(x - e, old).force) / 2e-6
+        np.testing.assert_allclose(found.stiffness[:, :, j], quotient, atol=0.02)
+
+
 def test_tray_without_friction():
     """Filled below 500 iterations; of the order and the number of points that touch in a step nothing is left."""
     walls = []

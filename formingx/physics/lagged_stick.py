@@ -100,15 +100,17 @@ class LaggedStick:
                   expected: Motion | None = None) -> Tractions:
         """See `ContactLaw`; `normal` says 1 of what is held: normals are not asked for."""
         assert old is not None
-        held, zero = self.held(old), np.zeros(len(x))
-        force = np.where(held[:, None], self.k * (x - old.position), 0.0)
+        held, zero, force = self.held(old), np.zeros(len(x)), np.zeros_like(x)
+        force[held] = self._force(x[held], old.position[held])
         return Tractions(force, held.astype(float), zero, zero, lambda: self.stiffness_ahead(x, old, held),
                          lambda: self._touch(x, old, held))
 
     def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
         """See `ContactLaw`."""
         assert old is not None
-        return self.held(old)[:, None, None] * (self.k * np.eye(x.shape[1]))
+        held, stiffness = self.held(old), np.zeros((*x.shape, x.shape[1]))
+        stiffness[held] = self._stiffness(x[held])
+        return stiffness
 
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
         """See `ContactLaw`; there is no axis."""
@@ -129,6 +131,14 @@ class LaggedStick:
     def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
         """See `ContactLaw`; nothing is held by penetration."""
         return np.zeros(len(x))
+
+    def _force(self, x: np.ndarray, position: np.ndarray) -> np.ndarray:
+        """Of points that are held, shape (n, 3), stress."""
+        return np.asarray(self.k * (x - position))
+
+    def _stiffness(self, x: np.ndarray) -> np.ndarray:
+        """Its derivative, shape (n, 3, 3) or (3, 3), stress/length."""
+        return np.asarray(self.k * np.eye(x.shape[1]))
 
     def _touch(self, x: np.ndarray, old: Touch, held: np.ndarray) -> Touch:
         """What to remember of an accepted state."""
@@ -172,23 +182,13 @@ class LaggedSlide(LaggedStick):
         """Which points that touch pull, shape (n,): they are outside the tool."""
         return self.held(old) & (self.distance(x) < -_NONE * self.theta)
 
-    def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
-                  expected: Motion | None = None) -> Tractions:
-        """See `ContactLaw`."""
-        assert old is not None
-        held, zero, force = self.held(old), np.zeros(len(x)), np.zeros_like(x)
-        d, gradient, _ = self._derivatives(x[held])
-        force[held] = self.k * d[:, None] * gradient
-        return Tractions(force, held.astype(float), zero, zero, lambda: self.stiffness_ahead(x, old, held),
-                         lambda: self._touch(x, old, held))
+    def _force(self, x: np.ndarray, position: np.ndarray) -> np.ndarray:
+        d, gradient, _ = self._derivatives(x)
+        return np.asarray(self.k * d[:, None] * gradient)
 
-    def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
-        """See `ContactLaw`."""
-        assert old is not None
-        held, stiffness = self.held(old), np.zeros((*x.shape, x.shape[1]))
-        d, gradient, curvature = self._derivatives(x[held])
-        stiffness[held] = self.k * (gradient[:, :, None] * gradient[:, None] + d[:, None, None] * curvature)
-        return stiffness
+    def _stiffness(self, x: np.ndarray) -> np.ndarray:
+        d, gradient, curvature = self._derivatives(x)
+        return np.asarray(self.k * (gradient[:, :, None] * gradient[:, None] + d[:, None, None] * curvature))
 
     def _derivatives(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Distances of points, shape (n,), their gradients, (n, 3), and second derivatives, (n, 3, 3)."""
