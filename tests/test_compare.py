@@ -211,6 +211,14 @@ def test_names_of_stages_are_read_back(tmp_path, stage):
     assert [row[0] for _, row in csv_files.records(tmp_path / "run.csv")] == ["stage", *columns["stage"]]
 
 
+@pytest.mark.parametrize("name", ["mould;1_force", "a\tb", "r, mm"])
+def test_names_of_columns_are_read_back(tmp_path, name):
+    """A semicolon or a tab in a name parts no cells."""
+    files.write_rows(tmp_path / "run.csv", ["stage", "x", name], [["blow; hold", 0.0, 1.5], ["b", 1.0, 2.5]],
+                     MPI.COMM_SELF)
+    assert csv_files.read(tmp_path / "run.csv").columns[name].tolist() == [1.5, 2.5]
+
+
 def test_backwards():
     t = np.linspace(0, 2, 30)
     with pytest.raises(fx.InputError, match="backwards"):

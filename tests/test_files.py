@@ -328,6 +328,8 @@ def test_report_is_one_file(inflated, tmp_path, monkeypatch):
     for words in ("A <test>", "NeoHookean(c10=2.0)", "SimplySupported('rim')", "Pressure('bottom') (driven)",
                   "limit point 1", f"{inflated.limit_points[0].measures['pressure']:.6g}", "dolfinx", "No warnings"):
         assert words in text
+    with pytest.raises(fx.InputError, match="its name must end in .html"):
+        inflated.report(tmp_path / "a.pdf")
 
 
 def test_report_of_a_run_that_failed(tmp_path):

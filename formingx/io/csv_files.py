@@ -104,7 +104,7 @@ def read(file: Any) -> Table:
 def records(file: Any) -> list[tuple[int, list[str]]]:
     """[(line, cells)] of a CSV file, in which numbers have decimal points.
 
-    Cells are parted by semicolons or tabs if the first line has any, else by commas; lines that begin with # are left
+    Cells are parted by semicolons or tabs if the first line has any outside quotes, else by commas; lines that begin with # are left
     out. Decimal commas (of semicolons, tabs, or cells in quotes) become points, where no number has a point.
 
     Raises:
@@ -116,7 +116,8 @@ def records(file: Any) -> list[tuple[int, list[str]]]:
             lines = _without_remarks(list(stream))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"table {name!r} cannot be read: {error}") from None
-    delimiter = next((mark for mark in ";\t" if lines and mark in lines[0][1]), ",")
+    first = re.sub('"[^"]*"', "", lines[0][1]) if lines else ""
+    delimiter = next((mark for mark in ";\t" if mark in first), ",")
     found, reader = [], csv.reader((line for _, line in lines), delimiter=delimiter, strict=True)
     try:
         for row in reader:

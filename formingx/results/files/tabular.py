@@ -38,7 +38,7 @@ def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], 
     def write(stream):
         writer, quoted = (csv.writer(stream, lineterminator="\n", quoting=how)
                           for how in (csv.QUOTE_MINIMAL, csv.QUOTE_ALL))     # a line that begins with # is a remark
-        writer.writerow(header)
+        (quoted if any(mark in name for name in header for mark in ";\t") else writer).writerow(header)
         for row in rows:
             cells = [repr(float(v)) if isinstance(v, (float, np.floating)) else v for v in row]
             (quoted if str(cells[0]).lstrip().startswith("#") else writer).writerow(cells)

@@ -38,7 +38,7 @@ def report(runs: Sequence[Any], file: Any = "report.html", title: str = "", *, n
         density: in g/cm3, for the weights in grams; trim: where parts are cut off, see `Path.part`.
 
     Raises:
-        InputError: no run, another number of names, a folder that is no checkpoint, or plotly is not installed.
+        InputError: no run, another number of names, a file that is not .html, a folder that is no checkpoint, or plotly is not installed.
         OSError: the file cannot be written.
     """
     from ..files import checkpoint
@@ -55,7 +55,7 @@ def write(records: Record | list[Record], file: Any, title: str, failure: Any, c
           density: float | None = None, trim: Any = None, names: list[str] | None = None) -> FilePath:
     """See `report` and `Path.report`."""
     records = [records] if isinstance(records, Record) else records
-    names = names or [title or "run"]
+    names, file = names or [title or "run"], files.named("report", file, ".html", ".htm")
 
     def make():
         parts = [_part(record, units, density, trim) for record in records]
