@@ -38,7 +38,8 @@ def report(runs: Sequence[Any], file: Any = "report.html", title: str = "", *, n
         density: in g/cm3, for the weights in grams; trim: where parts are cut off, see `Path.part`.
 
     Raises:
-        InputError: no run, another number of names, a file that is not .html, a folder that is no checkpoint, or plotly is not installed.
+        InputError: no run, another number of names, a file that is not .html, a folder that is no checkpoint, or plotly
+            is not installed.
         OSError: the file cannot be written.
     """
     from ..files import checkpoint
