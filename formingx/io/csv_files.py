@@ -105,7 +105,8 @@ def records(file: Any) -> list[tuple[int, list[str]]]:
     """[(line, cells)] of a CSV file, in which numbers have decimal points.
 
     Cells are parted by semicolons or tabs if the first line has any outside quotes, else by commas; lines that begin
-    with # are left out. Decimal commas (of semicolons, tabs, or cells in quotes) become points, where no number has a point.
+    with # are left out. Decimal commas (of semicolons, tabs, or cells in quotes) become points,
+    where no number has a point.
 
     Raises:
         InputError: the file cannot be read, quotes do not match, some numbers have commas and others points.
