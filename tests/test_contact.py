@@ -1,11 +1,14 @@
 """Contact: laws against differences, balances, closed forms of stick and of sliding, independence of the step."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import formingx as fx
 from formingx.discrete.contact.increment import Increment
 from formingx.discrete.problem import Problem
+from formingx.discrete.step_limit import Way
 from formingx.physics.contact import Law, Touch
 
 tools = fx.tools
@@ -354,10 +357,60 @@ def scene_with(contact, pressed="bottom"):
 
 
 def test_what_never_slides_is_stick():
-    """Coulomb's law with a coefficient that is never reached gives the numbers of stick."""
-    paths = [form(cup(friction, (20, 2), penalty=2e5, ramp=1e-5), 8.0, largest=0.02, length=0.02)
+    """Coulomb's law with a coefficient that is never reached gives the numbers of stick, one node a step."""
+    paths = [form(cup(friction, (20, 2), penalty=2e5, ramp=1e-5, nodes_per_step=1), 8.0, largest=0.02, length=0.02)
              for friction in ("stick", 1000.0, 10.0)]
     stick, same, rough = paths
     assert np.abs(same.last.x - stick.last.x).max() < 1e-12 * np.abs(stick.last.x).max()
     np.testing.assert_allclose(rough.profile().thickness, stick.profile().thickness, rtol=1e-4)
     assert rough.last.measures["tool_force"] == pytest.approx(stick.last.measures["tool_force"], rel=1e-4)
+
+
+def test_nodes_foretold_one_after_the_other():
+    """A step that brings many nodes holds each where it arrives: walls of one node a step, in a third of the states."""
+    many, one = (form(cup("stick", (30, 1), nodes_per_step=n), 30.0, largest=largest)
+                 for n, largest in ((None, np.inf), (1, 0.02)))
+    single = form(cup("stick", (30, 1), nodes_per_step=1), 30.0)
+    inside = many.profile().reference_radius < 9.7
+    off = np.abs(many.profile().thickness / one.profile().thickness - 1)[inside]
+    assert off[0] < 5e-3 and off[1:].max() < 1.5e-3            # the first touches where the sheet is all but flat
+    assert 3 * many.counts.steps < 1.2 * single.counts.steps and many.counts.failures < 0.1 * single.counts.steps
+
+
+def test_a_foretold_step_ends_near_its_state():
+    """What arrivals add to the tangent leads nearer to the state found; forces at points do what their columns say."""
+    path = form(cup("stick", (30, 1)), 8.0)
+    problem, curve = path.problem, path.record.curve
+    k = max(range(2, len(path.states)), key=lambda k: path["contact_length"][k] - path["contact_length"][k - 1])
+    old, new = path.states[k - 1], path.states[k]
+    touching = problem.contacts[0].touching(old.x, old.control)
+    point = int(np.flatnonzero(~touching & (problem.contacts[0].rule.area > 0))[0])
+    with problem.at(old):
+        response = curve.response(old)
+        length = curve.progress(old, new)
+        way = Way(old.x, old.control, old.direction, old.slope, length, response)
+        problem.limit.length(way)
+        dx, dc = problem.limit.bend(way)
+        V, steps = response.to_points([np.array([point])])
+        F = problem.x.duplicate()
+        x = problem.x.duplicate()
+        h = 1e-6
+        x.array_w[:] = old.x
+        before = _residual(problem, x, old.control, F)
+        x.array_w[:] = old.x + h * V[:, 1]
+        after = _residual(problem, x, old.control + h * steps[1], F)
+    forces = np.zeros_like(problem.contacts[0].points)
+    forces[point, 1] = 1.0
+    unit = np.zeros(len(before))
+    problem.contacts[0].add(unit, forces)
+    free = np.ones(len(before), dtype=bool)                  # of kinks: points that touch are as in the step ahead
+    free[problem.contacts[0].rule.dofs[touching]] = False
+    assert np.abs((after - before) / h - unit)[free].max() < 1e-4
+    straight = replace(new, x=old.x + length * old.direction, control=old.control + length * old.slope)
+    bent = replace(straight, x=straight.x + dx, control=straight.control + dc)
+    assert curve.distance(new, bent) < 0.5 * curve.distance(new, straight)
+
+
+def _residual(problem, x, control, F):
+    problem.residual(x, control, F)
+    return F.array_r.copy()

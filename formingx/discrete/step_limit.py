@@ -7,20 +7,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .contact.approach import Approach
+from .contact.approach import AS_GOOD, BEYOND, Approach
+from .contact.sequence import Foretold, Response
 
 _SHORTEST = 1e-4
 """Lengths of steps (dimensionless) that are never too long for what comes into contact."""
 
 
 class Way(NamedTuple):
-    """A straight piece of a path: from (x, control) along (direction, slope), so long. Arrays: own part, shape (n,)."""
+    """A straight piece of a path: from (x, control) along (direction, slope), so long. Arrays: own part, shape (n,).
+
+    response: how the body gives way there, or None: then arrivals do not turn the path.
+    """
 
     x: np.ndarray
     control: float
     direction: np.ndarray
     slope: float
     length: float
+    response: Response | None = None
 
 
 class Cut(NamedTuple):
@@ -38,27 +43,69 @@ class StepLimit:
     """
 
     def __init__(self, problem: Any):
-        self._n, heat, self._all = problem.n_owned, problem.scene.heat, []
-        for face in problem.contacts:
-            timed = face.law.remembers or heat is not None and heat.conducts(face.contact)
-            # where it does not matter when they come, the convergence of the contact limits them
-            self._all.append(Approach(face, face.points_per_step * (1 if timed else 10)))
+        self._n, heat = problem.n_owned, problem.scene.heat
+        self._all = [Approach(face, heat is not None and heat.conducts(face.contact)) for face in problem.contacts]
+        self._foretold: tuple[Any, Foretold | None] = (None, None)      # ahead of a state, by its x
 
     @property
     def _present(self) -> list[Approach]:
         return [approach for approach in self._all if approach.face.present]
 
+    @property
+    def foretells(self) -> bool:
+        """True if a step may bring more points where it is told how the body gives way."""
+        return any(c.foretold > c.at_once for c in self._present) and all(
+            hasattr(c.face.law, "friction") and hasattr(c.face.law, "without") for c in self._present)
+
     def length(self, way: Way) -> float:
         """How long a step may be: up to where contact begins, or enough new nodes touch."""
-        n = self._n
+        found = self._length_foretold(way) if way.response else None
+        if found is not None:
+            return found
+        n, self._foretold = self._n, (way.x, None)
         return min([c.reach(way.x[:n], way.control, way.direction[:n], way.slope, way.length)
                     for c in self._present], default=way.length)
 
+    def _length_foretold(self, way: Way) -> float | None:
+        """Up to where enough nodes have touched one after the other; None: that cannot be told."""
+        n, present = self._n, self._present
+        if self._foretold[0] is not way.x:
+            assert way.response is not None
+            self._foretold = way.x, Foretold([c.face for c in present], n, way.x, way.control, way.direction,
+                                             way.slope, way.response, max(c.foretold for c in present))
+        ahead = self._foretold[1]
+        if ahead is None:
+            return None
+        allowed = [c.foretold if touching > 1 else 1 for c, touching in zip(present, ahead.touching)]
+        for k in range(2 * sum(allowed)):
+            arrival = ahead.next(k, way.length)
+            if arrival is None:
+                break
+            allowed[arrival.face] -= arrival.time > AS_GOOD * way.length
+            if not allowed[arrival.face]:
+                return min(BEYOND * arrival.time, way.length)
+        else:
+            return None
+        return None if ahead.ends <= AS_GOOD * way.length else min(BEYOND * ahead.ends, way.length)
+
     def prepare(self, way: Way, ends: bool = False) -> None:
         """A step is about to be taken; `ends`: it is to end where something comes into contact, see `check`."""
-        n = self._n
-        for approach in self._present:
-            approach.prepare(way.x[:n], way.control, way.direction[:n], way.slope, way.length, ends)
+        n, ahead = self._n, self._ahead(way)
+        if ahead is not None:
+            found = list(zip(*ahead.places(way.length), strict=True))
+        else:
+            found = [c.along(way.x[:n], way.control, way.direction[:n], way.slope, way.length) for c in self._present]
+        for approach, (times, places) in zip(self._present, found):
+            approach.prepare(times, places, way.length, ends)
+
+    def bend(self, way: Way) -> tuple[np.ndarray, float] | None:
+        """What arrivals add to (x, control) at the end of a step, own part; None: nothing, or nothing is foretold."""
+        ahead = self._ahead(way)
+        return None if ahead is None else ahead.bend(way.length)
+
+    def _ahead(self, way: Way) -> Foretold | None:
+        """What was foretold of this way by `length`."""
+        return self._foretold[1] if self._foretold[0] is way.x else None
 
     def check(self, old: Any, new: Any, length: float, ends: bool = False) -> Cut | None:
         """Why the step between two states is too long, or None.

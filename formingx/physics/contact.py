@@ -76,9 +76,9 @@ class Contact(Part):
             start); with "stick" or "none". Default True; in space, where it sticks, False: it is held until a stage
             leaves the tool out, or, with True, until it pulls (of materials that do not relax).
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge); in space so many
-            hundredths of all nodes.
-            What sticks or gives off heat depends on when it touched: with 4, a run takes half the iterations, and
-            thickness changes by some 0.1 % of itself.
+            hundredths of all nodes, default 1. What sticks, slides under friction or gives off heat depends on when it
+            touched. None: of what sticks up to 5 % of the nodes, foretold one after the other, each held where it
+            arrives; of what slides under friction or gives off heat one.
         present_area: the penalty is per area and over the wall as they are at the beginning of a step, not at rest:
             what is drawn or pressed 20 times thinner is held as well as at rest. Without friction. (Then a state
             depends, by its penetration, on the steps on the way to it.)
@@ -104,7 +104,7 @@ class Contact(Part):
 
     def __init__(self, on: str, tool: Tool | SolidTool, friction: Any = "stick", *, penalty: float | None = None,
                  ramp: float | None = None, elastic_slip: float = _ELASTIC_SLIP, separates: bool | None = None,
-                 nodes_per_step: int = 1, points: str | int = "nodes",
+                 nodes_per_step: int | None = None, points: str | int = "nodes",
                  present_area: bool = False, moves: tuple[float, ...] | None = None, name: str | None = None):
         self.name, name = name, f"Contact({on!r})"
         if not isinstance(tool, Tool | SolidTool):
@@ -122,7 +122,7 @@ class Contact(Part):
         if not self.separates and not held and (self.friction_by_temperature or 0 < self.mu < math.inf):
             raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
                              f" Coulomb friction; use 'stick' or 'none'")
-        self.nodes_per_step = count(f"{name}: nodes_per_step", nodes_per_step)
+        self.nodes_per_step = None if nodes_per_step is None else count(f"{name}: nodes_per_step", nodes_per_step)
         self.points = _points(f"{name}: points", points)
         self.present_area = instance(f"{name}: present_area", present_area, bool, "True or False")
         if present_area and (self.friction_by_temperature or self.mu > 0 or not self.separates):
@@ -273,6 +273,18 @@ class Law(NormalLaw):
         slope = np.minimum(np.maximum((d + self.theta) / (2 * self.theta), 0.0), 1.0)      # np.clip is slow
         return np.where(d < self.theta, self.theta * slope**2, d), slope
 
+    def depth(self, pressure: np.ndarray) -> np.ndarray:
+        """The distance at which the normal traction is a pressure, stress."""
+        over = pressure / (self.k * self.theta)
+        return self.theta * ((np.where(over > 1, over, 2 * np.sqrt(over) - 1)) if self.separates else over - 1)
+
+    @property
+    def friction(self) -> np.ndarray:
+        """T/N of a point that slides under next to no pressure, shape () or (n,); infinite: it sticks."""
+        sticks = np.asarray(self.mu >= _STICKS)
+        grows = self.shear_limit(np.zeros(np.shape(self.mu)), np.where(sticks, 0.0, self.mu))[1]
+        return np.where(sticks, np.inf, grows)
+
     def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
         """Of the normal traction, see `ContactLaw`."""
         d, theta = self.distance(x), self.theta
@@ -317,8 +329,8 @@ class Law(NormalLaw):
         g, dg = self._slip(x, near, old)
         foretold = g if expected is None else expected.slip
         s, rising = self._resistance(at, pressed, slope)
-        T, dT = s * g + rising * ahead * foretold, s[:, None] * dg + (rising * foretold)[:, None] * n
-        sense_now, bent = zero, T
+        T, sliding = s * g + rising * ahead * foretold, np.zeros(len(x), dtype=bool)
+        sense_now, bent, grows = zero, T, 0.0
         if np.all(np.isfinite(self.mu)):
             trial = s * foretold
             turned = False if sense is None else np.sign(trial) * sense < 0
@@ -326,10 +338,11 @@ class Law(NormalLaw):
             sliding = (np.abs(trial) > limit) & ~np.asarray(turned)
             sense_now = np.where(sliding, np.sign(trial), 0.0)
             T, bent = np.where(sliding, sense_now * (limit + grows * (N - pressed)), T), np.clip(T, -limit, limit)
-            dT = np.where(sliding[:, None], (sense_now * grows * k * slope)[:, None] * n, dT)
         force = force + T[:, None] * t
 
         def stiffness() -> np.ndarray:
+            stuck = s[:, None] * dg + (rising * foretold)[:, None] * n
+            dT = np.where(sliding[:, None], (sense_now * grows * k * slope)[:, None] * n, stuck)
             return (outer(n, (k * slope)[:, None] * n - (bent * bend)[:, None] * t)
                     + outer(t, (pressed * bend)[:, None] * t + dT))
 

@@ -12,10 +12,14 @@ from ..errors import ConvergenceError
 from ..measures.targets import Target
 from .equations import Array, Attempt, Constraint, Equations, Measure
 from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
+from .response import Response
 from .state import State
 
 Predictor: TypeAlias = Callable[[float], Array | None]
 """x at a control, own part, or None where the tangent is the better guess."""
+
+Bend: TypeAlias = tuple[Array, float]
+"""What a guess is off the tangent: of x, own part, and of the control."""
 
 
 class Curve:
@@ -34,6 +38,7 @@ class Curve:
         self.newton = BorderedNewton(problem, tolerances, self.norm)
         self._iterations = 0
         self._found: State | None = None                    # whose factors are at hand
+        self._ahead_of: tuple[State | None, int] = None, 0  # whose tangent ahead is, by the count of the solver
         self._x, self._a, self._b = (problem.x.duplicate() for _ in range(3))
 
     def norm(self, x: PETSc.Vec, control: float) -> float:
@@ -118,6 +123,25 @@ class Curve:
             direction, slope = self.newton.b.array_r / size, 1 / size
             sense = np.sign(self._inner(direction, slope, state.direction, state.slope)) or 1.0
             state.direction, state.slope = sense * direction, sense * slope
+            self._ahead_of = state, self.newton.solver.count
+
+    def response(self, state: State) -> Response | None:
+        """How the body gives way ahead of an accepted state, in the plane normal to its tangent; None: no tangent.
+
+        Of use until Newton's method begins anew.
+        """
+        if self._ahead_of != (state, self.newton.solver.count):
+            self._x.array_w[:] = state.x
+            if not self.newton.tangent(self._x, state.control, ahead=True):
+                return None
+            self._ahead_of = state, self.newton.solver.count
+        return Response(self.newton, state, self._along_plane(state))
+
+    def _along_plane(self, state: State) -> Array:
+        """Derivative by x, own part, of the plane in which steps from a state end."""
+        self._a.array_w[:] = state.direction
+        self.problem.metric_times(self._a, self._b)
+        return self._b.array_r.copy()
 
     def guess_from_rest(self, rest: State, control: float) -> Array:
         """A guess of the state at a control, to correct at that control: rest, with what is held moved.
@@ -141,28 +165,34 @@ class Curve:
             low, high = (middle, high) if work(middle) < 0 else (low, middle)
         return sign * high * rest.direction
 
-    def step(self, old: State, length: float, predictor: Predictor | None = None, behind: State | None = None) -> State:
+    def step(self, old: State, length: float, predictor: Predictor | None = None, behind: State | None = None,
+             bend: Bend | None = None) -> State:
         """One step: predict along the tangent, correct in the plane normal to it at that distance (4.14 to 4.31).
 
         predictor: of a step in time: x at a control, or None if the tangent is the better guess. behind: an earlier
         state, the path smooth from there on: the guess is on the parabola through it, the old one and its tangent.
+        bend: what the guess is off the tangent, in the plane normal to it.
         """
         plane = self._plane(old, *self._ahead(old, length))
-        return self._solve_from(*self._ahead(old, length, behind), plane, "step", old, predictor)
+        return self._solve_from(*self._ahead(old, length, behind, bend), plane, "step", old, predictor)
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
-                behind: State | None = None, kind: str = "target") -> State:
+                behind: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
         """Predict as `step` does, correct to where an equation such as "measure = target" holds."""
-        return self._solve_from(*self._ahead(old, length, behind), equation, kind, old, predictor)
+        return self._solve_from(*self._ahead(old, length, behind, bend), equation, kind, old, predictor)
 
-    def _ahead(self, old: State, length: float, behind: State | None = None) -> tuple[Array, float]:
-        """(x, control) so far along the tangent, or along the parabola that a state behind gives."""
+    def _ahead(self, old: State, length: float, behind: State | None = None,
+               bend: Bend | None = None) -> tuple[Array, float]:
+        """(x, control) so far along the tangent, off it by a bend, or along the parabola that a state behind gives."""
         x, control = old.x + length * old.direction, old.control + length * old.slope
         if behind is not None:
             h = self.distance(behind, old)
             share = (length / h) ** 2
             x += share * (behind.x - old.x + h * old.direction)
             control += share * (behind.control - old.control + h * old.slope)
+        if bend is not None:
+            x += bend[0]
+            control += bend[1]
         return x, control
 
     def _solve_from(self, x: Array, control: float, constraint: Constraint, kind: str, old: State,

@@ -112,6 +112,9 @@ class ContactFace(Protocol):
     def add(self, values: Array, forces: Array) -> None:
         """Add forces at the points, shape (n, 2), to own rows of F."""
 
+    def leave_out(self, points: Array) -> None:
+        """Some points (a mask, shape (n,)) touch nothing, until another increment begins."""
+
     def moved(self, dx: Array, step: float) -> Array:
         """How the points move, seen from the tool, by a correction of x (own part) and the control; (n, 2), length."""
 

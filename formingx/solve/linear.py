@@ -28,6 +28,7 @@ class DirectSolver:
         self._matrix, self._symmetric, self._determinant, self._inertia = matrix, symmetric, determinant, inertia
         self._columns: list[PETSc.Mat] = []                 # dense, for `solve_all`
         self._scaled = False                                # there are factors, and a scaling with them
+        self.count = 0                                      # factorisations
         self._keeps = matrix.comm.size == 1                 # MUMPS can keep it
         self._create()
 
@@ -37,6 +38,7 @@ class DirectSolver:
         rescale: False keeps the scaling of rows and columns of the factorisation before, if there was one: to find
         one takes MUMPS a fifth of the time. (On several ranks it cannot keep one.)
         """
+        self.count += 1
         keep = self._keeps and self._scaled and not rescale
         self._ksp.getPC().getFactorMatrix().setMumpsIcntl(8, _KEEP_SCALING if keep else _SCALE)
         self._ksp.setOperators(self._matrix)

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 from petsc4py import PETSc
 
-from .arc_length import Curve, Predictor
+from .arc_length import Bend, Curve, Predictor
 from .equations import Array, Attempt, Constraint, Equations
 from .linear import configure
 from .newton import Failure, Iteration, Tolerances, relative
@@ -85,12 +85,13 @@ class FixedControlCurve(Curve):
         super().__init__(problem, tolerances)
         self._fixed = FixedControl(problem, tolerances)
 
-    def step(self, old: State, length: float, predictor: Predictor | None = None, behind: State | None = None) -> State:
+    def step(self, old: State, length: float, predictor: Predictor | None = None, behind: State | None = None,
+             bend: Bend | None = None) -> State:
         """One step to the control that the tangent foretells."""
         return self._correct(old, length, "step")
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
-                behind: State | None = None, kind: str = "target") -> State:
+                behind: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
         """The same, to where an equation for the control holds."""
         return self._correct(old, length, kind)
 
@@ -103,6 +104,9 @@ class FixedControlCurve(Curve):
         """See `Curve`."""
         self._a.array_w[:] = state.direction
         return state.slope / self.norm(self._a, state.slope)
+
+    def _along_plane(self, state: State) -> Array:
+        return np.zeros(len(state.x))
 
     def _length_of(self, b: PETSc.Vec) -> float:
         return 1.0

@@ -106,24 +106,45 @@ class LocalSolve:
         return self._problem.comm.allreduce(found, MPI.LOR)
 
 
-def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver, b: PETSc.Vec) -> bool:
-    """Make b = dx/dcontrol by a factorised tangent that of one which differs at a few points (Woodbury's formula).
+Update: TypeAlias = Callable[[Array, float], "Array | None"]
+"""V = dx/dcontrol or K^-1 E, own rows, shape (n, m), with change of the control, by another tangent than K."""
 
-    changes: of the stiffness per area of each contact's points, shape (n, 2, 2). False, and b as it was, where so many
-    points change that factors of the other tangent cost less, or where that is singular.
+
+def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> Update | None:
+    """What a tangent that differs from the factorised one at a few points makes of its solutions (Woodbury's formula).
+
+    changes: of the stiffness per area of each contact's points, shape (n, 2, 2). None where so many points change that
+    factors of the other tangent cost less; the update gives None where that is singular.
     """
     chosen = [np.flatnonzero(change.any((1, 2))) for change in changes]
     points = problem.comm.allreduce(sum(map(len, chosen)), MPI.SUM)
-    if not points:
-        return True
     if points > _LOCAL.few:
-        return False
+        return None
+    if not points:
+        return lambda V, step: V
     small = _Points(problem, problem.present, chosen, solver, lambda V: np.zeros(V.shape[1]))
-    by = small.updated(b, [change[i] for change, i in zip(changes, chosen)])
-    if by is None:
-        return False
-    b.array_w += by
-    return True
+    stiffer = [change[i] for change, i in zip(changes, chosen)]
+    return lambda V, step: small.updated(V, step, stiffer)
+
+
+def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array]) -> Array:
+    """Unit forces at own points of contacts in F, own rows, shape (n, m): point by point of all ranks."""
+    unit, components = np.zeros(problem.x.getLocalSize()), contacts[0].points.shape[1]
+    own = [(c, point, way) for c, points in zip(contacts, chosen) for point in points for way in range(components)]
+    units = []
+    for rank, count in enumerate(problem.comm.allgather(len(own))):
+        for k in range(count):
+            mine, point, way = own[k] if rank == problem.comm.rank else (None, 0, 0)
+            for contact in contacts:                        # on all ranks: the force may act on nodes of another
+                forces = np.zeros_like(contact.points)
+                if contact is mine:
+                    forces[point, way] = 1.0
+                contact.add(unit, forces)
+            units.append(unit.copy())
+            unit[:] = 0
+    E = np.array(units).reshape(-1, len(unit)).T
+    E[problem.held] = 0
+    return E
 
 
 class _Points:
@@ -132,32 +153,16 @@ class _Points:
     def __init__(self, problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array],
                  solver: DirectSolver, border: Border):
         self._comm, self._contacts, self._chosen = problem.comm, contacts, chosen
-        unit, held = np.zeros(problem.x.getLocalSize()), problem.held
         self._c = contacts[0].points.shape[1]               # components
         counts = self._comm.allgather(self._c * sum(map(len, chosen)))
         first = sum(counts[: self._comm.rank])
         self._own = slice(first, first + counts[self._comm.rank])
-        own = [(c, point, way) for c, points in zip(contacts, chosen) for point in points
-               for way in range(self._c)]
-        units = []
-        for rank, count in enumerate(counts):
-            for k in range(count):
-                mine, point, way = own[k] if rank == self._comm.rank else (None, 0, 0)
-                for contact in contacts:                        # on all ranks: the force may act on nodes of another
-                    forces = np.zeros_like(contact.points)
-                    if contact is mine:
-                        forces[point, way] = 1.0
-                    contact.add(unit, forces)
-                units.append(unit.copy())
-                unit[:] = 0
-        E = np.array(units).T
-        E[held] = 0
-        self._columns = solver.solve_all(E)                                     # own rows
+        self._columns = solver.solve_all(unit_forces(problem, contacts, chosen))        # own rows
         self._steps = border(self._columns)
         scale = np.concatenate([np.repeat(c.scale[i], self._c) for c, i in zip(contacts, chosen)])
         self._scale = self._gather(scale)
         moved = [self._moved(column, step) for column, step in zip(self._columns.T, self._steps)]
-        self._C = self._gather(np.array(moved).T.reshape(len(own), len(moved))) * self._scale
+        self._C = self._gather(np.array(moved).T.reshape(counts[self._comm.rank], len(moved))) * self._scale
 
     def solve(self, dx: PETSc.Vec, step: float) -> tuple[Array, float] | None:
         """How a correction and its step change, own part; None if no consistent state was found."""
@@ -183,13 +188,14 @@ class _Points:
             by = found
         return None
 
-    def updated(self, b: PETSc.Vec, changes: list[Array]) -> Array | None:
-        """How dx/dcontrol changes, own part, with stiffnesses per area of own points; None: the tangent is singular."""
+    def updated(self, V: Array, step: float, changes: list[Array]) -> Array | None:
+        """Solutions V, own rows, shape (n, m), with other stiffnesses per area of own points; None: it is singular."""
         more = self._gather(np.concatenate(changes))
-        y = self._within(more, self._gather(self._moved(b.array_r, 1.0)))
+        y = self._within(more, self._gather(np.array([self._moved(column, step) for column in V.T]).T))
         if y is None:
             return None
-        return -self._columns @ (self._scale * np.einsum("nij,nj->ni", more, y.reshape(-1, self._c)).ravel())
+        forces = np.einsum("nij,njm->nim", more, y.reshape(len(more), self._c, -1)).reshape(y.shape)
+        return V - self._columns @ (self._scale[:, None] * forces)
 
     def _within(self, more: Array, y: Array) -> Array | None:
         """What motions y become if the points are stiffer by `more`, (1 + C more)^-1 y; None if there is no answer."""

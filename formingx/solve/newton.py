@@ -14,7 +14,7 @@ from ..discrete.schedule import Setting
 from ..errors import count, positive
 from .equations import Array, Attempt, Constraint, Equations, Residual, Standing
 from .linear import DirectSolver
-from .local_contact import LocalSolve, woodbury
+from .local_contact import LocalSolve, Update, woodbury
 
 
 @dataclass(frozen=True)
@@ -236,6 +236,7 @@ class BorderedNewton:
         self.F, self.F_control, self.gradient, self.a, self.b = new(), new(), new(), new(), new()
         self.reached = 0.0, 0.0                             # control and its last correction in `correct`
         self._hurried = False
+        self._update: Update | None = None                  # of solutions, by a tangent that is not factorised
         self._modified = _ModifiedNewton(self.settings)
 
     @contextlib.contextmanager
@@ -263,7 +264,7 @@ class BorderedNewton:
         matrix = self.problem.tangent(x, control, ahead)
         if self._drag:
             self._drag.add_to(matrix)
-        good = self.solver.factorise(rescale)
+        good, self._update = self.solver.factorise(rescale), None
         self._modified.made(self.problem.setting if good else None)
         if good:
             self.problem.control_derivative(x, control, self.F_control, ahead)
@@ -271,7 +272,17 @@ class BorderedNewton:
 
     def update_ahead(self, x: PETSc.Vec, control: float) -> bool:
         """Make `self.b`, at a solution just found, that of the tangent ahead, by the factors at hand; False: failed."""
-        return woodbury(self.problem, self.problem.changes_ahead(x, control), self.solver, self.b)
+        update = woodbury(self.problem, self.problem.changes_ahead(x, control), self.solver)
+        found = update and update(self.b.array_r[:, None], 1.0)
+        if found is None:
+            return False
+        self.b.array_w[:], self._update = found[:, 0], update
+        return True
+
+    def solve_ahead(self, E: Array) -> Array | None:
+        """K^-1 E, own rows, (n, m), by the tangent made last by `tangent` or `update_ahead`; None: it is singular."""
+        V = self.solver.solve_all(E)
+        return self._update(V, 0.0) if self._update else V
 
     def correct(self, x: PETSc.Vec, control: float, constraint: Constraint, old: Standing | None = None,
                 chords: bool = False) -> tuple[float, list[Iteration]]:

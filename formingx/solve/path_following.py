@@ -25,6 +25,7 @@ from .equations import Array, Attempt, Measure
 from .newton import Failure, fixed, tangents
 from .progress import Aim, Progress
 from .record import Record, Unusable
+from .response import Response
 from .snap_through import NoEquilibrium, SnapThrough, at_limit_points, let_go, snap_through, snaps, was_passed
 from .state import State
 from .stepping import Cutback, StepControl, TimeError
@@ -75,6 +76,7 @@ class Run:
         self._ahead = self.settings.snap_through.ahead      # by how much the control goes on in a jump
         self._no_rest_at = np.nan                           # control from which a body that jumped came to rest nowhere
         self._turned: list[State] = []                      # its first state, if it goes back from there
+        self._response: Response | None = None                # how the body gives way ahead of the last state
 
     def follow(self, max_steps: int | None, progress: bool, start: State | None, may_turn: bool = False) -> None:
         """Follow the path from a state, or on from the last one, until the last target is met.
@@ -213,9 +215,11 @@ class Run:
         lengths, last = [*self.settings.snap_through.lengths, 0.0], self.settings.snap_through.lengths[-1]
         if snaps(self.curve, old, self._at_fold, self._sense):
             return self._snap(old)
+        foretold = limit and limit.foretells and old.kind != "start"        # at rest the tangent knows no contact yet
+        self._response = self.curve.response(old) if foretold else None
         while True:
             length = min(self.step.length, most)
-            length = limit.length(Way(old.x, old.control, old.direction, old.slope, length)) if limit else length
+            length = limit.length(self._way(old, length)) if limit else length
             target, bound, reach = self.aim.within_reach(old, length)
             if length < self.step.length:
                 self._limited("contact arriving", length)
@@ -244,6 +248,10 @@ class Run:
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
                                   failure.attempt)
 
+    def _way(self, old: State, length: float) -> Way:
+        """Ahead of a state, so long."""
+        return Way(old.x, old.control, old.direction, old.slope, length, self._response)
+
     def _failed(self, why: str, length: float) -> None:
         """A step was not taken; `length` is tried next."""
         self.record.counts.failures += 1
@@ -263,15 +271,16 @@ class Run:
         """
         limit = self.problem.limit
         if limit:
-            limit.prepare(Way(old.x, old.control, old.direction, old.slope, reach), ends=True)
+            limit.prepare(self._way(old, reach), ends=True)
+        bend = limit.bend(self._way(old, reach)) if limit else None
         behind = None if self.problem.has_kinks else predictor.behind(self.states, reach, self.curve.distance)
         with self.curve.newton.in_a_hurry(length > self.settings.snap_through.lengths[0]):
             if target is not None and bound is not None:
-                new = self.curve.step_to(old, reach, bound.equation(target.value), self._predictor, behind)
+                new = self.curve.step_to(old, reach, bound.equation(target.value), self._predictor, behind, bend)
             elif held is not None:
-                new = self.curve.step_to(old, reach, fixed(held), self._predictor, behind, kind="step")
+                new = self.curve.step_to(old, reach, fixed(held), self._predictor, behind, bend, kind="step")
             else:
-                new = self.curve.step(old, length, self._predictor, behind)
+                new = self.curve.step(old, length, self._predictor, behind, bend)
         if target is not None:
             if not 0 < self.curve.progress(old, new) < 2 * length:
                 raise _Astray("the target was met on a far part of the path", [])

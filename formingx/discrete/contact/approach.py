@@ -7,9 +7,19 @@ from mpi4py import MPI
 
 from ...ranks import gathered
 from .face import FaceContact
+from .sequence import arrivals
+
+AS_GOOD = 0.02
+"""Part of a step within which a point is as good as in touch."""
+
+BEYOND = 1.001
+"""How far a step goes that is to end at an arrival, over the length to there."""
 
 _NEAR = 1e-3
 """Distances (over thickness) at which a point is as good as in touch."""
+
+_SHARE = 0.05
+"""Of the points of a face, that a step may bring if they are foretold one after the other."""
 
 _AT_END = 0.95
 """Part of a step from which on what arrives, and will stick, has no friction until the next."""
@@ -30,11 +40,21 @@ class Approach:
 
     Args:
         face: the contact.
-        points_per_step: that a step may bring into contact.
+        conducts: heat flows through what touches, from the end of the step on.
+
+    Attributes:
+        at_once, foretold: so many points a step may bring into contact, along the tangent and one foretold after the
+            other. (Where it does not matter when they come, the convergence of contact limits steps.)
     """
 
-    def __init__(self, face: FaceContact, points_per_step: int):
-        self.face, self._comm, self._allowed = face, face.comm, points_per_step
+    def __init__(self, face: FaceContact, conducts: bool):
+        self.face, self._comm, given = face, face.comm, face.contact.nodes_per_step
+        points = face.comm.allreduce(len(face.rule.points))
+        share = max(points // 100, 1) if face.contact.lagged else 1
+        self.at_once = (given or 1) * share * (1 if face.law.remembers or conducts else 10)
+        slides = face.law.has_friction and not face.contact.sticks
+        one_by_one = given or slides or conducts or face.contact.lagged
+        self.foretold = self.at_once if one_by_one else max(self.at_once, round(_SHARE * points))
         self._foreseen = 0                                  # points that the step is going to bring, all ranks
 
     def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
@@ -50,41 +70,32 @@ class Approach:
             speed = np.linalg.norm(velocity, axis=1)
             most = np.divide(most, speed, out=np.full(len(speed), length), where=free & (speed > 0))
             length = self._comm.allreduce(float(most.min(initial=length)), MPI.MIN)
-        times = self._arrivals(start, velocity, length)
-        ahead = (times > 0.02 * length) & (times < length)         # nearer ones are as good as in touch
+        times = arrivals(face.law, start, velocity, free, length)
+        ahead = (times > AS_GOOD * length) & (times < length)
         times = np.sort(gathered(self._comm, times[ahead]))
         touching = self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM)
-        allowed = self._allowed if touching > 1 else 1
-        return min(1.001 * times[allowed - 1], length) if len(times) >= allowed else length
+        allowed = self.at_once if touching > 1 else 1
+        return min(BEYOND * times[allowed - 1], length) if len(times) >= allowed else length
 
-    def prepare(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float,
-                ends: bool) -> None:
-        """A step of this length along a tangent is about to be taken: foretell where points arrive.
+    def along(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
+              length: float) -> tuple[np.ndarray, np.ndarray]:
+        """Along a tangent: arc length at which points arrive, or `length`; where they are then, shapes (n,), (n, c)."""
+        face = self.face
+        start, velocity = face.positions(fields, control), face.moved(direction, slope)
+        free = ~face.law.touching(start, face.touch) & (face.rule.area > 0)
+        times = arrivals(face.law, start, velocity, free, length)
+        return times, start + times[:, None] * velocity
+
+    def prepare(self, times: np.ndarray, places: np.ndarray, length: float, ends: bool) -> None:
+        """A step of this length is about to be taken: points arrive at times (arc length, `length`: not), at places.
 
         ends: it is to end where a point touches that sticks (see `touches_by`), which has no friction before.
         """
         face = self.face
-        start, velocity = face.positions(fields, control), face.moved(direction, slope)
-        times = self._arrivals(start, velocity, length)
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
-        if face.contact.lagged:                             # it asks for no place of arrival
-            return
-        at_end = ends & face.contact.sticks & (times >= _AT_END * length)
-        face.expect_arrivals(np.where(at_end[:, None], np.nan, start + times[:, None] * velocity))
-
-    def _arrivals(self, start: np.ndarray, velocity: np.ndarray, length: float) -> np.ndarray:
-        """Arc length at which free points meet the ramp, `length` if they do not before, shape (n,)."""
-        face, law = self.face, self.face.law
-        at, times = length * np.linspace(0, 1, 17), np.full(len(start), length)
-        ways = 1.01 * length * np.linalg.norm(velocity, axis=1)         # none comes nearer by more
-        free = ~law.touching(start, face.touch) & (face.rule.area > 0)
-        near = np.flatnonzero(free & (law.distance(start) + ways > -law.theta))
-        gap = -law.theta - law.part(near).distance(start[near] + at[:, None, None] * velocity[near])    # shape (17, m)
-        hit = np.flatnonzero((gap[1:] <= 0).any(0))
-        k = np.argmax(gap[1:, hit] <= 0, axis=0)
-        before, now = gap[k, hit], gap[k + 1, hit]
-        times[near[hit]] = at[k] + (at[k + 1] - at[k]) * before / (before - now)
-        return times
+        if not face.contact.lagged:                         # that asks for no place of arrival
+            at_end = ends & face.contact.sticks & (times >= _AT_END * length)
+            face.expect_arrivals(np.where(at_end[:, None], np.nan, places))
 
     def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """More than twice the new points that a step is meant, or foreseen, to bring into contact.
@@ -99,7 +110,7 @@ class Approach:
             deep = np.where(face.law.touching(a, face.touch), 0.0, b - 2 * face.rule.lengths)
             return bool(self._comm.allreduce(float(deep.max(initial=0.0)), MPI.MAX) > 0)
         found = int(np.sum((a <= -theta - _NEAR * face.thickness) & (b > -theta)))
-        return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self._allowed, self._foreseen) + 2)
+        return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self.at_once, self._foreseen) + 2)
 
     def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """True if a point's straight way from one state to another, seen from the tool, leads through the tool.

@@ -39,7 +39,7 @@ class FaceContact:
         rule: where the points are (`Rule`); points: their reference positions, shape (n, components), length.
         law: at the points; thickness: of the body behind the face, length.
         increment: the `Increment` that goes on.
-        present: it takes part in the stage; points_per_step: so many are to come into contact in a step.
+        present: it takes part in the stage.
     """
 
     def __init__(self, solid: Any, contact: Contact, assemble: Any):
@@ -48,8 +48,6 @@ class FaceContact:
         self.rule: Rule = (Vertices(solid, assemble) if in_space else
                            Lobatto(solid, contact.on, assemble) if contact.points == "nodes" else
                            Gauss(solid, contact.on, int(contact.points)))
-        share = self.comm.allreduce(len(self.rule.points)) // 100 if in_space else 1
-        self.points_per_step = contact.nodes_per_step * max(share, 1)
         self.points, self.thickness = self.rule.points, solid.thickness(contact.on)
         self._warm = solid.temperature.nodes(self.rule.nodes) if contact.friction_by_temperature else None
         self._penalty = np.ones(len(self.points))
