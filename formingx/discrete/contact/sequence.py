@@ -115,7 +115,8 @@ class Foretold:
         self._sense: list[float] = []                       # of each that is held: 1, -1 slides, 0 does not
         self._pieces = [_Piece(0.0, start, speed, np.zeros(0), np.zeros(0), (np.zeros(len(x)), 0.0))]
         self._known: list[tuple[int, int, int]] = []        # points whose columns are there
-        self._columns, self._steps, self._C = np.zeros((len(x), 0)), np.zeros(0), np.zeros((0, 0))
+        self._columns, self._C = np.zeros((len(x), 0)), np.zeros((0, 0))
+        self._steps: np.ndarray = np.zeros(0)
         self._by = [np.zeros((*at.shape, 0)) for at in start]       # how all points move by them
         self._end: _Piece | None = None                     # of the last piece, in equilibrium
         self.ends = np.inf
