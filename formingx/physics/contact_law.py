@@ -92,6 +92,8 @@ class ContactLaw(Protocol):
         stiffness_ahead     there: the tangent of the path, with the points that have just touched;
         distance, nearest, ramp     limits of the next step: when points arrive, and whether that was foreseen.
 
+    Where it has `friction` and `depth`, too, as `formingx.physics.contact.Law`, a step may bring several points.
+
     Attributes:
         theta: half-width of the ramp: at -theta contact begins, length; elastic_slip: before a point slides, length.
         shift: what distances are less by, length, a number or one for each point, shape (n,).
