@@ -276,7 +276,7 @@ class Law(NormalLaw):
     def depth(self, pressure: np.ndarray) -> np.ndarray:
         """The distance at which the normal traction is a pressure, stress."""
         over = pressure / (self.k * self.theta)
-        return self.theta * ((np.where(over > 1, over, 2 * np.sqrt(over) - 1)) if self.separates else over - 1)
+        return self.theta * ((np.where(over > 1, over, 2 * np.sqrt(over) - 1)) if not self.pulls else over - 1)
 
     @property
     def friction(self) -> np.ndarray:
