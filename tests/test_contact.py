@@ -390,7 +390,7 @@ def test_a_foretold_step_ends_near_its_state():
         length = curve.progress(old, new)
         way = Way(old.x, old.control, old.direction, old.slope, length, response)
         problem.limit.length(way)
-        dx, dc = problem.limit.bend(way)
+        dx, dc = problem.limit.prepare(way)
         V, steps = response.to_points([np.array([point])])
         F = problem.x.duplicate()
         x = problem.x.duplicate()

@@ -88,8 +88,11 @@ class StepLimit:
             return None
         return None if ahead.ends <= AS_GOOD * way.length else min(BEYOND * ahead.ends, way.length)
 
-    def prepare(self, way: Way, ends: bool = False) -> None:
-        """A step is about to be taken; `ends`: it is to end where something comes into contact, see `check`."""
+    def prepare(self, way: Way, ends: bool = False) -> tuple[np.ndarray, float] | None:
+        """A step is about to be taken; `ends`: it is to end where something comes into contact, see `check`.
+
+        What arrivals that are foretold add to (x, control) at its end, own part; None: nothing.
+        """
         n, ahead = self._n, self._ahead(way)
         if ahead is not None:
             found = list(zip(*ahead.places(way.length), strict=True))
@@ -97,10 +100,6 @@ class StepLimit:
             found = [c.along(way.x[:n], way.control, way.direction[:n], way.slope, way.length) for c in self._present]
         for approach, (times, places) in zip(self._present, found):
             approach.prepare(times, places, way.length, ends)
-
-    def bend(self, way: Way) -> tuple[np.ndarray, float] | None:
-        """What arrivals add to (x, control) at the end of a step, own part; None: nothing, or nothing is foretold."""
-        ahead = self._ahead(way)
         return None if ahead is None else ahead.bend(way.length)
 
     def _ahead(self, way: Way) -> Foretold | None:

@@ -135,7 +135,7 @@ class Curve:
             if not self.newton.tangent(self._x, state.control, ahead=True):
                 return None
             self._ahead_of = state, self.newton.solver.count
-        return Response(self.newton, state, self._along_plane(state))
+        return Response(self.newton, state, self._along_plane(state), self._x, self._b)
 
     def _along_plane(self, state: State) -> Array:
         """Derivative by x, own part, of the plane in which steps from a state end."""

@@ -25,7 +25,6 @@ from .equations import Array, Attempt, Measure
 from .newton import Failure, fixed, tangents
 from .progress import Aim, Progress
 from .record import Record, Unusable
-from .response import Response
 from .snap_through import NoEquilibrium, SnapThrough, at_limit_points, let_go, snap_through, snaps, was_passed
 from .state import State
 from .stepping import Cutback, StepControl, TimeError
@@ -76,7 +75,6 @@ class Run:
         self._ahead = self.settings.snap_through.ahead      # by how much the control goes on in a jump
         self._no_rest_at = np.nan                           # control from which a body that jumped came to rest nowhere
         self._turned: list[State] = []                      # its first state, if it goes back from there
-        self._response: Response | None = None                # how the body gives way ahead of the last state
 
     def follow(self, max_steps: int | None, progress: bool, start: State | None, may_turn: bool = False) -> None:
         """Follow the path from a state, or on from the last one, until the last target is met.
@@ -215,11 +213,11 @@ class Run:
         lengths, last = [*self.settings.snap_through.lengths, 0.0], self.settings.snap_through.lengths[-1]
         if snaps(self.curve, old, self._at_fold, self._sense):
             return self._snap(old)
-        foretold = limit and limit.foretells and old.kind != "start"        # at rest the tangent knows no contact yet
-        self._response = self.curve.response(old) if foretold else None
+        response = self.curve.response(old) if limit and limit.foretells and old.kind != "start" else None
+        self._way = Way(old.x, old.control, old.direction, old.slope, 0.0, response)    # at rest it knows no contact
         while True:
             length = min(self.step.length, most)
-            length = limit.length(self._way(old, length)) if limit else length
+            length = limit.length(self._way._replace(length=length)) if limit else length
             target, bound, reach = self.aim.within_reach(old, length)
             if length < self.step.length:
                 self._limited("contact arriving", length)
@@ -248,10 +246,6 @@ class Run:
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
                                   failure.attempt)
 
-    def _way(self, old: State, length: float) -> Way:
-        """Ahead of a state, so long."""
-        return Way(old.x, old.control, old.direction, old.slope, length, self._response)
-
     def _failed(self, why: str, length: float) -> None:
         """A step was not taken; `length` is tried next."""
         self.record.counts.failures += 1
@@ -270,9 +264,7 @@ class Run:
         held: the control at its end, in place of the length.
         """
         limit = self.problem.limit
-        if limit:
-            limit.prepare(self._way(old, reach), ends=True)
-        bend = limit.bend(self._way(old, reach)) if limit else None
+        bend = limit.prepare(self._way._replace(length=reach), ends=True) if limit else None
         behind = None if self.problem.has_kinks else predictor.behind(self.states, reach, self.curve.distance)
         with self.curve.newton.in_a_hurry(length > self.settings.snap_through.lengths[0]):
             if target is not None and bound is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from petsc4py import PETSc
 
 from .equations import Array, ContactFace, Equations
 from .local_contact import unit_forces
@@ -16,12 +17,13 @@ class Response:
     Args:
         newton: it has just made the tangent ahead of the state.
         normal: derivative by x of the equation of that plane, own part, shape (n,).
+        x, F: vectors to work with.
     """
 
-    def __init__(self, newton: BorderedNewton, state: State, normal: Array):
+    def __init__(self, newton: BorderedNewton, state: State, normal: Array, x: PETSc.Vec, F: PETSc.Vec):
         self._newton, self._state, self._made = newton, state, newton.solver.count
         self._problem: Equations = newton.problem
-        self._x, self._F, self._normal = newton.problem.x.duplicate(), newton.problem.x.duplicate(), normal
+        self._x, self._F, self._normal = x, F, normal
 
     @property
     def at_hand(self) -> bool:
@@ -63,8 +65,3 @@ class Response:
             return None
         along = self._problem.comm.allreduce(self._normal @ V)
         return V - np.outer(self._state.direction, along), -self._state.slope * along
-
-    def destroy(self) -> None:
-        """Free the PETSc objects (collective)."""
-        self._x.destroy()
-        self._F.destroy()
