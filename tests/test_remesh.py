@@ -106,3 +106,55 @@ def test_what_is_not_carried_is_refused():
         fx.trace(block("none"), until=fx.pole_height(-0.2), remesh=remesh)
     with pytest.raises(fx.InputError, match="checkpoint"):
         fx.trace(block("none"), until=fx.travel(0.2), remesh=remesh, checkpoint="nowhere")
+
+
+def test_a_deformation_is_carried_to_other_elements():
+    """F of r -> r s(z), with det F = 1, known at scattered points: of second order at least, up to the faces."""
+    import ufl
+
+    from formingx.discrete.carry import in_own_cells
+    from formingx.discrete.preformed import Preformed
+    from formingx.discrete.problem import Problem
+
+    def deformation(r, z):
+        s, slope = 1 + z + 2 * z**3, 1 + 6 * z**2
+        return np.stack([s, r * slope, 0 * r, s**-2, s], axis=-1)
+    errors = []
+    for n in (4, 8, 16):
+        points = np.stack(np.meshgrid((np.arange(3 * n) + 0.4) / (3 * n), (np.arange(3 * n) + 0.6) / (3 * n)), -1)
+        points = points.reshape(-1, 2)
+        mesh = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(n, n))
+        forms = Problem(fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
+                                 supports=[fx.Symmetry("axis"), fx.Clamped("rim")])).forms
+        F = Preformed(points, deformation(*points.T), np.zeros((len(points), 0)), 0.0, 1.0).gradient(forms)
+        wanted = [F[0, 0], F[0, 1], F[1, 0], F[1, 1], F[2, 2], *forms.X, ufl.det(F)]
+        found = in_own_cells(forms.domain, ufl.as_vector(wanted), np.array([[0.3, 0.2], [0.1, 0.7]])).reshape(-1, 8)
+        errors.append(np.abs(found[:, :5] - deformation(found[:, 5], found[:, 6])).max())
+        assert found[:, 7] == pytest.approx(np.ones(len(found)), abs=1e-12)
+    assert errors[0] < 0.01 and errors[1] < errors[0] / 3.5 and errors[2] < errors[1] / 4
+
+
+def test_the_node_on_the_axis_stays_with_those_beside_it():
+    """Its share of the area is no measure of the pressure: what touches there carries no friction, and no dimple."""
+    path = pressed("stick", 0.55, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)))
+    made = next(s for s in path.segments[1:])
+    contact, state = made.problem.contacts[0], made.states[0]
+    near = np.argsort(contact.points[:, 0])[:5]
+    with made.problem.at(state):
+        found = contact.tractions(state.x[:made.problem.n_owned], state.control)
+        place = contact.positions(state.x[:made.problem.n_owned], state.control)[near]
+    assert np.ptp(place[:, 1]) < 1e-3 and np.abs(found.tangential[near]).max() < 0.2 * found.normal[near].max()
+
+
+def test_the_volume_of_each_point_is_held():
+    """A stuck block: J stays nearer to 1, the force where it was."""
+    def run(**options):
+        like = block("stick")
+        scene = fx.Scene(mesh=like.mesh, materials=like.materials, supports=like.supports, contacts=like.contacts,
+                         model=fx.MixedPressure(**options))
+        path = fx.trace(scene, until=fx.travel(0.5), progress=False)
+        return path.last.measures["tool_force"], path.problem.furthest_volume_ratio(path.last).value
+    (force, J), (held, held_J) = run(), run(volume_stiffness=10.0)
+    assert held == pytest.approx(force, rel=0.01) and abs(np.log(held_J)) < 0.8 * abs(np.log(J))
+    with pytest.raises(fx.InputError, match="volume_stiffness"):
+        fx.MixedPressure(volume_stiffness=-1.0)
