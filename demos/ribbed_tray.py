@@ -2,8 +2,8 @@
 
 The mould is drawn here as a height over the plane, 150 mm by 90 mm at its mouth and 35 mm deep, its walls at 10 degrees
 to the axis, with ribs and a boss (an F) on its floor, and written as a closed solid. The least wall, in a corner, needs
-small triangles there: after sheets of one size the mesh is adapted, twice, so that the wall changes by at most a fifth
-from one triangle to the next. Lengths in mm, stresses in MPa, times in s.
+small triangles there: after sheets of one size the mesh is adapted, so that the wall changes by at most a fifth from
+one triangle to the next. Lengths in mm, stresses in MPa, times in s.
 """
 
 import numpy as np
@@ -92,8 +92,8 @@ def numbers(path):
 
 def main():
     options = parser("ribbed_tray", __doc__)
-    options.add_argument("--sizes", type=float, nargs="+", default=[8.0, 5.0], help="of the triangles, mm")
-    options.add_argument("--adapted", type=int, default=2, help="how often the mesh is then made by what a run showed")
+    options.add_argument("--sizes", type=float, nargs="+", default=[8.0, 5.0, 3.0], help="of the triangles, mm")
+    options.add_argument("--adapted", type=int, default=1, help="how often the mesh is then made by what a run showed")
     args = options.parse_args()
     sizes, more, step = ([16.0], 0, 3.0) if args.quick else (args.sizes, args.adapted, 1.25)
     if COMM.rank == 0:
