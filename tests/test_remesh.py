@@ -97,6 +97,15 @@ def test_what_is_not_carried_is_refused():
                          materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
                          supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
         fx.trace(scene, until=fx.pressure(0.1), remesh=remesh)
+    def of(message, **parts):
+        like = block("none")
+        scene = fx.Scene(**{"mesh": like.mesh, "materials": like.materials, "supports": like.supports,
+                            "contacts": like.contacts, **parts})
+        with pytest.raises(fx.InputError, match=message):
+            fx.trace(scene, until=fx.travel(0.1), remesh=remesh)
+    of("a material with a history", materials=fx.Viscoelastic(fx.NeoHookean(c10=1.0), [(0.5, 1.0)]))
+    of("at Gauss points", contacts=[fx.Contact("top", fx.tools.plane(1.0), "none", moves=(0, -1), points=4)])
+    of("a support other than", supports=[fx.Symmetry("axis"), fx.SimplySupported("bottom")])
     with pytest.raises(fx.InputError, match="a law of contact of one's own"):
         class Own(fx.Contact):
             def law(self, *given):
