@@ -9,7 +9,8 @@ import formingx as fx
 from formingx.discrete.contact.increment import Increment
 from formingx.discrete.problem import Problem
 from formingx.discrete.step_limit import Way
-from formingx.physics.contact import Law, Touch
+from formingx.physics.contact import Law
+from formingx.physics.contact_law import NormalLaw, Touch
 
 tools = fx.tools
 THETA, K, SLIP = 0.02, 300.0, 3e-3
@@ -38,6 +39,32 @@ def test_force_is_derivative_of_energy():
     x, _ = points_near(TOOL, SIDES)
     force = law.tractions(x, None).force
     np.testing.assert_allclose(derivative(law.energy, x, 1e-6), force, atol=1e-7 * K)
+
+
+class Bond(NormalLaw):
+    """k d exp(-|d|/THETA): pulls and presses."""
+    pulls = True
+
+    def ramp(self, d, held=False):
+        fades = np.exp(-np.abs(d) / THETA)
+        return d * fades, (1 - np.abs(d) / THETA) * fades
+
+    def stored(self, d):
+        return -THETA * (np.abs(d) + THETA) * np.exp(-np.abs(d) / THETA)
+
+
+def test_a_law_of_the_distance_alone():
+    """Force and stiffness are derivatives; some of its points, and all without some, are as in the whole."""
+    law = Bond(TOOL, K, 5 * THETA)
+    x, _ = points_near(TOOL, [-2.5 * THETA, -0.5 * THETA, 0.2 * THETA])
+    found = law.tractions(x, None)
+    np.testing.assert_allclose(derivative(law.energy, x, 1e-6), found.force, atol=1e-6 * K * THETA)
+    np.testing.assert_allclose(derivative(lambda x: law.tractions(x, None).force, x, 1e-6), found.stiffness,
+                               atol=1e-6 * K)
+    some = np.arange(len(x)) % 2 == 0
+    assert np.array_equal(law.part(some).tractions(x[some], None).force, found.force[some])
+    assert np.array_equal(law.without(some).tractions(x, None).force, np.where(some[:, None], 0.0, found.force))
+
 
 
 @pytest.mark.quick
