@@ -7,11 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .contact.approach import AS_GOOD, BEYOND, Approach
+from .contact.approach import LIMITS, Approach
 from .contact.sequence import Foretold, Response
-
-_SHORTEST = 1e-4
-"""Lengths of steps (dimensionless) that are never too long for what comes into contact."""
 
 
 class Way(NamedTuple):
@@ -81,12 +78,12 @@ class StepLimit:
             arrival = ahead.next(k, way.length)
             if arrival is None:
                 break
-            allowed[arrival.face] -= arrival.time > AS_GOOD * way.length
+            allowed[arrival.face] -= arrival.time > LIMITS.as_good * way.length
             if not allowed[arrival.face]:
-                return min(BEYOND * arrival.time, way.length)
+                return min(LIMITS.beyond * arrival.time, way.length)
         else:
             return None
-        return None if ahead.ends <= AS_GOOD * way.length else min(BEYOND * ahead.ends, way.length)
+        return None if ahead.ends <= LIMITS.as_good * way.length else min(LIMITS.beyond * ahead.ends, way.length)
 
     def prepare(self, way: Way, ends: bool = False) -> tuple[np.ndarray, float] | None:
         """A step is about to be taken; `ends`: it is to end where something comes into contact, see `check`.
@@ -116,7 +113,7 @@ class StepLimit:
             return Cut("too much came into contact in one step")
         if self.passes_through(old, new):
             return Cut("a tool would pass through the face that it touches")
-        if ends and length > _SHORTEST:
+        if ends and length > LIMITS.shortest:
             part = min([c.touches_by(new.x[:n], new.control, new.direction[:n], new.slope, length) for c in contacts],
                        default=1.0)
             if part < 1:

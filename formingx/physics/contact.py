@@ -250,8 +250,6 @@ class Law(NormalLaw):
         self.remembers = self.has_friction or pulls
         self._slid: tuple[Nearest, Touch, tuple] | None = None      # of what is near, and remembered: the slip
 
-    separates = property(lambda self: not self.pulls)
-
     def with_friction(self, mu: np.ndarray | float) -> Law:
         """The same law with other coefficients of friction."""
         has_friction = np.ndim(mu) > 0 or bool(mu > 0)

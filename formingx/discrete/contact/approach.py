@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from mpi4py import MPI
 
@@ -9,30 +11,38 @@ from ...ranks import gathered
 from .face import FaceContact
 from .sequence import arrivals
 
-AS_GOOD = 0.02
-"""Part of a step within which a point is as good as in touch."""
 
-BEYOND = 1.001
-"""How far a step goes that is to end at an arrival, over the length to there."""
+@dataclass(frozen=True)
+class StepLimits:
+    """What of contact limits a step.
 
-_NEAR = 1e-3
-"""Distances (over thickness) at which a point is as good as in touch."""
+    Attributes:
+        as_good: part of a step within which a point is as good as in touch.
+        beyond: how far a step goes that is to end at an arrival, over the length to there.
+        near: distances, over thickness, at which a point is as good as in touch.
+        share: of the points of a face, that a step may bring if they are foretold one after the other.
+        at_end: part of a step from which on what arrives, and will stick, has no friction until the next.
+        slides: how far a point may slide so, over the length of face that is its own.
+        nearer: part of its distance from the tool that a point may move in a step of lagged contact, beside its length
+            of face.
+        cut_off: how deep the way of a point in a step may lead through a tool, over the length of face that is its own.
+        places: at most, at which that way is looked at.
+        shortest: lengths of steps (dimensionless) that are never too long for what comes into contact.
+    """
 
-_SHARE = 0.05
-"""Of the points of a face, that a step may bring if they are foretold one after the other."""
+    as_good: float = 0.02
+    beyond: float = 1.001
+    near: float = 1e-3
+    share: float = 0.05
+    at_end: float = 0.95
+    slides: float = 1e-2
+    nearer: float = 0.7
+    cut_off: float = 0.5
+    places: int = 4000
+    shortest: float = 1e-4
 
-_AT_END = 0.95
-"""Part of a step from which on what arrives, and will stick, has no friction until the next."""
 
-_SLIDES = 1e-2
-"""How far (over the length of face that is its own) a point may slide so."""
-
-_NEARER = 0.7
-"""Part of its distance from the tool that a point may move in a step of lagged contact, beside its length of face."""
-
-_CUT_OFF, _MOST_PLACES = 0.5, 4000
-"""How deep the way of a point in a step may lead through a tool, over the length of face that is its own; at how many
-places the way is looked at."""
+LIMITS = StepLimits()
 
 
 class Approach:
@@ -54,7 +64,7 @@ class Approach:
         self.at_once = (given or 1) * share * (1 if face.law.remembers or conducts else 10)
         slides = face.law.has_friction and not face.contact.sticks
         one_by_one = given or slides or conducts or face.contact.lagged
-        self.foretold = self.at_once if one_by_one else max(self.at_once, round(_SHARE * points))
+        self.foretold = self.at_once if one_by_one else max(self.at_once, round(LIMITS.share * points))
         self._foreseen = 0                                  # points that the step is going to bring, all ranks
 
     def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
@@ -66,16 +76,16 @@ class Approach:
         start, velocity = face.positions(fields, control), face.moved(direction, slope)
         free = ~face.law.touching(start, face.touch)
         if face.contact.lagged:                             # a tangent of a long step foretells no arrivals
-            most = _NEARER * np.maximum(-face.law.distance(start), 0.0) + face.rule.lengths
+            most = LIMITS.nearer * np.maximum(-face.law.distance(start), 0.0) + face.rule.lengths
             speed = np.linalg.norm(velocity, axis=1)
             most = np.divide(most, speed, out=np.full(len(speed), length), where=free & (speed > 0))
             length = self._comm.allreduce(float(most.min(initial=length)), MPI.MIN)
         times = arrivals(face.law, start, velocity, free, length)
-        ahead = (times > AS_GOOD * length) & (times < length)
+        ahead = (times > LIMITS.as_good * length) & (times < length)
         times = np.sort(gathered(self._comm, times[ahead]))
         touching = self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM)
         allowed = self.at_once if touching > 1 else 1
-        return min(BEYOND * times[allowed - 1], length) if len(times) >= allowed else length
+        return min(LIMITS.beyond * times[allowed - 1], length) if len(times) >= allowed else length
 
     def along(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
               length: float) -> tuple[np.ndarray, np.ndarray]:
@@ -94,7 +104,7 @@ class Approach:
         face = self.face
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         if not face.contact.lagged:                         # that asks for no place of arrival
-            at_end = ends & face.contact.sticks & (times >= _AT_END * length)
+            at_end = ends & face.contact.sticks & (times >= LIMITS.at_end * length)
             face.expect_arrivals(np.where(at_end[:, None], np.nan, places))
 
     def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
@@ -109,23 +119,24 @@ class Approach:
         if face.contact.lagged:
             deep = np.where(face.law.touching(a, face.touch), 0.0, b - 2 * face.rule.lengths)
             return bool(self._comm.allreduce(float(deep.max(initial=0.0)), MPI.MAX) > 0)
-        found = int(np.sum((a <= -theta - _NEAR * face.thickness) & (b > -theta)))
+        found = int(np.sum((a <= -theta - LIMITS.near * face.thickness) & (b > -theta)))
         return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self.at_once, self._foreseen) + 2)
 
     def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """True if a point's straight way from one state to another, seen from the tool, leads through the tool.
 
-        That is, deeper than both its ends by `_CUT_OFF`: so much a point may cut off an edge that it slides over.
+            looked = min(np.ceil((way / most)[far].max() * 2), LIMITS.places)
+            parts = int(looked) + 1
         """
         law, lengths = self.face.law, self.face.rule.lengths
         a, b = self.face.positions(old, old_control), self.face.positions(new, control)
-        way, most = np.linalg.norm(b - a, axis=1), _CUT_OFF * lengths
+        way, most = np.linalg.norm(b - a, axis=1), LIMITS.cut_off * lengths
         ends = np.maximum(np.maximum(law.distance(a), law.distance(b)), 0.0)
         between = (law.distance(a) + law.distance(b) + way) / 2            # no place of the way is deeper
         far = np.flatnonzero((between > ends + most) & (lengths > 0))
         found = False
         if len(far):
-            parts = int(min(np.ceil((way / most)[far].max() * 2), _MOST_PLACES)) + 1
+            parts = int(min(np.ceil((way / most)[far].max() * 2), LIMITS.places)) + 1
             places = a[far] + np.linspace(0, 1, parts)[:, None, None] * (b - a)[far]
             found = bool(np.any(law.part(far).distance(places).max(0) > (ends + most)[far]))
         return bool(self._comm.allreduce(found, MPI.LOR))
@@ -146,7 +157,7 @@ class Approach:
         since = np.minimum(np.divide(F, rate, out=np.full(len(F), length), where=rate > 0), length)
         slid = since * np.einsum("ni,ni->n", near.tangent, velocity)
         if face.contact.sticks:
-            wrong = np.isnan(touch.arrival[:, 0]) & (np.abs(slid) > _SLIDES * face.rule.lengths)
+            wrong = np.isnan(touch.arrival[:, 0]) & (np.abs(slid) > LIMITS.slides * face.rule.lengths)
         else:
             counted = np.einsum("ni,ni->n", near.tangent, end - touch.arrival)
             wrong = (slid * counted < 0) & (np.minimum(np.abs(slid), np.abs(counted)) > law.elastic_slip)
