@@ -90,6 +90,8 @@ def test_refusals():
     mesh = disc((4, 1))
     with pytest.raises(fx.InputError, match="adapted: share = 0"):
         fx.mesh.adapted(None, share=0)
+    with pytest.raises(fx.InputError, match="must be what trace or Process.run gave back"):
+        fx.mesh.adapted(None)
     with pytest.raises(fx.InputError, match="pilot 'sizes'"):
         plugged(mesh, pilot={"sizes": 1})
     with pytest.raises(fx.InputError, match="pilot = 3"):

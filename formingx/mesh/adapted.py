@@ -51,6 +51,8 @@ def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = Non
     """
     share = None if share is None else positive("adapted: share", share)
     error = None if error is None else positive("adapted: error", error)
+    if not hasattr(path, "problem"):
+        raise InputError(f"adapted: path = {path!r}: must be what trace or Process.run gave back")
     mesh = path.problem.scene.mesh
     if isinstance(mesh, Sheet):
         return _sheet(mesh, *path.wanted_sizes(share, error))
