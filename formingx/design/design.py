@@ -181,9 +181,11 @@ class Design:
         return Answer(first, best, taken, notes, aim.inside, why, foretold, _lack("volume", aim.held, best.volume))
 
     def least_weight(self, least_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
-        """Search for the least volume of the body with a wall nowhere less than so much (SciPy's SLSQP).
+        """Search for the least volume of the body with a wall nowhere less than so much (sequential linear programming).
 
-        Each iteration minimises the volume along its derivative with the wall as its derivatives foretell it.
+        Each iteration minimises the volume along its derivative with the wall as its derivatives foretell it, within a
+        range that shrinks where a run is worse (Palacios-Gomez, Lasdon and Engquist 1982): the wall at every node is a
+        bound, and its least value, which has kinks, is not differentiated.
 
         Args:
             least_wall: length; within: reference lengths that count; runs: at most so many.
