@@ -43,6 +43,26 @@ def test_derivatives_are_those_of_whole_runs():
     assert volume == pytest.approx(np.pi * 0.05, rel=1e-9) and by[0] == pytest.approx([0, np.pi, 0], abs=1e-8)
 
 
+def heated(heater):
+    """A sheet that heaters soften before it is blown."""
+    mesh = fx.mesh.disc(radius=0.15, thickness=2e-3, elements=(4, [1, 1]))
+    heat = fx.heat(mesh, fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=1800.0), unit="C",
+                   start=25.0, times=20.0, tolerance=5.0, boundaries=[
+                       fx.Radiation(face, emissivity=0.7, heater=fx.table({0.0: heater, 0.15: 400.0}))
+                       for face in ("top", "bottom")])
+    softer = fx.NeoHookean(c10=fx.table({20.0: 5e6, 100.0: 1e6, 160.0: 2e5, 220.0: 5e4, 300.0: 2e4}))
+    return fx.Scene(mesh=mesh, materials=softer, temperature=heat, **CAN), fx.pole_height(0.06)
+
+
+@pytest.mark.slow
+def test_heaters():
+    """A derivative goes through radiation and conduction, which the script's function runs."""
+    design = fx.Design(heated, {"heater": (430.0, 300, 500)})
+    above, below = (design.run({"heater": heater}).wall for heater in (431, 429))
+    by = design.run().derivative("wall")[1][:, 0]
+    assert by == pytest.approx((above - below) / 2, abs=0.01 * abs(by).max())
+
+
 def pushed(b, mu="none"):
     """A ball pushes a sheet."""
     mesh = fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1))

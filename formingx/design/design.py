@@ -181,7 +181,7 @@ class Design:
         return Answer(first, best, taken, notes, aim.inside, why, foretold, _lack("volume", aim.held, best.volume))
 
     def least_weight(self, least_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
-        """Search for the least volume of the body with a wall nowhere less than so much (sequential linear programming).
+        """Search for the least volume of the body with a wall nowhere less than so much (successive linear programs).
 
         Each iteration minimises the volume along its derivative with the wall as its derivatives foretell it, within a
         range that shrinks where a run is worse (Palacios-Gomez, Lasdon and Engquist 1982): the wall at every node is a
