@@ -125,8 +125,8 @@ class Approach:
     def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """True if a point's straight way from one state to another, seen from the tool, leads through the tool.
 
-            looked = min(np.ceil((way / most)[far].max() * 2), LIMITS.places)
-            parts = int(looked) + 1
+        That is, deeper than both its ends by `StepLimits.cut_off`: so much a point may cut off an edge that it slides
+        over.
         """
         law, lengths = self.face.law, self.face.rule.lengths
         a, b = self.face.positions(old, old_control), self.face.positions(new, control)
