@@ -12,8 +12,8 @@ import pytest
 from conftest import ROOT, drawn, run
 
 
-def summary(demo, out, *options, ranks=None):
-    run(f"demos/{demo}.py", "--out", out, *options, ranks=ranks)
+def summary(demo, out, *options, ranks=None, timeout=600):
+    run(f"demos/{demo}.py", "--out", out, *options, ranks=ranks, timeout=timeout)
     return json.loads((out / "summary.json").read_text())
 
 
@@ -263,7 +263,7 @@ def test_plug_adapted_quick(tmp_path):
 @pytest.mark.slow
 def test_plug_adapted(tmp_path):
     """Pilots at half the columns are as near to the membrane, which knows no bending, as uniform ones."""
-    found = summary("plug_adapted", tmp_path)
+    found = summary("plug_adapted", tmp_path, timeout=3600)
     for mu, force in (("0.1", 861), ("0.3", 1057), ("0.5", 1183), ("1", 1350)):
         numbers = found[f"mu_{mu}"]
         assert numbers["force_N"]["8"] == pytest.approx(force, rel=0.015)
@@ -303,7 +303,7 @@ def test_compression_extreme_quick(tmp_path):
 def test_compression_extreme(tmp_path):
     """The remeshed block beside 24 x 16 and 32 x 24 fixed elements (96476, 96248 N at 5.23), and at 8, where no fixed
     mesh comes, beside elements twice as large."""
-    found = summary("compression_extreme", tmp_path)
+    found = summary("compression_extreme", tmp_path, timeout=3600)
     fine, coarse = found["stuck"], found["stuck_coarse"]
     assert set(fine["force_N"]) == set(coarse["force_N"]) == {"3.4", "5.23", "6.5", "8"}
     assert fine["force_N"]["3.4"] == pytest.approx(23818, rel=7e-3)
