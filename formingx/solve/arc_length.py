@@ -113,10 +113,12 @@ class Curve:
     def look_ahead(self, state: State) -> None:
         """The tangent of an accepted state once more: the problem remembers the state now.
 
-        The factors of its last iteration serve, unless many contact points differ or materials have advanced.
+        The factors of its last iteration serve, unless many contact points differ or materials have advanced; or
+        arrivals are foretold with them, as they have to be from a checkpoint, too.
         """
         self._x.array_w[:] = state.x
-        at_hand, self._found = state is self._found and not self.problem.body_has_history, None
+        limit, at_hand = self.problem.limit, state is self._found and not self.problem.body_has_history
+        at_hand, self._found = at_hand and not (limit and limit.foretells), None
         if at_hand and self.newton.update_ahead(self._x, state.control) or self.newton.tangent(
                 self._x, state.control, ahead=True):
             size = self._length_of(self.newton.b)
