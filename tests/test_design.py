@@ -197,6 +197,29 @@ def test_stages_friction_and_time(relaxing):
         assert np.linalg.norm(by[:, k] - whole) < (0.02 if relaxing else 2e-3) * np.linalg.norm(whole), name
 
 
+def pressed(c10, nose, travel, force=None):
+    """A ball without friction drawn through a sheet: to a travel, or to a force."""
+    mesh = fx.mesh.disc(radius=40.0, thickness=1.2, elements=(10, 1))
+    ball = fx.tools.sphere(radius=nose).mirrored()
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=c10), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("bottom", ball, "none", moves=(0, 1), name="plug")])
+    return scene, [fx.Stage("down", drive="plug", until=fx.force(force) if force else fx.travel(travel))]
+
+
+def test_forces_of_tools():
+    """Of gaps of which a neighbour keeps few digits: they are linear in the constant, and follow whole runs."""
+    at = {"c10": 0.25, "nose": 15.0, "travel": 14.0}
+    design = fx.Design(pressed, {"c10": 0.25, "nose": (15.0, 10, 18), "travel": (14.0, 8, 18)})
+    force, by = design.run().derivative("plug_force")
+    assert by[0, 0] == pytest.approx(force[0] / 0.25, rel=2e-5)
+    for k, (name, h) in enumerate({"nose": 0.1, "travel": 0.1}.items(), start=1):
+        above, below = (design.run({name: at[name] + s * h}).path["plug_force"][-1] for s in (1, -1))
+        assert by[0, k] == pytest.approx((above - below) / (2 * h), rel=3e-3), name
+    to_force = fx.Design(lambda c10: pressed(c10, 15.0, None, force[0]), {"c10": (0.25, 0.1, 0.5)}).run()
+    assert to_force.derivative("plug_force")[1].item() == pytest.approx(0.0, abs=1e-4 * force[0] / 0.25)
+    assert to_force.derivative("travel")[1].item() == pytest.approx(-by[0, 0] / by[0, 2], rel=1e-4)
+
+
 def test_a_stage_that_waits_ends_where_its_target_is_met():
     """A sheet that creeps under its weight: when it has sagged so far goes with the weight."""
     creeps = fx.TransientNetwork(fx.NeoHookean(c10=1e-6), [(1.0, 2.0)])

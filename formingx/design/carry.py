@@ -131,7 +131,9 @@ class _Carrier:
                 one.x = state.x + (one.x - self._beside.x)
                 one.control = state.control + (one.control - self._beside.control)
             equation, equations = self._equations(state, last)
-            settle(self.curve, state, self.neighbours, equation, equations)
+            left_over = settle(self.curve, state, self.neighbours, equation, equations)
+            for one in self.neighbours if state is self.path.last else []:
+                one.balance(left_over)
             self._beside = state
             b = self.curve.newton.b.array_r
             self._velocity = [face.moved(b, 1.0) for face in self.problem.contacts]

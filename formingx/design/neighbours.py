@@ -79,6 +79,21 @@ class Neighbour:
         self.F.array_w[:] -= left_over
         return np.array(self.F.array_r)
 
+    def balance(self, left_over: np.ndarray) -> None:
+        """Forces of tools are what the body bears: theirs, of gaps smaller than round-off, tell nothing beside a run's.
+
+        left_over: as in `residual`."""
+        forms, fields = self.problem.forms, self.x[: self.problem.n_owned]
+        F = self.residual(left_over)[: self.problem.n_owned]
+        unit = forms.stress * forms.volume / forms.length
+        for face in self.problem.present:
+            touching = face.rule.dofs[face.touching(fields, self.control)]
+            for c in range(len(face.unbalanced)):
+                numbers = np.unique(touching[:, c::len(face.unbalanced)])
+                numbers = numbers[numbers < len(F)]
+                face.unbalanced[c] = unit * F[numbers].sum()
+                F[numbers] = 0.0                                 # a node between two tools counts once
+
     def constraint(self, equation: Any) -> float:
         """What is left over of an equation at its state."""
         self.problem.x.array_w[:] = self.x
@@ -91,8 +106,9 @@ class Neighbour:
         self.problem.destroy()
 
 
-def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: Any, equations: Sequence[Any]) -> None:
-    """Solve for the neighbours beside a state of the run, at which its problem stands.
+def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: Any,
+           equations: Sequence[Any]) -> np.ndarray:
+    """Solve for the neighbours beside a state of the run, at which its problem stands; its residual, own part.
 
     equation: the constraint of the run's state; None: the neighbours are in the plane normal to its path; equations: of
     the neighbours.
@@ -152,9 +168,10 @@ def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: 
             if iteration == _MOST - 1 and correction > max(_GOOD * away, 10 * _NONE * size):
                 raise Apart(f"with {one.name} a little changed no state is found near", [])
         if good:
-            return
+            break
         # what is left is of second order: if nothing is of the one that was corrected most, the others are solved for
         todo = [int(np.argmax(first))] if iteration == 0 else list(range(len(neighbours)))
+    return left_over
 
 
 def _norm(problem: Any, x: np.ndarray) -> float:

@@ -40,6 +40,8 @@ class FaceContact:
         law: at the points; thickness: of the body behind the face, length.
         increment: the `Increment` that goes on.
         present: it takes part in the stage.
+        unbalanced: of the own forces, what the body does not bear at its nodes, shape (components,), stress length^2:
+            round-off of positions, told by a neighbour of a run (`formingx.design`), which is too near it for more.
     """
 
     def __init__(self, solid: Any, contact: Contact, assemble: Any):
@@ -51,6 +53,7 @@ class FaceContact:
         self.points, self.thickness = self.rule.points, solid.thickness(contact.on)
         self._warm = solid.temperature.nodes(self.rule.nodes) if contact.friction_by_temperature else None
         self._penalty = np.ones(len(self.points))
+        self.unbalanced = np.zeros(self.points.shape[1])
         self._shift: np.ndarray | None = None
         self.law = self._law(1.0)
         self._scale = solid.length / (solid.stress * solid.volume) * self.rule.area

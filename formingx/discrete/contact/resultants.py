@@ -26,7 +26,7 @@ def force(face: FaceContact, fields: np.ndarray, control: float) -> np.ndarray:
 
     Axisymmetric: the r entry is the radial traction summed around, not a resultant (which is 0).
     """
-    total = (face.area[:, None] * face.tractions(fields, control).force).sum(0)
+    total = (face.area[:, None] * face.tractions(fields, control).force).sum(0) - face.unbalanced
     return np.asarray(face.comm.allreduce(total, MPI.SUM))
 
 
