@@ -7,7 +7,7 @@ stresses in psi.
 
 import numpy as np
 from common import parser, say, summarise
-from moulding import at_pressures, cost, filled_at, first_touch, name_of, write
+from moulding import at_pressures, cost, filled_at, first_touch, first_touch_at, name_of, write
 
 import formingx as fx
 from formingx.discrete.contact import resultants
@@ -40,7 +40,7 @@ def key_numbers(path, mould):
     touching = np.flatnonzero(traction[:-1, 0] > 0)
     return {
         **at_pressures(path, PRESSURES, "psi"),
-        "first_contact_pressure_psi": touch.measures["pressure"],
+        "first_contact_pressure_psi": first_touch_at(path),
         "first_contact_at_R_cm": points[touching[-1], 0] if len(touching) else None,
         "filled_pressure_psi": filled_at(path, fillet, THICKNESS / 2),
         "max_penetration_over_h0": path["penetration"].max() / THICKNESS,

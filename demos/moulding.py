@@ -21,18 +21,33 @@ def largest_gap(profile, corner: np.ndarray) -> float:
 
 
 def filled_at(path, corner: np.ndarray, gap: float) -> float | None:
-    """Pressure at which the gap in a corner falls below `gap`, linear between states; None if it does not."""
-    pressures, gaps = path["pressure"], [largest_gap(path.profile(s), corner) for s in path.states]
-    for p, q, a, b in zip(pressures, pressures[1:], gaps, gaps[1:]):
-        if b < gap <= a:
-            return float(p + (q - p) * (a - gap) / (a - b))
-    return None
+    """Pressure at which the gap in a corner falls below `gap`; None if it does not."""
+    gaps = [largest_gap(path.profile(s), corner) for s in path.states]
+    k = next((k for k, (a, b) in enumerate(zip(gaps, gaps[1:])) if b < gap <= a), None)
+    return None if k is None else float(bisected(path, k, lambda s: largest_gap(path.profile(s), corner) < gap))
 
 
 def first_touch(path, start: int = 0):
     """The first state at which more than the rim touches."""
     rim = path.states[0].measures["contact_length"]
     return next(s for s in path.states[start:] if s.measures["contact_length"] > rim + 1e-12)
+
+
+def first_touch_at(path) -> float:
+    """Pressure at which more than the rim begins to touch."""
+    rim, first = path.states[0].measures["contact_length"], first_touch(path)
+    k = next(k for k, state in enumerate(path.states) if state is first)
+    return bisected(path, k - 1, lambda s: s.measures["contact_length"] > rim + 1e-12)
+
+
+def bisected(path, k: int, beyond) -> float:
+    """Pressure between states k and k + 1 from which on `beyond(state)` is true, to 1/256 of what is between them."""
+    before, after = (path.states[i].measures["pressure"] for i in (k, k + 1))
+    for _ in range(8):
+        middle = (before + after) / 2
+        before, after = ((before, middle) if beyond(path.at(fx.pressure(middle), after=path.states[k])) else
+                         (middle, after))
+    return after
 
 
 def at_pressures(path, pressures, unit: str) -> dict:

@@ -7,7 +7,7 @@ round bottom, held at the neck, in a mould whose body has radius 3 cm and height
 
 import numpy as np
 from common import parser, say, summarise
-from moulding import cost, filled_at, first_touch, name_of, write
+from moulding import cost, filled_at, first_touch, first_touch_at, name_of, write
 
 import formingx as fx
 from formingx.discrete.contact import resultants
@@ -47,7 +47,7 @@ def key_numbers(path, mould, room):
     z, t, thinnest = profile.top[:, 1], profile.thickness, int(np.argmin(profile.thickness))
     return {
         "limit_pressure_psi": [s.measures["pressure"] for s in path.limit_points],
-        "first_contact_pressure_psi": touch.measures["pressure"],
+        "first_contact_pressure_psi": first_touch_at(path),
         "first_contact_at_Z_cm": touching(path, touch)[0],
         "filled_pressure_psi": filled_at(path, fillet, WALL / 2),
         "pressure_psi_at_part_filled": {f"{part:g}": path.met(fx.enclosed_volume(part * room)).measures["pressure"]
