@@ -28,17 +28,31 @@ def test_a_run_costs_little_more_than_its_linear_algebra():
     assert 0.5 < found["ratio"] < 3 and found["iterations"] < 58
 
 
+def cup(friction="stick", **options):
+    """The cup of the benchmark, coarse."""
+    scene, _ = limit.cup((20, 1))
+    return limit.fx.Scene(mesh=scene.mesh, materials=scene.materials, supports=scene.supports, loads=scene.loads,
+                          contacts=[limit.fx.Contact("top", scene.contacts[0].tool, friction, **options)])
+
+
 def test_a_tool_is_looked_at_once_for_the_same_points(monkeypatch):
-    """Of 19 looks a state, beside those of iterations, four are for the way of its points and three for its verdict."""
+    """Of 19 looks a state, beside those of iterations, four are for the way of its points and three for its verdict.
+
+    (Points foretold one after the other ask for more a state, and for less in all.)
+    """
     calls, nearest = [0], limit.fx.Tool.nearest
 
     def counted(self, x):
         calls[0] += 1
         return nearest(self, x)
     monkeypatch.setattr(limit.fx.Tool, "nearest", counted)
-    scene, _ = limit.cup((20, 1))
-    path = limit.fx.trace(scene, until=limit.fx.pressure(8.0), step=limit.fx.StepControl(target=8), progress=False)
-    assert calls[0] < 2 * path.counts.iterations + 19 * len(path)
+    looks = []
+    for nodes in (1, None):
+        path = limit.fx.trace(cup(nodes_per_step=nodes), until=limit.fx.pressure(8.0), progress=False,
+                              step=limit.fx.StepControl(target=8))
+        looks.append(calls[0] - sum(looks))
+        assert nodes is None or looks[0] < 2 * path.counts.iterations + 19 * len(path)
+    assert looks[1] < looks[0]
 
 
 @pytest.mark.parametrize("friction", ["stick", "none"])
@@ -55,10 +69,8 @@ def test_the_tangent_ahead_comes_from_the_factors_at_hand(monkeypatch, friction)
         np.testing.assert_allclose(now, self.b.array_r, atol=1e-6 * size)
         return True
     monkeypatch.setattr(BorderedNewton, "update_ahead", beside_other_factors)
-    fx, (scene, _) = limit.fx, limit.cup((20, 1))
-    scene = fx.Scene(mesh=scene.mesh, materials=scene.materials, supports=scene.supports, loads=scene.loads,
-                     contacts=[fx.Contact("top", scene.contacts[0].tool, friction)])
-    path = fx.trace(scene, until=fx.pressure(8.0), progress=False,
+    fx = limit.fx
+    path = fx.trace(cup(friction, nodes_per_step=1), until=fx.pressure(8.0), progress=False,
                     tolerances=fx.Tolerances(correction=1e-14))     # the last factors are those of the state
     assert all(found) and len(path) - 2 <= len(found) < len(path)
     assert (max(changed) > 1e-3) == (friction == "stick")           # nodes that have just arrived
