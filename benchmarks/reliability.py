@@ -147,8 +147,8 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
             "concentrate": ("optional thing", None)}
     sphere = {"inner_radius": positive, "thickness": positive, "elements": ("pair", (4, 2)), "grading": positive}
     contact = {"on": ("word", "top"), "tool": ("thing", fx.tools.plane(0.3)), "friction": ("friction", "stick"),
-               "penalty": optional, "ramp": optional, "nodes_per_step": ("count", 1), "separates": ("flag", True),
-               "present_area": ("flag", False),
+               "penalty": optional, "ramp": optional, "nodes_per_step": ("count or None", 1),
+               "separates": ("flag", True), "present_area": ("flag", False),
                "moves": ("pair or None", None), "name": name, "points": ("points", "nodes"), "elastic_slip": positive}
     stage = {"name": ("label", "up"), "drive": ("optional thing", "air"), "until": ("optional thing", fx.pressure(0.1)),
              "through": ("several", ()), "without": ("several", ()), "step": ("optional thing", None),
@@ -189,7 +189,8 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
         Call("Tool", fx.Tool, {"points": ("several", [(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)]),
                                "fillets": ("not negative", 0.0),
                                "closed": ("flag", False)}),
-        Call("MixedPressure", fx.MixedPressure, {"eps": ("not negative", 0.0), "space": ("word", "P1dg")}),
+        Call("MixedPressure", fx.MixedPressure, {"eps": ("not negative", 0.0), "space": ("word", "P1dg"),
+                                                 "volume_stiffness": ("not negative", 0.0)}),
         Call("DisplacementPenalty", fx.DisplacementPenalty, {"eps": positive, "points": ("count", 3),
                                                              "stress_free": ("flag", True)}),
         Call("Scene", fx.Scene, {

@@ -46,7 +46,8 @@ class Design:
     Args:
         build: a function of the parameters, by name, that returns (scene, target) or (scene, stages), as `trace` or
             `Process.run` want them. It is called beside a design, too, for derivatives: it must give the same mesh but
-            for the places of its nodes.
+            for the places of its nodes. A contact of it that leaves `nodes_per_step` open takes one a step: so their
+            arrivals have exact derivatives.
         parameters: {name: (start, low, high), a number to start from, or `along(...)`: a profile, which `build` gets as
             a function of a length from 0 to 1}.
         step, tolerances, max_steps: of the runs, see `trace`.
@@ -96,6 +97,8 @@ class Design:
 
     def _run(self, vector: np.ndarray) -> DesignRun:
         scene, end = self._make(vector)
+        for contact in scene.contacts:
+            contact.nodes_per_step = contact.nodes_per_step or 1
         self.paths += 1
         options: dict[str, Any] = {"step": self._step, "tolerances": self._tolerances, "max_steps": self._most,
                                    "progress": False}
