@@ -113,6 +113,7 @@ def follow(path: Any, targets: Sequence[Target], remesh: Remesh, step: StepContr
     record.on_state.append(lambda state: _look(record, state, remesh))
     start: State | None = begin(record.curve)
     step = step or StepControl()
+    record.problem.limit.one_by_one()                        # a mesh that wears is looked at as each node arrives
     while True:
         record.ended, problem = "", record.problem
         run = Run(record, [(t, t.bind(problem)) for t in targets if path.met(t) is None], step, at_fold)
@@ -122,6 +123,8 @@ def follow(path: Any, targets: Sequence[Target], remesh: Remesh, step: StepContr
         except ConvergenceError as error:
             low, high = _ratios(record, record.last) if record.segments[-1].states else (1.0, 1.0)
             if len(record.segments[-1].states) < before + 3 or low > 0.9 and high < 1.1:
+                if not record.segments[-1].states and len(record.segments) > 1:
+                    record.segments.pop()                    # a mesh without a state: the path ends before it
                 raise
             log.info("a new mesh, as no state was found: %s", error)
             record.ended = _WORN
@@ -203,6 +206,7 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
                     lambda x, names: _outside(x, names, worn))
     made = scene.with_mesh(mesh, Preformed.of(old, state))
     problem = Problem(made)
+    problem.limit.one_by_one()
     control = state.control * old.scales[driven] / problem.scales[driven]
     curve = Curve(problem, tolerances)
     x = made.preformed.unknowns(problem)

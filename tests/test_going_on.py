@@ -114,3 +114,15 @@ def test_an_undercut_cup_without_friction():
     assert later.value.path["pressure"][-1] > error.value.path["pressure"][-1] and later.value.path.jumps
     path = fx.trace(made(4), until=fx.pressure(8.0))
     assert path["pressure"][-1] == pytest.approx(8.0, rel=1e-12) and path.profile().top[:, 1].max() > 5.29
+
+
+def test_a_jump_of_what_has_no_wall_is_no_doubt_about_it():
+    """A block that rolled over: distances of opposite points mean nothing there, and were told as nan."""
+    from types import SimpleNamespace
+
+    from formingx.results.evaluate import snaps
+    wall = iter((np.array([1.0, 1.0]), np.array([1.0, np.nan])))
+    path = SimpleNamespace(states=[SimpleNamespace(kind=kind) for kind in ("start", "step", "jump")],
+                           problem=SimpleNamespace(has_history=True),
+                           profile=lambda state: SimpleNamespace(wall_ratio=next(wall), reference_radius=np.zeros(2)))
+    assert snaps.doubts(snaps.largest(path)) == []

@@ -54,6 +54,11 @@ class StepLimit:
         return any(c.foretold > c.at_once for c in self._present) and all(
             hasattr(c.face.law, "friction") and hasattr(c.face.law, "without") for c in self._present)
 
+    def one_by_one(self) -> None:
+        """Points are not foretold one after the other."""
+        for approach in self._all:
+            approach.foretold = approach.at_once
+
     def length(self, way: Way) -> float:
         """How long a step may be: up to where contact begins, or enough new nodes touch."""
         found = self._length_foretold(way) if way.response else None

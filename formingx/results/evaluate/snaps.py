@@ -44,7 +44,10 @@ def largest(path: Any) -> Snap | None:
             before, after = path.profile(path.states[k - 1]).wall_ratio, profile.wall_ratio
         except InputError:                                  # no sheet
             return None
-        i = int(np.argmax(np.abs(after / before - 1)))
+        change = np.abs(after / before - 1)
+        if not np.isfinite(change).all():                   # no wall: a block whose sides roll over
+            return None
+        i = int(np.argmax(change))
         found.append(Snap(len(jumps), k, float(before[i]), float(after[i]), float(profile.reference_radius[i])))
     return max(found, key=lambda snap: snap.change)
 
