@@ -327,7 +327,7 @@ def test_plug_friction_quick(tmp_path):
 def test_pot_study_quick(tmp_path):
     found = summary("pot_study", tmp_path, "--quick")
     assert found["runs"] == 4 and found["failed"] == 0
-    assert found["best"]["travel"] == 48 and found["best"]["evenness"] == pytest.approx(0.3387, rel=1e-3)
+    assert found["best"]["travel"] == 48 and found["best"]["evenness"] == pytest.approx(0.3383, rel=1e-3)
     for file in ("best.gif", "best.html", "effects.png", "pareto.png", "study.html"):
         assert drawn(tmp_path / file) if file.endswith(".png") else (tmp_path / file).stat().st_size > 10_000
 
