@@ -24,7 +24,7 @@ def filled_at(path, corner: np.ndarray, gap: float) -> float | None:
     """Pressure at which the gap in a corner falls below `gap`; None if it does not."""
     gaps = [largest_gap(path.profile(s), corner) for s in path.states]
     k = next((k for k, (a, b) in enumerate(zip(gaps, gaps[1:])) if b < gap <= a), None)
-    return None if k is None else float(bisected(path, k, lambda s: largest_gap(path.profile(s), corner) < gap))
+    return None if k is None else bisected(path, k, lambda s: largest_gap(path.profile(s), corner) < gap)
 
 
 def first_touch(path, start: int = 0):

@@ -35,10 +35,11 @@ def main():
         cases = [(0.3, FILLET, (2.0, 4.0))]
     found = list(map(run, cases)) if args.quick else sweep(run, cases)
     summary: dict = {}
-    for (mu, fillet, _), (numbers, _) in sorted(zip(cases, found), key=lambda case: (-case[0][1], case[0][0])):
+    ran = sorted(zip(cases, found), key=lambda case: (-case[0][1], case[0][0]))
+    for (mu, fillet, _), (numbers, _) in ran:
         summary["fillet_h0/8" if fillet == SHARP else f"mu_{mu:g}"] = numbers
         tell(mu, fillet, numbers)
-    save(draw(cases, found), args.out / "plug_adapted.png")
+    save(draw(ran), args.out / "plug_adapted.png")
     summarise(args.out, {**summary, "share": SHARE, "versions": files.versions()})
 
 
@@ -101,10 +102,10 @@ def tell(mu, fillet, n) -> None:
         *(f"  ended before its target: {one['ended'][:200]} ..." for one in (n, *uniform) if one["ended"] != "done"))
 
 
-def draw(cases, found):
+def draw(ran):
     """Force over travel, the membrane dashed, and the columns that the pilots made."""
     figure, (left, right) = plots.figure(2, width=5.0)
-    for k, ((mu, fillet, _), (_, (travel, force, at, membrane, ends))) in enumerate(zip(cases, found)):
+    for k, ((mu, fillet, _), (_, (travel, force, at, membrane, ends))) in enumerate(ran):
         label = f"$\\mu$ = {mu:g}" + (", edge $h_0/8$" if fillet == SHARP else "")
         left.plot(travel, force, color=f"C{k}", label=label)
         left.plot(at, membrane, "--", color=f"C{k}", linewidth=1)

@@ -70,6 +70,14 @@ def test_cup_quick(tmp_path):
     assert found["frictionless"]["pole_thickness_ratio_at_psi"]["160"] == pytest.approx(0.4649, rel=2e-2)
 
 
+def test_deep_cup_quick(tmp_path):
+    """Pressures are those with one node a step, in steps of 0.01: they are not read off the states of a run."""
+    found = summary("deep_cup", tmp_path, "--quick")
+    for name, filled in (("stick", 35.098), ("coulomb_0.3", 34.938)):
+        assert found[name]["first_contact_pressure_psi"] == pytest.approx(9.1431, rel=5e-4)
+        assert found[name]["filled_pressure_psi"] == pytest.approx(filled, rel=5e-4)
+
+
 def test_rectangular_part_quick(tmp_path):
     found = summary("rectangular_part", tmp_path, "--quick")
     stick, free = found["stick"], found["frictionless"]

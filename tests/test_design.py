@@ -220,6 +220,17 @@ def test_forces_of_tools():
     assert to_force.derivative("travel")[1].item() == pytest.approx(-by[0, 0] / by[0, 2], rel=1e-4)
 
 
+def test_contacts_of_a_script_stay_as_they_are():
+    """Runs of designs take one node a step; what the script makes of its contact does not change."""
+    mould = fx.Contact("top", fx.tools.plane(0.3), "stick")
+
+    def build(c10):
+        return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1)), contacts=[mould], **CAN,
+                        materials=fx.NeoHookean(c10=c10)), fx.pressure(0.06)
+    run = fx.Design(build, {"c10": (0.5, 0.4, 0.6)}).run()
+    assert mould.nodes_per_step is None and not run.path.problem.limit.foretells
+
+
 def test_a_stage_that_waits_ends_where_its_target_is_met():
     """A sheet that creeps under its weight: when it has sagged so far goes with the weight."""
     creeps = fx.TransientNetwork(fx.NeoHookean(c10=1e-6), [(1.0, 2.0)])

@@ -49,6 +49,30 @@ def test_a_stuck_block_goes_on():
     assert np.all(np.diff([s.measures["travel"] for s in path.states if s.kind != "remesh"]) > 0)
 
 
+def test_nodes_are_not_foretold(monkeypatch):
+    """They arrive one a step, on all meshes."""
+    from formingx.discrete.contact import approach
+    monkeypatch.setattr(approach, "LIMITS", approach.StepLimits(share=0.5))
+    assert pressed("stick", 0.1).problem.limit.foretells
+    path = pressed("stick", 0.5, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)))
+    assert len(path.segments) > 1 and not any(segment.problem.limit.foretells for segment in path.segments)
+
+
+def test_a_mesh_without_a_state_ends_no_path(monkeypatch):
+    """The path of a run that fails at once on its new mesh ends before that."""
+    from formingx import remeshing
+
+    class Fails(remeshing.Run):
+        def follow(self, most, progress, start=None):
+            if start.kind == "remesh":
+                raise fx.ConvergenceError("nothing is found")
+            return super().follow(most, progress, start)
+    monkeypatch.setattr(remeshing, "Run", Fails)
+    with pytest.raises(fx.ConvergenceError) as caught:
+        pressed("stick", 0.6, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)))
+    assert len(caught.value.path.segments) == 1 and caught.value.path.last.measures["travel"] > 0
+
+
 @pytest.mark.parametrize("options, message", [
     ({"size": -1.0}, "Remesh: size = -1"), ({"size": 1.0, "corner": 2.0}, "corner = 2"),
     ({"size": 1.0, "volume_ratio": (1.1, 1.5)}, "volume_ratio")])

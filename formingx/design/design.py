@@ -97,12 +97,17 @@ class Design:
 
     def _run(self, vector: np.ndarray) -> DesignRun:
         scene, end = self._make(vector)
-        for contact in scene.contacts:
-            contact.nodes_per_step = contact.nodes_per_step or 1
         self.paths += 1
         options: dict[str, Any] = {"step": self._step, "tolerances": self._tolerances, "max_steps": self._most,
                                    "progress": False}
-        path = trace(scene, until=end, **options) if isinstance(end, Target) else Process(scene).run(end, **options)
+        left_open = [contact for contact in scene.contacts if contact.nodes_per_step is None]
+        for contact in left_open:
+            contact.nodes_per_step = 1
+        try:
+            path = trace(scene, until=end, **options) if isinstance(end, Target) else Process(scene).run(end, **options)
+        finally:                                             # contacts may be the script's own, of other runs, too
+            for contact in left_open:
+                contact.nodes_per_step = None
         return DesignRun(self._make, self.parameters, vector, path, end, self._tolerances)
 
     def fit(self, *, wall: Any = None, even: bool = False, within: tuple[float, float] | None = None,

@@ -81,8 +81,7 @@ def take_over(face: FaceContact, worn: Worn, fields: np.ndarray, control: float)
     pressure, friction, touches = worn.at(x)
     share = np.where(rule.has_area, rule.lumped / rule.area, 0.0)
     touches &= pressure > 0
-    over = np.where(touches, pressure * share, 0.0) / face.law.k
-    depth = theta * np.where(over > theta, over / theta, 2 * np.sqrt(over / theta) - 1)
+    depth = law.depth(np.where(touches, pressure * share, 0.0))
     face.shift_distances(np.where(touches, d - depth, np.maximum(d + theta, 0.0)))
     if not face.remembers:
         return
