@@ -232,6 +232,12 @@ def test_default_penetration_is_small():
     assert path.last.measures["penetration"] < 1e-3 * path.profile().thickness.min()
 
 
+def test_length_in_touch_does_not_depend_on_the_node_on_the_axis():
+    """It bears nothing, and stands a little off, or not, by the steps: 8.083 with one node a step."""
+    found = [form(cup("stick", (20, 1), nodes_per_step=n), 30.0).last.measures["contact_length"] for n in (None, 1)]
+    assert found == pytest.approx([8 + 1 / 6] * 2)
+
+
 def trough_error(thickness, elements):
     """Largest relative error of the wall thickness against the membrane law, half-width 1, depth 2."""
     mesh = fx.mesh.disc(radius=1.0, thickness=thickness, elements=(elements, 1))

@@ -229,6 +229,56 @@ def test_tool_files_are_looked_over(tmp_path):
              supports=HELD, loads=[fx.Pressure("top")], contacts=[fx.Contact("bottom", floor)])
 
 
+def block(low, high, inward=False):
+    """Points and triangles of a block."""
+    points = np.array(np.meshgrid(*zip(low, high), indexing="ij")).reshape(3, -1).T
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    triangles = np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))])
+    return points, triangles[:, ::-1] if inward else triangles
+
+
+def solid_of(file, *blocks):
+    write_stl(np.vstack([points for points, _ in blocks]),
+              np.vstack([triangles + 8 * k for k, (_, triangles) in enumerate(blocks)]), file)
+    return fx.tools.solid(file)
+
+
+@pytest.mark.parametrize("low, high", [
+    ((1, 0.5, 0.5), (2, 1.5, 3)), ((2, 0, 0), (6, 2, 1)), ((1, 0.8, -2), (1.4, 1.2, 3)), ((1, 0.5, 1), (2, 1.5, 2)),
+    ((1, 0.5, 2), (2, 1.5, 3)), ((1, 0.5, 0.2), (2, 1.5, 0.8))],
+    ids=["corner", "as wide", "bar", "upon", "apart", "within"])
+def test_bodies_of_a_file_are_one_tool(low, high, tmp_path):
+    """The distance to the union of two blocks, as exact as to one."""
+    ends = np.array([[(0, 0, 0), low], [(4, 2, 1), high]], float)
+    tool = solid_of(tmp_path / "two.stl", *(block(*ends[:, k]) for k in (0, 1)))
+    x = np.random.default_rng(3).uniform(-1, 5, (4000, 3))
+    off = np.maximum(ends[0][:, None] - x, x - ends[1][:, None])
+    exact = -(np.linalg.norm(np.maximum(off, 0), axis=2) + np.minimum(off.max(2), 0)).min(0)
+    np.testing.assert_allclose(tool.signed_distance(x), exact, atol=1e-6)
+
+
+def test_hollows_and_turned_bodies_of_a_file(tmp_path):
+    outer = block((0, 0, 0), (4, 2, 1))
+    hollow = solid_of(tmp_path / "hollow.stl", outer, block((1, 0.5, 0.2), (2, 1.5, 0.8), inward=True))
+    np.testing.assert_allclose(hollow.signed_distance([(1.5, 1, 0.5), (0.5, 1, 0.5)]), [-0.3, 0.5], atol=1e-6)
+    with pytest.raises(fx.InputError, match=r"a body around \(1.5, 1, 2.5\) that is inside out"):
+        solid_of(tmp_path / "turned.stl", outer, block((1, 0.5, 2), (2, 1.5, 3), inward=True))
+
+
+def test_axes_of_a_sheet_in_space_are_x_and_y(tmp_path):
+    """What is given over the sheet fails, and is read from a file, by these names."""
+    warm = fx.NeoHookean(c10=fx.of_temperature(lambda T: 1.0 + 0 * T))
+    broken = lambda x, y: np.where(x > 0.3, np.nan, 1.0)  # noqa: E731
+    for given in ({"material": fx.NeoHookean(c10=broken)}, {"material": warm, "temperature": broken}):
+        with pytest.raises(fx.InputError, match=r"is nan, not a finite number, at \(x, y\) ="):
+            disc(**given)
+    (tmp_path / "T.csv").write_text("x,T\n0,100\n2,120\n")
+    assert disc(material=warm, temperature=tmp_path / "T.csv").temperature.T.x.array.max() == pytest.approx(110)
+    with pytest.raises(fx.InputError, match="must have T, and x, y or both"):
+        (tmp_path / "T.csv").write_text("R,T\n0,100\n2,120\n")
+        disc(material=warm, temperature=tmp_path / "T.csv")
+
+
 def plug_above(separates):
     plug = fx.tools.box(half=(0.4, 0.4), depth=0.9, corner=0.2, fillet=0.12, draft=5, mouth=1.2, plug=True)
     return fx.Contact("top", plug, moves=(0, 0, -1), name="plug", separates=separates)

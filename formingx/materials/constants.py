@@ -14,6 +14,7 @@ import ufl
 from dolfinx import fem
 
 from ..errors import InputError, finite, known, values
+from ..mesh.nodes import axes
 from ..values.table import Table
 from ..values.temperature import ABSOLUTE_ZERO, FunctionOfTemperature
 
@@ -65,7 +66,7 @@ class OfPosition(Varying):
         return values(f"the constant {self!r}", self.function, {"R": R, "Z": Z})
 
     def values(self, sample):
-        return self(*sample.points.T)
+        return values(f"the constant {self!r}", self.function, dict(zip(axes(sample.domain), sample.points.T)))
 
     def expression(self, fields):
         return fields.of_position(self)

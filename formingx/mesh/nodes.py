@@ -7,6 +7,11 @@ import numpy as np
 from .. import _compat
 
 
+def axes(domain: Any) -> str:
+    """Names of the two reference coordinates: "RZ" of a section, "xy" of a sheet in space."""
+    return "RZ" if domain.geometry.dim == 2 else "xy"
+
+
 def own_cells(domain: Any) -> np.ndarray:
     """Numbers of the cells that are this rank's own, shape (m,), from 0 on."""
     return np.arange(domain.topology.index_map(domain.topology.dim).size_local, dtype=np.int32)

@@ -11,10 +11,11 @@ from ..errors import InputError, finite, values
 from ..io import csv_files
 from ..mesh import Mesh
 from ..mesh.locate import locate
+from ..mesh.nodes import axes
 from ..ranks import gathered
 from ..values.table import Table
 
-_WHAT = "a number, a table over R, a function of (R, Z), a CSV file, what fx.heat returned, or a DOLFINx Function"
+_WHAT = "a number, a table over {0}, a function of ({0}, {1}), a CSV file, what fx.heat returned, or a DOLFINx Function"
 
 
 def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperature") -> np.ndarray:
@@ -26,36 +27,36 @@ def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperatu
             what `fx.heat` returned (its last state); a scalar DOLFINx Function on this mesh.
         name: what it is called in an error.
 
+    Of a sheet in space it is x and y instead of R and Z.
+
     Raises:
         InputError: something else, a value that is not finite, a point outside a table or a file.
     """
     comm: Any = mesh.comm
     first = comm.scan(len(points)) - len(points)
     # all ranks look at all points, so that they raise the same errors
-    return _values(field, gathered(mesh.comm, points), name)[first: first + len(points)]
+    return _values(field, gathered(mesh.comm, points), name, axes(mesh.domain))[first: first + len(points)]
 
 
-def _values(field: Any, points: np.ndarray, name: str) -> np.ndarray:
+def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
     """`values_at` points that are the same on all ranks."""
-    R, Z = points.T
     if isinstance(field, type):
-        raise InputError(f"{name} = {field!r}: must be {_WHAT}, not a class")
+        raise InputError(f"{name} = {field!r}: must be {_WHAT.format(*axes)}, not a class")
     if isinstance(field, Table):
-        field.check(R, "R")
-        found = field(R)
+        field.check(points[:, 0], axes[0])
+        found = field(points[:, 0])
     elif isinstance(field, str | os.PathLike):
-        found = _from_file(field, points)
+        found = _from_file(field, points, axes)
     elif isinstance(field, fem.Function):
         found = PointReader(field.function_space, points).read(field.x.array)
     elif hasattr(field, "temperature"):
-        return _values(field.temperature(), points, name)
+        return _values(field.temperature(), points, name, axes)
     elif callable(field):
-        return values(name, field, {"R": R, "Z": Z})
+        return values(name, field, dict(zip(axes, points.T)))
     else:
         found = np.full(len(points), finite(name, field))
     if not np.all(np.isfinite(found)):
-        r, z = points[np.argmin(np.isfinite(found))]
-        raise InputError(f"{name} = {field!r}: is not a finite number at (R, Z) = ({r:.6g}, {z:.6g})")
+        raise InputError(f"{name} = {field!r}: is not a finite number at {_at(points, np.isfinite(found), axes)}")
     return found
 
 
@@ -83,19 +84,20 @@ class PointReader:
         return self._comm.allreduce(values)
 
 
-def _from_file(file: Any, points: np.ndarray) -> np.ndarray:
-    """Linear between the points of a CSV file: over R, over Z, or over both, by its columns."""
+def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
+    """Linear between the points of a CSV file: over one of the axes, or over both, by its columns."""
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError
     table = csv_files.read(file)
-    axes = [k for k, name in enumerate("RZ") if name in table.columns]
+    axes = [k for k, name in enumerate(names) if name in table.columns]
     if not axes:
-        raise InputError(f"{table.name}: has the columns {', '.join(table.columns)}: must have T, and R, Z or both")
-    for name in ("T", *("RZ"[k] for k in axes)):
+        raise InputError(f"{table.name}: has the columns {', '.join(table.columns)}: must have T, and"
+                         f" {', '.join(names)} or both")
+    for name in ("T", *(names[k] for k in axes)):
         if name in table.units and table.units[name] is not None:
             raise InputError(f"{table.name}: column {name!r} is in {table.units[name]!r}: a temperature is read as it"
                              f" is: turn it into the script's units and leave the unit out of the header")
-    at, T = np.column_stack([table.take("RZ"[k]) for k in axes]), table.take("T")
+    at, T = np.column_stack([table.take(names[k]) for k in axes]), table.take("T")
     at, place = np.unique(at, axis=0, return_inverse=True)
     low, high = np.full(len(at), np.inf), np.full(len(at), -np.inf)
     np.minimum.at(low, place.ravel(), T)
@@ -107,10 +109,10 @@ def _from_file(file: Any, points: np.ndarray) -> np.ndarray:
     wanted, spans = points[:, axes], np.ptp(at, axis=0)
     if len(axes) == 1:
         x, near = wanted[:, 0], 1e-9 * spans[0]
-        _inside(table.name, points, (x >= at[0, 0] - near) & (x <= at[-1, 0] + near))
+        _inside(table.name, points, names, (x >= at[0, 0] - near) & (x <= at[-1, 0] + near))
         return np.interp(x, at[:, 0], low)
     if spans.min() <= 1e-9 * spans.max():
-        name = "RZ"[int(np.argmin(spans))]
+        name = names[int(np.argmin(spans))]
         raise InputError(f"{table.name}: all its points have the same {name}, and the body is not flat: leave the"
                          f" column {name} out if the temperature is the same along it")
     centre = at.mean(0)
@@ -118,13 +120,18 @@ def _from_file(file: Any, points: np.ndarray) -> np.ndarray:
     try:
         found = LinearNDInterpolator(at / spans, low)(inner / spans)
     except QhullError:
-        raise InputError(f"{table.name}: its {len(at)} points lie on one line: give R and T alone, Z and T alone, or"
-                         f" points all around the body") from None
-    _inside(table.name, points, np.isfinite(found))
+        raise InputError(f"{table.name}: its {len(at)} points lie on one line: give {names[0]} and T alone,"
+                         f" {names[1]} and T alone, or points all around the body") from None
+    _inside(table.name, points, names, np.isfinite(found))
     return found
 
 
-def _inside(name: str, points: np.ndarray, inside: np.ndarray) -> None:
+def _inside(name: str, points: np.ndarray, axes: str, inside: np.ndarray) -> None:
     if not np.all(inside):
-        r, z = points[np.argmin(inside)]
-        raise InputError(f"{name}: point (R, Z) = ({r:.6g}, {z:.6g}) of the body lies outside the points of the file")
+        raise InputError(f"{name}: point {_at(points, inside, axes)} of the body lies outside the points of the file")
+
+
+def _at(points: np.ndarray, fine: np.ndarray, axes: str) -> str:
+    """The first point that is not fine, in words."""
+    first, second = points[np.argmin(fine)]
+    return f"({', '.join(axes)}) = ({first:.6g}, {second:.6g})"

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InputError, as_points, direction, instance, known, non_negative, pair, place, positive, triple
 from ..io.output import replace
+from .bodies import apart, volume
 from .profile import Tool
 
 _PER_CORNER = 24           # straight pieces of a rounded corner in `surface`
@@ -131,24 +132,28 @@ class Triangulated(SolidTool):
     """A closed surface of triangles that look outward; the distance is VTK's, exact, the sign by its normals.
 
     Attributes:
-        name: of its file; triangles: how many; volume: length^3.
+        name: of its file; triangles: how many; volume: of its bodies, length^3; what two share counts twice.
     """
 
     def __init__(self, points: np.ndarray, triangles: np.ndarray, name: str):
         self._points, self._triangles, self.name = points, triangles, name
-        self._implicit: Any = None
+        self._groups = apart(points, triangles, f"solid: {name!r}")
+        self._implicit: list[Any] = []
         self.triangles, self.volume = len(triangles), round(volume(points, triangles), 12)
 
     def _distance(self, x):
         from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkDoubleArray
-        if self._implicit is None:
-            self._implicit = _implicit(self._points, self._triangles)
-        out = vtkDoubleArray()
+        if not self._implicit:
+            self._implicit = [_implicit(self._points, group) for group in self._groups]
         if not len(x):
             return np.zeros(0)
-        self._implicit.FunctionValue(numpy_to_vtk(np.ascontiguousarray(x), deep=True), out)
-        return -vtk_to_numpy(out).copy()
+        given, found = numpy_to_vtk(np.ascontiguousarray(x), deep=True), np.full(len(x), -np.inf)
+        for implicit in self._implicit:
+            out = vtkDoubleArray()
+            implicit.FunctionValue(given, out)
+            np.maximum(found, -vtk_to_numpy(out), out=found)
+        return found
 
     def _surface(self):
         return self._points, self._triangles
@@ -156,8 +161,8 @@ class Triangulated(SolidTool):
     def undercuts(self, along: tuple[float, float, float] = (0, 0, 1)) -> dict[str, float]:
         """How a part comes out of a mould along a direction: {"undercut_area", "least_draft"} (area; degrees).
 
-        Of the faces that look into the hull of the tool: the area of those that look against the direction, and the
-        least angle of the others to it (90: a floor).
+        Of the faces that look into the hull of the tool, and lie in no other of its bodies: the area of those that look
+        against the direction, and the least angle of the others to it (90: a floor).
         """
         from scipy.spatial import ConvexHull
         way = direction("undercuts: along", along)
@@ -166,7 +171,8 @@ class Triangulated(SolidTool):
         area = np.linalg.norm(normal, axis=1) / 2
         hull = ConvexHull(self._points).equations
         depth = -(corners.mean(1) @ hull[:, :3].T + hull[:, 3]).max(1)
-        inner = depth > 1e-6 * np.ptp(self._points, axis=0).max()
+        near = 1e-6 * np.ptp(self._points, axis=0).max()
+        inner = (depth > near) & (self._distance(corners.mean(1) + near * normal / (2 * area[:, None])) <= 0)
         draft = np.degrees(np.arcsin(np.clip(normal @ way / (2 * area), -1, 1)))
         under = inner & (draft < -0.01)
         return {"undercut_area": float(area[under].sum()),
@@ -245,12 +251,6 @@ def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False
     if volume(points, triangles) <= 0:
         raise InputError(f"solid: {name!r} is inside out: its triangles look inward: use inverted={not inverted}")
     return Triangulated(points, triangles, os.path.basename(name))
-
-
-def volume(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Within closed surfaces of triangles that look outward."""
-    a, b, c = (points[triangles[:, k]] - points.mean(0) for k in range(3))
-    return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6)
 
 
 def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

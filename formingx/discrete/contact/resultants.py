@@ -17,8 +17,16 @@ def penetration(face: FaceContact, fields: np.ndarray, control: float) -> float:
 
 
 def length(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """Reference length of the face that is in touch; in space its area."""
-    return _sum(face, face.rule.extent[face.touching(fields, control)])
+    """Reference length of the face that is in touch; in space its area.
+
+    The node on the axis bears hardly anything, and stands a little off where its neighbours stick: it counts with them.
+    """
+    rule = face.rule
+    rows = gathered(face.comm, np.column_stack([rule.points, rule.lumped, rule.extent, face.touching(fields, control)]))
+    points, (lumped, extent, touching) = rows[:, :-3], rows[:, -3:].T
+    for i in np.flatnonzero(without_area(lumped, extent)):
+        touching[i] = max(touching[i], touching[_beside(points, i)])
+    return float(extent @ touching)
 
 
 def force(face: FaceContact, fields: np.ndarray, control: float) -> np.ndarray:
@@ -54,10 +62,15 @@ def traction(face: FaceContact, fields: np.ndarray, control: float) -> tuple[np.
     axis = without_area(lumped, lengths)
     values = values * np.divide(area, lumped, out=area.copy(), where=~axis)[:, None]
     for i in np.flatnonzero(axis):
-        middle = np.argsort(np.linalg.norm(points - points[i], axis=1))[1]
+        middle = _beside(points, i)
         values[middle] += values[i] / lumped[middle]
         values[i] = values[middle, 0], 0.0
     return points, values
+
+
+def _beside(points: np.ndarray, i: int) -> int:
+    """The point next to points[i]."""
+    return int(np.argsort(np.linalg.norm(points - points[i], axis=1))[1])
 
 
 def _sum(face: FaceContact, values: np.ndarray) -> float:
