@@ -6,7 +6,12 @@ from typing import Any
 
 import dolfinx
 import ufl
+from dolfinx import fem, jit
 from dolfinx.fem import petsc as fem_petsc
+from ffcx.naming import compute_signature
+from ufl.classes import Label
+from ufl.corealg.map_dag import map_expr_dag
+from ufl.corealg.multifunction import MultiFunction
 
 from .errors import InputError
 
@@ -17,24 +22,50 @@ if tuple(int(n) for n in dolfinx.__version__.split(".")[:2]) < (0, 9):
 JIT_OPTIONS = {"timeout": 120}
 
 _compiled: dict[str, Any] = {}
-"""What the compiler gave for forms of this process, by their signatures."""
+"""What the compiler gave for forms and expressions of this process, by their signatures."""
 
 
 def compile_form(form: Any) -> Any:
-    """A compiled form. One on a single rank is looked for in the compiler's folder once: that is slow to list."""
-    from dolfinx import fem, jit
+    """A compiled form."""
+    return _looked_up_once(lambda: fem.form(form, jit_options=JIT_OPTIONS))
+
+
+def compile_expression(expression: Any, points: Any) -> Any:
+    """A compiled expression at points of the reference cell.
+
+    Its variables are numbered from 0: with UFL's numbers, which count on in a process and are part of its signature, it
+    would be compiled for every problem again.
+    """
+    numbered = map_expr_dag(_Numbered(), expression)
+    return _looked_up_once(lambda: fem.Expression(numbered, points, jit_options=JIT_OPTIONS))
+
+
+class _Numbered(MultiFunction):
+    def __init__(self) -> None:
+        super().__init__()
+        self._labels: dict[Any, Label] = {}
+
+    expr = MultiFunction.reuse_if_untouched
+
+    def label(self, label: Label) -> Label:
+        return self._labels.setdefault(label, Label(len(self._labels)))
+
+
+def _looked_up_once(compiled: Any) -> Any:
+    """`compiled()`; on a single rank, what is asked for again is not looked for in the compiler's folder: that is slow
+    to list. Ranks compile together, or none does."""
     compiler = jit.ffcx_jit
 
     def once(comm: Any, what: Any, **options: Any) -> Any:
-        if comm.size > 1:                                    # ranks compile together, or none does
+        if comm.size > 1:
             return compiler(comm, what, **options)
-        key = what.signature()
+        key = what.signature() if isinstance(what, ufl.Form) else compute_signature([what], "")
         if key not in _compiled:
             _compiled[key] = compiler(comm, what, **options)
         return _compiled[key]
     jit.ffcx_jit = once
     try:
-        return fem.form(form, jit_options=JIT_OPTIONS)
+        return compiled()
     finally:
         jit.ffcx_jit = compiler
 

@@ -4,10 +4,11 @@ import csv
 
 import numpy as np
 import pytest
+import ufl
 from conftest import run as run_python
 
 import formingx as fx
-from formingx import Stage
+from formingx import Stage, _compat
 from formingx.results.files.fields import Fields
 from formingx.solve import predictor
 from formingx.solve.newton import Tolerances
@@ -134,3 +135,18 @@ def test_nothing_is_compiled_for_other_constants():
     """Each in a process of its own: UFL sorts terminals by their numbers as text, so 9 and 10 make another form."""
     run_python("-c", CONSTANTS, 0.05, 0.3, 0.5, 0)
     assert float(run_python("-c", CONSTANTS, 0.2, 1.0, 2.0, 1).split()[-1]) == pytest.approx(11.0, rel=1e-9)
+
+
+def test_an_expression_is_compiled_once():
+    """For all problems of a process, however many variables UFL has counted before."""
+    domain = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)).domain
+    x = ufl.SpatialCoordinate(domain)[0]
+    places = np.array([[0.5, 0.25]])
+
+    def slope():
+        v, _ = ufl.variable(x), ufl.variable(x)
+        return _compat.compile_expression(ufl.diff(v**2, v), places)
+    one, two = slope(), slope()
+    assert one.ufcx_expression == two.ufcx_expression
+    where = _compat.compile_expression(x, places).eval(domain, [0])
+    assert two.eval(domain, [0]) == pytest.approx(2 * where, rel=1e-14)

@@ -87,7 +87,7 @@ def in_own_cells(domain: Any, expression: Any, where: np.ndarray) -> np.ndarray:
     """A UFL expression in this rank's own cells at places of the reference cell, shape (cells, places, components)."""
     cells = own_cells(domain)
     shape = len(cells), len(where), int(np.prod(expression.ufl_shape, dtype=int))
-    found = fem.Expression(expression, where, jit_options=_compat.JIT_OPTIONS)
+    found = _compat.compile_expression(expression, where)
     return found.eval(domain, cells).reshape(shape) if len(cells) else np.zeros(shape)
 
 

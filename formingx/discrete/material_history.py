@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
-from dolfinx import fem
 
 from .. import _compat
 from ..errors import InputError
@@ -39,7 +38,7 @@ class MaterialHistory:
         self._sizes = {name: int(np.prod(f.ufl_shape, dtype=int)) for name, f in terms.internal.items()}
         flat = [ufl.as_ufl(updated[name])[i] if i else ufl.as_ufl(updated[name])
                 for name, f in terms.internal.items() for i in np.ndindex(f.ufl_shape)]
-        self._updated = fem.Expression(ufl.as_vector(flat), terms.places, jit_options=_compat.JIT_OPTIONS)
+        self._updated = _compat.compile_expression(ufl.as_vector(flat), terms.places)
         self._now: Memory | None = None                              # what was put or got last, if it still holds
         self.start()
 
@@ -123,7 +122,7 @@ class MaterialHistory:
         X, components = self._forms.X, self._forms.X.ufl_shape[0]
         if not len(self._own):
             return np.zeros((0, components))
-        where = fem.Expression(X, self._terms.places, jit_options=_compat.JIT_OPTIONS)
+        where = _compat.compile_expression(X, self._terms.places)
         return where.eval(self._forms.domain, self._own).reshape(-1, components)
 
     def _array(self, name: str) -> np.ndarray:

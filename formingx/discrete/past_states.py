@@ -52,7 +52,7 @@ class PastStates:
         self._n = len(self._own) * len(terms.places)
 
         def at_points(expression: Any) -> fem.Expression:
-            return fem.Expression(expression, terms.places, jit_options=_compat.JIT_OPTIONS)
+            return _compat.compile_expression(expression, terms.places)
         self._C = at_points(ufl.as_vector(isochoric(forms.elastic_F)))
         self._aT = at_points(ufl.as_vector([terms.constants["aT"]])) if self._law.shifted else None
         rows = {name: f.function_space.dofmap.list[self._own].ravel() for name, f in terms.held.items()}
@@ -126,7 +126,7 @@ class PastStates:
     def points(self) -> np.ndarray:
         """Reference positions of the owned quadrature points, shape (n, coordinates), length."""
         X = self._forms.X
-        where = fem.Expression(X, self._terms.places, jit_options=_compat.JIT_OPTIONS)
+        where = _compat.compile_expression(X, self._terms.places)
         found = where.eval(self._forms.domain, self._own) if len(self._own) else np.zeros(0)
         return found.reshape(-1, X.ufl_shape[0])
 

@@ -88,7 +88,7 @@ class Solid(Formulation):
             space, dofs = self.space.sub(0).collapse()
             u = fem.Function(space)
             stretched = self.constant(_FIRST_STRETCH / self.length) * self.X
-            u.interpolate(fem.Expression(stretched, _compat.interpolation_points(space)))
+            u.interpolate(_compat.compile_expression(stretched, _compat.interpolation_points(space)))
             self.w.x.array[dofs] = u.x.array
 
     def _make_mesh(self) -> Any:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import ufl
-from dolfinx import fem
 from mpi4py import MPI
 
 from .. import _compat
@@ -121,7 +120,7 @@ class _Stress:
         tau -= ufl.tr(tau) / 3 * ufl.Identity(3)
         entries = [tau[0, 0], tau[1, 1], np.sqrt(2) * tau[0, 1], tau[2, 2]]
         self._forms, self._cells = forms, terms.own_cells
-        self._expression = fem.Expression(ufl.as_vector(entries), terms.places, jit_options=_compat.JIT_OPTIONS)
+        self._expression = _compat.compile_expression(ufl.as_vector(entries), terms.places)
 
     def values(self) -> np.ndarray:
         """Shape (points, 4), own cells."""

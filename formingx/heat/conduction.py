@@ -288,7 +288,8 @@ class Conduction:
             return None
         if self._displaced is None:
             space = fem.functionspace(self.mesh.domain, ("Lagrange", self._degree, (2,)))
-            self._displaced = fem.Function(space), fem.Expression(self._u, _compat.interpolation_points(space))
+            self._displaced = fem.Function(space), _compat.compile_expression(
+                self._u, _compat.interpolation_points(space))
         u, expression = self._displaced
         u.interpolate(expression)
         return u.x.array.reshape(-1, 2)[: self._n]
@@ -318,7 +319,7 @@ class Conduction:
         return self._assemble(form)
 
     def _form(self, form: Any) -> Any:
-        return fem.form(form, jit_options=_compat.JIT_OPTIONS)
+        return _compat.compile_form(form)
 
     def _integral(self, form: Any) -> float:
         return float(self.comm.allreduce(fem.assemble_scalar(self._form(form)), MPI.SUM))

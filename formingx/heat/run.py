@@ -107,7 +107,7 @@ class _Displaced:
     def __init__(self, displacement: Any, mesh: Mesh):
         space = fem.functionspace(mesh.domain, ("Lagrange", 2, (2,)))
         u = fem.Function(space)
-        u.interpolate(fem.Expression(displacement, _compat.interpolation_points(space)))
+        u.interpolate(_compat.compile_expression(displacement, _compat.interpolation_points(space)))
         self._mesh, self._parts = mesh, [u.sub(k).collapse() for k in (0, 1)]
 
     def __call__(self, points: np.ndarray) -> np.ndarray:

@@ -74,8 +74,7 @@ class PoleStressRatio:
         stresses = [ufl.sqrt(1.5 * ufl.inner(d, d)) for d in deviators] + [forms.constant(forms.stress)]
         volume = sum(part.integrand() for part in forms.weighted(forms.constant(1.0), terms.names).integrals())
         volume *= abs(ufl.JacobianDeterminant(forms.domain))
-        return fem.Expression(ufl.as_vector([s * volume for s in stresses]), terms.places,
-                              jit_options=_compat.JIT_OPTIONS)
+        return _compat.compile_expression(ufl.as_vector([s * volume for s in stresses]), terms.places)
 
 
 class ElasticStretches:
@@ -92,8 +91,8 @@ class ElasticStretches:
         for terms in forms.terms:
             if stretches := terms.elastic_stretches(forms.elastic_F):
                 own = terms.cells[terms.cells < len(own_cells(forms.domain))]
-                self._parts.append((fem.Expression(ufl.as_vector(stretches), terms.places,
-                                                   jit_options=_compat.JIT_OPTIONS), own, len(stretches)))
+                compiled = _compat.compile_expression(ufl.as_vector(stretches), terms.places)
+                self._parts.append((compiled, own, len(stretches)))
         self.count = max((count for *_, count in self._parts), default=0)
         if self._parts:
             at: Any

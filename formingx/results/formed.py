@@ -8,6 +8,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
+from .. import _compat
 from ..discrete.outline import Outline
 from ..errors import InputError, finite, instance, positive
 from ..mesh.grid import Grid, counter_clockwise, gathered, to_mesh
@@ -41,7 +42,7 @@ def formed(problem: Any, state: Any, size: float | None = None) -> Mesh:
     points = np.zeros((len(cells), 6, 2))
     if len(cells):
         with problem.at(state):
-            moved = fem.Expression(ufl.as_vector([forms.X[0], forms.X[1]]) + forms.u, _NODES)
+            moved = _compat.compile_expression(ufl.as_vector([forms.X[0], forms.X[1]]) + forms.u, _NODES)
             points = moved.eval(domain, cells).reshape(len(cells), 6, 2)
     layers = {name: triangles[(found := mesh.cells.find(tag))[found < len(cells)]] for name, tag in mesh.layers.items()}
     domain.topology.create_connectivity(1, 2)

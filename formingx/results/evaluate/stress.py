@@ -329,7 +329,7 @@ class Stresses:
             values = ufl.as_vector([*self._F, *(sum(part[k] for part, _ in parts) for k in range(len(_S)))])
             area = abs(ufl.JacobianDeterminant(forms.domain))
             where = ufl.as_vector([forms.X[0], forms.X[1], forms.weight * area])
-            self._raw[number] = *(fem.Expression(e, points) for e in (values, where)), weights
+            self._raw[number] = *(_compat.compile_expression(e, points) for e in (values, where)), weights
         values, where, weights = self._raw[number]
         cells, q = self._owned(layer), len(weights)
         with self.problem.at(state):

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
-from dolfinx import fem
 
 from ... import _compat
 from ...mesh.nodes import own_cells
@@ -54,8 +53,8 @@ class Tension:
             resultants = [N + h * (F[i, i] * P[i, i] - F[1, 1] * P[1, 1]) for N, i in zip(resultants, (0, 2))]
         unit = forms.constant(forms.stress) * sum(forms.thicknesses.values())
         at_rest = resultants[1] * forms.F[0, 0]
-        self._found = fem.Expression(ufl.as_vector([*(N / unit for N in resultants), forms.X[0], forms.X[1], at_rest]),
-                                     forms.terms[0].places, jit_options=_compat.JIT_OPTIONS)
+        values = ufl.as_vector([*(N / unit for N in resultants), forms.X[0], forms.X[1], at_rest])
+        self._found = _compat.compile_expression(values, forms.terms[0].places)
 
     def least(self, state: Any) -> Resultant:
         """Of a state; in plane strain along the section alone: nothing wrinkles across it; collective."""

@@ -31,6 +31,7 @@ from dolfinx import fem, has_adios2, io
 from dolfinx import mesh as dolfinx_mesh
 from mpi4py import MPI
 
+from ... import _compat
 from ...errors import InputError
 from ...measures.relaxed import ElasticStretches
 from ...mesh.nodes import own_cells
@@ -54,8 +55,8 @@ class Fields:
         self.dimension = domain.topology.dim
         self._cells = own_cells(domain)
         self._components = domain.geometry.dim
-        self._where, self._u = (fem.Expression(ufl.as_vector([v[i] for i in range(self._components)]),
-                                               _NODES[self.dimension]) for v in (forms.X, forms.u))
+        self._where, self._u = (_compat.compile_expression(ufl.as_vector([v[i] for i in range(self._components)]),
+                                                            _NODES[self.dimension]) for v in (forms.X, forms.u))
         self.points = self._eval(self._where)
         self._elastic = ElasticStretches(self._problem, _NODES[self.dimension])
         self._between: tuple[np.ndarray, np.ndarray] | None = None
@@ -68,7 +69,7 @@ class Fields:
             found = {"displacement": self._eval(self._u)}
         if self._components == 3:
             ratio, rest = forms.F[2, 2], sum(forms.thicknesses.values())
-            wall = fem.Expression(ufl.as_vector([rest * ratio, ratio, 0.0]), _NODES[2])
+            wall = _compat.compile_expression(ufl.as_vector([rest * ratio, ratio, 0.0]), _NODES[2])
             with problem.at(state):
                 h = self._eval(wall)
             found |= {"thickness": h[..., 0], "thickness_ratio": h[..., 1]}
