@@ -41,6 +41,9 @@ _GOOD = 0.4
 _POCKET = 0.25
 """Of the size of an element: a pocket between the body and a tool that is not so deep is closed."""
 
+_OWN = "step", "counts", "until"
+"""What `Record.complete_step` notes by itself."""
+
 _WORN = "the mesh is worn"
 """Why a run ends whose mesh is to be made again."""
 
@@ -102,43 +105,64 @@ def check(scene: Any, remesh: Any, targets: Sequence[Target]) -> None:
             raise InputError(f"trace: remesh: target {target}: must be a travel or a pressure")
 
 
-def follow(path: Any, targets: Sequence[Target], remesh: Remesh, step: StepControl | None, tolerances: Tolerances,
-           at_fold: str | None, max_steps: int | None, progress: bool, begin: Callable[[Curve], State]) -> None:
-    """Follow a path to the last of the targets, with as many meshes as it takes.
+def follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[], None],
+           done: Callable[[], bool]) -> None:
+    """Follow a path with as many meshes as it takes.
+
+    Args:
+        part: goes on from the last state, on the mesh of that, as a run that was interrupted does.
+        done: True if nothing is left to do.
 
     Raises:
-        ConvergenceError: it was not reached.
+        ConvergenceError: its end was not reached.
     """
     record = path.record
     record.on_state.append(lambda state: _look(record, state, remesh))
-    start: State | None = begin(record.curve)
-    step = step or StepControl()
-    record.problem.limit.one_by_one()                        # a mesh that wears is looked at as each node arrives
-    while True:
-        record.ended, problem = "", record.problem
-        run = Run(record, [(t, t.bind(problem)) for t in targets if path.met(t) is None], step, at_fold)
-        before = len(record.segments[-1].states)
+    worn = bool(record.states) and _is_worn(record, record.last, remesh)
+    while not (worn and done()):
+        record.problem.limit.one_by_one()                    # a mesh that wears is looked at as each node arrives
+        if worn:
+            _take_up(path, remesh, tolerances)
+        record.ended = ""
         try:
-            run.follow(max_steps, progress, start)
+            part()
         except ConvergenceError as error:
-            low, high = _ratios(record, record.last) if record.segments[-1].states else (1.0, 1.0)
-            if len(record.segments[-1].states) < before + 3 or low > 0.9 and high < 1.1:
-                if not record.segments[-1].states and len(record.segments) > 1:
-                    record.segments.pop()                    # a mesh without a state: the path ends before it
+            low, high = _ratios(record, record.last) if record.states else (1.0, 1.0)
+            if len(record.segments[-1].states) < 3 or low > 0.9 and high < 1.1:
                 raise
             log.info("a new mesh, as no state was found: %s", error)
             record.ended = _WORN
-        if path.met(targets[-1]) is not None or record.ended != _WORN:
-            record.ended = "" if record.ended == _WORN else record.ended
+        worn = record.ended == _WORN
+        if not worn:
             return
-        step = replace(run.step, length=min(run.step.length, step.length * 4))
-        start = _best(path, remesh, tolerances)
+    record.ended = ""
 
 
-def _best(path: Any, remesh: Remesh, tolerances: Tolerances) -> State:
-    """The first state on a new mesh, which is the record's from now on: of sizes about the one that is asked for the
-    first whose elements keep their volumes well, or else the best."""
-    (low, high), record = remesh.volume_ratio, path.record
+def _take_up(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
+    """Make the mesh again, and take up the first state on it, from which a part goes on with the steps before."""
+    record, last = path.record, path.last
+    kept = next(s.stepping for s in reversed(record.segments[-1].states) if s.stepping)
+    first = record.segments[-1].states[0].stepping.get("step", kept["step"])
+    segment, start = _best(path, remesh, tolerances)
+    record.segments.append(segment)
+    try:
+        path._view(segment)
+        record.stage = last.stage
+        record.accept(start)
+    except BaseException:
+        record.segments.pop()                                # a mesh without a state: the path ends before it
+        raise
+    if segment.problem.has_kinks:
+        segment.curve.look_ahead(start)
+    record.counts.iterations += segment.curve.spent()
+    record.complete_step(StepControl(**kept["step"] | {"length": min(kept["step"]["length"], 4 * first["length"])}),
+                         Target(*kept["until"], None), **{k: v for k, v in kept.items() if k not in _OWN})
+
+
+def _best(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, State]:
+    """A new mesh and the first state on it: of sizes about the one that is asked for the first whose elements keep
+    their volumes well, or else the best."""
+    low, high = remesh.volume_ratio
     found, why = [], ""
     for share in _SHARES:
         try:
@@ -155,9 +179,7 @@ def _best(path: Any, remesh: Remesh, tolerances: Tolerances) -> State:
     if not found:
         raise ConvergenceError(f"no state was found on a new mesh, of {len(_SHARES)} that were tried: {why}")
     _, segment, start = max(found, key=lambda one: one[0])
-    record.segments.append(segment)
-    path._view(segment)
-    return start
+    return segment, start
 
 
 def _ratios(record: Record, state: State) -> tuple[float, float]:
@@ -167,7 +189,6 @@ def _ratios(record: Record, state: State) -> tuple[float, float]:
 
 def _look(record: Record, state: State, remesh: Remesh) -> None:
     """End the run where a mesh is worn; note of a remeshed state what it changed."""
-    low, high = _ratios(record, state)
     if state.kind == "remesh":
         before = record.segments[-2].states[-1].measures
         force = next((name for name in before if name.endswith("force")), None)
@@ -175,8 +196,12 @@ def _look(record: Record, state: State, remesh: Remesh) -> None:
             if name and before.get(name):
                 state.jump[what] = state.measures[name] / before[name] - 1
         log.info("a new mesh: %s", state.jump)
-    elif state.kind != "start" and _worn(low, high, remesh, state):
+    elif _is_worn(record, state, remesh):
         record.ended = _WORN
+
+
+def _is_worn(record: Record, state: State, remesh: Remesh) -> bool:
+    return state.kind not in ("start", "remesh") and _worn(*_ratios(record, state), remesh, state)
 
 
 def _worn(low: float, high: float, remesh: Remesh, state: State) -> bool:
@@ -187,7 +212,7 @@ def _worn(low: float, high: float, remesh: Remesh, state: State) -> bool:
 def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> tuple[Segment, State]:
     """A new mesh of the last state's body, elements `share` of the size, and the body in balance there."""
     record, old, state = path.record, path.problem, path.last
-    scene, driven = old.scene, old.setting.leading
+    scene = old.scene
     outline = Outline(old.forms)
     with old.at(state):
         edges = outline.edges()
@@ -207,15 +232,20 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
     made = scene.with_mesh(mesh, Preformed.of(old, state))
     problem = Problem(made)
     problem.limit.one_by_one()
-    control = state.control * old.scales[driven] / problem.scales[driven]
+    setting, control = old.setting.on_next_mesh(old.scales, problem.scales, state.control)
     curve = Curve(problem, tolerances)
     x = made.preformed.unknowns(problem)
+    problem.enter(setting, x, control)
+    if not setting.rate[-1]:
+        problem.clock = state.time
     for new, (_, before, _) in zip(problem.contacts, worn, strict=True):
         take_over(new, before, x[: problem.n_owned], control)
     volume = problem.forms.volume / old.forms.volume / (1 + state.measures["mass_error"]) - 1
-    x = _balanced(problem, curve, x, control)
+    x = x if setting.fading else _balanced(problem, curve, x, control)      # else what is left over fades, too
     start = curve.resume(x, control)
-    start.kind, start.jump = "remesh", {"volume": volume}
+    if start.slope * state.slope < 0:
+        start.direction, start.slope, start.orientation = -start.direction, -start.slope, -start.orientation
+    start.kind, start.jump, start.met = "remesh", {"volume": volume}, state.met
     record.counts.iterations += curve.spent()
     return Segment(problem, curve), start
 

@@ -76,7 +76,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
             `Path.pilot` is the first run; a first run that did not reach the target counts as far as it came.
         remesh: a `Remesh`: the mesh is made again, of the body as it is, where elements are crushed; states of kind
             "remesh", whose `jump` says by how much force, energy and volume changed. For blocks and sheets of one layer
-            of an elastic material, under tools; on one rank, without checkpoint.
+            of an elastic material, under tools; on one rank.
         stop_at: `unstable(modes=range(2, 9))`: end, as a result, once the body is unstable in one of these modes;
             `Path.ended` says which.
 
@@ -97,9 +97,8 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     instance("trace: scene", scene, Scene, "a formingx.Scene")
     if remesh is not None:
         remeshing.check(scene, remesh, [*through, until])
-        if start is not None or checkpoint is not None or pilot is not False or stop_at is not None:
-            raise InputError("trace: remesh: with start, checkpoint, pilot or stop_at: a run with several meshes begins"
-                             " at rest and is not written; leave them out")
+        if pilot is not False or stop_at is not None:
+            raise InputError("trace: remesh: with pilot or stop_at: is not known; leave them out")
     if pilot is not False:
         return _after_pilot("trace", pilot, start, resume, scene, checkpoint, lambda scene, checkpoint: trace(
             scene, until=until, through=through, step=step, tolerances=tolerances, max_steps=max_steps,
@@ -117,23 +116,27 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     known("trace: at_fold =", at_fold, AT_FOLD)
     scene.only_driven("trace")
     aims.check(scene, [until, *through])
-    if start is not None and (not isinstance(start, Path) or start.problem.scene is not scene or not start.states):
+    if start is not None and (not isinstance(start, Path) or start.scene is not scene or not start.states):
         raise InputError("trace: start: must be a path of this very scene: fx.load(folder, scene), or what trace gave"
                          " back")
     start = _from_checkpoint("trace", resume, checkpoint, scene, start)
     with _carried(checkpoint) as carried:
         problem = Problem(scene) if start is None else start.problem
         path = carried(_path(Curve(problem, tolerances or Tolerances()), start, record, beyond))
-        if remesh is not None:
-            remeshing.follow(path, [*through, until], remesh, step, tolerances or Tolerances(), at_fold, max_steps,
-                             progress, begin)
-            return path
-        targets = [(target, target.bind(problem)) for target in (*through, until)]
         _keep(path, checkpoint)
         if stop_at is not None:
             stop_at.watch(path)
-        run = Run(path.record, targets, step, at_fold)
-        run.follow(max_steps, progress, None if path.states else begin(path.record.curve), may_turn=True)
+
+        def part() -> None:
+            on_the_way = [target for target in through if len(path.segments) == 1 or path.met(target) is None]
+            targets = [(target, target.bind(path.problem)) for target in (*on_the_way, until)]
+            run = Run(path.record, targets, step, at_fold)
+            run.follow(max_steps, progress, None if path.states else begin(path.record.curve), may_turn=True)
+        if remesh is None:
+            part()
+        else:
+            remeshing.follow(path, remesh, tolerances or Tolerances(), part,
+                             lambda: path.last.met is not None and path.last.met[:2] == until[:2])
     return path
 
 
@@ -250,7 +253,7 @@ class Process:
         allowed = allowed_error("Process", accuracy)
         plans = [plan(self.scene, stage) for stage in stages]
         unsure = clearance.check(self.scene, plans)
-        if isinstance(start, Path) and start.problem.scene is not self.scene:
+        if isinstance(start, Path) and start.scene is not self.scene:
             raise InputError("Process: start: must be a path of this very scene: fx.load(folder, scene), or what run"
                              " gave back")
         start = _from_checkpoint("Process", resume, checkpoint, self.scene, start)

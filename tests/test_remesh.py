@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+from test_restart import same
 
 import formingx as fx
 
@@ -62,12 +63,11 @@ def test_a_mesh_without_a_state_ends_no_path(monkeypatch):
     """The path of a run that fails at once on its new mesh ends before that."""
     from formingx import remeshing
 
-    class Fails(remeshing.Run):
-        def follow(self, most, progress, start=None):
-            if start.kind == "remesh":
-                raise fx.ConvergenceError("nothing is found")
-            return super().follow(most, progress, start)
-    monkeypatch.setattr(remeshing, "Run", Fails)
+    def fails(record, state, remesh, look=remeshing._look):
+        if state.kind == "remesh":
+            raise fx.ConvergenceError("nothing is found")
+        look(record, state, remesh)
+    monkeypatch.setattr(remeshing, "_look", fails)
     with pytest.raises(fx.ConvergenceError) as caught:
         pressed("stick", 0.6, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)))
     assert len(caught.value.path.segments) == 1 and caught.value.path.last.measures["travel"] > 0
@@ -137,8 +137,24 @@ def test_what_is_not_carried_is_refused():
         fx.trace(block("none", Own), until=fx.travel(0.1), remesh=remesh)
     with pytest.raises(fx.InputError, match="must be a travel or a pressure"):
         fx.trace(block("none"), until=fx.pole_height(-0.2), remesh=remesh)
-    with pytest.raises(fx.InputError, match="checkpoint"):
-        fx.trace(block("none"), until=fx.travel(0.2), remesh=remesh, checkpoint="nowhere")
+    with pytest.raises(fx.InputError, match="pilot or stop_at"):
+        fx.trace(block("none"), until=fx.travel(0.2), remesh=remesh, pilot=True)
+
+
+def test_any_state_goes_on_to_the_same_path(tmp_path):
+    """From before the mesh is made again, from where it is worn, from the first state on the new one, and later."""
+    scene, remesh = block("stick"), fx.Remesh(size=0.2, corner=0.1, volume_ratio=(0.8, 1.2))
+    whole = fx.trace(scene, until=fx.travel(0.5), remesh=remesh, progress=False, checkpoint=tmp_path / "run")
+    same(fx.load(tmp_path / "run", scene), whole, rel=0)
+    made = [state.kind for state in whole.states].index("remesh")
+    for state in (made - 2, made - 1, made):
+        part = fx.load(tmp_path / "run", scene, state=state)
+        assert len(part.segments) == 1 + (state >= made)
+        same(fx.trace(scene, until=fx.travel(0.5), remesh=remesh, progress=False, start=part), whole)
+    again = fx.trace(scene, until=fx.travel(0.55), remesh=remesh, progress=False, checkpoint=tmp_path / "run",
+                     resume=True)
+    assert [s.control for s in again.states[:len(whole)]] == [s.control for s in whole.states]
+    assert again.last.measures["travel"] == pytest.approx(0.55)
 
 
 def test_a_deformation_is_carried_to_other_elements():

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 
@@ -16,6 +17,7 @@ class Setting:
         fading: the control takes away, from 0 to 1, the forces that what has changed left without balance.
         stage, piece: number of the stage in its process, and of the piece of it that has one control.
         changed: numbers of the things that leave or come in while it fades.
+        mesh: how often the mesh was made again before (`formingx.remeshing`).
     """
 
     base: list[float]
@@ -25,6 +27,7 @@ class Setting:
     stage: int = 0
     piece: int = 0
     changed: list[int] = field(default_factory=list)
+    mesh: int = 0
 
     @classmethod
     def first(cls, scene: Any) -> Setting:
@@ -58,3 +61,11 @@ class Setting:
     def standing(self, control: float) -> list[float]:
         """Amplitudes at a control, of the things and the time."""
         return [self.amplitude(i, control) for i in range(len(self.base))]
+
+    def on_next_mesh(self, before: Sequence[float], now: Sequence[float], control: float) -> tuple[Setting, float]:
+        """(the same setting, the same control) where the user's values over the amplitudes are `now`."""
+        ratio = [b / n for b, n in zip(before, now, strict=True)]
+        of_control = 1.0 if self.leading is None else ratio[self.leading]
+        return replace(self, base=[r * b for r, b in zip(ratio, self.base, strict=True)],
+                       rate=[r * b / of_control for r, b in zip(ratio, self.rate, strict=True)],
+                       mesh=self.mesh + 1), of_control * control

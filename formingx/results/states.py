@@ -65,6 +65,11 @@ class States:
         return self.record.counts
 
     @property
+    def scene(self) -> Any:
+        """The scene as it was given: on the mesh that the run began with."""
+        return self.segments[0].problem.scene
+
+    @property
     def problem(self) -> Any:
         """The (last) `Problem`, for further evaluation at a state, within its `at(state)`."""
         return self.record.problem

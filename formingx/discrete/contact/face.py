@@ -40,6 +40,7 @@ class FaceContact:
         law: at the points; thickness: of the body behind the face, length.
         increment: the `Increment` that goes on.
         present: it takes part in the stage.
+        shift: what distances count less by, shape (n,), length, or None.
         unbalanced: of the own forces, what the body does not bear at its nodes, shape (components,), stress length^2:
             round-off of positions, told by a neighbour of a run (`formingx.design`), which is too near it for more.
     """
@@ -54,7 +55,7 @@ class FaceContact:
         self._warm = solid.temperature.nodes(self.rule.nodes) if contact.friction_by_temperature else None
         self._penalty = np.ones(len(self.points))
         self.unbalanced = np.zeros(self.points.shape[1])
-        self._shift: np.ndarray | None = None
+        self.shift: np.ndarray | None = None
         self.law = self._law(1.0)
         self._scale = solid.length / (solid.stress * solid.volume) * self.rule.area
         self._way = solid.length * np.array(contact.moves or np.zeros(self.points.shape[1]))
@@ -69,7 +70,7 @@ class FaceContact:
 
     def shift_distances(self, by: np.ndarray) -> None:
         """Distances count less from now on, shape (n,), length: of a mesh that is made on the way."""
-        self._shift = by
+        self.shift = by
         self.law = self._law(self._penalty)
 
     def _temperatures(self) -> np.ndarray | None:
@@ -199,8 +200,8 @@ class FaceContact:
     def _law(self, penalty: np.ndarray | float) -> Any:
         law: Any = self.contact.law(self._penalty_at_rest * penalty, self.thickness, self.points,
                                     self._temperatures())
-        if self._shift is not None:
-            law.shift = self._shift
+        if self.shift is not None:
+            law.shift = self.shift
         return law
 
     def _harden(self, penalty: np.ndarray) -> None:

@@ -6,7 +6,8 @@
 
 A state is written beside its place and then renamed: what has its name is complete, whenever a run is killed. Fields
 are kept by the order of the cells in the script's mesh, which does not depend on the number of ranks; what histories
-remember, by node or by cell, likewise. Of format 4, which is read, too, fields are x.bp and direction.bp, written by
+remember, by node or by cell, likewise. The first state on a mesh that was made on the way holds that mesh, and what the
+body has brought to it ("mesh"). Of format 4, which is read, too, fields are x.bp and direction.bp, written by
 adios4dolfinx, and all else is in state.json.
 """
 
@@ -17,7 +18,7 @@ import os
 import shutil
 import zlib
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -27,17 +28,19 @@ from mpi4py import MPI
 
 from ... import _compat
 from ...discrete.problem import Problem
+from ...discrete.schedule import Setting
 from ...errors import InputError, instance, place
 from ...measures.targets import Target
 from ...scene.scene import Scene
 from ...scene.summary import summary
 from ...solve.arc_length import Curve
 from ...solve.newton import Iteration, Tolerances
-from ...solve.record import Counts, Record
+from ...solve.record import Counts, Record, Segment
 from ...solve.state import State
 from .. import files
 from .arrays import pack, unpack
 from .description import describe, differences
+from . import remade
 from .progress import progress
 
 FORMAT = 5
@@ -60,7 +63,7 @@ class Checkpoint:
     """
 
     def __init__(self, folder: Any, path: Any):
-        self.folder, self._path, self._problem = place("checkpoint", folder), path, path.problem
+        self.folder, self._path, self._comm = place("checkpoint", folder), path, path.problem.comm
         self._there = self._begin()                         # states in the folder
 
     def write(self) -> None:
@@ -70,15 +73,15 @@ class Checkpoint:
             OSError: it cannot be written, or the disk is full; all states before are kept.
         """
         path, first = self._path, self._there
-        with progress(self._problem.comm, f"{self.folder}: {len(path) - first} states") as done:
+        with progress(self._comm, f"{self.folder}: {len(path) - first} states") as done:
             for number in range(first, len(path)):
-                self._write_state(number, path.states[number], _profile(path, path.states[number]))
+                self._write_state(number, path.states[number])
                 self._there = number + 1
                 done((self._there - first) / (len(path) - first))
 
     def _begin(self) -> int:
         """Make the folder, or check what is in it; the number of states there."""
-        problem, folder, path = self._problem, self.folder, self._path
+        problem, folder, path = self._path.segments[0].problem, self.folder, self._path
         scene = describe(problem)
         about = {"formingx": FORMAT, "versions": files.versions(), "scene": scene, "summary": summary(problem.scene)}
 
@@ -106,13 +109,16 @@ class Checkpoint:
             return len(whole)
         return files.on_root(problem.comm, lambda: _plainly(begin, folder, "cannot be begun"))
 
-    def _write_state(self, number: int, state: State, profile: Any) -> None:
-        problem = self._problem
+    def _write_state(self, number: int, state: State) -> None:
+        segment = self._path._segment(state)
+        problem = segment.problem
         final = self.folder / _name(number)
         part = final.with_name(final.name + ".part")
         memory = [history.save(kept) for history, kept in zip(problem.histories, state.memory, strict=True)]
         space = problem.forms.space
-        data = _plain_state(state) | {"number": number, "memory": memory, "profile": profile}
+        data = _plain_state(state) | {"number": number, "memory": memory, "profile": _profile(self._path, state)}
+        if state is segment.states[0] and segment is not self._path.segments[0]:
+            data["mesh"] = remade.save(problem)
         for name in _FIELDS:
             data |= {name: _by_cell(space, getattr(state, name)), f"{name}_tail": _tail(space, getattr(state, name))}
 
@@ -160,11 +166,14 @@ def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
         return found[:settled[-1] + 1] if state is None and settled else found
     found = files.on_root(problem.comm, look)
     record = Record(problem, Curve(problem, Tolerances()))
-    states = [_read_state(folder / _name(k), data, problem) for k, data in enumerate(found)]
-    record.segments[-1].states += states
-    kept = next((s.stepping for s in reversed(states) if s.stepping), None)
+    for k, data in enumerate(found):
+        if "mesh" in data:
+            problem = remade.load(scene, data["mesh"])
+            record.segments.append(Segment(problem, Curve(problem, Tolerances())))
+        record.segments[-1].states.append(_read_state(folder / _name(k), data, problem))
+    kept = next((s.stepping for s in reversed(record.states) if s.stepping), None)
     record.counts = Counts(**kept["counts"]) if kept else Counts()
-    record.counts.steps = sum(s.kind != "start" for s in states)
+    record.counts.steps = sum(s.kind != "start" for s in record.states)
     problem.stand(record.last)
     return record
 
@@ -238,7 +247,8 @@ def _read_state(folder: FilePath, data: dict, problem: Any) -> State:
     for name in _FIELDS:
         own = _of_cells(space, data[name]) if name in data else _of_file(space, folder / f"{name}.bp", name)
         arrays[name] = np.concatenate([own, data[f"{name}_tail"] if last else []])
-    met = data.pop("met")
+    met, setting = data.pop("met"), data["setting"]
+    data["setting"] = setting and asdict(Setting(**setting))             # older files do without some of it
     return State(**arrays, met=Target(met[0], met[1], None, met[2]) if met else None,
                  history=[Iteration(*row) for row in data.pop("history")],
                  memory=_read_memory(problem, data.pop("memory")),

@@ -1,0 +1,45 @@
+"""In a checkpoint: a mesh that a run has made on the way, and what its body has brought to it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...discrete.preformed import Preformed
+from ...discrete.problem import Problem
+from ...errors import InputError
+from ...mesh.grid import Grid, gathered, to_mesh
+from ...scene.scene import Scene
+from .description import describe, differences
+
+
+def save(problem: Any) -> dict[str, Any]:
+    """All that makes the problem once more, from its scene, on one rank: in the order that its mesh was made in."""
+    mesh = problem.scene.mesh
+    grid, nodes = gathered(mesh), np.asarray(mesh.domain.geometry.input_global_indices, dtype=np.int64)
+    number = mesh.domain.topology.original_cell_index
+    points = np.empty_like(grid.points)
+    points[nodes] = grid.points
+    layers = {name: nodes[rows[np.argsort(number[mesh.cells.find(mesh.layers[name])])]]
+              for name, rows in grid.layers.items()}
+    return {"points": points, "layers": layers, "boundaries": {name: nodes[r] for name, r in grid.boundaries.items()},
+            "preformed": problem.scene.preformed._asdict(), "shifts": [c.shift for c in problem.contacts],
+            "scene": describe(problem)["mesh"]}
+
+
+def load(scene: Scene, data: dict[str, Any]) -> Problem:
+    """The problem of the scene on the mesh that `save` gave; an InputError if it is another one."""
+    if scene.mesh.comm.size > 1:
+        raise InputError("load: the run has made its mesh again, which is known on one rank only: load it on one")
+    points = np.array(data["points"])
+    grid = Grid(points, np.arange(1, len(points) + 1), {k: np.array(v) for k, v in data["layers"].items()},
+                {k: np.array(v) for k, v in data["boundaries"].items()})
+    mesh = to_mesh(lambda: grid, scene.mesh.comm, "checkpoint: its mesh")
+    made = Problem(scene.with_mesh(mesh, Preformed(**data["preformed"])))
+    for contact, shift in zip(made.contacts, data["shifts"], strict=True):
+        if shift is not None:
+            contact.shift_distances(np.array(shift))
+    if found := list(differences(data["scene"], describe(made)["mesh"])):
+        raise InputError(f"checkpoint: its mesh was made in another order here: {found[0]}")
+    return made
