@@ -38,9 +38,9 @@ from ...solve.newton import Iteration, Tolerances
 from ...solve.record import Counts, Record, Segment
 from ...solve.state import State
 from .. import files
+from . import remade
 from .arrays import pack, unpack
 from .description import describe, differences
-from . import remade
 from .progress import progress
 
 FORMAT = 5
