@@ -155,8 +155,9 @@ def _take_up(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
     if segment.problem.has_kinks:
         segment.curve.look_ahead(start)
     record.counts.iterations += segment.curve.spent()
+    name, value = kept["until"]
     record.complete_step(StepControl(**kept["step"] | {"length": min(kept["step"]["length"], 4 * first["length"])}),
-                         Target(*kept["until"], None), **{k: v for k, v in kept.items() if k not in _OWN})
+                         Target(name, value, None), **{k: v for k, v in kept.items() if k not in _OWN})
 
 
 def _best(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, State]:
