@@ -52,16 +52,15 @@ class _Numbered(MultiFunction):
 
 
 def _looked_up_once(compiled: Any) -> Any:
-    """`compiled()`; on a single rank, what is asked for again is not looked for in the compiler's folder: that is slow
-    to list. Ranks compile together, or none does."""
+    """`compiled()`; on a single rank, what is asked for again is not looked for in the compiler's folders, of which
+    there are 16: it lists a whole one. Ranks compile together, or none does."""
     compiler = jit.ffcx_jit
 
-    def once(comm: Any, what: Any, **options: Any) -> Any:
-        if comm.size > 1:
-            return compiler(comm, what, **options)
-        key = what.signature() if isinstance(what, ufl.Form) else compute_signature([what], "")
-        if key not in _compiled:
-            _compiled[key] = compiler(comm, what, **options)
+    def once(comm: Any, what: Any, jit_options: dict[str, Any], **more: Any) -> Any:
+        key = compute_signature([what], "")
+        if key not in _compiled or comm.size > 1:
+            folder = jit.get_options(jit_options)["cache_dir"] / key[0]
+            _compiled[key] = compiler(comm, what, jit_options={**jit_options, "cache_dir": folder}, **more)
         return _compiled[key]
     jit.ffcx_jit = once
     try:

@@ -49,7 +49,7 @@ class MaterialHistory:
             self._set(name, self._cells, np.asarray(rest, dtype=float).ravel())
         self._terms.start.value = 0.0
 
-    def advance(self, x: np.ndarray, control: float, start: np.ndarray | None = None) -> None:
+    def advance(self, x: np.ndarray, control: float, start: Any = None) -> None:
         """See `History`."""
         self._now = None
         for name, values in self._after(self._cells).items():

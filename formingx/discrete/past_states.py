@@ -99,7 +99,7 @@ class PastStates:
             array[rows] = values.T
         self._seen = C, step
 
-    def advance(self, x: np.ndarray, control: float, start: np.ndarray | None = None) -> None:
+    def advance(self, x: np.ndarray, control: float, start: Any = None) -> None:
         """See `History`."""
         (C, step, _), memory = self._now(), self._memory
         states, least = [*memory.states, Past(memory.states[-1].felt + step, C)], memory.least

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
-from dolfinx import fem
 
+from .. import _compat
 from ..errors import InputError, finite, known, values
 from ..mesh.nodes import axes
 from ..values.table import Table
@@ -130,7 +130,7 @@ class OfMesh(Varying):
             raise InputError(f"the constant {self!r} must be a scalar of the scene's own mesh")
         if not len(sample.cells):
             return np.zeros(0)
-        return fem.Expression(self._expression, sample.places).eval(sample.domain, sample.cells).ravel()
+        return _compat.compile_expression(self._expression, sample.places).eval(sample.domain, sample.cells).ravel()
 
     def expression(self, fields):
         return fields.of_mesh(self._expression)
