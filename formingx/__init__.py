@@ -1,4 +1,14 @@
-"""formingx: how polymers are formed, simulated with finite elements on FEniCSx."""
+"""formingx: how polymers are formed, simulated with finite elements on FEniCSx.
+
+The examples of all classes and functions begin with these lines (mm and MPa):
+
+>>> import formingx as fx
+>>> import numpy as np
+>>> sheet = fx.mesh.disc(radius=10.0, thickness=0.3, elements=(8, 1))
+>>> scene = fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=0.4), loads=[fx.Pressure("bottom")],
+...                  supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+>>> path = fx.trace(scene, until=fx.pole_height(12.0), progress=False)
+"""
 
 import sys as _sys
 

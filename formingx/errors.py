@@ -16,6 +16,10 @@ class InputError(ValueError):
 
     Attributes:
         path: of a process that refuses a stage when it comes to it, what was computed before; else None.
+
+    >>> fx.NeoHookean(c10=-1.0)
+    Traceback (most recent call last):
+    formingx.errors.InputError: NeoHookean(c10=-1.0) has no stiffness: its shear modulus at rest is -2, must be positive
     """
 
     path: Any = None
@@ -27,6 +31,12 @@ class ConvergenceError(RuntimeError):
     Attributes:
         path: what was computed up to there (`formingx.Path`), its last state converged; or None.
         diagnosis: why, in numbers and words, and as a picture (`formingx.solve.diagnose.Diagnosis`); or None.
+
+    >>> try:
+    ...     fx.trace(scene, until=fx.pole_height(12.0), max_steps=3, progress=False)
+    ... except fx.ConvergenceError as error:
+    ...     len(error.path.states)
+    4
     """
 
     def __init__(self, message: str, path: Any = None, diagnosis: Any = None):

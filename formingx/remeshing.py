@@ -60,6 +60,9 @@ class Remesh:
 
     Raises:
         InputError: a size that is not positive, a range that does not hold 1.
+
+    >>> fx.Remesh(size=0.5, corner=0.1)
+    Remesh(size=0.5, corner=0.1, volume_ratio=(0.6, 1.5))
     """
 
     size: float

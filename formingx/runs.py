@@ -87,9 +87,6 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
         ConvergenceError: the target was not reached. It carries the path so far and says what to try.
         OSError: the checkpoint cannot be written; the states in it are kept.
 
-    >>> import formingx as fx
-    >>> scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(8, 1)), loads=[fx.Pressure("bottom")],
-    ...                  materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
     >>> path = fx.trace(scene, until=fx.pole_height(12.0), progress=False)
     >>> len(path.limit_points), round(float(path["pole_height"][-1]), 6)           # through the pressure maximum
     (1, 12.0)
@@ -158,9 +155,6 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
         InputError: nothing is driven, or an argument is not allowed.
         ConvergenceError: an increment did not converge; it carries the path so far.
 
-    >>> import formingx as fx
-    >>> scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(8, 1)), loads=[fx.Pressure("bottom")],
-    ...                  materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
     >>> path = fx.solve(scene, to=0.02)
     >>> round(float(path["pressure"][-1]), 6)
     0.02
@@ -197,7 +191,6 @@ class Process:
     Args:
         scene: with any number of things that can be driven.
 
-    >>> import formingx as fx
     >>> air, plug = fx.Pressure("bottom"), fx.Contact("top", fx.tools.plane(2.0), "none", moves=(0, -1))
     >>> scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(8, 1)), loads=[air], contacts=[plug],
     ...                  materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
@@ -297,6 +290,11 @@ def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
     Raises:
         InputError: there is no checkpoint, it is damaged, or it is of another mesh or scene; the message says what
             differs.
+
+    >>> path.save("run")
+    >>> again = fx.load("run", scene)
+    >>> len(again.states) == len(path.states)
+    True
     """
     return Path(read(folder, scene, state))
 

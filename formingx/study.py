@@ -280,6 +280,15 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
 
     Raises:
         InputError: an argument that is not allowed; a folder of another study. A run that fails raises nothing.
+
+    >>> from concurrent.futures import ThreadPoolExecutor
+    >>> def build(c10):
+    ...     stiff = fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=c10), loads=scene.loads, supports=scene.supports)
+    ...     return fx.trace(stiff, until=fx.pole_height(3.0), progress=False)
+    >>> found = fx.study(build, {"c10": [0.2, 0.4]}, {"p": "pressure"}, goal={"p": "min"}, progress=False,
+    ...                  executor=ThreadPoolExecutor(1))
+    >>> found.best.values
+    {'c10': 0.2}
     """
     from tqdm import tqdm
     cases = design(variables)

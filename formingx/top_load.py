@@ -124,6 +124,12 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
     Raises:
         InputError: an argument that is not allowed; the foot does not come to the floor.
         ConvergenceError: not even the first state was found.
+
+    >>> tube = fx.mesh.disc(radius=1.0, inner_radius=0.8, thickness=4.0, elements=(1, 8))
+    >>> found = fx.top_load(tube, material=fx.NeoHookean(c10=1.0), travel=0.3, neck="top", foot="bottom", modes=[1],
+    ...                     step=fx.StepControl(largest=0.2))
+    >>> round(found.largest_force, 2)
+    0.21
     """
     instance("top_load: body", body, Mesh, "a mesh, such as path.formed()")
     known("top_load: neck", neck, body.boundaries)

@@ -31,7 +31,6 @@ class Units:
     Raises:
         InputError: a unit that is not known.
 
-    >>> import formingx as fx
     >>> units = fx.Units(length="mm", stress="MPa")
     >>> units.force
     'N'

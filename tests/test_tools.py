@@ -255,3 +255,21 @@ def test_bounds():
     assert cup.bounds == pytest.approx(np.array([[0.0, 1.5], [4.0, 2.5]]))
     ball = fx.tools.sphere(radius=1.0, z=-0.5, r=3.0)
     assert ball.bounds == pytest.approx(np.array([[2.0, -0.5], [4.0, 1.5]]), abs=1e-2)
+
+
+IN_SPACE = {
+    "revolved": tools.revolved(SHAPES["male"]), "extruded": tools.extruded(SHAPES["cup"], along="x"),
+    "box": tools.box(half=(6.0, 4.0), depth=2.0, corner=1.5, fillet=0.5, lip=0.2, draft=3).moved(x=1.0, z=-2.0),
+}
+
+
+@pytest.mark.parametrize("name", [*SHAPES, *IN_SPACE])
+def test_surface(name):
+    """Points on the tool, and pieces between them that cut its corners by no more than their sagitta; its bounds."""
+    tool = (SHAPES | IN_SPACE)[name]
+    points, pieces = tool.surface()
+    size = np.ptp(points, axis=0).max()
+    assert points.shape[1] == tool.components == pieces.shape[1] and np.unique(pieces).tolist() == [*range(len(points))]
+    assert np.abs(tool.signed_distance(points)).max() < 1e-9 * size
+    assert np.abs(tool.signed_distance(points[pieces].mean(1))).max() < 0.02 * size
+    np.testing.assert_array_equal(tool.bounds, [points.min(0), points.max(0)])

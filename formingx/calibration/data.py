@@ -19,7 +19,6 @@ _TRELOAR_1944 = {
 def treloar1944() -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Treloar's (1944) vulcanised rubber: {test: (stretch, nominal stress in MPa)}, digitised from his curves.
 
-    >>> import formingx as fx
     >>> sorted(fx.treloar1944())
     ['equibiaxial', 'pure_shear', 'uniaxial']
     """

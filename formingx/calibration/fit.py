@@ -91,7 +91,6 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
             all at stretch 1, stresses or stretches that are no test's, or beyond every
             admissible limit.
 
-    >>> import formingx as fx
     >>> stretch = np.array([1.2, 1.6, 2.0])
     >>> found = fx.fit(fx.MooneyRivlin, {"uniaxial": (stretch, 2 * (stretch - stretch**-2) * (0.2 + 0.05 / stretch))})
     >>> {name: round(value, 6) for name, value in found.material.parameters.items()}

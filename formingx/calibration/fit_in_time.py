@@ -33,6 +33,10 @@ class TimedTest(NamedTuple):
         stretches: shape (n,).
         stress: nominal, shape (n,); not a number where it was not measured.
         between: what grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
+
+    >>> held = fx.TimedTest("uniaxial", times=[0.0, 1.0, 5.0], stretches=[1.0, 2.0, 2.0], stress=[0.0, 1.2, 0.9])
+    >>> held.between                                                        # 0 and 1 it grew at a constant rate
+    'stretch'
     """
 
     mode: str

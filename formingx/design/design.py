@@ -55,7 +55,6 @@ class Design:
     Raises:
         InputError: an argument that is not allowed.
 
-    >>> import formingx as fx
     >>> def build(thickness):
     ...     return fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=thickness, elements=(8, 1)),
     ...                     materials=fx.NeoHookean(c10=0.4), loads=[fx.Pressure("bottom")],

@@ -66,7 +66,6 @@ def along(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, sm
     Raises:
         InputError: an argument that is not allowed.
 
-    >>> import formingx as fx
     >>> fx.along(3, start=2.0, low=1.0).start.tolist()
     [2.0, 2.0, 2.0]
     """

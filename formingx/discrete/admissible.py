@@ -54,7 +54,7 @@ class Admissible:
         self._n = len(inside)
         points = np.concatenate([inside, beside, np.array(_MIDDLES[cell], dtype=float)])
         n = len(own := own_cells(domain))
-        self.dofs = [forms.space.sub(0).sub(i).dofmap.list[:n] for i in (0, 1)]
+        self.dofs = [forms.space.sub(0).sub(i).dofmap.list[:n] for i in range(scene.kinematics.components)]
         shapes: Any = forms.displacement_element.tabulate(1, points)                    # (1 + dim, points, dofs)
         geometry = basix.ufl.element("Lagrange", domain.basix_cell(), _compat.coordinate_map(domain).degree)
         map_shapes: Any = geometry.tabulate(1, points)
@@ -127,7 +127,7 @@ class Admissible:
         u = np.stack([w[dofs] for dofs in self.dofs], -1) * size                  # (cells, dofs, 2)
         found, along = {}, np.ones(())
         if self._solid:
-            by_R, by_Z = np.moveaxis((self._gradients @ u).reshape(*self._X.shape, 2), 2, 0)
+            by_R, by_Z = np.moveaxis((self._gradients @ u).reshape(*self._X.shape, len(self.dofs)), 2, 0)
             along = 1 + by_R[..., 0]
             found["in-plane determinant"] = along * (1 + by_Z[..., 1]) - by_Z[..., 0] * by_R[..., 1]
         if self._has_hoop:

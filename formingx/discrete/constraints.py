@@ -100,7 +100,7 @@ class Constraints:
             return fem.locate_dofs_topological(sub, forms.mesh.facets.dim, forms.mesh.facets_of(item.on))
         near, point = 1e-8 * forms.length, forms.nearest(np.array([item.point])).T
         found = fem.locate_dofs_geometrical((sub, sub.collapse()[0]),
-                                            lambda X: np.hypot(*(X[:2] - point)) < near)[0]
+                                            lambda X: np.hypot(*(X[: len(point)] - point)) < near)[0]
         if forms.comm.allreduce(len(found), MPI.MAX) == 0:
             raise InputError(f"{support!r}: the mesh has no node at this place")
         return found

@@ -42,7 +42,7 @@ def body(problem: Any, x: Any, control: float) -> Body | None:
     problem.set_state(x, control)
     gauss = basix.make_quadrature(basix.CellType.triangle, problem.scene.quadrature_degree)[0]
     nodes = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
-    where = ufl.as_vector([forms.X[0], forms.X[1]])
+    where = forms.X
     F = ufl.as_vector([forms.F[i] for i in ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))])
     F, X, points = (in_own_cells(domain, of, np.asarray(gauss)) for of in (F, where, where + forms.u))
     rest, moved = (in_own_cells(domain, of, nodes) for of in (where, where + forms.u))

@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from .. import figures
 from ..errors import InputError
+from ..mesh.nodes import COORDINATES, of_space
 from ..mesh.triangles import Place, place
 from .elements import Body, body
 from .past_states import PastStates
@@ -71,7 +72,7 @@ class Examination:
                 melt = getattr(past.material, "base", past.material)
                 most, (least, point) = melt.rupture_stretch("equibiaxial"), past.thinnest()
                 if (drawn := least**-0.5) > max(most, self.facts.get("drawn", (0.0,))[0]):
-                    where = place(problem.scene.mesh, point[:2])
+                    where = place(problem.scene.mesh, point[:COORDINATES])
                     self.facts |= {"drawn": (drawn, most), "ruptures": where}
 
     def _take_attempt(self, x: Any, attempt: Any) -> None:
@@ -119,7 +120,7 @@ def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], 
     out.destroy()
     vectors, numbers = space.sub(0).collapse()
     dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, problem.forms.domain.geometry.dim)
-    points = vectors.tabulate_dof_coordinates()[: len(dofs), :2]
+    points = of_space(vectors)[: len(dofs)]
     own = dofs[:, 0] < n
     dofs, points = dofs[own], points[own]
     is_u = np.zeros(n, dtype=bool)
@@ -141,7 +142,7 @@ def _moved(problem: Any, state: Any, point: np.ndarray) -> np.ndarray:
     """Where a node at a reference point is in a state, shape (2,)."""
     vectors, numbers = problem.forms.space.sub(0).collapse()
     dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, problem.forms.domain.geometry.dim)
-    points = vectors.tabulate_dof_coordinates()[: len(dofs), :2]
+    points = of_space(vectors)[: len(dofs)]
     own = dofs[:, 0] < problem.forms.space.dofmap.index_map.size_local
     away = np.hypot(*(points[own] - point).T)
     at = int(np.argmin(away)) if len(away) else 0
@@ -172,7 +173,7 @@ def _flips(problem: Any, attempt: Any) -> int | None:
 
 def _draw(shape: Body, marks: list, tools: list, title: str, file: Any) -> None:
     from matplotlib.collections import PolyCollection
-    size = np.ptp(shape.outline.reshape(-1, 2), axis=0)
+    size = np.ptp(shape.outline, axis=(0, 1))
     wide = size[0] > 4 * size[1]
     height = float(np.clip(7.0 * size[1] / size[0], 2.0, 7.0)) + 1.2
     figure, axes = figures.figure(width=8.0, height=height)

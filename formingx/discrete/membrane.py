@@ -101,7 +101,7 @@ class MidSurface(Formulation):
 
     def set_stiff(self) -> None:
         """A small stretch in all directions."""
-        self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X[:2])
+        self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X[:self.scene.kinematics.components])
 
     def _make_mesh(self) -> Mesh:
         """The line halfway between the two faces, with a node wherever the lower face has one."""

@@ -71,9 +71,9 @@ class Outline:
     def pieces(self, edges: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
         """(points, shape (n, 2), length; straight pieces between them, shape (parts m, 2)) along `edges()`."""
         m, corners = len(edges), int(self.ends.max()) + 1
-        points = np.empty((corners + m * (parts - 1), 2))
+        points = np.empty((corners + m * (parts - 1), edges.shape[-1]))
         points[self.ends] = edges[:, :2]
-        points[corners:] = along(edges, parts)[:, 1:-1].reshape(-1, 2)
+        points[corners:] = along(edges, parts)[:, 1:-1].reshape(-1, edges.shape[-1])
         inner = corners + np.arange(m * (parts - 1)).reshape(m, parts - 1)
         chain = np.column_stack([self.ends[:, 0], inner, self.ends[:, 1]])
         return points, np.stack([chain[:, :-1], chain[:, 1:]], -1).reshape(-1, 2)

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from .. import _compat
 from ..errors import InputError
 from ..mesh.locate import locate
-from ..mesh.nodes import of_cells
+from ..mesh.nodes import of_cells, own_cells
 from ..ranks import gathered
 
 
@@ -121,8 +121,7 @@ class MidSurfaceProbe(Probe):
     def _take_ends(self, element: Any, geometry: Any) -> None:
         """Of points where two elements meet, whose slopes differ, the mean of both counts."""
         forms, domain = self._problem.forms, self._problem.forms.domain
-        owned = domain.topology.index_map(1).size_local
-        nodes = domain.geometry.x[_compat.cell_nodes(domain)[:owned], :2]
+        nodes = of_cells(domain, own_cells(domain))
         R = forms.nearest(self.points)[:, 0]
         at, cells, end = np.nonzero(np.abs(R[:, None, None] - nodes[None, :, :2, 0]) < 1e-9 * forms.length)
         meet = self._problem.comm.allreduce(np.bincount(at, minlength=len(R))) == 2
@@ -137,7 +136,7 @@ class MidSurfaceProbe(Probe):
 
     def _at_ends(self, values: np.ndarray) -> np.ndarray:
         """Means of values on both sides of points where elements meet, of all points, shape (n, 2), all ranks."""
-        total = np.zeros((len(self.points), 2))
+        total = np.zeros((len(self.points), self._components))
         np.add.at(total, self._ends[0], values / 2)
         return self._problem.comm.allreduce(total, MPI.SUM)
 

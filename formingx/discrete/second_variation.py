@@ -201,7 +201,8 @@ class SecondVariation:
         self._own, size = index_map.size_local, index_map.size_local + index_map.num_ghosts
         ours = old.dofmap.index_map
         self._to_mode = np.zeros(ours.size_local + ours.num_ghosts, dtype=np.int32)
-        pairs = [(old.sub(0).sub(i), new.sub(0).sub(i)) for i in range(2)]
+        components = range(forms.scene.kinematics.components)
+        pairs = [(old.sub(0).sub(i), new.sub(0).sub(i)) for i in components]
         pairs += [(old.sub(i), new.sub(i)) for i in range(1, old.num_sub_spaces)]
         for a, b in pairs:
             self._to_mode[np.asarray(a.dofmap.list)] = np.asarray(b.dofmap.list)
@@ -210,11 +211,12 @@ class SecondVariation:
         all_W, all_V = (found.ravel()[first] for found in lists[1:])
         self._V_of = np.zeros(size, dtype=np.int32)
         self._V_of[all_U] = all_V
-        old_lists = [np.asarray(old.sub(0).sub(i).dofmap.list).ravel()[first] for i in range(2)]
+        old_lists = [np.asarray(old.sub(0).sub(i).dofmap.list).ravel()[first] for i in components]
         bubble = (first % lists[0].shape[1]) >= 6
         axis, numbers = new.sub(0).sub(0).collapse()
-        X, place = np.zeros((size, 2)), fem.Function(axis)              # unknowns of bubbles are no values at a point
-        for i in range(2):
+        X = np.zeros((size, len(components)))                           # unknowns of bubbles are no values at a point
+        place = fem.Function(axis)
+        for i in components:
             place.interpolate(lambda X, i=i: X[i])
             X[np.asarray(numbers), i] = place.x.array
         on_axis = self._axisymmetric & (X[all_U, 0] < 1e-9 * forms.length) & ~bubble

@@ -48,6 +48,9 @@ def doctor(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Seque
 
     Raises:
         InputError: `scene` is not a Scene or a Path, a target not a target, a stage not a stage or of another scene.
+
+    >>> print(fx.doctor(scene, targets=[fx.pole_height(12.0)]))
+    nothing was found that stands against this scene
     """
     if isinstance(scene, Path):
         of_run = list(_run(scene))

@@ -221,7 +221,7 @@ def _closing(body: Body) -> Found:
         if not len(open_at) or len(open_at) == len(points):  # closed; or a tool beside what is blown up
             continue
         tool = pushed.tools[0].tool
-        wall = float((tool.outline() - open_at.mean(0)).dot(_across(pushed, open_at)).max())
+        wall = float((tool.surface()[0] - open_at.mean(0)).dot(_across(pushed, open_at)).max())
         aims = [aim for aim in body.pressures() if peak is not None and abs(aim[1]) > _BEYOND * peak.pressure]
         deep = not body.goals and wall > _DEEP * np.ptp(points, axis=0).max()
         if aims or deep:
@@ -244,7 +244,7 @@ def _mould_sizes(body: Body) -> Found:
     for contact in body.scene.contacts:
         if contact.tool.components == 3:
             continue
-        face, outline = body.scene.mesh.nodes_of(contact.on), contact.tool.outline()
+        face, outline = body.scene.mesh.nodes_of(contact.on), contact.tool.surface()[0]
         wide, reach = float(np.abs(face[:, 0]).max()), np.abs(outline[:, 0])
         if contact.moves is not None or np.ptp(face[:, 1]) > 0.1 * wide:
             continue

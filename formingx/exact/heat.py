@@ -34,6 +34,7 @@ def series(slab: Slab, start: float, h: tuple[float, float], air: tuple[float, f
 
     The first root must belong to a decaying mode: at least one h above 0.
 
+    >>> from formingx.exact.heat import Slab, series
     >>> sheet = Slab(thickness=2.0, conductivity=0.2, capacity=2.0)
     >>> series(sheet, 180.0, (0.0, 0.01), (0.0, 20.0), [0.0, 2.0], [10.0]).round(3).tolist()
     [[178.436, 171.328]]

@@ -51,6 +51,7 @@ def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
     Raises:
         InputError: a size or constant that is not allowed; no pressure leads from rest to this stretch.
 
+    >>> from formingx.exact.inflation import membrane_inflation
     >>> state = membrane_inflation(2.0, radius=1.25, thickness=0.082, c10=2.0)
     >>> round(float(state.pressure), 4), round(float(state.height), 4)
     (0.4906, 1.3538)
@@ -143,6 +144,7 @@ def membrane_limit_point(*, radius: float, thickness: float, c10: float,
                          c01: float = 0.0) -> tuple[float, MembraneState] | None:
     """(pole stretch, state) of the first pressure maximum below a pole stretch of 12, or None if there is none.
 
+    >>> from formingx.exact.inflation import membrane_limit_point
     >>> stretch, state = membrane_limit_point(radius=1.25, thickness=0.082, c10=2.0)
     >>> round(stretch, 3), round(float(state.pressure), 4)
     (2.196, 0.4931)
@@ -216,6 +218,7 @@ def thick_wall(kind: str, inner_stretch: float, *, inner_radius: float, outer_ra
     Raises:
         InputError: a size or constant that is not allowed.
 
+    >>> from formingx.exact.inflation import thick_wall
     >>> state = thick_wall("sphere", 2.0, inner_radius=1.0, outer_radius=2.0, c10=1.0)
     >>> round(float(state.pressure), 4)
     1.6139

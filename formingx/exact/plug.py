@@ -55,6 +55,7 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
         InputError: a size or constant that is not allowed; a travel at which the membrane would touch the plug's side,
             or that a frictionless plug does not come to.
 
+    >>> from formingx.exact.plug import membrane_under_plug
     >>> state = membrane_under_plug(0.5, radius=1.0, plug_radius=0.4, thickness=0.02, c10=1.0)
     >>> round(float(state.force), 5)
     0.08978

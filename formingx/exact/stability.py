@@ -37,6 +37,7 @@ def cylinder(nu: float, n: int) -> float:
     With L = lambda^-1 (d2/dr2 + ...) + lambda^2 d2/dz2: L v = grad q/mu, so v is a gradient (of I_n(k r)), or L v = 0
     (I_n(k lambda^(3/2) r): curls of two potentials along the axis).
 
+    >>> from formingx.exact.stability import cylinder
     >>> round(cylinder(1.0, 1), 4)
     0.7517
     """
@@ -90,6 +91,7 @@ def inflated_tube(ratio: float, kB: float, n: int) -> float:
 def clamped_plate(n: int) -> float:
     """N a^2/D at which a thin clamped disc under equal radial compression buckles in n waves round it.
 
+    >>> from formingx.exact.stability import clamped_plate
     >>> round(clamped_plate(0), 2)
     14.68
     """

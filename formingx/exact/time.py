@@ -39,6 +39,7 @@ class Body:
         weight: called with s, gives c and dc/ds, each of shape (n,).
         time, s: where it is. w: elastic strains, shape (n, branches, 3).
 
+    >>> from formingx.exact.time import block
     >>> bar = block("uniaxial", c10=0.5, branches=[(1.0, 2.0)])
     >>> bar.jump(0.2)
     >>> bar.hold([1.0, 10.0]).round(4).tolist()

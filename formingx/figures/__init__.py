@@ -43,7 +43,7 @@ def tools(axes: Any, placed: Any, low: Any, high: Any, mirror: bool = False) -> 
     r, z = (np.linspace(box[0, k], box[1, k], n[k]) for k in (0, 1))
     points = np.stack(np.meshgrid(np.abs(r) if mirror else r, z), axis=-1)
     for tool, shift in placed:
-        depth = tool.signed_distance(points.reshape(-1, 2) - shift).reshape(points.shape[:2])
+        depth = tool.signed_distance(points.reshape(-1, points.shape[-1]) - shift).reshape(points.shape[:2])
         if depth.max() <= 0 or depth.min() >= 0:
             continue
         axes.contourf(r, z, depth, levels=[0, np.inf], colors=["0.88"], zorder=0.5)

@@ -24,6 +24,9 @@ class ThermalProperties:
 
     Raises:
         InputError: a number that is not above 0.
+
+    >>> fx.ThermalProperties(conductivity=0.2e-3, density=1e-3, heat_capacity=2.0)      # W/(mm K), g/mm3, J/(g K)
+    ThermalProperties(conductivity=0.0002, density=0.001, heat_capacity=2.0)
     """
 
     def __init__(self, *, conductivity: float, density: float, heat_capacity: float):
@@ -79,6 +82,9 @@ class Convection(_Boundary):
     Args:
         on: name of the boundary.
         h: heat transfer coefficient, heat per time, area and degree; air: temperature; numbers or tables over R.
+
+    >>> fx.Convection("top", h=2e-5, air=fx.table({0.0: 25.0, 10.0: 20.0}))              # W/(mm2 K); by R
+    Convection('top', h=2e-05, air=table({0: 25, 10: 20}))
     """
 
     temperatures = ("air",)
@@ -99,6 +105,9 @@ class Radiation(_Boundary):
         on: name of the boundary.
         emissivity, view_factor: from 0 to 1; heater: temperature; numbers or tables over R.
         stefan_boltzmann: sigma in the units of the run: 5.670374419e-8 in W/(m2 K4), 5.670374419e-14 in W/(mm2 K4).
+
+    >>> fx.Radiation("top", emissivity=0.9, heater=600.0, stefan_boltzmann=5.67e-14)      # W/(mm2 K4)
+    Radiation('top', emissivity=0.9, heater=600.0, view_factor=1.0, stefan_boltzmann=5.67e-14)
     """
 
     temperatures = ("heater",)
@@ -123,6 +132,9 @@ class HeatFlux(_Boundary):
     Args:
         on: name of the boundary.
         flux: heat per time and area, number or table over R; negative takes heat out.
+
+    >>> fx.HeatFlux("top", flux=1e-3)
+    HeatFlux('top', flux=0.001)
     """
 
     def __init__(self, on: str, *, flux: float | Table):
@@ -139,6 +151,9 @@ class FixedTemperature(_Boundary):
     Args:
         on: name of the boundary.
         temperature: number or table over R.
+
+    >>> fx.FixedTemperature("rim", temperature=80.0)
+    FixedTemperature('rim', temperature=80.0)
     """
 
     temperatures = ("temperature",)
@@ -157,6 +172,9 @@ class Absorption:
         on: name of the boundary that it comes in through; for both sides, give two.
         flux: what enters, heat per time and area.
         coefficient: 1/length, above 0.
+
+    >>> fx.Absorption("top", flux=2e-3, coefficient=1.5)                           # W/mm2, 1/mm
+    Absorption('top', flux=0.002, coefficient=1.5)
     """
 
     def __init__(self, on: str, *, flux: float, coefficient: float):

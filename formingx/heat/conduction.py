@@ -21,6 +21,7 @@ from petsc4py import PETSc
 from .. import _compat
 from ..errors import ConvergenceError
 from ..mesh import Mesh
+from ..mesh.nodes import of_space
 from ..physics import kinematics as kin
 from ..ranks import gathered
 from ..results.evaluate.profile import distance_to_line
@@ -64,7 +65,7 @@ class Conduction:
         self.space = fem.functionspace(domain, ("Lagrange", degree))
         self.T, self._change, self._held_at = (fem.Function(self.space) for _ in range(3))
         self._n = self.space.dofmap.index_map.size_local
-        self.points = self.space.tabulate_dof_coordinates()[: self._n, :2]
+        self.points = of_space(self.space)[: self._n]
         self._X, self._v = ufl.SpatialCoordinate(domain), ufl.TestFunction(self.space)
         self._dx = ufl.Measure("dx", domain, subdomain_data=mesh.cells,
                                metadata={"quadrature_degree": 2 * degree + 2})
@@ -292,7 +293,7 @@ class Conduction:
                 self._u, _compat.interpolation_points(space))
         u, expression = self._displaced
         u.interpolate(expression)
-        return u.x.array.reshape(-1, 2)[: self._n]
+        return u.x.array.reshape(-1, self.points.shape[1])[: self._n]
 
     @staticmethod
     def _moved(points: np.ndarray, u: Any) -> np.ndarray:

@@ -27,6 +27,9 @@ class ConductingTool:
 
     Raises:
         InputError: a number that is not allowed.
+
+    >>> fx.ConductingTool(thickness=20.0, conductivity=0.05, heat_capacity=3.6e-3, back=40.0)      # steel: mm, W
+    ConductingTool(thickness=20.0, conductivity=0.05, heat_capacity=0.0036, back=40.0)
     """
 
     def __init__(self, *, thickness: float, conductivity: float, heat_capacity: float, back: float,
@@ -74,6 +77,9 @@ class ContactWithTool:
         on: name of the boundary.
         conductance: of the contact, heat per time, area and degree.
         tool: a temperature, or a `ConductingTool`.
+
+    >>> fx.ContactWithTool("bottom", conductance=1e-3, tool=40.0)
+    ContactWithTool('bottom', conductance=0.001, tool=40.0)
     """
 
     temperatures = ("tool",)

@@ -67,6 +67,11 @@ class Cooling:
         work_to_heat: heat that comes of a unit of the work that materials dissipate, in the units of the two: 1 in
             SI, 1e-3 for MPa, mm and W, less where a part of it is stored. None: work does not heat. (That of friction
             on tools never does.)
+
+    >>> air = fx.Convection("top", h=2e-5, air=20.0)
+    >>> polymer = fx.ThermalProperties(conductivity=0.2e-3, density=1e-3, heat_capacity=2.0)
+    >>> hot = fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=fx.entropic(0.4, 150.0, unit="C")), loads=scene.loads,
+    ...                supports=scene.supports, temperature=150.0, heat=fx.Cooling(polymer, [air], unit="C"))
     """
 
     def __init__(self, materials: ThermalProperties | Mapping[str, ThermalProperties], boundaries: Sequence[Any] = (),
@@ -349,7 +354,7 @@ def _extremes(temperatures: list[float], laws: Sequence[Any]) -> tuple[float, fl
 def _rows(points: np.ndarray, others: Any) -> np.ndarray:
     """For each point, shape (n, 2), the row of others in which it is; an InputError if it is not there."""
     from scipy.spatial import cKDTree
-    others = np.array(others).reshape(-1, 2)
+    others = np.reshape(others, (-1, points.shape[-1]))
     if not len(points):
         return np.zeros(0, dtype=int)
     away, rows = cKDTree(others).query(points)

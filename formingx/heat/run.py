@@ -12,6 +12,7 @@ from mpi4py import MPI
 from .. import _compat
 from ..errors import ConvergenceError, InputError, finite, instance, known, positive, several
 from ..mesh import Mesh
+from ..mesh.nodes import of_space
 from ..physics.kinematics import Axisymmetric
 from ..scene import fields
 from ..values.temperature import ABSOLUTE_ZERO
@@ -53,7 +54,6 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
         InputError: something of this is not allowed.
         ConvergenceError: steps became too short, or too many.
 
-    >>> import formingx as fx
     >>> sheet = fx.mesh.disc(radius=20.0, thickness=2.0, elements=(4, 2))
     >>> polymer = fx.ThermalProperties(conductivity=0.2, density=1e-3, heat_capacity=2000.0)
     >>> run = fx.heat(sheet, polymer, [fx.Convection("top", h=0.01, air=20.0)], start=180.0, times=[10.0], unit="C")
@@ -118,7 +118,7 @@ class _Displaced:
     def on(self, mesh: Mesh) -> fem.Function:
         """The displacement as a P2 Function on another mesh."""
         u = fem.Function(fem.functionspace(mesh.domain, ("Lagrange", 2, (2,))))
-        points = u.function_space.tabulate_dof_coordinates()[:, :2]
+        points = of_space(u.function_space)
         u.x.array[:] = (self(points) - points).ravel()
         return u
 

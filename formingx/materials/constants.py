@@ -92,6 +92,9 @@ def of_temperature(function: Callable) -> OfTemperature:
 
     Args:
         function: f(T), called with an array of temperatures, shape (n,), in the unit that the scene's are given in.
+
+    >>> fx.NeoHookean(c10=fx.of_temperature(lambda T: 0.4 * np.exp(-(T - 150.0) / 20.0)))
+    NeoHookean(c10=of_temperature(<lambda>))
     """
     if not callable(function):
         raise InputError(f"of_temperature({function!r}): must be a function of the temperature")
@@ -104,7 +107,6 @@ def entropic(value: float, reference: float, *, unit: str) -> OfTemperature:
     Args:
         value: at the temperature `reference`. unit: of temperatures, "C" or "K".
 
-    >>> import formingx as fx
     >>> modulus = fx.entropic(1.0, 20.0, unit="C")
     >>> float(modulus(313.15).round(6))
     2.0

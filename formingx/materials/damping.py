@@ -41,6 +41,8 @@ class PSM(Damping):
     Args:
         alpha: above 0; the larger, the less is damped.
         beta: from 0 to 1; the smaller, the less is damped in uniaxial, and the more in equibiaxial extension.
+
+    >>> melt = fx.KBKZ([(0.1, 1.0), (0.02, 10.0)], damping=fx.PSM(alpha=10.0, beta=0.5))         # (modulus, time)
     """
 
     def __init__(self, alpha: float, beta: float):
@@ -57,6 +59,9 @@ class Wagner(Damping):
     Args:
         alpha: from 0 to 1, the share of I1.
         beta: above 0; the larger, the more is damped.
+
+    >>> fx.Wagner(alpha=0.1, beta=0.2)
+    Wagner(alpha=0.1, beta=0.2)
     """
 
     def __init__(self, alpha: float, beta: float):
@@ -67,7 +72,11 @@ class Wagner(Damping):
 
 
 def LuoTanner(n: float, beta: float) -> Wagner:  # noqa: N802  a card's name for a law
-    """`Wagner` in the letters of Luo and Tanner: h = exp(-n sqrt(beta I1 + (1 - beta) I2 - 3)); n above 0."""
+    """`Wagner` in the letters of Luo and Tanner: h = exp(-n sqrt(beta I1 + (1 - beta) I2 - 3)); n above 0.
+
+    >>> fx.LuoTanner(n=0.2, beta=0.1)
+    Wagner(alpha=0.1, beta=0.2)
+    """
     return Wagner(alpha=_share("LuoTanner: beta", beta), beta=positive("LuoTanner: n", n))
 
 
@@ -76,6 +85,9 @@ class DoubleWagner(Damping):
 
     Args:
         alpha, f: from 0 to 1. n1, n2: above 0.
+
+    >>> fx.DoubleWagner(alpha=0.05, f=0.57, n1=0.31, n2=0.106)
+    DoubleWagner(alpha=0.05, f=0.57, n1=0.31, n2=0.106)
     """
 
     def __init__(self, alpha: float, f: float, n1: float, n2: float):

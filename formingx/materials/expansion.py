@@ -24,7 +24,6 @@ class ThermalExpansion:
     Raises:
         InputError: neither of the two, or both; a volume that is not above 0.
 
-    >>> import formingx as fx
     >>> float(fx.ThermalExpansion(linear=1e-4, stress_free=120.0).stretch(20.0).round(6))
     0.99
     """

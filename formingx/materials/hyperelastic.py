@@ -20,7 +20,6 @@ class NeoHookean(Material):
     Args:
         c10: the I1 constant, stress, greater than 0.
 
-    >>> import formingx as fx
     >>> rubber = fx.NeoHookean(c10=0.4)
     >>> rubber.shear_modulus, round(float(rubber.stress("uniaxial", 2.0)), 6)      # 2 c10 (l - l^-2)
     (0.8, 1.4)
@@ -48,7 +47,6 @@ class MooneyRivlin(Material):
         c10: the I1 constant, stress, at least 0.
         c01: the I2 constant, stress, at least 0 (both at least 0: else W falls without bound).
 
-    >>> import formingx as fx
     >>> rubber = fx.MooneyRivlin(c10=0.3, c01=0.1)
     >>> round(float(rubber.stress("uniaxial", 2.0)), 6)                            # 2 (c10 + c01/l) (l - l^-2)
     1.225
@@ -84,7 +82,6 @@ class Yeoh(Material):
         c20: stress, greater than -sqrt(3 c10 c30) (at least 0 if c30 is 0), so that W grows with I1 everywhere.
         c30: stress, at least 0.
 
-    >>> import formingx as fx
     >>> round(float(fx.Yeoh(c10=0.2, c20=0.01, c30=0.001).shear_modulus), 6)
     0.4
     """
@@ -127,7 +124,6 @@ class Gent(Material):
         mu: shear modulus, stress, greater than 0.
         Jm: the limit of I1 - 3, greater than 0. In uniaxial tension the largest stretch is about sqrt(Jm + 3).
 
-    >>> import formingx as fx
     >>> stiffens = fx.Gent(mu=0.8, Jm=50.0)
     >>> round(stiffens.largest_stretch("uniaxial"), 3)                             # l^2 + 2/l - 3 = Jm
     7.261
@@ -168,7 +164,6 @@ class ArrudaBoyce(Material):
         N: segments in a chain, greater than 1: I1 stays below 3 N. In uniaxial tension the largest stretch is about
             sqrt(3 N).
 
-    >>> import formingx as fx
     >>> fx.ArrudaBoyce(mu=0.8, N=25.0).largest_I1                                  # 3 N
     75.0
     """
@@ -212,7 +207,6 @@ class Ogden(Material):
         mu: the mu_k, stress; the shear modulus is half the sum of mu_k alpha_k.
         alpha: as many exponents alpha_k, none zero, each with mu_k alpha_k > 0.
 
-    >>> import formingx as fx
     >>> same = fx.Ogden(mu=[0.8], alpha=[2.0])                                     # neo-Hookean, c10 = mu/2
     >>> round(float(same.stress("equibiaxial", 2.0)), 6)                           # mu (l - l^-5)
     1.575
@@ -273,6 +267,11 @@ class Hyperelastic(Material):
         constants: the energy's named constants. Exponents and the like may be among them.
 
     Example: ``Hyperelastic(lambda I1, I2, c1, c2: c1 * (I1 - 3) + c2 * (I1 - 3)**2, c1=0.2, c2=0.01)``
+
+    >>> def energy(I1, I2, c1, c2):
+    ...     return c1 * (I1 - 3) + c2 * (I1 - 3) ** 2
+    >>> round(float(fx.Hyperelastic(energy, c1=0.2, c2=0.01).stress("uniaxial", 2.0)), 6)
+    0.84
     """
 
     def __init__(self, energy: Callable, of: str = "invariants", **constants: float):

@@ -47,7 +47,6 @@ class KBKZ(Relaxing):
         shift: how relaxation times depend on the temperature of the scene, see `Viscoelastic`.
         irreversible: h of a past state is the least that it has been since then.
 
-    >>> import formingx as fx
     >>> melt = fx.KBKZ([(0.1, 0.5), (0.02, 10.0)], damping=fx.PSM(alpha=14.4, beta=0.05))
     >>> round(melt.shear_modulus, 12)
     0.12

@@ -41,7 +41,6 @@ def published() -> dict[str, Published]:
     They hold for the stretches, temperatures and rates of their tests, which are given as far as the source states
     them. Quoted ones were not read in the original. Test data to fit to: `treloar1944`.
 
-    >>> import formingx as fx
     >>> acrylic = fx.published()["PMMA 160 C"]
     >>> acrylic.material, acrylic.temperature
     (NeoHookean(c10=0.44815922405594344), 160.0)

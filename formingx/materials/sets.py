@@ -32,6 +32,9 @@ class Sets(Material):
         modulus: G, the shear modulus of what has set, above 0; stress.
         between: two temperatures; all has set at the lower, nothing at the higher, phi is linear between.
         fraction: phi(T) instead, a `table` from 1 to 0; beyond its ends phi stays as it is there.
+
+    >>> fx.Sets(fx.NeoHookean(c10=0.4), modulus=800.0, between=(90.0, 110.0))
+    Sets(NeoHookean(c10=0.4), modulus=800.0, between=(90, 110))
     """
 
     def __init__(self, base: Material, modulus: float, between: Any = None, fraction: Table | None = None):

@@ -271,7 +271,6 @@ class Viscoelastic(RelaxingMaterial):
         order: of a step in time, 2 or 1.
         shift: as of `RelaxingMaterial`.
 
-    >>> import formingx as fx
     >>> melt = fx.Viscoelastic(fx.NeoHookean(c10=0.1), branches=[(0.6, 0.1), (0.3, 2.0)])
     >>> round(melt.shear_modulus, 12)
     1.1
@@ -330,7 +329,6 @@ class TransientNetwork(RelaxingMaterial):
     + (m - e^-x + p) C_n^-1 + p s (C_n^-1 - C_n-1^-1), p = [x - 2 + (x + 2) e^-x]/x^2 s/(1 + s), s the length of the
     step over that of the one before. The stored energy is (mu/2) [tr(C A) - 3 - ln det A].
 
-    >>> import formingx as fx
     >>> fx.TransientNetwork(None, branches=[(0.05, 1.0)]).shear_modulus
     0.05
     """

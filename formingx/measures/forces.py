@@ -21,6 +21,9 @@ def force(value: float, *, of: str | None = None) -> Target:
     """The force on what is driven, or on what is called `of`, reaches `value` (stress length^2).
 
     Of the body: on a driven support along its component; on a tool against its travel, positive when it resists.
+
+    >>> fx.Stage("press", drive="plug", until=fx.force(100.0, of="plug"))
+    Stage('press')
     """
     def bind(problem):
         scene = problem.scene

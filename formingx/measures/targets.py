@@ -163,17 +163,28 @@ class Target(NamedTuple):
 
 
 def pressure(value: float, *, of: str | None = None) -> Target:
-    """The driven pressure, or the one called `of`, reaches `value` (stress)."""
+    """The driven pressure, or the one called `of`, reaches `value` (stress).
+
+    >>> round(float(path.at(fx.pressure(0.02)).measures["pole_height"]), 3)
+    4.795
+    """
     return _driven("pressure", value, of)
 
 
 def travel(value: float, *, of: str | None = None) -> Target:
-    """The driven support or tool, or the one called `of`, has moved by `value` (a length)."""
+    """The driven support or tool, or the one called `of`, has moved by `value` (a length).
+
+    >>> fx.travel(6.0, of="plug").name
+    'plug_travel'
+    """
     return _driven("travel", value, of)
 
 
 def process_time(value: float) -> Target:
-    """The time of a process, as its tables give it, reaches `value`."""
+    """The time of a process, as its tables give it, reaches `value`.
+
+    >>> blow = fx.Stage("blow", follow={scene.driven: [(0.0, 0.0), (2.0, 0.02)]}, until=fx.process_time(1.0))
+    """
     return Target("process_time", finite("process_time", value), lambda problem: Amplitude(problem, -1))
 
 
@@ -200,7 +211,11 @@ def _driven(quantity: str, value: float, of: str | None) -> Target:
 
 
 def pole_height(value: float) -> Target:
-    """The displacement u_z of the mid-thickness point on the axis reaches `value` (a length)."""
+    """The displacement u_z of the mid-thickness point on the axis reaches `value` (a length).
+
+    >>> round(float(path.at(fx.pole_height(6.0)).measures["pressure"]), 4)
+    0.0289
+    """
     return Target("pole_height", finite("pole_height", value), bind_pole_height)
 
 
@@ -209,6 +224,9 @@ def pole_stretch(value: float) -> Target:
     of revolution; in plane strain, where the sheet is stretched one way only, (thickness/original)^(-1).
 
     A run raises an InputError if no material of the scene can be stretched so far (Gent, Arruda-Boyce).
+
+    >>> round(float(path.at(fx.pole_stretch(1.5)).measures["pole_stretch"]), 9)
+    1.5
     """
     return Target("pole_stretch", positive("pole_stretch", value), bind_pole_stretch, signed=False)
 
@@ -217,6 +235,9 @@ def enclosed_volume(value: float) -> Target:
     """The volume that the driven face has swept reaches `value` (length^3; per depth in plane strain).
 
     It lies between the face at rest and now; where an end of the face has moved, straight lines close it.
+
+    >>> round(float(path.at(fx.enclosed_volume(500.0)).measures["enclosed_volume"]), 6)
+    500.0
     """
     return Target("enclosed_volume", finite("enclosed_volume", value), bind_volume)
 
@@ -225,6 +246,9 @@ def displacement(value: float, *, at: tuple[float, float], component: str = "z")
     """The displacement component ("r" or "z") of the reference point `at` = (R, Z) reaches `value` (a length).
 
     Of a sheet in space "x", "y" or "z", `at` = (x, y).
+
+    >>> fx.displacement(3.0, at=(5.0, 0.0)).name
+    'u_z_at_5_0'
     """
     at = pair("displacement: at", at)
     if not isinstance(component, str) or component not in ("r", "z", "x", "y"):
@@ -238,7 +262,11 @@ def displacement(value: float, *, at: tuple[float, float], component: str = "z")
 
 
 def sag(value: float) -> Target:
-    """The largest downward displacement (along -Z) of the body reaches `value` (a length above 0)."""
+    """The largest downward displacement (along -Z) of the body reaches `value` (a length above 0).
+
+    >>> fx.Stage("heat", duration=60.0, until=fx.sag(30.0))                              # until it hangs 30 mm
+    Stage('heat')
+    """
     return Target("sag", positive("sag", value), Sag)
 
 

@@ -39,7 +39,6 @@ def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = Non
         InputError: an argument that is not allowed; a mesh that is not one of columns; nothing asks for a size: the
             sheet neither bends nor touches a fillet, and no `error` is given.
 
-    >>> import formingx as fx
     >>> plug = fx.tools.male(radius=3.0, height=60.0, base=-60.0, fillet=0.5).mirrored().moved(z=0.5)
     >>> scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(20, 1)),
     ...                  materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],

@@ -58,7 +58,6 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
             concentrate at that is not on the disc, fewer elements than there are parts between such radii, or a
             thickness that is not given all over the disc.
 
-    >>> import formingx as fx
     >>> print(fx.mesh.disc(radius=40.0, thickness={"core": 1.0, "skin": 0.2}, elements=(30, (2, 1))))
     180 six-node triangles, R from 0 to 40, Z from 0 to 1.2
     layers: core, skin
@@ -151,7 +150,6 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
     Raises:
         InputError: as in `disc`.
 
-    >>> import formingx as fx
     >>> list(fx.mesh.sphere(inner_radius=1.0, thickness=0.2, elements=(8, 2)).boundaries)
     ['axis', 'equator', 'inner', 'outer']
     """
@@ -184,7 +182,6 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
     Raises:
         InputError: as in `disc`; fewer than two elements along the meridian.
 
-    >>> import formingx as fx
     >>> wall = {-10.0: 2.0, 60.0: 3.0}                                         # at heights of the inner face
     >>> tube = fx.mesh.parison(inner_radius=10.0, thickness=wall, length=60.0, elements=(20, 1))
     >>> float(tube.nodes_of("neck")[-1, 0])
@@ -231,7 +228,6 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
         InputError: points that are not finite, too few or not as many as on the other line, lines that cross or meet,
             a count that is not a whole number of at least 1.
 
-    >>> import formingx as fx
     >>> cone = fx.mesh.from_lines([(0, 0), (20, 0), (30, 40)], [(0, -2), (21, -2), (32, 40)], elements=([8, 16], 2))
     >>> print(cone)
     96 six-node triangles, R from 0 to 32, Z from -2 to 40

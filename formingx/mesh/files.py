@@ -20,6 +20,10 @@ def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     Raises:
         InputError: the file is not there, is no such mesh, has no named 2-D group, or its elements do not cover a
             section once (see `Mesh.check`).
+
+    >>> fx.mesh.write(sheet, "sheet.msh")
+    >>> list(fx.mesh.read("sheet.msh").boundaries)
+    ['axis', 'rim', 'bottom', 'top']
     """
     name = os.fspath(place("mesh.read: file", file))
 
@@ -40,6 +44,8 @@ def write(mesh: Mesh, file: str | os.PathLike, shift: tuple[float, float] = (0.0
 
     Raises:
         InputError: an unknown numbering, or more than one rank.
+
+    >>> fx.mesh.write(sheet, "sheet.txt", numbering="around")                # nodes of an element in a circle
     """
     name = os.fspath(place("mesh.write: file", file))
     plain = to_grid(mesh)

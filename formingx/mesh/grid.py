@@ -26,6 +26,10 @@ class Grid(NamedTuple):
         layers: {name: triangles, shape (m, 6)}: corners counter-clockwise, then middles of edges 01, 12, 20 (of a
             first-order mesh: shape (m, 3)).
         boundaries: {name: edges, shape (k, 3)}: first, last, middle, the body on the left (first order: shape (k, 2)).
+
+    >>> grid = fx.mesh.to_grid(sheet)
+    >>> grid.points.shape, grid.layers["sheet"].shape, grid.boundaries["bottom"].shape
+    ((51, 2), (16, 6), (8, 3))
     """
 
     points: np.ndarray
@@ -44,7 +48,11 @@ def counter_clockwise(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def to_grid(mesh: Mesh) -> Grid:
-    """The mesh as plain arrays (serial only); node i of the mesh has the number i + 1."""
+    """The mesh as plain arrays (serial only); node i of the mesh has the number i + 1.
+
+    >>> fx.mesh.to_grid(sheet).points.max(0).tolist()
+    [10.0, 0.3]
+    """
     if mesh.comm.size > 1:
         raise InputError("the nodes of a mesh are numbered and written on one rank only: run this on one")
     return gathered(mesh)

@@ -45,6 +45,9 @@ class Mesh:
         comm: the communicator that it was made on. (What mpi4py hangs on `domain.comm`, a copy, when objects are
             passed there is freed with it; inside an exception that would lock up Python's end.)
         columns: of a disc, a sphere, a parison, or what is `from_lines`; None of others.
+
+    >>> list(sheet.layers), list(sheet.boundaries), sheet.nodes_of("rim").shape
+    (['sheet'], ['axis', 'rim', 'bottom', 'top'], (3, 2))
     """
 
     domain: Any

@@ -6,6 +6,9 @@ import numpy as np
 
 from .. import _compat
 
+COORDINATES = 2
+"""Of a point of the body at rest: (R, Z), of a sheet in space, which is flat then, (x, y)."""
+
 
 def axes(domain: Any) -> str:
     """Names of the two reference coordinates: "RZ" of a section, "xy" of a sheet in space."""
@@ -15,6 +18,16 @@ def axes(domain: Any) -> str:
 def own_cells(domain: Any) -> np.ndarray:
     """Numbers of the cells that are this rank's own, shape (m,), from 0 on."""
     return np.arange(domain.topology.index_map(domain.topology.dim).size_local, dtype=np.int32)
+
+
+def of_mesh(domain: Any) -> np.ndarray:
+    """This rank's nodes at rest, shape (n, COORDINATES)."""
+    return domain.geometry.x[:, :COORDINATES]
+
+
+def of_space(space: Any) -> np.ndarray:
+    """Where the unknowns of a space are at rest (of blocks, the blocks), shape (n, COORDINATES)."""
+    return space.tabulate_dof_coordinates()[:, :COORDINATES]
 
 
 def of_cells(domain: Any, cells: Any) -> np.ndarray:

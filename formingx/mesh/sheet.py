@@ -62,6 +62,9 @@ def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "
     Args:
         width, height: along x and y, of the whole, length; corner: radius of its corners.
         part: "whole"; "half": where x > 0; "quarter": where y > 0 too. Where it is cut it is called "x0" and "y0".
+
+    >>> [edge.name for edge in fx.mesh.rectangle(200.0, 100.0, part="quarter")]
+    ['rim', 'rim', 'x0', 'y0']
     """
     a, b = positive("rectangle: width", width) / 2, positive("rectangle: height", height) / 2
     r = non_negative("rectangle: corner", corner)
@@ -97,7 +100,11 @@ def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "
 
 
 def circle(radius: float, *, part: str = "whole") -> list[Edge]:
-    """The outline of a circle about (0, 0), for `sheet`; see `rectangle`."""
+    """The outline of a circle about (0, 0), for `sheet`; see `rectangle`.
+
+    >>> fx.mesh.circle(100.0, part="quarter")[0].name
+    'rim'
+    """
     return rectangle(2 * positive("circle: radius", radius), 2 * radius, corner=radius, part=part)
 
 
@@ -114,7 +121,6 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
     Raises:
         InputError: an outline that is none or crosses itself, a size that is not above 0, more than 500,000 triangles.
 
-    >>> import formingx as fx
     >>> print(fx.mesh.sheet(fx.mesh.rectangle(300, 200, corner=20, part="quarter"), size=40))
     35 triangles, x from 0 to 150, y from 0 to 100
     layers: sheet

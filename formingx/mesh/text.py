@@ -42,7 +42,6 @@ def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> No
     Raises:
         InputError: an unknown numbering, or a grid of three-node triangles.
 
-    >>> import formingx as fx
     >>> fx.mesh.write(fx.mesh.disc(radius=50.0, thickness=2.0, elements=(10, 1)), "plate.msh")
     >>> sorted(fx.mesh.read("plate.msh").boundaries)
     ['axis', 'bottom', 'rim', 'top']

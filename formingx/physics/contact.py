@@ -33,7 +33,7 @@ import numpy as np
 from ..errors import InputError, count, instance, non_negative, pair, positive, triple
 from ..tools.shapes import Nearest, Tool
 from ..tools.solid import SolidTool
-from ..tools.tool import RigidTool
+from ..tools.tool import PlaneTool
 from ..values.table import Table
 from ..values.temperature import FunctionOfTemperature
 from .contact_law import ContactLaw, Motion, NormalLaw, Touch, Tractions, outer
@@ -91,7 +91,6 @@ class Contact(Part):
     Raises:
         InputError: an argument that is not allowed.
 
-    >>> import formingx as fx
     >>> plug = fx.Contact("top", fx.tools.cylinder(radius=20.0, z=2.0, fillet=4.0), 0.3, moves=(0, -1), name="plug")
     >>> plug.driven
     True
@@ -240,7 +239,7 @@ class Law(NormalLaw):
     pulls: what touches is held for ever.
     """
 
-    def __init__(self, tool: RigidTool, mu: np.ndarray | float, k: np.ndarray | float, theta: float,
+    def __init__(self, tool: PlaneTool, mu: np.ndarray | float, k: np.ndarray | float, theta: float,
                  elastic_slip: float, shift: np.ndarray | float = 0.0, pulls: bool = False,
                  shear_limit: Callable | None = None):
         super().__init__(tool, k, theta, shift)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ..tools.shapes import Nearest
-from ..tools.tool import RigidTool
+from ..tools.tool import PlaneTool
 
 _FAR = 1e30
 """A length beyond all others, which may still be multiplied with 0."""
@@ -135,7 +135,7 @@ class ContactLaw(Protocol):
         """Signed, of points x, shape (n, c), or several places of each, (m, n, c), length; contact begins at -theta."""
 
     def nearest(self, x: np.ndarray) -> Nearest:
-        """`RigidTool.nearest`, with these distances."""
+        """`PlaneTool.nearest`, with these distances."""
 
     def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Normal traction over the penalty at distances d, and its derivative."""
@@ -166,7 +166,7 @@ class NormalLaw:
     has_friction = remembers = pulls = False
     elastic_slip = 0.0
 
-    def __init__(self, tool: RigidTool, k: np.ndarray | float, theta: float, shift: np.ndarray | float = 0.0):
+    def __init__(self, tool: PlaneTool, k: np.ndarray | float, theta: float, shift: np.ndarray | float = 0.0):
         self.tool, self.k, self.theta, self.shift = tool, k, theta, shift
         self._near: tuple[np.ndarray, Nearest] | None = None        # points last asked for, and what was found
 

@@ -14,6 +14,7 @@ from ufl.constantvalue import Zero
 from ufl.tensors import ListTensor
 
 from ..errors import InputError
+from ..mesh.nodes import COORDINATES
 from .supports import NAMES, Held
 
 
@@ -21,13 +22,15 @@ class Kinematics:
     """What the motion of a section of the body means in space.
 
     Attributes:
-        axes: names of the coordinates; components: of a displacement and of a position.
+        axes: names of the coordinates; components: of a displacement and of a position now; coordinates: of a point
+            at rest, by which tables and functions look it up.
         axisymmetric: True if the section turns about R = 0.
         dimension_of_volume: 3; of a volume per unit depth 2.
     """
 
     axes: tuple[str, ...] = ("r", "z")
     components = 2
+    coordinates = COORDINATES
     axisymmetric = False
     dimension_of_volume = 3
 
@@ -78,6 +81,9 @@ class Axisymmetric(Kinematics):
 
     F = [[1 + u_r,R, u_r,Z, 0], [u_z,R, 1 + u_z,Z, 0], [0, 0, 1 + u_r/R]]; quadrature points never lie on the
     axis, so u_r/R needs no guard.
+
+    >>> fx.Axisymmetric().axes, list(fx.Axisymmetric().rigid_motions())                 # what a support must stop
+    (('r', 'z'), ['translation along Z'])
     """
 
     axisymmetric = True
@@ -110,7 +116,11 @@ class Axisymmetric(Kinematics):
 
 
 class PlaneStrain(Kinematics):
-    """A long body, unit depth: F33 = 1, forces and volumes per unit depth."""
+    """A long body, unit depth: F33 = 1, forces and volumes per unit depth.
+
+    >>> fx.PlaneStrain().axes, list(fx.PlaneStrain().rigid_motions())
+    (('r', 'z'), ['translation along R', 'translation along Z', 'rotation'])
+    """
 
     dimension_of_volume = 2
 
@@ -142,6 +152,9 @@ class ThreeD(Kinematics):
 
     The gradient of a displacement is that along the surface; the normal goes with it unstretched in I + grad u, whose
     cofactor so gives the area vector, and `Surface` puts the thickness there.
+
+    >>> fx.ThreeD().axes, fx.ThreeD().coordinates                                       # a point at rest is (x, y)
+    (('x', 'y', 'z'), 2)
     """
 
     axes = ("x", "y", "z")

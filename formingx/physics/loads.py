@@ -74,6 +74,9 @@ class Pressure(Load):
         on: name of the boundary. A positive pressure pushes into the body.
         value: a fixed pressure (stress); None: the pressure is what the run controls.
         name: what it is called in a process and in its columns.
+
+    >>> scene.driven                                                                  # what `trace` finds the value of
+    Pressure('bottom')
     """
 
     quadrature_degree = 5
@@ -105,6 +108,9 @@ class Gravity(Load):
             t/mm3 with MPa, mm and s.
         value: the acceleration, length/time^2 (9.81 m/s2 or 9810 mm/s2; below 0: upward); None: the run controls it.
         name: what it is called in a process and in its columns.
+
+    >>> fx.Gravity(density=0.95e-9, value=9810.0)                                        # t/mm3, mm/s2
+    Gravity(9810.0)
     """
 
     symmetric = True
@@ -126,6 +132,9 @@ class Spin(Load):
     Args:
         density, name: as of `Gravity`.
         value: omega^2, the square of the angular speed, 1/time^2; None: the run controls it.
+
+    >>> fx.Spin(density=0.95e-9, value=100.0**2)                                         # t/mm3; 100 rad/s
+    Spin(10000.0)
     """
 
     symmetric = True

@@ -8,6 +8,7 @@ the linearised constraint carries no wrong stress k (J - 1).
 
 from __future__ import annotations
 
+from inspect import signature
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,6 +43,10 @@ class Model:
     solid = True
     volume_stiffness = 0.0
 
+    def __repr__(self) -> str:
+        given = {name: (getattr(self, name), p.default) for name, p in signature(type(self)).parameters.items()}
+        return f"{type(self).__name__}({', '.join(f'{k}={v!r}' for k, (v, usual) in given.items() if v != usual)})"
+
     def check(self, scene: Any) -> None:
         """Raise an InputError if the scene has what this model cannot have."""
 
@@ -59,6 +64,12 @@ class Membrane(Model):
     Args:
         wrinkles: in space: the part of the stiffness, up to 1, that is left where the membrane wrinkles (tension-field
             theory, see `formingx.discrete.surface`), 0.01 for one; None: all of it.
+
+    >>> thin = fx.Scene(mesh=sheet, materials=scene.materials, supports=scene.supports, loads=scene.loads,
+    ...                 model=fx.Membrane())
+    >>> found = fx.trace(thin, until=fx.pole_height(12.0), progress=False)
+    >>> round(float(found["pressure"].max() / path["pressure"].max()), 2)
+    1.0
     """
 
     solid = False
@@ -122,6 +133,9 @@ class MixedPressure(Model):
             modulus, as in a block that is pressed very flat, they crush one part and open another. 10 for one; then
             thin sheets on coarse meshes are stiffer. (The grad-div stabilisation of mixed methods: Olshanskii and
             Reusken, Mathematics of Computation 73, 2004.)
+
+    >>> scene.model
+    MixedPressure()
     """
 
     stress_free = True
@@ -172,6 +186,9 @@ class DisplacementPenalty(Model):
             becomes indefinite in bending for eps <= 1e-3) or 7 (full: locks).
         stress_free: False leaves the energy as printed in (3.4.1), not free of stress at rest: the unloaded body
             then swells or shrinks to I3 - 1 of the order of eps.
+
+    >>> fx.DisplacementPenalty(eps=1e-4)
+    DisplacementPenalty(eps=0.0001)
     """
 
     pressure = None

@@ -76,6 +76,9 @@ class Symmetry(Support):
     Args:
         mirror: the body goes on behind it, as its own image: then modes that are no image of themselves count, too, see
             `Path.stability`. False: it is an axis, or a guide along which the body slides.
+
+    >>> [fx.Symmetry("axis"), fx.Symmetry("middle", normal="z", mirror=True)]
+    [Symmetry('axis'), Symmetry('middle')]
     """
 
     def __init__(self, on: str, normal: str = "r", mirror: bool = False):
@@ -91,6 +94,9 @@ class Clamped(Support):
     """All displacements of a boundary are 0.
 
     The corner of a clamped rim is singular: see docs/verification.md for the band that this leaves in a limit pressure.
+
+    >>> [(held.component, held.on) for held in fx.Clamped("rim").constraints()]          # u_r and u_z
+    [(0, 'rim'), (1, 'rim')]
     """
 
     holds_rotation = True
@@ -108,6 +114,9 @@ class SimplySupported(Support):
         on: name of the boundary.
         weight: "area": the plain mean, so that every layer is pulled with the same traction; "stiffness": layers count
             by their shear modulus, for layers so different that the soft one could not carry that traction.
+
+    >>> scene.supports
+    [Symmetry('axis'), SimplySupported('rim')]
     """
 
     on: str
@@ -129,6 +138,9 @@ class PinnedNode(Support):
 
     Args:
         r, z: the node's reference coordinates, unit of the mesh.
+
+    >>> fx.PinnedNode(10.0, 0.15)
+    PinnedNode(10.0, 0.15)
     """
 
     def __init__(self, r: float, z: float):
@@ -148,6 +160,11 @@ class Displaced(Support):
         on: name of the boundary.
         component: "r" or "z".
         name: what it is called in a process and in its columns.
+
+    >>> pulled = fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=0.4),
+    ...                   supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0), fx.Displaced("rim", "r")])
+    >>> round(float(fx.solve(pulled, to=10.0)["pole_stretch"][-1]), 3)                  # to twice its width
+    2.0
     """
 
     driven = True

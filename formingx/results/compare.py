@@ -143,6 +143,11 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     Raises:
         InputError: a file that cannot be read, an unknown column or unit, a column that does not vary, rows that run
             backwards, or no point in common.
+
+    >>> other = {"pressure": 1.01 * path["pressure"], "pole_height": path["pole_height"]}
+    >>> compared = fx.compare(path, other)
+    >>> round(float(compared.differences["pressure"].maximum / path["pressure"].max()), 3)
+    0.01
     """
     left, right = _table("ours", ours), _table("theirs", theirs)
     pairs = _columns(left, right, columns)

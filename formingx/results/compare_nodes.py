@@ -82,6 +82,10 @@ def write_nodes(path: Any, file: Any, *, state: Any = None, mesh: str | os.PathL
 
     Raises:
         InputError: the mesh file cannot be read, or a node of it lies outside the run's mesh.
+
+    >>> fx.write_nodes(path, "nodes.csv")
+    >>> open("nodes.csv").readline().strip()
+    'node,R,Z,u_r,u_z'
     """
     plain = meshes.to_grid(path.problem.scene.mesh) if mesh is None else grid.read(mesh)
     u = _displacements(path, state, plain.points)
@@ -103,6 +107,11 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
 
     Raises:
         InputError: a file that cannot be read, a column, unit or node that is not known, or a node outside our mesh.
+
+    >>> fx.write_nodes(path, "nodes.csv")                                   # or what another program wrote
+    >>> found = fx.compare_nodes(path, "nodes.csv")
+    >>> len(found.nodes), float(abs(found.ours - found.theirs).max()) < 1e-12
+    (51, True)
     """
     table = (csv_files.from_arrays("compare_nodes: theirs", theirs) if isinstance(theirs, Mapping)
              else csv_files.read(theirs))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import ufl
 from dolfinx import fem
 
 from .. import _compat
@@ -39,11 +38,11 @@ def formed(problem: Any, state: Any, size: float | None = None) -> Mesh:
     cells = own_cells(domain)
     triangles = numbers.index_map.local_to_global(np.asarray(numbers.list)[cells].ravel().astype(np.int32))
     triangles = triangles.reshape(-1, 6)
-    points = np.zeros((len(cells), 6, 2))
+    points = np.zeros((len(cells), 6, forms.scene.kinematics.components))
     if len(cells):
         with problem.at(state):
-            moved = _compat.compile_expression(ufl.as_vector([forms.X[0], forms.X[1]]) + forms.u, _NODES)
-            points = moved.eval(domain, cells).reshape(len(cells), 6, 2)
+            moved = _compat.compile_expression(forms.X + forms.u, _NODES)
+            points = moved.eval(domain, cells).reshape(points.shape)
     layers = {name: triangles[(found := mesh.cells.find(tag))[found < len(cells)]] for name, tag in mesh.layers.items()}
     domain.topology.create_connectivity(1, 2)
     domain.topology.create_connectivity(2, 1)
@@ -58,7 +57,7 @@ def formed(problem: Any, state: Any, size: float | None = None) -> Mesh:
     parts = comm.allgather((triangles, points, layers, edges))
 
     def grid() -> Grid:
-        place = np.zeros((1 + max(int(t.max(initial=0)) for t, *_ in parts), 2))
+        place = np.zeros((1 + max(int(t.max(initial=0)) for t, *_ in parts), points.shape[-1]))
         for t, x, *_ in parts:
             place[t] = x
         if problem.scene.kinematics.axisymmetric:            # what is on the axis is there to the last bit
@@ -81,7 +80,7 @@ def _of_size(problem: Any, state: Any, size: float) -> Mesh:
     of, order = {name: outline.of(name) for name in mesh.boundaries}, outline.around("Path.formed: size")
     names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
     (layer,), axisymmetric = mesh.layers, problem.scene.kinematics.axisymmetric
-    return remeshed(edges[order], names, np.zeros((0, 2)), size, size, layer, axisymmetric, mesh.comm)
+    return remeshed(edges[order], names, np.zeros((0, edges.shape[-1])), size, size, layer, axisymmetric, mesh.comm)
 
 
 def imperfect(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
@@ -93,6 +92,12 @@ def imperfect(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
 
     Raises:
         InputError: the mode varies round the body, or is of other nodes; the moved elements are no mesh.
+
+    >>> column = fx.mesh.disc(radius=1.0, thickness=3.0, elements=(1, 4))
+    >>> pressed = fx.Scene(mesh=column, materials=fx.NeoHookean(c10=0.5), supports=[
+    ...     fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.Displaced("top", "z")])
+    >>> loss = fx.trace(pressed, until=fx.travel(-1.9), progress=False).stability([0]).first
+    >>> bent = fx.imperfect(column, loss, 0.01)
     """
     from .stability import Loss
     instance("imperfect: mesh", mesh, Mesh, "a mesh")
@@ -109,5 +114,5 @@ def imperfect(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
     if min(found) < 0:
         R, Z = grid.points[int(np.argmin(found))]
         raise InputError(f"imperfect: mode: it has no node at (R, Z) = ({R:.6g}, {Z:.6g}): it is of another mesh")
-    moved = grid.points + amplitude * mode.amplitudes[found][:, :2]
+    moved = grid.points + amplitude * mode.amplitudes[found][:, : grid.points.shape[1]]
     return to_mesh(lambda: grid._replace(points=moved), mesh.comm, "imperfect: the moved mesh")

@@ -24,9 +24,18 @@ class Path(States):
     Attributes:
         record: what the solver keeps of the run (`formingx.solve.record.Record`).
         pilot: the path of the run that its mesh was made by (`trace(..., pilot=True)`); else None.
+
+    >>> path
+    Path(9 states, to State('target', pressure=0.045088, pole_height=12, pole_stretch=2.26198, enclosed_volume=2895.08,
+         strain_energy=85.9012, ...))
+    >>> round(float(path["pressure"].max()), 4), path.last.kind
+    (0.0451, 'target')
     """
 
     pilot: Path | None = None
+
+    def __repr__(self) -> str:
+        return f"Path({len(self.states)} states, to {self.last!r})"
 
     def doubts(self) -> list[tuple[str, str]]:
         """(how bad: "serious" or "minor"; what) of contact in the last state, of wrinkles in space; collective."""

@@ -268,6 +268,9 @@ def unstable(modes: Iterable[float] = range(9)) -> Unstable:
 
     modes: waves round the axis; in plane strain wave numbers along the depth. It costs about two iterations a mode and
     state. `Path.ended` says which mode, `Path.stability` finds where.
+
+    >>> fx.trace(scene, until=fx.pole_height(12.0), stop_at=fx.unstable([0, 1]), progress=False).ended
+    ''
     """
     return Unstable(modes)
 

@@ -81,7 +81,7 @@ def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:
         for held in scene.kinematics.in_axes(support, support.constraints()):
             if isinstance(held, Held) and not held.driven and scene.kinematics.axes[held.component] == component:
                 nodes = np.array([held.point]) if held.on is None else scene.mesh.nodes_of(held.on)
-                if np.hypot(*(nodes[:, :2] - point).T).min() < near:
+                if np.hypot(*(nodes[:, : len(point)] - point).T).min() < near:
                     return support
     return None
 

@@ -76,12 +76,11 @@ def _check_overlap(scene: Scene, who: str, present: dict[int, Contact], outlines
 
 def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
     """Points along a tool's profile, shape (n, 2); of one in space some of its surface, shape (n, 3)."""
+    points, lines = contact.tool.surface()
     if contact.tool.components == 3:
-        points = contact.tool.surface()[0]
         return points[:: max(1, len(points) // _MOST)]
-    corners = contact.tool.outline()
-    parts = np.linspace(0, 1, pieces, endpoint=False)[:, None]
-    return np.concatenate([*(a + parts * (b - a) for a, b in zip(corners, corners[1:])), corners[-1:]])
+    (a, b), parts = points[lines.T][..., None, :], np.linspace(0, 1, pieces, endpoint=False)[:, None]
+    return np.concatenate([*(a + parts * (b - a)), points[-1:]])
 
 
 def _at(contact: Contact, travel: float) -> str:

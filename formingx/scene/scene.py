@@ -14,6 +14,7 @@ from ..errors import InputError, count, known, several, together
 from ..materials.expansion import ThermalExpansion
 from ..materials.hyperelastic import Material
 from ..mesh.mesh import Mesh
+from ..mesh.nodes import of_mesh
 from ..physics.contact import Contact
 from ..physics.kinematics import Axisymmetric, Kinematics, ThreeD
 from ..physics.loads import Load
@@ -58,6 +59,16 @@ class Scene:
     Raises:
         InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, or whose
             elements lie over each other or are inside out, two driven objects that no name tells apart.
+
+    >>> print(scene)
+    mesh               16 six-node triangles, 10 by 0.3 (R, Z); layers: sheet; boundaries: axis, rim, bottom, top
+    material of sheet  NeoHookean(c10=0.4)
+    support 1          Symmetry('axis'), component 0, mirror False
+    support 2          SimplySupported('rim')
+    load 1             Pressure('bottom') (driven)
+    model              MixedPressure()
+    kinematics         Axisymmetric()
+    quadrature degree  5
     """
 
     def __init__(self, *, mesh: Mesh, materials: Material | Mapping[str, Material], supports: Sequence[Any],
@@ -282,7 +293,7 @@ class Scene:
                              f" does that; must be moves=(0, ...), or PlaneStrain()")
         face = mesh.nodes_of(contact.on)
         comm = mesh.comm
-        points = gathered(comm, mesh.domain.geometry.x[:, :2])
+        points = gathered(comm, of_mesh(mesh.domain))
         depth = contact.tool.signed_distance(points)
         worst = int(np.argmax(depth))
         if depth[worst] > near:
@@ -399,7 +410,7 @@ class Scene:
 
 
 def _extent(mesh: Mesh) -> np.ndarray:
-    X, comm = mesh.domain.geometry.x[:, :2], mesh.comm
+    X, comm = of_mesh(mesh.domain), mesh.comm
     high = np.array([comm.allreduce(X[:, i].max(initial=-np.inf), MPI.MAX) for i in (0, 1)])
     low = np.array([comm.allreduce(X[:, i].min(initial=np.inf), MPI.MIN) for i in (0, 1)])
     return high - low

@@ -32,7 +32,7 @@ def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
 
 def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None:
     """A closed tool is wider than the way between contact points, where it is next to the face: else it passes."""
-    outline = contact.tool.outline()
+    outline = contact.tool.surface()[0]
     if axisymmetric and outline[:, 0].min() <= 1e-9 * contact.tool.size:         # it goes on beyond the axis
         outline = np.concatenate([outline, outline * (-1, 1)])
     angles = np.linspace(0, np.pi, _DIRECTIONS, endpoint=False)
@@ -62,13 +62,13 @@ def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> 
     points, places = (ends[:, :1] + s[:, None] * (ends[:, 1:] - ends[:, :1]) for s in (at, np.linspace(0, 1, _PLACES)))
     travel, furthest = 0.0, 2 * (tool.size + float(np.ptp(ends, axis=(0, 1)).max()))
     for _ in range(_MOVES):
-        gap = -float(tool.signed_distance(points.reshape(-1, 2) - travel * way).max())
+        gap = -float(tool.signed_distance(points.reshape(-1, points.shape[-1]) - travel * way).max())
         if gap < 1e-6 * thickness:
             break
         travel += gap
         if gap > furthest or travel > 5 * furthest:
             return                                          # it goes elsewhere
-    depth = tool.signed_distance(places.reshape(-1, 2) - travel * way).reshape(places.shape[:2]).max(1)
+    depth = tool.signed_distance(places.reshape(-1, places.shape[-1]) - travel * way).reshape(places.shape[:2]).max(1)
     worst = int(np.argmax(depth))
     if depth[worst] > _CUT * thickness:
         edge = float(np.hypot(*(ends[worst, 1] - ends[worst, 0])))

@@ -130,6 +130,8 @@ class Tolerances:
 
     Raises:
         InputError: a value that is not greater than 0.
+
+    >>> exact = fx.solve(scene, to=0.01, tolerances=fx.Tolerances(correction=1e-12))
     """
 
     correction: float = 1e-10

@@ -48,6 +48,12 @@ class Stage:
 
     Raises:
         InputError: no target, both `drive` and `follow`, a table that goes back in time, an argument not allowed.
+
+    >>> air = scene.driven
+    >>> blow = fx.Stage("blow", follow={air: [(0.0, 0.0), (2.0, 0.02)]})                   # time, pressure
+    >>> done = fx.Process(scene).run([blow], progress=False)
+    >>> done.last.time, round(float(done.last.measures["pressure"]), 9)
+    (2.0, 0.02)
     """
 
     def __init__(self, name: str, drive: Any = None, until: Target | None = None,

@@ -31,6 +31,10 @@ class State:
         orientation: sign of the tangent's determinant times that of the slope: the same along a path, through limit
             points too, until another path branches off; 0 if it is not known.
         verdict: why it is no state that a body can have, in words; "" but in a run that went on beyond (`Record`).
+
+    >>> state = path.limit_points[0]
+    >>> state.kind, round(float(state.measures["pressure"]), 4), len(state.history)
+    ('limit point', 0.0451, 2)
     """
 
     x: Array

@@ -33,6 +33,10 @@ class StepControl:
 
     Raises:
         InputError: a value that is not greater than 0, a growth below 1, or `smallest` above `largest`.
+
+    >>> fine = fx.trace(scene, until=fx.pole_height(3.0), step=fx.StepControl(largest=0.05), progress=False)
+    >>> len(fine.states)
+    6
     """
 
     length: float = 0.1

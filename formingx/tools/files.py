@@ -46,6 +46,12 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
         InputError: the file is not what its ending says or cannot be read, a statement that a .geo file may not hold,
             a unit that the file does not state, a curve outside the plane, one that is neither a line nor a circular
             arc where no tolerance is given, curves that do not follow one another, a body on both sides of the profile.
+
+    >>> with open("plug.geo", "w") as file:
+    ...     print("Point(1) = {9, 0, 0}; Point(2) = {4, 0, 0}; Point(3) = {0, 2, 0};"
+    ...           "Line(1) = {1, 2}; Line(2) = {2, 3};", file=file)
+    >>> fx.tools.read("plug.geo", body=(0.0, -1.0))                             # the solid above
+    Tool(2 lines from (0, 2) to (9, 0))
     """
     name = os.fspath(place("tools.read: file", file))
     tags = None if curves is None else [_tag(t) for t in several("tools.read: curves", curves, "numbers of curves")]

@@ -102,7 +102,6 @@ class Tool:
         InputError: fewer than two different points, a fillet without a corner or too large for it, a profile that
             crosses itself.
 
-    >>> import formingx as fx
     >>> step = fx.Tool([(0, 2), (3, 2), (4, 0), (9, 0)], fillets=[0, 0.5, 0.2, 0])
     >>> step.signed_distance([(0.0, 2.1), (8.0, -0.3)]).round(6).tolist()          # above 0: inside
     [0.1, -0.3]
@@ -209,6 +208,12 @@ class Tool:
         """Points along the profile for drawing, shape (n, 2)."""
         parts = [_sampled(p, per_arc) for p in self.pieces]
         return np.vstack([parts[0], *(part[1:] for part in parts[1:])])
+
+    def surface(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `RigidTool.surface`: the points of `outline`, and the numbers of the ends of each of its pieces."""
+        points = self.outline()
+        numbers = np.arange(len(points))
+        return points, np.stack([numbers[:-1], numbers[1:]], 1)
 
     @property
     def bounds(self) -> np.ndarray:

@@ -16,7 +16,6 @@ __all__ = ["Arc", "Line", "Nearest", "Pot", "Tool", "bottle", "clamp_ring", "con
 def plane(z: float = 0.0) -> Tool:
     """Everything above Z = z.
 
-    >>> import formingx as fx
     >>> fx.tools.plane(5.0).signed_distance([[0.0, 4.0], [0.0, 7.0]]).tolist()
     [-1.0, 2.0]
     """
@@ -34,7 +33,6 @@ def cup(*, radius: float, depth: float, mouth: float = 0.0, draft: float = 0.0, 
         draft: angle between the wall and the Z axis, degrees; the floor is narrower than the mouth.
         fillet, lip: radii of the edge between wall and floor, and of that between wall and flange.
 
-    >>> import formingx as fx
     >>> mould = fx.tools.cup(radius=30.0, depth=20.0, draft=np.radians(5), fillet=3.0, lip=2.0)
     >>> mould.signed_distance([[0.0, 19.0]]).round(6).tolist()
     [-1.0]
@@ -59,7 +57,6 @@ def male(*, radius: float, height: float, base: float = 0.0, draft: float = 0.0,
         draft: angle between the wall and the Z axis, degrees; the foot is wider than the top.
         fillet, foot: radii of the edge around the top, and of that between wall and base plate.
 
-    >>> import formingx as fx
     >>> mould = fx.tools.male(radius=30.0, height=20.0, fillet=3.0)
     >>> mould.signed_distance([[0.0, 25.0]]).tolist()
     [-5.0]
@@ -81,7 +78,6 @@ def bottle(*, radius: float, height: float, neck: float, shoulder: float, neck_h
         base: Z of the bottom.
         fillet, shoulder_fillet: radii of the bottom edge and of both shoulder edges.
 
-    >>> import formingx as fx
     >>> mould = fx.tools.bottle(radius=30.0, height=150.0, neck=12.0, shoulder=110.0, neck_height=130.0, fillet=5.0)
     >>> mould.signed_distance([[0.0, 60.0]]).tolist()
     [-30.0]
@@ -100,7 +96,6 @@ def bottle(*, radius: float, height: float, neck: float, shoulder: float, neck_h
 def cylinder(*, radius: float, z: float = 0.0, fillet: float = 0.0) -> Tool:
     """A flat-ended plug that points down, its face at Z = z.
 
-    >>> import formingx as fx
     >>> plug = fx.tools.cylinder(radius=20.0, z=2.0, fillet=4.0)
     >>> plug.signed_distance([[0.0, 0.0], [25.0, 30.0]]).tolist()
     [-2.0, -5.0]
@@ -118,7 +113,6 @@ def cone(*, half_angle: float, z: float = 0.0, tip: float = 0.0, size: float = 1
         z: of its lowest point; tip: radius of the rounded tip, length.
         size: a length to draw it at (the cone has no end).
 
-    >>> import formingx as fx
     >>> plug = fx.tools.cone(half_angle=np.radians(30), z=1.0)
     >>> plug.signed_distance([[0.0, 0.0]]).tolist()
     [-1.0]
@@ -137,7 +131,6 @@ def cone(*, half_angle: float, z: float = 0.0, tip: float = 0.0, size: float = 1
 def sphere(*, radius: float, z: float = 0.0, r: float = 0.0) -> Tool:
     """A ball (axisymmetric, r = 0) or a round bar (plane strain), its lowest point at (r, z).
 
-    >>> import formingx as fx
     >>> fx.tools.sphere(radius=10.0, z=5.0).signed_distance([[0.0, 4.0], [0.0, 6.0]]).tolist()
     [-1.0, 1.0]
     """
@@ -165,7 +158,6 @@ def clamp_ring(*, radius: float, width: float, fillet: float, z: float = 0.0, he
         fillet: radius of the edges.
         height: of the ring, at least two fillets, as by default.
 
-    >>> import formingx as fx
     >>> ring = fx.tools.clamp_ring(radius=50.0, width=20.0, fillet=2.0)
     >>> ring.signed_distance([[60.0, -1.0]]).tolist()
     [-1.0]
@@ -194,6 +186,10 @@ def pot(*, mouth: float, base: float, depth: float, sheet: float, fillet: float,
     Raises:
         InputError: a length that is not positive, a base wider than the mouth, fillets that do not fit, a plug that is
             not smaller than the base.
+
+    >>> tools = fx.tools.pot(mouth=40.0, base=25.0, depth=70.0, sheet=1.2, fillet=4.0)
+    >>> tools.mould.bounds.round(6).tolist()
+    [[0.0, 1.2], [80.0, 71.2]]
     """
     mouth, base, depth = positive("pot: mouth", mouth), positive("pot: base", base), positive("pot: depth", depth)
     sheet = positive("pot: sheet", sheet)

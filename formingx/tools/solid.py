@@ -183,14 +183,18 @@ class Triangulated(SolidTool):
 
 
 def revolved(profile: Tool) -> Swept:
-    """A profile turned about the axis x = y = 0."""
+    """A profile turned about the axis x = y = 0.
+
+    >>> ball = fx.tools.revolved(fx.tools.sphere(radius=10.0, z=0.0))
+    >>> ball.bounds.round(6).tolist()
+    [[-10.0, -10.0, 0.0], [10.0, 10.0, 20.0]]
+    """
     return Swept(instance("revolved: profile", profile, Tool, "a Tool"), "revolved")
 
 
 def extruded(profile: Tool, along: str = "y") -> Swept:
     """A profile (r, z) drawn along y, r being x; or along x, r being y.
 
-    >>> import formingx as fx
     >>> fx.tools.extruded(fx.tools.sphere(radius=10.0)).signed_distance([[0.0, 55.0, -1.0]]).tolist()
     [-1.0]
     """
@@ -210,7 +214,6 @@ def box(*, half: tuple[float, float], depth: float, corner: float = 0.0, fillet:
         draft: angle between wall and z axis, degrees.
         plug: the solid is inside, and goes up from there.
 
-    >>> import formingx as fx
     >>> tray = fx.tools.box(half=(60.0, 40.0), depth=20.0, corner=15.0, fillet=5.0)
     >>> tray.signed_distance([[0.0, 0.0, -18.0]]).tolist()
     [-2.0]
@@ -241,6 +244,12 @@ def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False
     Raises:
         InputError: the file cannot be read, or is no closed surface whose triangles look outward; the message says
             where it is open.
+
+    >>> cup = fx.tools.revolved(fx.tools.cup(radius=30.0, depth=20.0, draft=5.0).mirrored())
+    >>> cup.to_stl("mould.stl", wall=5.0)
+    >>> mould = fx.tools.solid("mould.stl")
+    >>> mould.triangles, round(mould.undercuts()["least_draft"], 1)
+    (768, 5.0)
     """
     name = os.fspath(place("solid: file", file))
     points, triangles = merged(*_read(name))

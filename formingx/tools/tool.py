@@ -1,4 +1,4 @@
-"""What contact asks of a rigid tool."""
+"""What contact, checks and pictures ask of a rigid tool."""
 
 from typing import Protocol
 
@@ -8,7 +8,7 @@ from .profile import Nearest
 
 
 class RigidTool(Protocol):
-    """A rigid tool at rest, which moves as a whole: n points are seen from it. A `Tool` is one, by its profile.
+    """A rigid tool at rest, which moves as a whole: n points are seen from it. A `Tool` and a `SolidTool` are.
 
     Distances must be exact near the surface: a penalty 1e5 times as stiff as the body multiplies their errors.
     """
@@ -16,9 +16,19 @@ class RigidTool(Protocol):
     def signed_distance(self, x: np.ndarray) -> np.ndarray:
         """Distance of points x, shape (n, components), to the surface, positive inside the tool, shape (n,), length."""
 
-    def nearest(self, x: np.ndarray) -> Nearest:
-        """That distance, its gradient and its curvature."""
+    def surface(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points of the surface, shape (n, components), length, and its straight pieces, for drawing and for checks.
+
+        A piece is the numbers of its ends, shape (m, 2), in space of its corners, shape (m, 3).
+        """
 
     @property
     def bounds(self) -> np.ndarray:
         """Lowest and highest coordinates of the surface as drawn, shape (2, components), length."""
+
+
+class PlaneTool(RigidTool, Protocol):
+    """A rigid tool of a section: smooth up to its corners, so its distance has derivatives."""
+
+    def nearest(self, x: np.ndarray) -> Nearest:
+        """The signed distance of points x, shape (n, 2), its gradient and its curvature."""

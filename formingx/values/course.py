@@ -21,7 +21,6 @@ def course(function: Callable, until: float, start: float = 0.0, *, tolerance: f
     Raises:
         InputError: times in the wrong order, a value that is not finite, a function that takes over 2000 points.
 
-    >>> import formingx as fx
     >>> stroke = fx.course(lambda t: 20 * (1 - np.cos(np.pi * t)), until=1.0)
     >>> len(stroke), stroke[0], round(stroke[-1][1], 6)
     (29, (0.0, 0.0), 40.0)

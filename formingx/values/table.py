@@ -83,7 +83,6 @@ def table(points: Mapping[float, float]) -> Table:
     Raises:
         InputError: fewer than two points, or one that is not two finite numbers.
 
-    >>> import formingx as fx
     >>> modulus = fx.table({100.0: 2.0, 120.0: 1.0, 140.0: 0.4})
     >>> float(modulus(120.0)), bool(modulus(110.0) > 1.0)
     (1.0, True)

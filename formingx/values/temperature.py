@@ -49,7 +49,6 @@ class WLF:
         c1: number; c2: temperature difference; both above 0, for logarithms to the base 10.
         reference: Tr, temperature.
 
-    >>> import formingx as fx
     >>> slower = fx.WLF(c1=17.44, c2=51.6, reference=100.0)
     >>> round(float(np.log10(slower(110.0))), 4)
     -2.8312
@@ -80,7 +79,6 @@ class Arrhenius:
         reference: Tr, temperature.
         unit: of temperatures, "C" or "K".
 
-    >>> import formingx as fx
     >>> slower = fx.Arrhenius(80e3, 180.0, unit="C")
     >>> round(float(slower(170.0)), 4)
     1.6147

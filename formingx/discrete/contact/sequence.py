@@ -153,7 +153,7 @@ class Foretold:
         if not held:
             return None
         force = self._forces(piece, length)
-        gap = np.zeros((len(held), 2))
+        gap = np.zeros((len(held), len(held[0].normal)))
         for k, arrival in enumerate(held):
             f, i = arrival.face, arrival.point
             if arrival.rank == self._comm.rank:             # as deep in its tool as its force wants it

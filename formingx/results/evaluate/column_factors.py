@@ -86,7 +86,7 @@ def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
 
 def _turns(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     """By how much each column turns, half of the kinks at its ends included, radians, shape (n,)."""
-    way = np.zeros(2)                                        # directions at both ends, of both faces together
+    way = np.zeros(edges.shape[-1])                          # directions at both ends, of both faces together
     for numbers, back in sides:
         a, b, m = edges[numbers].transpose(1, 0, 2)
         first, last = 4 * m - 3 * a - b, 3 * b - 4 * m + a

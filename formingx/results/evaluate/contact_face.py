@@ -70,7 +70,7 @@ class ContactFace:
             fields = problem.x.array_r.copy()
             moved = contact.points + path.problem.forms.length * contact.displacement(fields)
             gap = -contact.contact.tool.signed_distance(contact.positions(fields, state.control))
-            traction = np.zeros((len(self.rest), 2))
+            traction = np.zeros_like(self.rest)
             if contact in path.problem.present:
                 _, traction = resultants.traction(contact, fields, state.control)
         _, values = self._gathered(moved, gap)

@@ -38,7 +38,7 @@ class Patches:
         for row, patch in zip(self._patch, patches, strict=True):
             row[: len(patch)] = patch
         self._origin = points[mine].mean(1)
-        self._size = np.ones((len(mine), 2))
+        self._size = np.ones_like(self._origin)
         for some in self._chunks():
             away = np.abs(points[self._patch[some]] - self._origin[some, None, None])
             self._size[some] = np.where(self._patch[some, :, None, None] < 0, 0.0, away).max((1, 2))

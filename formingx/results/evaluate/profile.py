@@ -23,6 +23,10 @@ class Profile:
     Attributes:
         rest_bottom, rest_top: points (R, Z) of the two faces, opposite each other at rest, shape (n, 2), length.
         bottom, top: where they are now, (r, z), shape (n, 2), length.
+
+    >>> wall = path.profile().thickness                                                   # from the pole to the rim
+    >>> [round(float(h), 3) for h in (wall[0], wall[-1])]
+    [0.059, 0.218]
     """
 
     rest_bottom: np.ndarray

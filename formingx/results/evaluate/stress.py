@@ -31,7 +31,7 @@ from petsc4py import PETSc
 from ... import _compat
 from ...errors import InputError, as_points, known, pair
 from ...mesh.locate import Place, locate
-from ...mesh.nodes import of_cells, own_cells
+from ...mesh.nodes import COORDINATES, of_cells, own_cells
 from ...ranks import gathered
 from .patches import Patches
 from .stress_error import Fitted, StressError, StressPeak
@@ -60,6 +60,10 @@ class Stress:
         points: reference points (R, Z), shape (n, 2), length.
         deformation_gradient: F, shape (n, 3, 3).
         second_piola: S, shape (n, 3, 3), stress.
+
+    >>> pole = path.stress().at([(0.0, 0.15)])
+    >>> pole.principal_stretches.round(1).tolist(), pole.principal_stresses[:, 0].round(1).tolist()
+    ([[2.3, 0.2, 2.3]], [4.0])
     """
 
     points: np.ndarray
@@ -111,7 +115,12 @@ class Stress:
 
 
 class StressField:
-    """The stresses of one state: `at` points of a layer, or `at_quadrature_points`, where they are not smoothed."""
+    """The stresses of one state: `at` points of a layer, or `at_quadrature_points`, where they are not smoothed.
+
+    >>> field = path.stress(path.at(fx.pole_height(6.0)))
+    >>> field.at([(0.0, 0.0), (0.0, 0.3)]).principal_stresses[:, 0].round(2).tolist()
+    [0.9, 0.99]
+    """
 
     def __init__(self, recovery: Stresses, state: Any):
         self._recovery, self._state = recovery, state
@@ -151,7 +160,7 @@ class StressField:
         nodes = self._nodes[recovery.space.dofmap.list[:owned], column[:, None]]
         shapes: Any = recovery.element.tabulate(0, reference)
         values = np.einsum("kn,cnx->ckx", shapes[0], nodes)
-        return _unpack(np.zeros((owned * len(reference), 2)), values.reshape(-1, _COUNT))
+        return _unpack(np.zeros((owned * len(reference), COORDINATES)), values.reshape(-1, _COUNT))
 
     def at_quadrature_points(self, layer: str | None = None) -> Stress:
         """Stresses as they are at the quadrature points of a layer, all ranks' together; collective."""
@@ -328,14 +337,14 @@ class Stresses:
                 weights = np.full(len(points), 0.5 / len(points))
             values = ufl.as_vector([*self._F, *(sum(part[k] for part, _ in parts) for k in range(len(_S)))])
             area = abs(ufl.JacobianDeterminant(forms.domain))
-            where = ufl.as_vector([forms.X[0], forms.X[1], forms.weight * area])
+            where = ufl.as_vector([*forms.X, forms.weight * area])
             self._raw[number] = *(_compat.compile_expression(e, points) for e in (values, where)), weights
         values, where, weights = self._raw[number]
         cells, q = self._owned(layer), len(weights)
         with self.problem.at(state):
             values, where = (e.eval(forms.domain, cells).reshape(-1, q, n) if len(cells) else np.zeros((0, q, n))
                              for e, n in ((values, _COUNT), (where, 3)))
-        return where[..., :2], values, where[..., 2] * weights
+        return where[..., :-1], values, where[..., -1] * weights
 
     def _parts(self, material: Any, names: list[str]) -> list[tuple[Any, dict]]:
         """[(entries of S (UFL), quadrature metadata)] of a body: of its material, and of what keeps its volume."""
@@ -406,7 +415,7 @@ def _det(F: np.ndarray) -> np.ndarray:
 def _cauchy(values: np.ndarray) -> np.ndarray:
     """Cauchy stress, shape (m, q, 3, 3), of F and S, shape (m, q, _COUNT)."""
     flat = values.reshape(-1, _COUNT)
-    return _unpack(np.zeros((len(flat), 2)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
+    return _unpack(np.zeros((len(flat), COORDINATES)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
 
 
 def _unpack(points: np.ndarray, values: np.ndarray) -> Stress:

@@ -116,7 +116,7 @@ class Fitted(NamedTuple):
             if not callable(exact):
                 raise InputError(f"stress error: exact = {exact!r}: must be a function of points, shape (n, 2)")
             try:
-                better = np.asarray(exact(self.points.reshape(-1, 2)), dtype=float)
+                better = np.asarray(exact(self.points.reshape(-1, self.points.shape[-1])), dtype=float)
             except (TypeError, ValueError) as error:
                 raise InputError(f"stress error: exact: the function of points fails: {error}") from error
             if better.shape != (self.volume.size, 3, 3):

@@ -232,9 +232,9 @@ class Ledger:
     def _nodes(self, contact: Any, fields: np.ndarray, control: float) -> np.ndarray:
         """Owned unknowns (u_r, u_z) of its face, shape (n, 2); of what touches, where it shares the face."""
         problem, dofs = self._problem, contact.rule.dofs
-        if dofs.shape[1] == 2 and sum(c.contact.on == contact.contact.on for c in problem.contacts) > 1:
+        if contact.contact.points == "nodes" and sum(c.contact.on == contact.contact.on for c in problem.contacts) > 1:
             return dofs[contact.touching(fields, control)]
-        dofs = np.unique(dofs.reshape(-1, 2), axis=0)
+        dofs = np.unique(dofs.reshape(-1, problem.scene.kinematics.components), axis=0)
         return dofs[dofs[:, 0] < problem.n_owned]
 
     def _kinked(self, state: Any) -> bool:

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from ...materials.constants import Varying
 from ...materials.material import Material
-from ...mesh.nodes import of_cells, own_cells
+from ...mesh.nodes import COORDINATES, of_cells, own_cells
 from ...scene.sampling import sample
 from ...scene.summary import text
 
@@ -84,7 +84,7 @@ def _sums_of_constants(scene: Any, layer: str) -> dict[str, float]:
 def _mesh(problem: Any) -> dict[str, Any]:
     mesh, domain, comm = problem.scene.mesh, problem.forms.domain, problem.comm
     cells = len(own := own_cells(domain))
-    x = of_cells(domain, own)[:, :, :2] / problem.forms.length
+    x = of_cells(domain, own)[..., :COORDINATES] / problem.forms.length
     number = domain.topology.original_cell_index[:cells]
     weights = np.sin(1.0 + number)[:, None] * np.sin(1.0 + np.arange(x.shape[1]))
     total = comm.allreduce(cells, MPI.SUM)

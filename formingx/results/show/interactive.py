@@ -92,7 +92,7 @@ def _tools(record: Record) -> list[dict[str, Any]]:
     size = max((np.ptp(np.vstack([p.bottom, p.top]), axis=0).max() for p in shapes), default=1.0)
     found = []
     for k, (contact, name) in enumerate(zip(record.tooling.contacts, record.tooling.names)):
-        line = contact.tool.outline()
+        line = contact.tool.surface()[0]
         shell = line + 0.02 * size * contact.tool.nearest(line).normal
         found.append({"name": name, "line": _rounded(line.T), "shell": _rounded(shell.T),
                       "moves": list(contact.moves or (0.0, 0.0)),

@@ -41,6 +41,9 @@ def report(runs: Sequence[Any], file: Any = "report.html", title: str = "", *, n
         InputError: no run, another number of names, a file that is not .html, a folder that is no checkpoint, or plotly
             is not installed.
         OSError: the file cannot be written.
+
+    >>> fx.report([path], "report.html", "A disc inflated", units=fx.Units(length="mm", stress="MPa")).name
+    'report.html'
     """
     from ..files import checkpoint
     runs = several("report: runs", runs, "paths or folders of checkpoints")

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, finite, positive
+from ...mesh.nodes import COORDINATES
 from ...units import NONE, Units
 from ..files.sheet import Sheet
 from ..numbers import PartNumbers
@@ -66,8 +67,9 @@ def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, unit
     whole = float((wall.wall * wall.area).sum())
     weight = None if density is None else units.mass(volume, positive("part: density", density))
     return PartInSpace(volume, float(area.sum()), float(area.sum() / rest.sum()), mean, float(wall.wall[k]),
-                       tuple(wall.middle[k].tolist()), tuple(wall.rest[wall.triangles[k], :2].mean(0).tolist()),
-                       float(wall.wall[k] / mean), float(np.sqrt(np.average((h - mean) ** 2, weights=area)) / mean),
+                       tuple(wall.middle[k].tolist()),
+                       tuple(wall.rest[wall.triangles[k], :COORDINATES].mean(0).tolist()), float(wall.wall[k] / mean),
+                       float(np.sqrt(np.average((h - mean) ** 2, weights=area)) / mean),
                        weight, 1 - volume / whole, float(rest[wall.wrinkled[kept]].sum() / rest.sum()), units)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
+from ...mesh.nodes import COORDINATES
 from ...scene.summary import summary
 from ...units import Units
 from .. import files
@@ -93,7 +94,7 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     from .part import part
     wall, last, comm = path.wall(), path.last, path.problem.comm
     found = part(wall, density, trim, (), units)
-    size = np.ptp(wall.rest[:, :2], axis=0).max() / 12
+    size = np.ptp(wall.rest[:, :COORDINATES], axis=0).max() / 12
     pictures: list[str] = []
     with TemporaryDirectory() as folder:
         for caption, grid in (("The wall over the original thickness.", None),

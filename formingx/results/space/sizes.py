@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ...mesh.nodes import COORDINATES
 from .wall import wall_of
 
 _FINEST = 0.25
@@ -34,12 +35,12 @@ def wanted_sizes(path: Any, share: float | None, error: float | None) -> tuple[n
         for allowed, found in ((share, turn), (error, change)):
             if allowed is not None:
                 part = np.maximum(allowed / np.maximum(found, allowed), _FINEST)
-                for k in range(2):
-                    np.minimum.at(factor, pairs[:, k], part)
+                for of_pair in pairs.T:
+                    np.minimum.at(factor, of_pair, part)
     strictest = np.ones(len(wall.rest))
     np.minimum.at(strictest, wall.triangles.ravel(), np.repeat(factor, 3))
     size = wall.to_nodes(np.sqrt(wall.area_at_rest / (np.sqrt(3) / 4)))         # equilateral ones
-    return wall.rest[:, :2], _graded(wall.rest, wall.triangles, size * strictest)
+    return wall.rest[:, :COORDINATES], _graded(wall.rest, wall.triangles, size * strictest)
 
 
 def _neighbours(triangles: np.ndarray) -> np.ndarray:

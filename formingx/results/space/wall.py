@@ -11,7 +11,7 @@ import numpy as np
 
 from ...discrete.surface import wrinkled
 from ...errors import InputError, direction, pair, positive, triple
-from ...mesh.nodes import of_cells, own_cells
+from ...mesh.nodes import COORDINATES, of_cells, own_cells
 from ...ranks import gathered
 from ..files.sheet import Sheet
 
@@ -67,7 +67,7 @@ class WallInSpace(Sheet):
     def stretches(self) -> np.ndarray:
         """Principal, in the surface, the larger first, shape (m, 2)."""
         a, b = (x[self.triangles[:, 1:]] - x[self.triangles[:, :1]] for x in (self.rest, self.now))
-        inverse = np.linalg.inv(a[..., :2])                             # the sheet is flat at rest
+        inverse = np.linalg.inv(a[..., :COORDINATES])                             # the sheet is flat at rest
         F = np.einsum("mij,mjk->mki", inverse, b)
         return np.linalg.svd(F, compute_uv=False)
 
@@ -93,7 +93,7 @@ class WallInSpace(Sheet):
 
     def at(self, x: float, y: float) -> float:
         """The wall at the node that was nearest to a place of the flat sheet, length."""
-        away = np.hypot(*(self.rest[:, :2] - pair("at", (x, y))).T)
+        away = np.hypot(*(self.rest[:, :COORDINATES] - pair("at", (x, y))).T)
         return float(self.at_nodes[np.argmin(away)])
 
     def around(self, point: tuple[float, float, float], radius: float) -> float:
@@ -187,7 +187,7 @@ def wall_of(path: Any, state: Any) -> WallInSpace:
         now = forms.length * forms.w.x.array[dofs]
     cells = vectors.dofmap.list[own]
     X = vectors.tabulate_dof_coordinates()
-    middles = of_cells(domain, own).mean(1)[:, :2].T
+    middles = of_cells(domain, own).mean(1)[:, :COORDINATES].T
     h = {name: given(*middles) for name, given in problem.scene.thickness.items()}
     order = np.argsort(gathered(comm, domain.topology.original_cell_index[own]))
     rest, moved = (gathered(comm, part)[order].reshape(-1, 3) for part in (X[cells], X[cells] + now[cells]))
