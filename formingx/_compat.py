@@ -9,6 +9,7 @@ import ufl
 from dolfinx import fem, jit
 from dolfinx.fem import petsc as fem_petsc
 from ffcx.naming import compute_signature
+from mpi4py import MPI
 from ufl.classes import Label
 from ufl.corealg.map_dag import map_expr_dag
 from ufl.corealg.multifunction import MultiFunction
@@ -52,13 +53,13 @@ class _Numbered(MultiFunction):
 
 
 def _looked_up_once(compiled: Any) -> Any:
-    """`compiled()`; on a single rank, what is asked for again is not looked for in the compiler's folders, of which
-    there are 16: it lists a whole one. Ranks compile together, or none does."""
+    """`compiled()`; what is asked for again is not looked for in the compiler's folders: it lists a whole one, so there
+    are 16."""
     compiler = jit.ffcx_jit
 
     def once(comm: Any, what: Any, jit_options: dict[str, Any], **more: Any) -> Any:
         key = compute_signature([what], "")
-        if key not in _compiled or comm.size > 1:
+        if not comm.allreduce(key in _compiled, op=MPI.LAND):    # ranks compile together, or none does
             folder = jit.get_options(jit_options)["cache_dir"] / key[0]
             _compiled[key] = compiler(comm, what, jit_options={**jit_options, "cache_dir": folder}, **more)
         return _compiled[key]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from mpi4py import MPI
+from on_ranks import Ranks, execute
 
 import formingx as fx
 
@@ -54,6 +55,31 @@ def run(*command, ranks=None, timeout=600):
     return done.stdout
 
 
+_ranks = {}
+"""The processes that run, by their number."""
+
+
+def printed_by(script, *arguments, ranks=1, timeout=600):
+    """What a Python script prints, a text for each of so many ranks; on one it runs in this process."""
+    arguments = [str(a) for a in arguments]
+    if ranks == 1:
+        return [execute(script, arguments)]
+    if ranks not in _ranks or not _ranks[ranks].alive:
+        _ranks[ranks] = Ranks(ranks)
+    return _ranks[ranks].run(script, arguments, timeout)
+
+
+def run_script(script, *arguments, ranks=1):
+    """What a Python script prints on all ranks."""
+    return "".join(printed_by(script, *arguments, ranks=ranks))
+
+
 def run_json(script, ranks):
     """The JSON that a Python script prints on rank 0."""
-    return json.loads(run("-c", script, ranks=ranks).strip().splitlines()[-1])
+    return json.loads(printed_by(script, ranks=ranks)[0].strip().splitlines()[-1])
+
+
+def pytest_sessionfinish():
+    """End what runs on several ranks."""
+    for ranks in _ranks.values():
+        ranks.end()

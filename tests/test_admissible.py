@@ -144,6 +144,6 @@ else:
 
 
 def test_ranks_agree():
-    serial = run_json(RANKS, None)
+    serial = run_json(RANKS, 1)
     assert serial[0] == "in-plane determinant" and serial[1] == pytest.approx(-0.2) and serial[2][0] == pytest.approx(1)
     assert run_json(RANKS, 2)[:2] == [serial[0], pytest.approx(serial[1])]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import drawn, run, treloar
+from conftest import drawn, run_script, treloar
 from mpi4py import MPI
 from reference import element
 from test_reference_element import follow, pair
@@ -232,13 +232,13 @@ def test_on_two_ranks(tmp_path):
     write(tmp_path / "theirs.csv", "pressure,pole_height", [[0.0, 0.3, 0.45, 0.49], [0.0, 0.5, 0.9, 1.3]])
     script = f"""import sys; sys.path.insert(0, 'tests')
 import formingx as fx
-from conftest import run, treloar
+from conftest import treloar
 from mpi4py import MPI
 path = fx.trace(treloar((10, 1)), until=fx.pole_stretch(2.0), progress=False)
 found = fx.compare(path, {str(tmp_path / 'theirs.csv')!r})
 found.to_csv({str(tmp_path / 'pairs.csv')!r})
 print([round(d.maximum, 9) for d in found.differences.values()]) if MPI.COMM_WORLD.rank == 0 else None"""
-    assert run("-c", script, ranks=2) == run("-c", script)
+    assert run_script(script, ranks=2) == run_script(script)
     assert len((tmp_path / "pairs.csv").read_text().splitlines()) == 5
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import run
+from conftest import run_script
 from test_contact import cup
 from test_derivatives import difference, random_state, residual
 
@@ -108,7 +108,7 @@ def test_ranks_agree_and_go_on_where_others_stopped(tmp_path):
     path = push(one)
     expected = numbers(path)
     assert np.sum(path.contact().friction != 0) > 5
-    run("-c", ON_RANKS, two, ranks=2)
-    run("-c", ON_RANKS, three, two, ranks=3)
+    run_script(ON_RANKS, two, ranks=2)
+    run_script(ON_RANKS, three, two, ranks=3)
     for path in (fx.load(two, plugged()), fx.load(three, plugged()), push(end, three)):
         np.testing.assert_allclose(numbers(path), expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())

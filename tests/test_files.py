@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import test_process
-from conftest import run, treloar
+from conftest import run_script, treloar
 from mpi4py import MPI
 from PIL import Image
 from test_contact import cup
@@ -144,7 +144,7 @@ except OSError as error:
 
 
 def test_on_two_ranks(inflated, tmp_path):
-    assert run("-c", VTX, tmp_path / "two.bp", ranks=2).count("True") == 2
+    assert run_script(VTX, tmp_path / "two.bp", ranks=2).count("True") == 2
     inflated.to_vtx(tmp_path / "one.bp", "all")
     one, two = steps_of(tmp_path / "one.bp")[-1], steps_of(tmp_path / "two.bp")[-1]
     assert sorted(one) == sorted(two)

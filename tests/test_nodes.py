@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import ROOT, run, treloar
+from conftest import ROOT, run_script, treloar
 
 import formingx as fx
 from formingx.mesh import text as grid
@@ -61,7 +61,7 @@ try:
 except fx.InputError:
     n = MPI.COMM_WORLD.allreduce(m.domain.topology.index_map(2).size_local)
     print(n) if MPI.COMM_WORLD.rank == 0 else None"""
-    assert run("-c", script, ranks=2).split() == ["20"]
+    assert run_script(script, ranks=2).split() == ["20"]
 
 
 def test_textbook_element(tmp_path):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import run, run_json
+from conftest import run_json, run_script
 
 SCRIPT = """
 import json, sys
@@ -43,7 +43,7 @@ def test_ranks_agree(support):
 
 @pytest.mark.quick
 def test_errors_come_on_all_ranks():
-    lines = run("-c", BAD, ranks=2)
+    lines = run_script(BAD, ranks=2)
     for words in ("not there", "too little support"):
         assert lines.count(words) == 2
 

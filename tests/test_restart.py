@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import ROOT, run, treloar
+from conftest import ROOT, run_script, treloar
 from test_contact import cup
 
 import formingx as fx
@@ -72,10 +72,10 @@ def test_on_another_number_of_ranks(name, ranks, whole, tmp_path):
     made = folder
     if ranks[0] > 1:
         made = tmp_path / "made"
-        run("-c", OTHER_RANKS.format(name=name, folder="", state=None, out=str(made)), ranks=ranks[0])
+        run_script(OTHER_RANKS.format(name=name, folder="", state=None, out=str(made)), ranks=ranks[0])
     if ranks[1] > 1:
         out = tmp_path / "out"
-        run("-c", OTHER_RANKS.format(name=name, folder=str(made), state=len(path) // 2, out=str(out)), ranks=ranks[1])
+        run_script(OTHER_RANKS.format(name=name, folder=str(made), state=len(path) // 2, out=str(out)), ranks=ranks[1])
         same(fx.load(out, scene), path)
     else:
         start = fx.load(made, scene, state=len(path) // 2)
@@ -391,7 +391,7 @@ except OSError as error:
 
 
 def test_errors_come_on_all_ranks():
-    assert run("-c", UNWRITABLE, ranks=2).count("cannot be begun") == 2
+    assert run_script(UNWRITABLE, ranks=2).count("cannot be begun") == 2
 
 
 def test_contents_need_no_scene(whole):
