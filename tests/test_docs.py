@@ -1,5 +1,7 @@
 """Every code block of the pages runs, one after the other, and prints what stands below it; Sphinx builds them all."""
 
+import importlib
+import pkgutil
 import re
 import shutil
 from contextlib import nullcontext
@@ -7,6 +9,8 @@ from contextlib import nullcontext
 import pytest
 from conftest import ROOT, run
 from printed import assert_shows
+
+import formingx.exact
 
 DOCS = ROOT / "docs"
 MADE = {"_build", "notebooks"}
@@ -71,6 +75,9 @@ def test_every_demo_is_in_the_gallery():
 def test_sphinx_warns_of_nothing(tmp_path):
     run("-m", "sphinx", "-W", "--keep-going", "-q", "docs", tmp_path / "html")
     page = (tmp_path / "html" / "api.html").read_text()
+    exact = [importlib.import_module(m.name) for m in pkgutil.iter_modules(formingx.exact.__path__, "formingx.exact.")]
+    assert [name for room in exact for name, thing in vars(room).items() if not name.startswith("_") and callable(thing)
+            and thing.__module__ == room.__name__ and f'id="{room.__name__}.{name}"' not in page] == []
     assert [name for name, thing in public().items() if not any(
         f'id="{place}"' in page for place in (f"formingx.{name}", f"{thing.__module__}.{thing.__qualname__}"))] == []
 

@@ -71,7 +71,10 @@ def test_no_file_is_long():
 
 
 def test_tuned_numbers_have_a_name_each():
-    """No module begins with a tuple of numbers: each has a line and a word of its own, or is a field of a dataclass."""
+    """No module begins with a tuple of numbers: each has a line and a word of its own, or is a field of a dataclass.
+
+    Those of the solver are all fields; any other is said what it is, on its line or the next.
+    """
     codes = {"physics.supports", "solve.linear", "solve.predictor"}     # indices, counts
     tops = [(name_of(file), node) for file in FILES for node in ast.parse(file.read_text()).body]
     found = {(name, ast.unparse(node.targets[0])) for name, node in tops
@@ -81,6 +84,13 @@ def test_tuned_numbers_have_a_name_each():
     found |= {(name, ast.unparse(node.targets[0])) for name, node in tops if name.startswith("solve.")
               and isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant)
               and isinstance(node.value.value, int | float) and ast.unparse(node.targets[0]) != "SAME_TIME"}
+    for file in FILES:
+        lines, body = file.read_text().splitlines(), ast.parse(file.read_text()).body
+        for node, following in zip(body, [*body[1:], None]):
+            said = "#" in lines[node.lineno - 1] or isinstance(following, ast.Expr)
+            if (isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant) and not said
+                    and isinstance(node.value.value, int | float)):
+                found.add((name_of(file), ast.unparse(node.targets[0])))
     assert found == set()
 
 

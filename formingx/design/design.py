@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,23 +22,29 @@ from .run import DesignRun
 
 log = logging.getLogger("formingx")
 
-_HELD = 1e2
-"""Weight of the volume that is held, relative, beside relative walls."""
 
-_SPARE = 1e-6
-"""Part of the volume by which what is kept stays below it."""
+@dataclass(frozen=True)
+class Search:
+    """How searches weigh what they look for, and when they end.
 
-_KEPT = 5e-3
-"""Part by which a volume or a least wall may be missed, unsaid."""
+    Attributes:
+        held: weight of the volume that is held, relative, beside relative walls.
+        spare: part of the volume by which what is kept stays below it.
+        kept: part by which a volume or a least wall may be missed, unsaid.
+        damped: of what has most effect: smaller effects count as none.
+        worth: of the sum of squares: after two runs that are better by less nothing more is looked for.
+        shortest: part of a step of a search below which nothing better is looked for.
+    """
 
-_DAMPED = 1e-6
-"""Of what has most effect: smaller effects count as none."""
+    held: float = 1e2
+    spare: float = 1e-6
+    kept: float = 5e-3
+    damped: float = 1e-6
+    worth: float = 0.02
+    shortest: float = 1 / 64
 
-_WORTH = 0.02
-"""Of the sum of squares: after two runs that are better by less nothing more is looked for."""
 
-_SHORTEST = 1 / 64
-"""Part of a step of a search below which nothing better is looked for."""
+_SEARCH = Search()
 
 
 class Design:
@@ -134,7 +141,7 @@ class Design:
             raise InputError(f"fit: volume = {volume!r}: must be 'kept', a number or None")
         first = start if isinstance(start, DesignRun) else self._run(self.parameters.vector(start or {}))
         held = None if volume is None else (
-            first.volume * (1 - _SPARE) if volume == "kept" else positive("fit: volume", volume))
+            first.volume * (1 - _SEARCH.spare) if volume == "kept" else positive("fit: volume", volume))
         aim = _Aim(first, wall, within, held)
         return self._search(first, aim, most, good)
 
@@ -155,17 +162,17 @@ class Design:
                 break
             if not np.any(np.abs(by * size) > 1e-9):
                 raise InputError("fit: no parameter has an effect on what is fitted")
-            held = _DAMPED * np.linalg.norm(by * size, 2) * np.eye(len(size))     # what has no effect stays
+            held = _SEARCH.damped * np.linalg.norm(by * size, 2) * np.eye(len(size))     # what has no effect stays
             step = lsq_linear(np.vstack([by * size, held]), np.append(-left, 0 * size), tol=1e-12,
                               bounds=((low - best.vector) / size, (high - best.vector) / size)).x * size
             gain = np.sqrt(np.mean((by @ step) ** 2))
             better = 1 - np.sum((left + by @ step) ** 2) / np.sum(left**2)
-            if gain < good or better < _WORTH:
+            if gain < good or better < _SEARCH.worth:
                 why = f"the next step would change the wall by {gain:.1e}" if gain < good else (
                     f"the next step, within the bounds, would be {100 * max(better, 0.0):.1f} % better")
                 break
             share, new = 1.0, None
-            while share >= _SHORTEST and len(taken) + len(notes) < most:
+            while share >= _SEARCH.shortest and len(taken) + len(notes) < most:
                 try:
                     new = self._run(np.clip(best.vector + share * step, low, high))
                     taken.append(new)
@@ -175,12 +182,12 @@ class Design:
                     notes.append(str(error).splitlines()[0])
                 share, new = share / 2, None
             if new is None:
-                why = "no shorter step is better" if share < _SHORTEST else why
+                why = "no shorter step is better" if share < _SEARCH.shortest else why
                 break
             foretold = best.wall + share * (best.derivative("wall")[1] @ step)
             gained = 1 - aim.cost(new) / aim.cost(best)
             best = new
-            if max(gained, before) < _WORTH:     # a first step may lead beyond, to what is hardly better
+            if max(gained, before) < _SEARCH.worth:     # a first step may lead beyond, to what is hardly better
                 why = f"the last run was {100 * gained:.1f} % better"
                 break
             before = gained
@@ -251,7 +258,7 @@ class Design:
 
 def _lack(what: str, wanted: float | None, found: float) -> str:
     """What was asked for and not reached, in words, or ""."""
-    if wanted is None or abs(found / wanted - 1) < _KEPT:
+    if wanted is None or abs(found / wanted - 1) < _SEARCH.kept:
         return ""
     return f"the {what} that was asked for, {wanted:.5g}, was not reached: {found:.5g}"
 
@@ -280,7 +287,7 @@ class _Aim:
             slopes -= np.outer(wall / wanted**2, by.mean(0))
         if self.held is not None:
             grows = run.derivative("volume")[1][0] / self.held
-            weight = _HELD * np.sqrt(len(left))
+            weight = _SEARCH.held * np.sqrt(len(left))
             left = np.append(left, weight * (run.volume / self.held - 1))
             slopes = np.vstack([slopes, weight * grows])
         return left, slopes

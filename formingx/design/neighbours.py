@@ -12,6 +12,7 @@ and whatever is measured at two neighbours has their difference over 2 dp for it
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,20 +22,26 @@ from ..errors import InputError
 from ..solve.newton import Failure
 from ..solve.state import State
 
-_ENOUGH = 1e-9
-"""Corrections over the distance of a neighbour at which it is solved for."""
 
-_ENOUGH_IN_CONTACT = 1e-5
-"""The same with contact."""
+@dataclass(frozen=True)
+class Solved:
+    """When a neighbour counts as solved for: corrections of Newton's method over its distance from the state.
 
-_GOOD = 1e-3
-"""The same of one that is taken as it is after all iterations."""
+    Attributes:
+        enough, enough_in_contact: without contact, and with it.
+        good: of one that is taken as it is after all iterations.
+        iterations: at most so many.
+        none: corrections over the unknowns that are round-off.
+    """
 
-_MOST = 12
-"""Iterations."""
+    enough: float = 1e-9
+    enough_in_contact: float = 1e-5
+    good: float = 1e-3
+    iterations: int = 12
+    none: float = 2e-13
 
-_NONE = 2e-13
-"""Corrections, over the unknowns, that are round-off."""
+
+_SOLVED = Solved()
 
 
 class Apart(Failure):
@@ -141,9 +148,10 @@ def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: 
             return float(problem.comm.allreduce(float(g @ (one.x - state.x))) + by_control * (
                 one.control - state.control))
         return one.constraint(equations[k]) - kept
-    size, enough = _norm(problem, state.x) + abs(state.control), _ENOUGH_IN_CONTACT if problem.has_kinks else _ENOUGH
+    size = _norm(problem, state.x) + abs(state.control)
+    enough = _SOLVED.enough_in_contact if problem.has_kinks else _SOLVED.enough
     todo, first = list(range(len(neighbours))), np.full(len(neighbours), np.inf)
-    for iteration in range(_MOST):
+    for iteration in range(_SOLVED.iterations):
         rows = np.column_stack([neighbours[k].residual(left_over) for k in todo])
         left = np.array([constraint(k) for k in todo])
         if len(todo) > 1:
@@ -164,8 +172,8 @@ def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: 
             if not np.isfinite(correction):
                 raise Apart(f"with {one.name} a little changed no state is found near", [])
             first[k] = correction if iteration == 0 else first[k]
-            good &= correction <= max(enough * away, _NONE * size)
-            if iteration == _MOST - 1 and correction > max(_GOOD * away, 10 * _NONE * size):
+            good &= correction <= max(enough * away, _SOLVED.none * size)
+            if iteration == _SOLVED.iterations - 1 and correction > max(_SOLVED.good * away, 10 * _SOLVED.none * size):
                 raise Apart(f"with {one.name} a little changed no state is found near", [])
         if good:
             break

@@ -30,7 +30,7 @@ from ..values.table import Table
 from .boundaries import Absorption, FixedTemperature, ThermalProperties
 from .contact import ContactWithTool, Touch
 
-_MOST_ITERATIONS = 20
+_MOST_ITERATIONS = 20      # of Newton's method, of radiation and of constants by temperature
 
 
 class Stage(NamedTuple):

@@ -21,7 +21,7 @@ from .layers import graded
 from .run import checked_boundaries, checked_materials
 from .space_error import SpaceError
 
-_MOST_STEPS = 10_000
+_MOST_STEPS = 10_000       # of the heat equation in one of the run's
 _WARNS = 2e-3
 """Error in space over the span of temperatures above which a run warns: what is promised of stress."""
 _LOOKS = 8

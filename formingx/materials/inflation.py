@@ -11,7 +11,7 @@ import numpy as np
 from .homogeneous import along
 from .material import Material
 
-_HALVINGS = 60
+_HALVINGS = 60             # of a stretch: to round-off
 
 
 class Peak(NamedTuple):

@@ -86,11 +86,11 @@ class ContactLaw(Protocol):
 
     For each increment, in this order:
 
-        motion, touching    where it begins: each point's distance and slip to first order; which points touch;
-        tractions           each iteration, linearised where the `Motion` of the iteration before foretells: forces,
-                            their derivative (the tangent) and, of a state that is accepted, what to remember;
-        stiffness_ahead     there: the tangent of the path, with the points that have just touched;
-        distance, nearest, ramp     limits of the next step: when points arrive, and whether that was foreseen.
+    * `motion`, `touching`, where it begins: each point's distance and slip to first order; which points touch;
+    * `tractions`, each iteration, linearised where the `Motion` of the iteration before foretells: forces, their
+      derivative (the tangent) and, of a state that is accepted, what to remember;
+    * `stiffness_ahead`, there: the tangent of the path, with the points that have just touched;
+    * `distance`, `nearest`, `ramp`, for limits of the next step: when points arrive, and whether that was foreseen.
 
     Where it has `friction` and `depth`, too, as `formingx.physics.contact.Law`, a step may bring several points.
 
@@ -154,7 +154,7 @@ class ContactLaw(Protocol):
 
 
 class NormalLaw:
-    """A `ContactLaw` without friction or memory: subclasses give `ramp` and `stored`.
+    """A `ContactLaw`, with its methods, without friction or memory: subclasses give `ramp` and `stored`.
 
     Args:
         tool: with its signed distance.
@@ -171,7 +171,6 @@ class NormalLaw:
         self._near: tuple[np.ndarray, Nearest] | None = None        # points last asked for, and what was found
 
     def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """See `ContactLaw`."""
         raise NotImplementedError
 
     def stored(self, d: np.ndarray) -> np.ndarray:
@@ -179,11 +178,9 @@ class NormalLaw:
         raise NotImplementedError
 
     def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
-        """See `ContactLaw`."""
         return self.k * self.stored(self.distance(x))
 
     def distance(self, x: np.ndarray) -> np.ndarray:
-        """See `ContactLaw`."""
         if x.ndim == 2:
             return self.nearest(x).distance
         return self.tool.signed_distance(x).reshape(x.shape[:-1]) - self.shift
@@ -196,21 +193,17 @@ class NormalLaw:
         return self._near[1]
 
     def start(self, x: np.ndarray) -> Touch:
-        """See `ContactLaw`."""
         return Touch(x.copy(), self.distance(x), np.zeros(len(x)), x.copy())
 
     def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
-        """See `ContactLaw`."""
         return self.distance(x) > -self.theta
 
     def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
-        """See `ContactLaw`."""
         near = self.nearest(x)
         return Motion(x, near.distance, near.normal, np.zeros(len(x)), 0 * x)
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """See `ContactLaw`."""
         near, none = self.nearest(x), np.zeros(len(x))
         n, t, at = near.normal, near.tangent, near.distance if expected is None else expected.distance
         F, slope = self.ramp(at)
@@ -219,7 +212,6 @@ class NormalLaw:
                          + outer(t, (self.k * F * near.curvature)[:, None] * t), lambda: self.start(x))
 
     def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
-        """See `ContactLaw`."""
         return self.tractions(x, old).stiffness
 
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
@@ -228,16 +220,13 @@ class NormalLaw:
         return np.divide(turned, radius, out=np.zeros(len(x)), where=radius > 0)
 
     def part(self, points: np.ndarray | slice) -> Any:
-        """See `ContactLaw`."""
         arrays = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
         return self._with(**{name: value[points] for name, value in arrays.items()})
 
     def without(self, points: np.ndarray) -> Any:
-        """See `ContactLaw`."""
         return self._with(shift=self.shift + np.where(points, _FAR, 0.0))
 
     def with_friction(self, mu: np.ndarray | float) -> Any:
-        """See `ContactLaw`."""
         return self
 
     def _with(self, **other: Any) -> Any:

@@ -22,7 +22,7 @@ from ..tools.shapes import Nearest
 from ..tools.tool import RigidTool
 from .contact_law import Motion, Touch, Tractions
 
-_BISECTIONS = 30
+_BISECTIONS = 30           # of a chord, to where it crosses a tool: 1e-9 of it
 
 _PULLS = 0.01
 """Part, out of the tool, of the way by which the penalty gives way, from which on a point pulls (sheared along a facet
@@ -55,7 +55,6 @@ class LaggedStick:
         self._found: list[tuple[np.ndarray, np.ndarray]] = []           # distances asked for last, and where
 
     def part(self, points: np.ndarray | slice) -> LaggedStick:
-        """See `ContactLaw`."""
         return LaggedStick(self.tool, self.k, self.theta, self.separates)
 
     def without(self, points: np.ndarray) -> LaggedStick:
@@ -63,7 +62,6 @@ class LaggedStick:
         raise NotImplementedError
 
     def with_friction(self, mu: np.ndarray | float) -> LaggedStick:
-        """See `ContactLaw`."""
         return self
 
     def held(self, old: Touch) -> np.ndarray:
@@ -77,7 +75,6 @@ class LaggedStick:
         return self.separates & self.held(old) & (-self.distance(x) > most)
 
     def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
-        """See `ContactLaw`."""
         return np.zeros(len(x), dtype=bool) if old is None else self.held(old)
 
     def distance(self, x: np.ndarray) -> np.ndarray:
@@ -106,7 +103,6 @@ class LaggedStick:
                          lambda: self._touch(x, old, held))
 
     def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
-        """See `ContactLaw`."""
         assert old is not None
         held, stiffness = self.held(old), np.zeros((*x.shape, x.shape[1]))
         stiffness[held] = self._stiffness(x[held])
@@ -175,7 +171,6 @@ class LaggedSlide(LaggedStick):
         self._last: tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
 
     def part(self, points: np.ndarray | slice) -> LaggedSlide:
-        """See `ContactLaw`."""
         return LaggedSlide(self.tool, self.k, self.theta, self.step)
 
     def pulling(self, x: np.ndarray, old: Touch) -> np.ndarray:

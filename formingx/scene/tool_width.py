@@ -10,10 +10,10 @@ from ..mesh.triangles import Triangles
 from ..physics.contact import Contact
 from ..ranks import gathered
 
-_DIRECTIONS = 90
+_DIRECTIONS = 90           # in which a closed tool's width is measured
 
-_CUT = 0.1
-"""Depth over the thickness, as above which a run warns (`results.evaluate.verdict`)."""
+CUT = 0.1
+"""Depth of a face in a tool between contact points, over the thickness, from which on it is cut."""
 
 _PLACES = 33
 """Places of an edge that are looked at."""
@@ -70,10 +70,10 @@ def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> 
             return                                          # it goes elsewhere
     depth = tool.signed_distance(places.reshape(-1, places.shape[-1]) - travel * way).reshape(places.shape[:2]).max(1)
     worst = int(np.argmax(depth))
-    if depth[worst] > _CUT * thickness:
+    if depth[worst] > CUT * thickness:
         edge = float(np.hypot(*(ends[worst, 1] - ends[worst, 0])))
         r, z = ends[worst].mean(0)
         raise InputError(f"{contact!r}: the tool would be {depth[worst]:.4g} deep in {contact.on!r} near (R, Z) ="
                          f" ({r:.4g}, {z:.4g}), between two contact points, before it meets one: use elements of"
-                         f" {edge * _CUT * thickness / depth[worst]:.4g} or less there (they are {edge:.4g} long), or a"
+                         f" {edge * CUT * thickness / depth[worst]:.4g} or less there (they are {edge:.4g} long), or a"
                          f" rounder edge")

@@ -3,53 +3,54 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...discrete.contact import resultants
 from ...discrete.outline import Outline, along
+from ...scene.tool_width import CUT
 from ...solve.state import State
 
-_VOLUME = 0.25
-"""Root mean square of J - 1. (Creases at clamped rims, and at corners of coarse blocks, stay below 0.17.)"""
 
-_INSIDE_OUT = 0.05
-"""Part of the elements that may have a point with J <= 0."""
+@dataclass(frozen=True)
+class Limits:
+    """What a state may have, and when a run warns.
 
-_FEWEST = 4
-"""Number of them that always may: corners are singular."""
+    Attributes:
+        volume: root mean square of J - 1. (Creases at clamped rims, and at corners of coarse blocks, stay below 0.17.)
+        inside_out: part of the elements that may have a point with J <= 0.
+        fewest: number of them that always may: corners are singular.
+        inside: depth of the body in a tool, over the thickness and over the length of an edge: beyond both it stands in
+            the tool.
+        sunk: penetration of contact points over the wall that is left there: above it the body did not follow the tool.
+            (Williams' plug on coarse elements comes to 0.051.)
+        warns: by how much penetration may change a force before a run warns: that is its accuracy.
+        ends: by how much it may before a run ends.
+        stiffest: that change over the part of the body's energy that penetration holds: at most, of a body pressed
+            flat.
+        small: of arc length: half of a difference quotient.
+        felt: penetration over the thickness below which it ends no run: at a first touch the body holds nothing yet.
+        thinnest: pole stretch: the square root of a wall that is not above 0 is taken of 1e-300.
+        pulls: force by which a tool without friction is pulled, over the forces that press on it.
+    """
 
-_INSIDE = 0.25
-"""Depth of the body in a tool, over the thickness and over the length of an edge: beyond both it stands in the tool."""
+    volume: float = 0.25
+    inside_out: float = 0.05
+    fewest: int = 4
+    inside: float = 0.25
+    sunk: float = 0.15
+    warns: float = 2e-3
+    ends: float = 0.05
+    stiffest: float = 3.0
+    small: float = 1e-5
+    felt: float = 1e-3
+    thinnest: float = 1e100
+    pulls: float = 1e-3
 
-_SUNK = 0.15
-"""Penetration of contact points over the wall that is left there: above it the body did not follow the tool. (Williams'
-plug on coarse elements comes to 0.051.)"""
 
-_WARNS = 2e-3
-"""By how much penetration may change a force before a run warns: that is its accuracy."""
-
-_ENDS = 0.05
-"""By how much it may before a run ends."""
-
-_STIFFEST = 3.0
-"""That change over the part of the body's energy that penetration holds: at most, of a body pressed flat."""
-
-_SMALL = 1e-5
-"""Of arc length: half of a difference quotient."""
-
-_FELT = 1e-3
-"""Penetration over the thickness below which it ends no run: at a first touch the body holds nothing yet."""
-
-_THINNEST = 1e100
-"""Pole stretch: the square root of a wall that is not above 0 is taken of 1e-300."""
-
-_CUT = 0.1
-"""Depth of a face in a tool between contact points, over the thickness, above which a run warns."""
-
-_PULLS = 1e-3
-"""Force by which a tool without friction is pulled, over the forces that press on it."""
+_LIMITS = Limits()
 
 
 class Depth(NamedTuple):
@@ -84,7 +85,7 @@ class Verdict:
             edges, found = self._outline.edges(), []
             for contact in self._problem.present:
                 off = _off(contact, state)
-                if off > _WARNS:
+                if off > _LIMITS.warns:
                     found.append(("serious", f"Penetration changes the force on the tool of {_name(contact)!r} by about"
                                              f" {100 * off:.2g} %: {_harder(contact, off)}."))
             for cut in self._deepest(edges, state, own=True):
@@ -98,16 +99,16 @@ class Verdict:
         for name, value in measures.items():
             if not np.isfinite(value):
                 yield f"the {name.replace('_', ' ')} is {value}"
-        if measures.get("pole_stretch", 1.0) > _THINNEST:
+        if measures.get("pole_stretch", 1.0) > _LIMITS.thinnest:
             yield "the two faces cross at the pole"
         if not self._solid:
             return
-        if measures["volume_error"] > _VOLUME:
+        if measures["volume_error"] > _LIMITS.volume:
             yield (f"the elements do not keep their volumes: the root mean square of J - 1 is"
                    f" {measures['volume_error']:.2g}")
         with self._problem.at(state) as problem:
             bad, cells, (R, Z) = problem.inside_out()
-            if bad > max(_FEWEST, _INSIDE_OUT * cells):
+            if bad > max(_LIMITS.fewest, _LIMITS.inside_out * cells):
                 yield (f"{bad} of {cells} elements are inside out, the worst at (R, Z) = ({R:.5g}, {Z:.5g}):"
                        f" make the mesh again on the way (trace(remesh=Remesh(size=...)), a crushed block), or by a"
                        f" first run (trace(pilot=True), a sheet over an edge)")
@@ -118,12 +119,12 @@ class Verdict:
                        f" large for the tool")
             for sunk in self._sunk(edges, state):
                 yield (f"the body did not follow the tool of {sunk.name!r}: contact points are {sunk.depth:.4g} deep in"
-                       f" it, {100 * sunk.share * _SUNK:.2g} % of the wall that is left there: give Contact a penalty"
-                       f" of {50 * sunk.share * sunk.contact.contact.penalty:.1g}")
+                       f" it, {100 * sunk.share * _LIMITS.sunk:.2g} % of the wall that is left there: give Contact a"
+                       f" penalty of {50 * sunk.share * sunk.contact.contact.penalty:.1g}")
             for contact in problem.present:
                 off = _off(contact, state)
-                felt = resultants.penetration(contact, state.x, state.control) > _FELT * contact.thickness
-                if off > _ENDS and felt:
+                felt = resultants.penetration(contact, state.x, state.control) > _LIMITS.felt * contact.thickness
+                if off > _LIMITS.ends and felt:
                     yield (f"the body did not follow the tool of {_name(contact)!r}: penetration changes the force by"
                            f" about {100 * off:.2g} %: {_harder(contact, off)}")
                 if _pulled(contact, state):
@@ -140,7 +141,7 @@ class Verdict:
             if not contact.present:
                 continue
             depth = _depths(contact, points, state)
-            most = _CUT * contact.thickness if own else _INSIDE * np.maximum(contact.thickness, length)
+            most = CUT * contact.thickness if own else _LIMITS.inside * np.maximum(contact.thickness, length)
             share = np.where(face | (not own), depth.max(1) / most, 0.0)
             k = int(np.argmax(share))
             if share[k] > 1:
@@ -154,7 +155,7 @@ class Verdict:
                 continue
             depth = _depths(contact, edges[face], state).max(1)
             grown = _lengths(edges[face]) / self._rest[face] * weight(edges[face, 2].T) / weight(rest[face, 2].T)
-            share = depth * grown / (_SUNK * contact.thickness)
+            share = depth * grown / (_LIMITS.sunk * contact.thickness)
             k = int(np.argmax(share))
             if share[k] > 1:
                 yield Depth(share[k], depth[k], edges[face][k, 2], contact, _name(contact))
@@ -176,17 +177,18 @@ def _off(contact: Any, state: State) -> float:
         return 0.0
     energy = resultants.energy(contact, state.x, state.control)
     share = energy / (state.measures.get("strain_energy") or np.inf)
-    if share < 0.1 * _WARNS:
+    if share < 0.1 * _LIMITS.warns:
         return share
     along = np.array(contact.contact.moves) / np.hypot(*contact.contact.moves)
-    by = [(state.x + e * state.direction, state.control + e * state.slope) for e in (-_SMALL, 0.0, _SMALL)]
+    e = _LIMITS.small
+    by = [(state.x + s * state.direction, state.control + s * state.slope) for s in (-e, 0.0, e)]
     less, force, more = (resultants.force(contact, *at) @ along for at in by)
     way = (contact.travelled(by[2][1]) - contact.travelled(by[0][1])) @ along
-    return min(2 * energy * abs((more - less) / way) / force**2, _STIFFEST * share) if force and way else share
+    return min(2 * energy * abs((more - less) / way) / force**2, _LIMITS.stiffest * share) if force and way else share
 
 
 def _harder(contact: Any, off: float) -> str:
-    return f"give Contact a penalty of {contact.contact.penalty * off / _WARNS * 10:.1g}"
+    return f"give Contact a penalty of {contact.contact.penalty * off / _LIMITS.warns * 10:.1g}"
 
 
 def _pulled(contact: Any, state: State) -> bool:
@@ -195,7 +197,7 @@ def _pulled(contact: Any, state: State) -> bool:
     if not law.driven or not law.separates or law.friction_by_temperature or law.mu > 0:
         return False
     force = resultants.force(contact, state.x, state.control) @ np.array(law.moves) / np.hypot(*law.moves)
-    return bool(force > _PULLS * resultants.pressing(contact, state.x, state.control))
+    return bool(force > _LIMITS.pulls * resultants.pressing(contact, state.x, state.control))
 
 
 def _lengths(edges: np.ndarray) -> np.ndarray:

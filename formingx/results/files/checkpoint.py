@@ -43,7 +43,7 @@ from .arrays import pack, unpack
 from .description import describe, differences
 from .progress import progress
 
-FORMAT = 5
+FORMAT = 5                 # of the files written
 _READ = (4, 5)
 _FIELDS = ("x", "direction")
 _ARRAYS = "arrays.bin"
