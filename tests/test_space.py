@@ -11,6 +11,7 @@ from test_demos import summary
 from test_derivatives import assert_derivatives, difference, random_state
 
 import formingx as fx
+from formingx.__main__ import main
 from formingx.discrete.problem import Problem
 from formingx.results.files.fields import Fields
 from formingx.results.space.part import _beyond
@@ -117,6 +118,28 @@ def test_triangles_as_a_pilot_run_asks_for():
     assert len(path.wall().ratio) < 1.15 * len(even.wall().ratio) and path.counts.failures == 0
     assert path.problem.scene.mesh.boundaries.keys() == path.pilot.problem.scene.mesh.boundaries.keys()
     assert len(fx.mesh.adapted(path.pilot, share=None, error=1e9).nodes_of("rim")) < 5       # nothing asks for more
+
+
+def test_a_checkpoint_tells_of_itself_and_knows_its_scene(tmp_path):
+    """Its tools, from a file or not, are in pages made of it alone; another place of one, or thickness, is refused."""
+    at, floor = HELD, fx.tools.revolved(fx.tools.plane(-0.2).reversed())
+    block_of = solid_of(tmp_path / "block.stl", block((-2, -2, -0.5), (2, 2, -0.2)))
+
+    def scene(tool=floor, low=0.0, thickness=0.01):
+        return disc(on="top", supports=at, contacts=[fx.Contact("bottom", tool.moved(z=low), name="floor")],
+                    thickness=lambda x, y: thickness + 0.001 * x)
+    for number, tool in enumerate((floor, block_of)):
+        folder = tmp_path / f"run{number}"
+        path = fx.trace(scene(tool), until=fx.pressure(0.02), progress=False, checkpoint=folder)
+        assert main(["open", str(folder)]) == 0
+        text = fx.report([path, folder], tmp_path / "both.html").read_text()
+        assert "block.stl" in text if number else "revolved" in text
+        for other in ({"low": -0.1}, {"thickness": 0.011}):
+            with pytest.raises(fx.InputError, match="of another scene"):
+                fx.load(folder, scene(tool, **other))
+        assert len(fx.load(folder, scene(tool))) == len(path)
+    with pytest.raises(fx.InputError, match="the pole needs a boundary named 'axis'"):
+        fx.trace(scene(), until=fx.pole_height(0.1))
 
 
 def test_goes_on_from_a_checkpoint_and_part_is_read_off(tmp_path):

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..physics.contact import Contact
 from ..tools.shapes import Arc, Line, Tool
+from ..tools.solid import SolidTool, Swept
 from .schedule import Setting
 
 
@@ -61,17 +62,35 @@ class Tooling(NamedTuple):
                 for contact, travel in zip(self.contacts, travels, strict=True) if travel is not None]
 
 
+class _OfFile(SolidTool):
+    """A tool from a file, of which a checkpoint holds the name alone."""
+
+    def __init__(self, name: str):
+        self.name = name
+
+    def __repr__(self) -> str:
+        return f"solid({self.name!r})"
+
+
+def _tool(shape: dict[str, Any]) -> Tool | SolidTool:
+    if "pieces" in shape:
+        pieces: list[Line | Arc] = []
+        for piece in shape["pieces"]:
+            values: list[Any] = [np.array(v) if isinstance(v, list) else v for v in piece]
+            pieces.append((Line if len(values) == 2 else Arc)(*values))
+        return Tool.of_pieces(pieces, shape["closed"])
+    if "profile" not in shape:
+        return _OfFile(shape["name"])
+    profile = _tool(shape["profile"])
+    assert isinstance(profile, Tool)
+    return Swept(profile, shape["kind"], tuple(shape["half"]), shape["corner"], shape["along"])
+
+
 def _contact(data: dict[str, Any]) -> Contact:
-    shape = data["tool"]
-    pieces: list[Line | Arc] = []
-    for piece in shape["pieces"]:
-        values: list[Any] = [np.array(v) if isinstance(v, list) else v for v in piece]
-        pieces.append((Line if len(values) == 2 else Arc)(*values))
     moves = data["moves"] and tuple(data["moves"])
     names = ("penalty", "ramp", "elastic_slip", "separates", "nodes_per_step", "points", "name")
     more = {name: data[name] for name in names if name in data}
     words = isinstance(data["friction"], str) and data["friction"] not in ("stick", "none")
-    found = Contact(data["on"], Tool.of_pieces(pieces, shape["closed"]), "stick" if words else data["friction"],
-                    moves=moves, **more)
+    found = Contact(data["on"], _tool(data["tool"]), "stick" if words else data["friction"], moves=moves, **more)
     found.friction = data["friction"]                       # a function of the temperature can only be told
     return found

@@ -316,6 +316,7 @@ class Path(States):
             InputError: plane strain, fewer than 3 parts, or the mesh is no sheet.
         """
         from .files.shells import to_inp
+        self._section_only("to_inp", "use shell_model")
         if not self.problem.scene.kinematics.axisymmetric or count("to_inp: parts", parts) < 3:
             raise InputError(f"to_inp: parts = {parts!r}: must be at least 3, of an axisymmetric body")
         to_inp(self.profile(state), parts, file, self.problem.comm)

@@ -90,7 +90,7 @@ def _beyond(scene: Scene, contact: Any, height: float) -> bool:
     """True if the contact's face, moved to a pole height, has its pole deeper in the tool than the body is thick."""
     nodes = scene.mesh.nodes_of(contact.on)
     pole = nodes[np.argmin(nodes[:, 0])]
-    if pole[0] > 1e-9 * max(scene.extent):
+    if contact.tool.components == 3 or pole[0] > 1e-9 * max(scene.extent):
         return False
     depth = contact.tool.signed_distance((pole + [0.0, height])[None])[0]
     return float(depth) > Triangles(scene.mesh).thickness

@@ -19,16 +19,16 @@ _PER_CORNER = 24           # straight pieces of a rounded corner in `surface`
 
 
 class SolidTool:
-    """A tool in space: `signed_distance` (positive inside), `bounds`, `surface`, `moved`."""
+    """A tool in space: `signed_distance` (positive inside), `bounds`, `surface`, `moved` (by its `shift`)."""
 
     components = 3
     sized = True
     """False for a plane, whose drawing has no size."""
-    _shift: tuple[float, ...] = (0.0, 0.0, 0.0)
+    shift: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     def signed_distance(self, x: np.ndarray) -> np.ndarray:
         """Distance of points x, shape (n, 3), to the surface, positive inside the tool, shape (n,), length."""
-        return self._distance(as_points("signed_distance: x", x, 3) - self._shift)
+        return self._distance(as_points("signed_distance: x", x, 3) - self.shift)
 
     @property
     def bounds(self) -> np.ndarray:
@@ -39,13 +39,13 @@ class SolidTool:
     def surface(self) -> tuple[np.ndarray, np.ndarray]:
         """Points, shape (n, 3), length, and triangles, shape (m, 3), of the surface, for drawing."""
         points, triangles = self._surface()
-        return points + self._shift, triangles
+        return points + self.shift, triangles
 
     def moved(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
         """The tool, moved."""
         import copy
         found = copy.copy(self)
-        found._shift = tuple(a + b for a, b in zip(self._shift, triple("moved", (x, y, z))))
+        found.shift = tuple(a + b for a, b in zip(self.shift, triple("moved", (x, y, z))))
         return found
 
     def _distance(self, x: np.ndarray) -> np.ndarray:
@@ -96,7 +96,7 @@ class Swept(SolidTool):
         (top, upper), (back, lower) = (self._swept(np.array(line)) for line in (
             outline, [[0.0, low], [outline[0, 0], low], outline[0]]))
         points, triangles = merged(np.vstack([top, back]), np.vstack([upper, lower + len(top)]))
-        write_stl(points + self._shift, triangles if volume(points, triangles) > 0 else triangles[:, ::-1], file)
+        write_stl(points + self.shift, triangles if volume(points, triangles) > 0 else triangles[:, ::-1], file)
 
     def _swept(self, outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The surface over points (r, z) of a profile."""
@@ -132,7 +132,8 @@ class Triangulated(SolidTool):
     """A closed surface of triangles that look outward; the distance is VTK's, exact, the sign by its normals.
 
     Attributes:
-        name: of its file; triangles: how many; volume: of its bodies, length^3; what two share counts twice.
+        name: of its file; triangles: how many; volume: of its bodies, length^3 (what two share counts twice); middle:
+            the mean of its points.
     """
 
     def __init__(self, points: np.ndarray, triangles: np.ndarray, name: str):
@@ -140,6 +141,7 @@ class Triangulated(SolidTool):
         self._groups = apart(points, triangles, f"solid: {name!r}")
         self._implicit: list[Any] = []
         self.triangles, self.volume = len(triangles), round(volume(points, triangles), 12)
+        self.middle = points.mean(0)
 
     def _distance(self, x):
         from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy

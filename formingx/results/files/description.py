@@ -31,8 +31,13 @@ def describe(problem: Any) -> dict[str, Any]:
         found["temperature"] = text(scene.temperature)
     for layer, material in scene.materials.items():
         if material.varies:
+            constants = {name: constant.values for name, constant in material.constants().items()
+                         if isinstance(constant, Varying)}
             found["materials"][layer] |= {"shear_modulus": scene.shear_modulus(layer),
-                                          "sums": _sums_of_constants(scene, layer)}
+                                          "sums": _sums(scene, layer, constants)}
+    if "thickness" in extra:
+        found["thickness"] = {layer: _sums(scene, layer, {"sum": lambda at, h=h: h(*at.points.T)})
+                              for layer, h in scene.thickness.items()}
     return found
 
 
@@ -69,16 +74,13 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
         yield where, a, b
 
 
-def _sums_of_constants(scene: Any, layer: str) -> dict[str, float]:
-    """{constant that varies: sum over the layer that changes with the value at any of its points}."""
+def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
+    """{name: sum over a layer that changes with the value at any of its points} of functions of a `Sample`."""
     at = sample(scene.mesh, layer, scene.quadrature_degree, scene.temperature)
-    q, sums = len(at.places), {}
     numbers = np.sin(1.0 + scene.mesh.domain.topology.original_cell_index[at.cells])
-    weights = (numbers[:, None] * np.sin(1.0 + np.arange(q))).ravel()
-    for name, constant in scene.materials[layer].constants().items():
-        if isinstance(constant, Varying):
-            sums[name] = float(scene.mesh.comm.allreduce(float(weights @ constant.values(at)), MPI.SUM))
-    return sums
+    weights = (numbers[:, None] * np.sin(1.0 + np.arange(len(at.places)))).ravel()
+    return {name: float(scene.mesh.comm.allreduce(float(weights @ values(at)), MPI.SUM))
+            for name, values in fields.items()}
 
 
 def _mesh(problem: Any) -> dict[str, Any]:

@@ -87,11 +87,13 @@ def _label(record: Record, units: Units, key: str) -> str:
 
 
 def _tools(record: Record) -> list[dict[str, Any]]:
-    """Outlines of the tools, with a shell on their solid side, and how far each has come in every state."""
+    """Outlines of the tools of a section, with a shell on their solid side; how far each has come in every state."""
     shapes = [p for p in record.profiles if p is not None]
     size = max((np.ptp(np.vstack([p.bottom, p.top]), axis=0).max() for p in shapes), default=1.0)
     found = []
     for k, (contact, name) in enumerate(zip(record.tooling.contacts, record.tooling.names)):
+        if contact.tool.components == 3:                    # nothing of it is in a section
+            continue
         line = contact.tool.surface()[0]
         shell = line + 0.02 * size * contact.tool.nearest(line).normal
         found.append({"name": name, "line": _rounded(line.T), "shell": _rounded(shell.T),

@@ -136,7 +136,7 @@ class Record:
     def gaps(self, states: list[int]) -> dict[str, np.ndarray]:
         """{"tool, corner": gap left in that corner of a tool that stays} in each of some states with profiles."""
         found = {}
-        for contact in self.tooling.contacts:
+        for contact in self.tooling.contacts if states else ():
             if contact.moves is not None or contact.on not in ("top", "bottom", "inner", "outer"):
                 continue
             for k, (_, points) in enumerate(corners_of(contact.tool), 1):

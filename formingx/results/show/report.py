@@ -7,6 +7,7 @@ made from paths or from checkpoints alone; plotly.js and the data are in the fil
 import datetime
 import html
 import importlib.metadata
+import re
 from collections.abc import Callable, Sequence
 from importlib import resources
 from pathlib import Path as FilePath
@@ -241,9 +242,9 @@ def _tools(record: Record, units: Units) -> str:
     rows = []
     for contact, name, travel in zip(record.tooling.contacts, record.tooling.names, record.travels[-1]):
         force = record.forces.get(name)
-        moves = "stays" if contact.moves is None else "moves along ({:g}, {:g})".format(*contact.moves)
+        moves = "stays" if contact.moves is None else f"moves along ({', '.join(f'{x:g}' for x in contact.moves)})"
         where = "takes no part" if travel is None else page.number(travel) if contact.moves else ""
-        rows.append([contact.name or "", contact.on, repr(contact.tool)[5:-1],
+        rows.append([contact.name or "", contact.on, re.sub(r"^Tool\((.*)\)$", r"\1", repr(contact.tool)),
                      f"{contact.friction}{'' if contact.separates else ', holds what has touched'}",
                      page.number(contact.penalty), moves, where, "" if force is None else page.number(force[-1])])
         if record.heat:
