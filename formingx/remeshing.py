@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from .discrete.carry import carry
 from .discrete.contact.taken_over import Worn, take_over
 from .discrete.outline import Outline
 from .discrete.preformed import Preformed
@@ -79,9 +80,9 @@ class Remesh:
                              f" above 1")
 
 
-def check(scene: Any, remesh: Any, targets: Sequence[Target]) -> None:
+def check(who: str, scene: Any, remesh: Any, targets: Sequence[Target]) -> None:
     """An InputError if a scene has what is not carried to another mesh, or a target is not one of what is driven."""
-    instance("trace: remesh", remesh, Remesh, "a formingx.Remesh")
+    instance(f"{who}: remesh", remesh, Remesh, "a formingx.Remesh")
     why = ""
     if scene.mesh.comm.size > 1:
         why = "several ranks: gmsh makes a mesh on one: run without mpirun"
@@ -91,8 +92,8 @@ def check(scene: Any, remesh: Any, targets: Sequence[Target]) -> None:
         why = "a sheet in space"
     elif len(scene.mesh.layers) > 1:
         why = "several layers"
-    elif any(material.internal or material.integral or material.varies for material in scene.materials.values()):
-        why = "a material with a history or with constants that vary"
+    elif any(material.varies for material in scene.materials.values()):
+        why = "a material with constants that vary"
     elif scene.temperature is not None or scene.heat is not None:
         why = "a temperature"
     elif any(not isinstance(support, Symmetry | Clamped) for support in scene.supports):
@@ -102,10 +103,11 @@ def check(scene: Any, remesh: Any, targets: Sequence[Target]) -> None:
     elif any(type(contact).law is not Contact.law for contact in scene.contacts):
         why = "a law of contact of one's own"
     if why:
-        raise InputError(f"trace: remesh: is not known with {why}")
+        raise InputError(f"{who}: remesh: is not known with {why}")
     for target in targets:
-        if not target.name.endswith(("travel", "pressure")):
-            raise InputError(f"trace: remesh: target {target}: must be a travel or a pressure")
+        if not target.name.endswith(("travel", "pressure", "process_time")):
+            raise InputError(f"{who}: remesh: target {target}: must be a travel, a pressure or a process_time: what"
+                             f" jumps as a mesh is made again may jump over it")
 
 
 def follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[], None],
@@ -224,11 +226,12 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
         x_old = old.x.array_r[: old.n_owned].copy()
         worn = [(c, Worn.of(c, x_old, state.control), c.travelled(state.control)) for c in old.contacts]
     touched = [(c.contact.on, w.position[w.touches] + by) for c, w, by in worn]
-    order = outline.around("trace: remesh")
+    order = outline.around("remesh")
     names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
     sizes = share * remesh.size, share * (remesh.corner or remesh.size / 3)
     volume = enclosed(edges[order], scene.kinematics.axisymmetric)
-    edges = _without_pockets(edges[order], np.concatenate([points for _, points in touched]), _POCKET * sizes[1])
+    on_tools = np.concatenate([np.zeros((0, 2)), *(points for _, points in touched)])
+    edges = _without_pockets(edges[order], on_tools, _POCKET * sizes[1])
     corners = _corners(edges, names, touched)
     layer, = scene.mesh.layers
     mesh = remeshed(edges, names, corners, *sizes, layer, scene.kinematics.axisymmetric, scene.mesh.comm, volume,
@@ -242,6 +245,7 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
     problem.enter(setting, x, control)
     if not setting.rate[-1]:
         problem.clock = state.time
+    carry(old, state, problem, x, control, moved=True)
     for new, (_, before, _) in zip(problem.contacts, worn, strict=True):
         take_over(new, before, x[: problem.n_owned], control)
     volume = problem.forms.volume / old.forms.volume / (1 + state.measures["mass_error"]) - 1
@@ -266,7 +270,8 @@ def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> 
     except Failure as failure:
         why = failure.reason
     log.info("the forces that a new mesh leaves without balance are taken away gradually: %s", why)
-    still = replace(first, base=first.standing(control), rate=[0.0] * len(first.rate), fading=True)
+    time = problem.time_at(control)
+    still = replace(first, base=[*first.standing(control)[:-1], time], rate=[0.0] * len(first.rate), fading=True)
     record, target = Record(problem, curve), Target("change", 1.0, None)
     try:
         problem.enter(still, x, 0.0)
@@ -275,6 +280,7 @@ def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> 
         raise ConvergenceError(f"no state was found on a new mesh: {error}; give Remesh another size, or a range of"
                                f" volume_ratio nearer to 1") from None
     problem.enter(first, record.last.x, control)
+    problem.clock += time - problem.time_at(control)         # of a flow it is no part of the setting
     return record.last.x
 
 

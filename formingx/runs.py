@@ -30,7 +30,7 @@ from .solve.arc_length import Curve
 from .solve.load_control import FixedControlCurve
 from .solve.newton import Tolerances
 from .solve.path_following import Run
-from .solve.process import Execution, begin
+from .solve.process import Execution, begin, is_done
 from .solve.record import Record
 from .solve.stage import AT_FOLD, Plan, Stage, plan
 from .solve.state import State
@@ -75,8 +75,8 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
             has columns of elements as the first run asks for. True, or arguments of that, such as {"error": 0.02}.
             `Path.pilot` is the first run; a first run that did not reach the target counts as far as it came.
         remesh: a `Remesh`: the mesh is made again, of the body as it is, where elements are crushed; states of kind
-            "remesh", whose `jump` says by how much force, energy and volume changed. For blocks and sheets of one layer
-            of an elastic material, under tools; on one rank.
+            "remesh", whose `jump` says by how much force, energy and volume changed. For solids of one layer, whose
+            constants do not vary; on one rank.
         stop_at: `unstable(modes=range(2, 9))`: end, as a result, once the body is unstable in one of these modes;
             `Path.ended` says which.
 
@@ -93,7 +93,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     """
     instance("trace: scene", scene, Scene, "a formingx.Scene")
     if remesh is not None:
-        remeshing.check(scene, remesh, [*through, until])
+        remeshing.check("trace", scene, remesh, [*through, until])
         if pilot is not False or stop_at is not None:
             raise InputError("trace: remesh: with pilot or stop_at: is not known; leave them out")
     if pilot is not False:
@@ -207,7 +207,7 @@ class Process:
             max_steps: int | None = None, progress: bool = True, start: Path | State | None = None,
             checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
             accuracy: str | float = "standard", resume: bool = False, beyond: bool = False,
-            pilot: bool | Mapping[str, float] = False) -> Path:
+            pilot: bool | Mapping[str, float] = False, remesh: Remesh | None = None) -> Path:
         """Run the stages; one path holds the states of all of them, every stage from a state of kind "start" on.
 
         Args:
@@ -224,7 +224,7 @@ class Process:
             accuracy: of the steps in time of a material that relaxes, "draft", "standard" or "fine" (1, 0.2, 0.03 % of
                 stress and thickness), or such an error as a number.
             resume: go on from what the checkpoint holds, which must be of this process; if it holds nothing, begin.
-            beyond, pilot: see `trace`.
+            beyond, pilot, remesh: see `trace`.
 
         Raises:
             InputError: a stage drives or leaves out something that the scene does not have, leaves the body free to
@@ -234,6 +234,10 @@ class Process:
             OSError: the checkpoint cannot be written; the states in it are kept.
         """
         stages = self._checked(stages)
+        if remesh is not None:
+            remeshing.check("Process", self.scene, remesh, [t for s in stages for t in (*s.through, s.until) if t])
+            if pilot is not False:
+                raise InputError("Process: remesh: with pilot: is not known; leave it out")
         if pilot is not False:
             return _after_pilot("Process", pilot, start, resume, self.scene, checkpoint, lambda scene, checkpoint:
                                 Process(scene).run(stages, step=step, tolerances=tolerances, max_steps=max_steps,
@@ -258,8 +262,15 @@ class Process:
             timed = any(stage.timed for stage in stages)
             path = carried(_path(Curve(problem, tolerances), start, record, beyond, timed))
             _keep(path, checkpoint)
-            execution = Execution(path.record, plans, unsure, self._look_again, step, tolerances.residual, allowed)
-            execution.run(None if max_steps is None else count("Process: max_steps", max_steps), progress)
+            max_steps = None if max_steps is None else count("Process: max_steps", max_steps)
+
+            def part() -> None:
+                Execution(path.record, plans, unsure, self._look_again, step, tolerances.residual, allowed).run(
+                    max_steps, progress)
+            if remesh is None:
+                part()
+            else:
+                remeshing.follow(path, remesh, tolerances, part, lambda: is_done(path.record, plans))
         return path
 
     def _look_again(self, plan: Plan, stands: Callable[[int], float]) -> None:

@@ -1,5 +1,7 @@
 """What histories remember, carried to another mesh of the body."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -46,7 +48,7 @@ def test_internal_variables_are_those_of_a_run_on_the_other_mesh():
     assert here.last.time == pytest.approx(there.last.time)
     for problem, path, other, most in ((b, here, there, 0.01), (a, there, here, 0.01), (a, there, there, 1e-12)):
         with problem.at(path.last):
-            carry(other.problem, other.last.memory, problem, path.last.x, path.last.control)
+            carry(other.problem, other.last, problem, path.last.x, path.last.control)
             found, = problem.memory
         wanted, = path.last.memory
         assert found.time == wanted.time
@@ -59,7 +61,8 @@ def test_temperatures_and_the_lines_of_tools():
     path, fine = press(pressed()), Problem(fx.Scene(**parts(pressed(), elements=(12, 2))))
     memory = path.last.memory
     T = memory[-1]._replace(temperature=quadratic_of(path.problem.histories[-1]._body.points))
-    carry(path.problem, [*memory[:-1], T], fine, np.zeros(fine.x.getLocalSize()), 0.0)
+    there = replace(path.last, memory=[*memory[:-1], T])
+    carry(path.problem, there, fine, np.zeros(fine.x.getLocalSize()), 0.0)
     body, found = fine.histories[-1]._body, fine.memory[-1]
     assert found.temperature == pytest.approx(quadratic_of(body.points), rel=1e-9)
     assert np.array_equal(fine.temperature.T.x.array[: len(found.temperature)], found.temperature)
@@ -84,7 +87,7 @@ def parts(scene, elements):
 def test_contact_comes_back_as_it_was(points):
     path = form(cup(0.3, elements=(12, 1), points=points), 10.0)
     here, kept = Problem(path.problem.scene), path.last.memory[0]
-    carry(path.problem, path.last.memory, here, path.last.x, path.last.control)
+    carry(path.problem, path.last, here, path.last.x, path.last.control)
     found = here.memory[0]
     touched = kept.touch.distance > -here.contacts[0].law.theta
     assert touched.sum() > 3 and np.abs(kept.touch.slip).max() > 0

@@ -104,14 +104,53 @@ def _key(corners: np.ndarray) -> frozenset[tuple[float, float]]:
     return frozenset((float(r), float(z)) for r, z in corners)
 
 
-def carry(source: Any, memory: list[Any], problem: Any, x: np.ndarray, control: float) -> None:
-    """Let a problem remember what one of the same body on another mesh does (`State.memory`); collective.
+def carry(source: Any, state: Any, problem: Any, x: np.ndarray, control: float, moved: bool = False) -> None:
+    """Let a problem remember what one of the same body on another mesh does in a state; collective.
 
     Where it has not the same contacts, what these remember is left out.
 
-    x, control: the state of it that this belongs to, own part.
+    Args:
+        x, control: the state of it that this belongs to, own part.
+        moved: its mesh is one of the body as it is in the state (and contacts are seen to elsewhere).
     """
     problem.look_at(x, control)
-    n = len(problem.histories) if len(problem.histories) == len(source.histories) else len(problem.forms.histories)
-    for mine, other, kept in zip(problem.histories[-n:], source.histories[-n:], memory[-n:], strict=True) if n else ():
-        mine.put(mine.carry(other, kept, x[: problem.n_owned], control))
+    with source.at(state):
+        def there(points: np.ndarray) -> np.ndarray:
+            return points + source.forms.probe(source, points).displacement_in(state) if moved else points
+        same = len(problem.histories) == len(source.histories) and not moved
+        n = len(problem.histories) if same else len(problem.forms.histories)
+        for mine, other, kept in zip(problem.histories[-n:], source.histories[-n:], state.memory[-n:],
+                                     strict=True) if n else ():
+            mine.put(mine.carry(other, kept, x[: problem.n_owned], control, there))
+
+
+def fitted_shapes(carrier: Carrier, values: np.ndarray, there: np.ndarray, here: np.ndarray) -> np.ndarray:
+    """Positive tensors, as C, entries 11, 22, 12, 33, shape (m, 4), at the targets, shape (n, 4).
+
+    What is fitted is the logarithm of them as the body as it is sees them, F^-T C F^-1: how it is strained since. So
+    stresses go on as they were, whatever a fit of F makes of that.
+
+    there, here: deformation gradients, shapes (m, 3, 3), (n, 3, 3).
+    """
+    seen = np.linalg.solve(np.swapaxes(there, 1, 2), _matrices(values))
+    w, v = np.linalg.eigh(np.swapaxes(np.linalg.solve(np.swapaxes(there, 1, 2), np.swapaxes(seen, 1, 2)), 1, 2))
+    w, v = np.linalg.eigh(carrier.fitted(np.einsum("nij,nj,nkj->nik", v, np.log(w), v)))
+    C = np.einsum("nji,njl,nl,nml,nmk->nik", here, v, np.exp(w), v, here, optimize=True)
+    return np.stack([C[:, 0, 0], C[:, 1, 1], C[:, 0, 1], C[:, 2, 2]], axis=1)
+
+
+def _matrices(entries: np.ndarray) -> np.ndarray:
+    found = np.zeros((len(entries), 3, 3))
+    found[:, 0, 0], found[:, 1, 1], found[:, 0, 1], found[:, 2, 2] = entries.T
+    found[:, 1, 0] = found[:, 0, 1]
+    return found
+
+
+def shapes_of(forms: Any, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """The deformation gradient that materials see, scaled to det F = 1, at places in some cells, shape (n, 3, 3)."""
+    if not len(cells):
+        return np.zeros((0, 3, 3))
+    F = forms.elastic_F
+    found = fem.Expression(ufl.as_vector([F[i, j] for i in range(3) for j in range(3)]), places,
+                           jit_options=_compat.JIT_OPTIONS).eval(forms.domain, cells).reshape(-1, 3, 3)
+    return found / np.cbrt(np.linalg.det(found))[:, None, None]

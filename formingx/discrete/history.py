@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -43,10 +44,12 @@ class History(Protocol):
     def load(self, data: dict[str, Any]) -> Any:
         """The memory, own part, of what `save` gave; an InputError if it does not fit this scene."""
 
-    def carry(self, source: Any, memory: Any, x: np.ndarray, control: float) -> Any:
+    def carry(self, source: Any, memory: Any, x: np.ndarray, control: float,
+              there: Callable[[np.ndarray], np.ndarray]) -> Any:
         """The memory, here, of what the same part remembers in a problem of the same body on another mesh; collective.
 
         Args:
-            source: its history there; memory: of that.
+            source: its history there; memory: of that. The problem there stands at the state that it belongs to.
             x, control: the state here that it belongs to (owned unknowns), at which the forms stand.
+            there: says where reference points of the other mesh are in this one's, shape (n, coordinates) both.
         """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -11,7 +12,7 @@ import ufl
 from .. import _compat
 from ..errors import InputError
 from ..ranks import gathered
-from .carry import Carrier
+from .carry import Carrier, fitted_shapes, shapes_of
 
 
 class Memory(NamedTuple):
@@ -108,12 +109,20 @@ class MaterialHistory:
             raise InputError(f"what {self._terms.material} remembers is of another mesh, or another material")
         return Memory(float(data["time"]), {name: found[name][rows] for name in self._sizes})
 
-    def carry(self, source: MaterialHistory, memory: Memory, x: np.ndarray, control: float) -> Memory:
+    def carry(self, source: MaterialHistory, memory: Memory, x: np.ndarray, control: float,
+              there: Callable[[np.ndarray], np.ndarray]) -> Memory:
         """See `History`."""
-        carrier = Carrier(self._forms.comm, source.points, self.points)
-        shape = len(self._own), len(self._terms.places)
+        carrier = Carrier(self._forms.comm, there(source.points), self.points)
+        shapes = self._terms.material.shapes
+        F = [shapes_of(one._forms, one._own, one._terms.places) for one in (source, self)] if shapes else []
+
+        def carried(name: str, values: np.ndarray) -> np.ndarray:
+            if name not in shapes:
+                return carrier.fitted(values)
+            return fitted_shapes(carrier, values, *(F if shapes[name] > 0 else [
+                np.linalg.inv(f).swapaxes(1, 2) for f in F]))
         return _unchangeable(Memory(memory.time, {
-            name: carrier.fitted(v.reshape(-1, v.shape[-1])).reshape(*shape, v.shape[-1])
+            name: carried(name, v.reshape(-1, v.shape[-1])).reshape(len(self._own), -1, v.shape[-1])
             for name, v in memory.values.items()}))
 
     @cached_property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -14,7 +15,7 @@ from .. import _compat
 from ..errors import InputError
 from ..materials.tensors import IDENTITY, cofactor, deviator_squared, entries, inner, isochoric
 from ..ranks import gathered
-from .carry import Carrier
+from .carry import Carrier, fitted_shapes, shapes_of
 
 _NOTHING = 3e-7
 """A past state that the line between its neighbours replaces to this part of the present stress is left out. (Of the
@@ -113,13 +114,16 @@ class PastStates:
             chosen = self._needed(states, C, least)
         self.put(Memory(time, tuple(states[k] for k in chosen), least if least is None else least[chosen]))
 
-    def carry(self, source: PastStates, memory: Memory, x: np.ndarray, control: float) -> Memory:
+    def carry(self, source: PastStates, memory: Memory, x: np.ndarray, control: float,
+              there: Callable[[np.ndarray], np.ndarray]) -> Memory:
         """See `History`."""
-        carrier = Carrier(self._forms.comm, source.points, self.points)
+        carrier = Carrier(self._forms.comm, there(source.points), self.points)
+        F = [shapes_of(one._forms, one._own, one._terms.places) for one in (source, self)]
 
         def fitted(values: np.ndarray) -> np.ndarray:
             return carrier.fitted(values.T).T
-        states = tuple(Past(fitted(s.felt) if self._aT else s.felt, fitted(s.C)) for s in memory.states)
+        states = tuple(Past(fitted(s.felt) if self._aT else s.felt, fitted_shapes(carrier, s.C.T, *F).T)
+                       for s in memory.states)
         return Memory(memory.time, states, None if memory.least is None else fitted(memory.least))
 
     @cached_property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -263,13 +263,14 @@ class CoolingHistory:
         before = (float(data["before"][0]), np.array(data["before"][1])[rows]) if "before" in data else None
         return Memory(float(data["time"]), np.array(data["temperature"])[rows], lines, data["step"], power, before)
 
-    def carry(self, source: CoolingHistory, memory: Memory, x: np.ndarray, control: float) -> Memory:
+    def carry(self, source: CoolingHistory, memory: Memory, x: np.ndarray, control: float,
+              there: Callable[[np.ndarray], np.ndarray]) -> Memory:
         """See `History`; the materials have been carried."""
         comm, before = self._problem.comm, memory.before
-        to_body = Carrier(comm, source._body.points, self._body.points).fitted
-        there = zip(source._body.touches, memory.lines, strict=True) if self._body.touches else ()
-        lines = [Carrier(comm, other.points, touch.points).fitted(kept)        # what is let go touches nothing
-                 for touch, (other, kept) in zip(self._body.touches, there, strict=True)]
+        to_body = Carrier(comm, there(source._body.points), self._body.points).fitted
+        touched = zip(source._body.touches, memory.lines, strict=True) if self._body.touches else ()
+        lines = [Carrier(comm, there(other.points), touch.points).fitted(kept)  # what is let go touches nothing
+                 for touch, (other, kept) in zip(self._body.touches, touched, strict=True)]
         power = None if memory.power is None else self._cooling.work_to_heat * self._body.assembled(self._dissipated)
         return Memory(memory.time, to_body(memory.temperature), lines, memory.step, power,
                       before and (before[0], to_body(before[1])))

@@ -12,6 +12,7 @@ import copy
 import functools
 import math
 from collections.abc import Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,8 @@ class Material:
             per quadrature point. Empty: no history.
         of_motion: names of internal variables that tell how the body moved in the last step, for its rate in the next;
             as at rest they tell nothing.
+        shapes: {name: 1 or -1} of internal variables that are positive tensors, as C or as its inverse, of entries 11,
+            22, 12, 33: on another mesh the body as it is sees them as it did. (Others are carried as numbers.)
         rate_dependent: False: its history follows the strain alone, as damage does, and time is nothing to it.
         integral: the stress that comes of all past states (`past.Integral`), or None.
         stores_energy: True if `stored_energy` is one.
@@ -50,6 +53,7 @@ class Material:
     parameters: dict[str, Any]
     internal: dict[str, Any] = {}
     of_motion: Any = ()
+    shapes: Any = MappingProxyType({})
     rate_dependent = True
     integral: Any = None
     stores_energy: Any = True

@@ -92,6 +92,11 @@ class Sets(Material):
         return self._base.of_motion
 
     @property
+    def shapes(self) -> dict[str, int]:  # type: ignore[override]  # read only here
+        """See `Material`."""
+        return {**self._base.shapes, _BEFORE: 1, _LAST: 1}
+
+    @property
     def largest_I1(self):
         return self.base.largest_I1
 

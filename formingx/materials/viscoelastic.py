@@ -43,6 +43,7 @@ class RelaxingMaterial(Relaxing):
 
     _tensor = ""                    # name of the branches' state
     _remembers = True               # the last state's C is needed, too
+    _sign = 1                       # of the branches' state: see `Material.shapes`
 
     def __init__(self, equilibrium: Material | None, branches: Any, shift: Any = None):
         super().__init__(equilibrium)
@@ -76,8 +77,13 @@ class RelaxingMaterial(Relaxing):
     @property
     def internal(self) -> dict[str, tuple]:  # type: ignore[override]  # read only here
         """{name: value at rest} of what the material remembers: entries (11, 22, 12, 33) of tensors."""
-        names = ["C"] * self._remembers + [f"{self._tensor}_{k}" for k, *_ in self._branches(self.parameters)]
-        return dict.fromkeys(names, IDENTITY)
+        return dict.fromkeys(self.shapes, IDENTITY)
+
+    @property
+    def shapes(self) -> dict[str, int]:  # type: ignore[override]  # read only here
+        """See `Material`."""
+        branches = {f"{self._tensor}_{k}": self._sign for k, *_ in self._branches(self.parameters)}
+        return {"C": 1} | branches if self._remembers else branches
 
     @property
     def of_flow(self) -> tuple[str, ...]:
@@ -333,7 +339,7 @@ class TransientNetwork(RelaxingMaterial):
     0.05
     """
 
-    _tensor = "A"
+    _tensor, _sign = "A", -1
     of_motion = ("change", "pace")
 
     @property

@@ -200,5 +200,5 @@ def _carried(source: Any, state: Any, problem: Problem) -> np.ndarray:
     take_fields(source, state, problem)
     x = np.zeros(problem.x.getLocalSize())
     x[: problem.n_owned] = problem.forms.w.x.array[: problem.n_owned]
-    carry(source, state.memory, problem, x, 0.0)
+    carry(source, state, problem, x, 0.0)
     return x

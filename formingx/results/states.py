@@ -277,7 +277,7 @@ class States:
     def _measure(self, state: State) -> None:
         """Fill the columns of an accepted state."""
         segment = self.segments[-1]
-        self._fill(segment, segment.states)
+        self._fill(segment, self.states if len(segment.states) == 1 else segment.states)
 
     def _fill(self, segment: Segment, states: list[State]) -> None:
         """Fill the columns of the last of some states, which may be the first of all."""
@@ -293,7 +293,7 @@ class States:
         Half way in time the body is on the curve that the run takes it along; what it remembers is advanced to there.
         """
         before, state = states[-2:]
-        if not before.time < state.time:
+        if not before.time < state.time:                     # as where a mesh is made again
             return 0.0
         column, time = self._view(segment).columns["dissipated_power"], (before.time + state.time) / 2
         if state.setting["rate"][-1]:

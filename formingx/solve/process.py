@@ -70,6 +70,8 @@ class Execution:
             piece = last["piece"] if k == last["stage"] else -1     # of this stage, that has begun already
             if piece < 1:
                 self._change(piece == 0)
+                if self.record.ended:
+                    break
                 if any(plan is p for p in self._unsure):     # now its travels are known
                     self._look(plan, self._stands)
             if plan.in_flow:
@@ -99,6 +101,13 @@ class Execution:
             found.append((target, bound))
         return found
 
+    def _left_to_meet(self) -> _Targets:
+        """The targets of the stage, but those on its way that were met on meshes before."""
+        met = [s.met[:2] for segment in self.record.segments[:-1] for s in segment.states
+               if s.met and s.setting["stage"] == self._k]
+        return [(target, bound) for target, bound in self._targets[self._k]
+                if target[:2] not in met or target not in self._stage.through]
+
     def _standing(self) -> tuple[Setting, Array, float]:
         """The setting, the unknowns and the control where the process stands now."""
         last = self.record.last if self.record.states else None
@@ -111,7 +120,7 @@ class Execution:
 
     def _enter(self, base: list[float], rate: list[float], piece: int, control: float, fading: bool = False) -> None:
         changed = sorted(set(self.problem.setting.off) ^ set(self._off)) if fading else []
-        setting = Setting(base, rate, self._off, fading, self._k, piece, changed)
+        setting = Setting(base, rate, self._off, fading, self._k, piece, changed, self.problem.setting.mesh)
         self.problem.enter(setting, self._standing()[1], control)
 
     def _resumed(self, control: float) -> State:
@@ -168,7 +177,7 @@ class Execution:
         before, _, control = self._standing()
         if not begun:
             control = self._enter_driving(numbers)
-        self._trace(self._targets[self._k], None if begun else control)
+        self._trace(self._left_to_meet(), None if begun else control)
 
     def _enter_driving(self, numbers: list[int], clocked: bool = True) -> float:
         """Make the amplitude of one thing the control; `clocked`: time goes by as it moves. The control now."""
@@ -189,7 +198,7 @@ class Execution:
         """Piece 1: one thing is what makes a measure follow a course in time."""
         control = None if begun else self._enter_driving(numbers, clocked=False)
         target, course, times = self._course(self.problem.setting.base[-1])
-        run = Flow(self.record, target.bind(self.problem), course, times, self._targets[self._k],
+        run = Flow(self.record, target.bind(self.problem), course, times, self._left_to_meet(),
                    self._stage.step or self._step or (None if begun else _IN_TIME), self._accuracy, self._label)
         run.follow(self._max_steps, self._progress, None if control is None else self._resumed(control))
 
@@ -215,13 +224,13 @@ class Execution:
     def _follow(self, tables: list[tuple[int, Array]], piece: int) -> None:
         """Pieces 1, 2, ...: from knot to knot of the tables, the time being the control."""
         before, _, control = self._standing()
-        stage, through = self._stage, self._targets[self._k]
+        stage, through = self._stage, self._left_to_meet()
         now = before.base[-1] if piece else self.problem.time_at(control)
         end = end_of(stage, tables, now)
         if not piece:
             self._check_beginning(tables, now, end)
         begun = piece > 0
-        while begun or now < end - SAME_TIME * abs(end):
+        while not self.record.ended and (begun or now < end - SAME_TIME * abs(end)):
             then = next_knot(tables, now, end)
             if not begun:
                 piece += 1
@@ -245,7 +254,7 @@ class Execution:
         target, wanted = process_time(then), self._stage.until if self._stage.waits else None
         left = self._trace([*through, (target, target.bind(self.problem))], None if begun else 0.0, wanted)
         for waited, bound in left:
-            if waited is wanted:
+            if waited is wanted and not self.record.ended:
                 last = self.record.last
                 raise ConvergenceError(f"{self._stage.who}: {waited} was not reached within its duration of"
                                        f" {self._stage.duration:g}: it is"
@@ -267,6 +276,21 @@ class Execution:
             if first[0] <= now + SAME_TIME * abs(now) and abs(stands - first[1]) > 1e-9 * size:
                 raise InputError(f"{who}: the table of {name} begins with {first[1]:g} at time {first[0]:g}, but it"
                                  f" stands at {stands:g} then")
+
+
+def is_done(record: Record, plans: list[Plan]) -> bool:
+    """True if the last state is the end of the last stage."""
+    last, plan = record.last, plans[-1]
+    if last.setting["stage"] < len(plans) - 1:
+        return False
+    if plan.stage.until is not None:
+        return last.met is not None and last.met[:2] == plan.stage.until[:2]
+    if not (plan.by_time or plan.in_flow):
+        return not last.setting["fading"] or last.control == 1.0
+    first = next(s for s in record.states if s.setting["stage"] == last.setting["stage"])
+    tables = [plan.stage.flow[1]] if plan.stage.flow else [table for _, table in plan.tables]
+    end = first.time + plan.stage.duration if plan.stage.duration else max(table[-1, 0] for table in tables)
+    return bool(last.time >= end - SAME_TIME * abs(end))
 
 
 def driving(amplitudes: list[float], scales: Sequence[float], numbers: list[int], stage: Stage,

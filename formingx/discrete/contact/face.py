@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -296,11 +297,12 @@ class FaceContact:
         penalty = np.array(data["penalty"], dtype=float)[rows] if "penalty" in data else np.ones(len(rows))
         return Memory(touch, np.array(data["arrived"], dtype=bool)[rows], penalty)
 
-    def carry(self, source: FaceContact, memory: Memory | None, x: np.ndarray, control: float) -> Memory | None:
+    def carry(self, source: FaceContact, memory: Memory | None, x: np.ndarray, control: float,
+              there: Callable[[np.ndarray], np.ndarray]) -> Memory | None:
         """See `History`: where its nearest point touched a point touches, and slipped as that did."""
         if memory is None:
             return None
-        carrier, touch, theta = Carrier(self.comm, source.points, self.points), memory.touch, self.law.theta
+        carrier, touch, theta = Carrier(self.comm, there(source.points), self.points), memory.touch, self.law.theta
         distance, arrived, penalty = (carrier.all(values)[carrier.nearest] for values in
                                       (touch.distance, memory.arrived, memory.penalty))
         touched, position = distance > -source.law.theta, self.positions(x, control)
