@@ -230,7 +230,7 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
     names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
     sizes = share * remesh.size, share * (remesh.corner or remesh.size / 3)
     volume = enclosed(edges[order], scene.kinematics.axisymmetric)
-    on_tools = np.concatenate([np.zeros((0, 2)), *(points for _, points in touched)])
+    on_tools = np.concatenate([edges[:0, 0], *(points for _, points in touched)])
     edges = _without_pockets(edges[order], on_tools, _POCKET * sizes[1])
     corners = _corners(edges, names, touched)
     layer, = scene.mesh.layers
