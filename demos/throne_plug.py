@@ -46,7 +46,7 @@ THESIS = {"thin_throne": "much softer than measured", "thin_treloar": "compares 
           "plane_strain_outside_plug": "only approximately"}
 # law: (elements, the pole stretch at which the run ends, or None: 10 cm, friction)
 RUNS = {"held": ((120, 1), None, "stick"), "frictionless": ((100, 1), 3.0, "none")}
-QUICK = {"held": ((60, 1), None, "stick"), "frictionless": ((60, 1), 1.3, "none")}
+QUICK = {"held": ((48, 1), None, "stick"), "frictionless": ((48, 1), 1.3, "none")}
 FILLETS = (0.18, 0.06, 0.02)                                 # over the plug's radius, against the membrane
 MU, FACE_STRETCH = 0.3, 25.0                                 # of friction, and of the face that elements are made for
 

@@ -66,7 +66,7 @@ def draw(paths):
 def main():
     options = parser("viscoelastic_disc", __doc__, elements=40, accuracy=1e-4)
     args = options.parse_args()
-    n, accuracy = (24, 3e-4) if args.quick else (args.elements, args.accuracy)
+    n, accuracy = (16, 1.5e-3) if args.quick else (args.elements, args.accuracy)
     summary: dict = {}
     paths = {}
     for model in MODELS:
