@@ -66,6 +66,9 @@ class Fit(NamedTuple):
         open_ = f"; the data do not determine {', '.join(self.undetermined)}" if self.undetermined else ""
         return f"{self.material}: rms {self.rms_total:.4g} ({parts}){open_}"
 
+    def __repr__(self) -> str:
+        return str(self)
+
 
 def fit(material: type[Material] | Material, data: Any, terms: int | None = None) -> Fit:
     """Fit the constants of a material to tests, all points of all tests with the same weight.

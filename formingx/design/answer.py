@@ -95,6 +95,8 @@ class Answer:
         lines += [f"the best run: {text}" for kind, text in self.best.path.doubts() if kind == "serious"]
         return "\n".join([*lines, *[self.lack] * bool(self.lack), *(f"failed: {text}" for text in self.failed)])
 
+    __repr__ = __str__
+
     def plot_wall(self, axes: Any = None) -> Any:
         """Draw the wall before and after over the reference length; returns the matplotlib axes."""
         if axes is None:

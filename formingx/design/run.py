@@ -51,6 +51,8 @@ class Effects:
                   for k in rows]
         return "\n".join(lines)
 
+    __repr__ = __str__
+
     def plot(self, axes: Any = None) -> Any:
         """Draw a heat map: by how much the measure changes, to first order, where a parameter goes over a tenth of its
         range; returns the matplotlib axes."""

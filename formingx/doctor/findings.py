@@ -32,3 +32,5 @@ class Report:
 
     def __str__(self) -> str:
         return "\n".join(map(str, self.findings)) or "nothing was found that stands against this scene"
+
+    __repr__ = __str__

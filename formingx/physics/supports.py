@@ -67,7 +67,8 @@ class Support(Part):
         return [*self.constraints(), *(Held(_component(f"{self!r}: resists", c), on=self.on) for c in self.resists)]
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.on!r})"
+        along = f", {NAMES[self.component]!r}" if hasattr(self, "component") else ""
+        return f"{type(self).__name__}({self.on!r}{along})"
 
 
 class Symmetry(Support):
@@ -78,7 +79,7 @@ class Symmetry(Support):
             `Path.stability`. False: it is an axis, or a guide along which the body slides.
 
     >>> [fx.Symmetry("axis"), fx.Symmetry("middle", normal="z", mirror=True)]
-    [Symmetry('axis'), Symmetry('middle')]
+    [Symmetry('axis', 'r'), Symmetry('middle', 'z')]
     """
 
     def __init__(self, on: str, normal: str = "r", mirror: bool = False):
@@ -116,7 +117,7 @@ class SimplySupported(Support):
             by their shear modulus, for layers so different that the soft one could not carry that traction.
 
     >>> scene.supports
-    [Symmetry('axis'), SimplySupported('rim')]
+    [Symmetry('axis', 'r'), SimplySupported('rim')]
     """
 
     on: str

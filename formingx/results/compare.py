@@ -94,6 +94,8 @@ class Comparison:
                      f" {theirs:.1e}")
         return "\n".join(lines)
 
+    __repr__ = __str__
+
     def plot(self) -> Any:
         """Both curves (first column over second), and the differences along the curve; returns the figure."""
         figure, (left, right) = plots.figure(2)

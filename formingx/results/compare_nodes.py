@@ -60,6 +60,8 @@ class NodalComparison:
                 f" (R, Z) = ({R:.6g}, {Z:.6g}): ours ({a:.8g}, {b:.8g}), theirs ({c:.8g}, {d:.8g})\n"
                 f"root mean square {self.rms:.5g} ({100 * self.rms / size:.2g} %)")
 
+    __repr__ = __str__
+
     def plot(self) -> Any:
         """The deformed nodes of both; returns the figure."""
         figure, axes = plots.figure()

@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+
 from ..units import Units
+
+
+def without_round_off(point: Any, points: Any) -> tuple[float, ...]:
+    """A point's coordinates, 0 where they are 1e-12 or less of the extent of points, shape (n, coordinates)."""
+    return tuple(float(x) if abs(x) > 1e-12 * np.ptp(points) else 0.0 for x in point)
 
 
 class KeyNumbers:
@@ -18,6 +27,8 @@ class KeyNumbers:
     def __str__(self) -> str:
         width = max(len(what) for what, _ in self.rows)
         return "\n".join(f"{what:{width}}  {value}" for what, value in self.rows)
+
+    __repr__ = __str__
 
     def _length(self, value: float) -> str:
         return self._said(value, self.units.length or "")

@@ -31,7 +31,7 @@ _THROUGH = 1.0
 """Time that a wall is given to cool, over thickness^2/diffusivity: exp(-pi^2) of a difference is left."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Released(KeyNumbers):
     """A part before and after it was let go.
 

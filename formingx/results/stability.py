@@ -13,6 +13,7 @@ from ..ranks import gathered
 from ..solve.record import Record
 from ..solve.stability import Kind, Located, Modes
 from ..solve.state import State
+from .numbers import without_round_off
 from .show.picture import Picture
 
 
@@ -57,10 +58,9 @@ class Loss:
     solved = property(lambda self: self.found.solved)
 
     @property
-    def at(self) -> tuple[float, float]:
+    def at(self) -> tuple[float, ...]:
         """Reference position (R, Z) of the largest amplitude, length."""
-        R, Z = self.points[np.argmax(np.linalg.norm(self.amplitudes, axis=1))]
-        return float(R), float(Z)
+        return without_round_off(self.points[np.argmax(np.linalg.norm(self.amplitudes, axis=1))], self.points)
 
     def branch(self, sense: int) -> Any:
         """A path that ends where another begins, headed along it: for `trace(scene, start=...)` (n = 0).
@@ -143,6 +143,8 @@ class Stability:
         lines = [head, *([f"  unstable from the first state on: {', '.join(unstable)}"] if unstable else [])]
         lines += [f"  {unit} = {loss.number:g}: {_shown(loss)}" for loss in self.losses]
         return "\n".join(lines if len(lines) > 1 else [*lines, "  no mode is unstable"])
+
+    __repr__ = __str__
 
 
 def _shown(loss: Loss) -> str:

@@ -63,7 +63,7 @@ class Scene:
     >>> print(scene)
     mesh               16 six-node triangles, 10 by 0.3 (R, Z); layers: sheet; boundaries: axis, rim, bottom, top
     material of sheet  NeoHookean(c10=0.4)
-    support 1          Symmetry('axis'), component 0, mirror False
+    support 1          Symmetry('axis', 'r')
     support 2          SimplySupported('rim')
     load 1             Pressure('bottom') (driven)
     model              MixedPressure()

@@ -2,6 +2,7 @@
 
 import contextlib
 import re
+from inspect import signature
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,10 @@ def summary(scene: Any) -> dict[str, str]:
         lines[f"material of {name}"] = _material(material, _temperatures(scene))
     for kind in ("supports", "loads", "contacts"):
         for k, thing in enumerate(getattr(scene, kind), 1):
+            usual = {name: p.default for name, p in signature(type(thing)).parameters.items()}
             numbers = "".join(f", {name.replace('_', ' ')} {value!r}" for name, value in vars(thing).items()
-                              if isinstance(value, int | float) and repr(value) not in text(thing))
+                              if isinstance(value, int | float) and repr(value) not in text(thing)
+                              and name != "component" and value != usual.get(name))
             lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if thing.driven else "")
     return lines | {"model": text(scene.model), "kinematics": text(scene.kinematics),
                     "quadrature degree": str(scene.quadrature_degree),

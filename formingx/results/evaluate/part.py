@@ -9,12 +9,12 @@ import numpy as np
 
 from ...errors import InputError, finite, known, positive, several
 from ...units import NONE, Units
-from ..numbers import PartNumbers
+from ..numbers import PartNumbers, without_round_off
 from .profile import fine
 from .wall import Wall
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Part(PartNumbers):
     """A part, from the axis to the rim or to where it is trimmed; in plane strain per unit of depth, as modelled.
 
@@ -42,7 +42,7 @@ class Part(PartNumbers):
     mean_wall: float
     least_wall: float
     least_at_radius: float
-    least_at: tuple[float, float]
+    least_at: tuple[float, ...]
     least_at_height: float
     least_from: tuple[str, float]
     evenness: float
@@ -85,7 +85,7 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     weight = None if density is None else units.mass(kept[3], positive("part: density", density))
     at = {finite("part: heights", h): wall.at_height(h) for h in several("part: heights", heights, "numbers")}
     return Part(kept[0], kept[1], kept[1] / kept[2], mean, float(wall.wall[k]), float(wall.reference_radius[k]),
-                (float(wall.r[k]), float(wall.z[k])), float(wall.height[k]),
+                without_round_off((wall.r[k], wall.z[k]), profile.middle), float(wall.height[k]),
                 ("RZ"[along], float(profile.rest_bottom[k, along])), float(wall.wall[k] / mean),
                 float(np.sqrt(spread) / average), weight, at, float(1 - kept[0] / volume.sum()),
                 _content(wall, inside, axisymmetric), units)

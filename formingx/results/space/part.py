@@ -15,7 +15,7 @@ from ..numbers import PartNumbers
 from .wall import WallInSpace
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PartInSpace(PartNumbers):
     """A part as modelled (a quarter of a sheet is a quarter of the part).
 
