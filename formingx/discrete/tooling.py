@@ -58,7 +58,7 @@ class Tooling(NamedTuple):
 
     def placed(self, travels: list[float | None]) -> list[tuple[Tool, np.ndarray]]:
         """(tool, its shift (r, z)) of those that take part."""
-        return [(contact.tool, travel * np.array(contact.moves or (0.0, 0.0)))
+        return [(contact.tool, travel * contact.way)
                 for contact, travel in zip(self.contacts, travels, strict=True) if travel is not None]
 
 

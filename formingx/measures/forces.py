@@ -14,7 +14,7 @@ from .targets import Bound, Target
 def resisting(contact: Any) -> np.ndarray:
     """Unit vector (r, z) along which the force of the body on a tool counts: against its travel, or +Z if it stays."""
     up = np.eye(contact.tool.components)[-1]
-    return up if contact.moves is None else -np.array(contact.moves) / np.linalg.norm(contact.moves)
+    return up if contact.moves is None else -contact.way / np.linalg.norm(contact.way)
 
 
 def force(value: float, *, of: str | None = None) -> Target:

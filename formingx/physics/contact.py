@@ -149,6 +149,11 @@ class Contact(Part):
         return not self.friction_by_temperature and self.mu >= _STICKS
 
     @property
+    def way(self) -> np.ndarray:
+        """Motion of the tool per unit of its travel, shape (components,); 0 of one that stays."""
+        return np.array(self.moves or (0.0,) * self.tool.components)
+
+    @property
     def symmetric(self) -> bool:
         """True without friction or memory: contact then has an energy."""
         return not self.friction_by_temperature and self.mu == 0 and self.separates

@@ -61,13 +61,12 @@ def _check_overlap(scene: Scene, who: str, present: dict[int, Contact], outlines
         for j, b in present.items():
             if j <= i or j in scene.together(i) or not np.isfinite(where[i] + where[j]):
                 continue
-            rests = (0,) * a.tool.components
-            shift = where[i] * np.array(a.moves or rests) - where[j] * np.array(b.moves or rests)
+            shift = where[i] * a.way - where[j] * b.way
             for points, other, back in ((outlines[i] + shift, b, 0.0), (outlines[j], a, shift)):
                 depth = other.tool.signed_distance(points - back)
                 worst = int(np.argmax(depth))
                 if depth[worst] > near:
-                    at = ", ".join(f"{x:.6g}" for x in points[worst] + where[j] * np.array(b.moves or rests))
+                    at = ", ".join(f"{x:.6g}" for x in points[worst] + where[j] * b.way)
                     axes = ", ".join(scene.kinematics.axes).replace("r, z", "R, Z")
                     raise InputError(f"{who}: tools overlap: with {_at(a, where[i])} and {_at(b, where[j])} one reaches"
                                      f" {depth[worst]:.6g} into the other at ({axes}) = ({at}); leave one out"

@@ -315,7 +315,7 @@ class Scene:
 
     def check_travel(self, contact: Contact, travel: float) -> None:
         """An InputError if a tool's travel (length) would put a held boundary as a whole inside the tool."""
-        moves = np.array(contact.moves)
+        moves = contact.way
         for support in self.supports:
             for held in self.kinematics.in_axes(support, support.constraints()):
                 if not isinstance(held, Held) or held.on is None or moves[held.component] == 0:

@@ -56,7 +56,7 @@ def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> 
     near = tool.nearest(ends.mean(1))
     way = -near.normal[np.argmax(near.distance)]
     if contact.moves:
-        way = np.array(contact.moves) / np.hypot(*contact.moves)
+        way = contact.way / np.hypot(*contact.way)
     at = np.array([0.0, 0.5, 1.0]) if contact.points == "nodes" else (
         np.polynomial.legendre.leggauss(int(contact.points))[0] + 1) / 2
     points, places = (ends[:, :1] + s[:, None] * (ends[:, 1:] - ends[:, :1]) for s in (at, np.linspace(0, 1, _PLACES)))

@@ -59,7 +59,7 @@ class FaceContact:
         self.shift: np.ndarray | None = None
         self.law = self._law(1.0)
         self._scale = solid.length / (solid.stress * solid.volume) * self.rule.area
-        self._way = solid.length * np.array(contact.moves or np.zeros(self.points.shape[1]))
+        self._way = solid.length * contact.way
         self.enter(0.0, float(contact.driven), True)
         self._in_tangent = np.zeros((*self.points.shape, self.points.shape[1]))  # stiffness in the tangent last made
         self._memory: Memory | None = None

@@ -179,7 +179,7 @@ def _off(contact: Any, state: State) -> float:
     share = energy / (state.measures.get("strain_energy") or np.inf)
     if share < 0.1 * _LIMITS.warns:
         return share
-    along = np.array(contact.contact.moves) / np.hypot(*contact.contact.moves)
+    along = contact.contact.way / np.hypot(*contact.contact.way)
     e = _LIMITS.small
     by = [(state.x + s * state.direction, state.control + s * state.slope) for s in (-e, 0.0, e)]
     less, force, more = (resultants.force(contact, *at) @ along for at in by)
@@ -196,7 +196,7 @@ def _pulled(contact: Any, state: State) -> bool:
     law = contact.contact
     if not law.driven or not law.separates or law.friction_by_temperature or law.mu > 0:
         return False
-    force = resultants.force(contact, state.x, state.control) @ np.array(law.moves) / np.hypot(*law.moves)
+    force = resultants.force(contact, state.x, state.control) @ law.way / np.hypot(*law.way)
     return bool(force > _LIMITS.pulls * resultants.pressing(contact, state.x, state.control))
 
 

@@ -219,9 +219,9 @@ class Ledger:
                 elif thing in scene.contacts:
                     together = [scene.things[k] for k in scene.together(i)]
                     tools = [c for c in at.present if c.contact in together]
-                    force = -sum(float(resultants.force(c, fields, state.control) @ np.array(c.contact.moves))
+                    force = -sum(float(resultants.force(c, fields, state.control) @ c.contact.way)
                                  for c in tools)
-                    slope = sum(self._sum(free[self._nodes(c, fields, state.control)] @ np.array(c.contact.moves))
+                    slope = sum(self._sum(free[self._nodes(c, fields, state.control)] @ c.contact.way)
                                 for c in tools)
                 else:
                     force = -at.reaction(i, at.x, state.control)

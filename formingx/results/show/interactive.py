@@ -97,7 +97,7 @@ def _tools(record: Record) -> list[dict[str, Any]]:
         line = contact.tool.surface()[0]
         shell = line + 0.02 * size * contact.tool.nearest(line).normal
         found.append({"name": name, "line": _rounded(line.T), "shell": _rounded(shell.T),
-                      "moves": list(contact.moves or (0.0, 0.0)),
+                      "moves": contact.way.tolist(),
                       "travel": [None if t[k] is None else float(f"{t[k]:.7g}")
                                  for t in (record.travels[i] for i in record.frames)]})
     return found
