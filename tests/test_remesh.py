@@ -156,6 +156,37 @@ def test_any_state_goes_on_to_the_same_path(tmp_path):
     assert again.last.measures["travel"] == pytest.approx(0.55)
 
 
+def test_results_go_on_from_mesh_to_mesh(tmp_path):
+    """The same points of the material are looked at on all meshes, and whatever draws and writes takes them."""
+    path = pressed("stick", 0.5, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)),
+                   record={"u": fx.displacement(0.1, at=(0.7, 0.6), component="r")})
+    made = [s.kind for s in path.states].index("remesh")
+    before, after = path.states[made - 1:made + 1]
+    a, b = path.profile(before), path.profile(after)
+    assert np.array_equal(a.rest_top, b.rest_top) and np.array_equal(a.rest_bottom, b.rest_bottom)
+    assert np.abs(a.top - b.top).max() < 0.01 and np.abs(a.bottom - b.bottom).max() < 0.01
+    for name in ("u", "pole_height", "pole_stretch"):
+        assert after.measures[name] == pytest.approx(before.measures[name], rel=0.01)
+    later = path.at(fx.displacement(0.25, at=(0.7, 0.6), component="r"), after=after)
+    assert later.measures["u"] == pytest.approx(0.25) and later.setting["mesh"] == 1
+    ledger = path.work()
+    assert ledger["new_meshes"][-1] == pytest.approx(after.measures["strain_energy"] - before.measures["strain_energy"])
+    assert np.abs(ledger["unbalanced"]).max() < 2e-3 * ledger["tool 1"][-1]
+    page = path.report(tmp_path / "report.html").read_text()
+    assert "remesh" in page
+    path.animate(tmp_path / "film.gif", frames=4)
+    path.to_stl(tmp_path / "part.stl")
+    path.to_xdmf(tmp_path / "last.xdmf")
+    path.to_xdmf(tmp_path / "first.xdmf", path.segments[0].states)
+    with pytest.raises(fx.InputError, match="a file holds one mesh"):
+        path.to_xdmf(tmp_path / "all.xdmf", "all")
+    for state in (before, after):
+        table, stress = path.contact("top", state), path.stress(state).at([(0.0, 0.5)])
+        assert (table.pressure > 0).any() and stress.cauchy[0, 2, 2] < 0
+    path.save(tmp_path / "run")
+    fx.report([tmp_path / "run", path], tmp_path / "both.html")
+
+
 def twice(monkeypatch, **after):
     """The mesh is made again once in each of these stages, after these times."""
     from formingx import remeshing
@@ -236,7 +267,7 @@ def test_a_deformation_is_carried_to_other_elements():
         mesh = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(n, n))
         forms = Problem(fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
                                  supports=[fx.Symmetry("axis"), fx.Clamped("rim")])).forms
-        F = Preformed(points, deformation(*points.T), np.zeros((len(points), 0)), 0.0, 1.0).gradient(forms)
+        F = Preformed(points, deformation(*points.T), np.zeros((len(points), 0))).gradient(forms)
         wanted = [F[0, 0], F[0, 1], F[1, 0], F[1, 1], F[2, 2], *forms.X, ufl.det(F)]
         found = in_own_cells(forms.domain, ufl.as_vector(wanted), np.array([[0.3, 0.2], [0.1, 0.7]])).reshape(-1, 8)
         errors.append(np.abs(found[:, :5] - deformation(found[:, 5], found[:, 6])).max())

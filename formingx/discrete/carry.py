@@ -11,6 +11,7 @@ from dolfinx import fem
 from .. import _compat
 from ..mesh.nodes import of_cells, own_cells
 from ..ranks import gathered
+from .probes import Probe
 
 _NEIGHBOURS = 12
 """Points of a fit: twice the six coefficients of a quadratic polynomial in the plane."""
@@ -116,7 +117,7 @@ def carry(source: Any, state: Any, problem: Any, x: np.ndarray, control: float, 
     problem.look_at(x, control)
     with source.at(state):
         def there(points: np.ndarray) -> np.ndarray:
-            return points + source.forms.probe(source, points).displacement_in(state) if moved else points
+            return points + Probe(source, points).displacement_in(state) if moved else points
         same = len(problem.histories) == len(source.histories) and not moved
         n = len(problem.histories) if same else len(problem.forms.histories)
         for mine, other, kept in zip(problem.histories[-n:], source.histories[-n:], state.memory[-n:],

@@ -22,6 +22,7 @@ from .. import _compat
 from ..errors import together
 from ..physics import kinematics as kin
 from .admissible import Admissible
+from .earlier_meshes import FollowedProbe
 from .free_stretch import FreeStretch
 from .history import History
 from .loaded_body import LoadedBody
@@ -208,7 +209,7 @@ class Formulation(ABC):
 
     def probe(self, problem: Any, points: Any) -> Probe:
         """The displacement at reference points (R, Z), shape (n, 2)."""
-        return Probe(problem, points)
+        return Probe(problem, points) if self.scene.preformed is None else FollowedProbe(problem, points)
 
     def mean_row(self, held: Any) -> Any:
         """Linear form: mean of a displacement component (dimensionless) over a boundary, as a `MeanHeld` asks."""

@@ -34,14 +34,13 @@ class Preformed(NamedTuple):
         points: where they are now, shape (n, 2), length.
         F: deformation gradient so far, entries rr, rz, zr, zz, hoop, shape (n, 5).
         pressures: of the pressure fields, shape (n, fields), dimensionless.
-        pole_height, pole_stretch: of the pole so far.
+        before: the problem of that mesh, and its last state.
     """
 
     points: np.ndarray
     F: np.ndarray
     pressures: np.ndarray
-    pole_height: float
-    pole_stretch: float
+    before: Any = None
 
     @classmethod
     def of(cls, problem: Any, state: Any) -> Preformed:
@@ -52,10 +51,10 @@ class Preformed(NamedTuple):
             values = [forms.X[0] + forms.u[0], forms.X[1] + forms.u[1], *(F[i] for i in _ENTRIES), *fields]
             where: Any = basix.make_quadrature(forms.domain.basix_cell(), forms.scene.quadrature_degree)[0]
             rows: Any = in_own_cells(forms.domain, ufl.as_vector(values), where).reshape(-1, len(values))
-        rest, J = state.measures, _det(rows[:, 2:7])
+        J = _det(rows[:, 2:7])
         rows = rows[(J > _LEAST) & (J < 1 / _LEAST)]         # what is crushed tells nothing
         rows[:, 2:7] /= np.cbrt(_det(rows[:, 2:7]))[:, None]
-        return cls(rows[:, :2], rows[:, 2:7], rows[:, 7:], rest.get("pole_height", 0.0), rest.get("pole_stretch", 1.0))
+        return cls(rows[:, :2], rows[:, 2:7], rows[:, 7:], (problem, state))
 
     def gradient(self, forms: Any) -> Any:
         """F_old on the elements of a formulation (UFL, shape (3, 3)): quadratic in each, scaled to det F_old = 1."""

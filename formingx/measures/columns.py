@@ -32,16 +32,6 @@ class _Scalar(_Recorded):
         return self._of(self._problem.assemble_scalar(self._form))
 
 
-class _SoFar(_Recorded):
-    """A measure that goes on from what it was before the mesh was made again: before + times value."""
-
-    def __init__(self, bound, before, times):
-        self._bound, self._before, self._times = bound, before, times
-
-    def value(self, x, control):
-        return self._before + self._times * self._bound.value(x, control)
-
-
 class _Nodal(_Recorded):
     """A number of every contact, put together by `over`."""
 
@@ -138,9 +128,6 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     if "axis" in scene.mesh.boundaries:
         found["pole_height"] = bind_pole_height(problem)
         found["pole_stretch"] = bind_pole_stretch(problem)
-        if (so_far := scene.preformed) is not None:
-            found["pole_height"] = _SoFar(found["pole_height"], so_far.pole_height, 1.0)
-            found["pole_stretch"] = _SoFar(found["pole_stretch"], 0.0, so_far.pole_stretch)
     if any(isinstance(load, Gravity) for load in scene.loads):
         found["sag"] = Sag(problem)
     if any(thing.quantity == "pressure" for thing in scene.drivable):

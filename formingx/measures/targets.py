@@ -98,17 +98,17 @@ class _Linear(Bound):
 
 
 class _Form(Bound):
-    """scale times the value of a scalar form."""
+    """scale times the value of a scalar form, and an offset."""
 
-    def __init__(self, problem, form, scale):
-        self._problem, self._scale = problem, scale
+    def __init__(self, problem, form, scale, offset=0.0):
+        self._problem, self._scale, self._offset = problem, scale, offset
         self._value = problem.forms.compile(form)
         self._derivative = problem.forms.compile(
             ufl.derivative(form, problem.forms.w, problem.forms.test_function()))
 
     def value(self, x, control):
         self._problem.set_state(x, control)
-        return self._scale * self._problem.assemble_scalar(self._value)
+        return self._offset + self._scale * self._problem.assemble_scalar(self._value)
 
     def equation(self, target):
         def c(x, control, gradient):
@@ -279,8 +279,10 @@ def bind_pole_height(problem: Any) -> Bound:
 def bind_pole_stretch(problem: Any) -> Bound:
     """See `pole_stretch`."""
     low, high = _pole(problem)
-    row, power = probe(problem, [(0.0, low), (0.0, high)]).across()
-    return _Linear(problem, row, 1.0, lambda t: max(t, 1e-300) ** power, lambda s: s ** (1 / power))
+    pole = probe(problem, [(0.0, low), (0.0, high)])
+    row, power = pole.across()
+    so_far = 1 + float(pole.so_far[1, -1] - pole.so_far[0, -1]) / (high - low)
+    return _Linear(problem, row, so_far, lambda t: max(t, 1e-300) ** power, lambda s: s ** (1 / power))
 
 
 def bind_volume(problem: Any) -> Bound:
@@ -296,17 +298,23 @@ def bind_volume(problem: Any) -> Bound:
     N, face = forms.face(driven.on, 5)
     scale = forms.length**kinematics.dimension_of_volume
     swept = sum(ufl.inner(forms.u, kinematics.area_vector(forms.constant(t) * forms.u, forms.X, N)) for t in _GAUSS)
-    return _Form(problem, -swept / forms.constant(2 * scale) * face, scale)
+    so_far = 0.0
+    if problem.scene.preformed is not None:
+        old, state = problem.scene.preformed.before
+        with old.at(state):
+            so_far = bind_volume(old).value(old.x, state.control)
+    return _Form(problem, -swept / forms.constant(2 * scale) * face, scale, so_far)
 
 
 def _displacement(problem, points, factors):
-    row = probe(problem, points).row(np.asarray(factors))
-    return _Linear(problem, row * problem.forms.length)
+    there = probe(problem, points)
+    return _Linear(problem, there.row(np.asarray(factors)) * problem.forms.length,
+                   float(np.sum(factors * there.so_far)))
 
 
 def _pole(problem):
     """Z of the bottom and the top of the axis."""
-    mesh = problem.scene.mesh
+    mesh = problem.scene.first.mesh
     if "axis" not in mesh.boundaries:
         raise InputError(f"the pole needs a boundary named 'axis'; the mesh has {list(mesh.boundaries)}: elsewhere take"
                          f" displacement(..., at=..., component=...)")

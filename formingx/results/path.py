@@ -263,6 +263,9 @@ class Path(States):
         if self._in_space:
             from .space.part import filling as filling_in_space
             return filling_in_space(self, contact_of(self, tool, "filling")[0])
+        if len(self.segments) > 1:
+            raise InputError("filling: is not known of a run that made its mesh again on the way: take that of a mesh,"
+                             " path.alone(state).filling()")
         from .evaluate.filling import filling
         return filling(self, contact_of(self, tool, "filling")[0])
 
@@ -270,7 +273,8 @@ class Path(States):
         """Contact pressure, friction and gap along the face that meets a tool (`ContactTable`): to_csv, to_excel."""
         self._section_only("contact", "use tool_forces(), or filling()")
         from .evaluate.contact_face import ContactFace, contact_of
-        return ContactFace(self, contact_of(self, tool, "contact")[0]).of(state or self.last)
+        alone = self.alone(state or self.last)
+        return ContactFace(alone, contact_of(alone, tool, "contact")[0]).of(state or self.last)
 
     def temperature(self, points: ArrayLike, state: State | None = None) -> np.ndarray:
         """Of the body in a state (default: the last) at reference points (R, Z), shape (n, 2), length: shape (n,)."""
@@ -289,9 +293,9 @@ class Path(States):
 
         Work done on the body by each load (its column; of a fixed one "pressure_on_bottom"), each driven support (its
         name, or "support") and each tool that moves; by forces that a stage leaves without balance, as they fade
-        ("change"). Energy of changes of temperature ("heat"). Where it went: "strain_energy", above that at first;
-        "dissipated_energy" in materials; "friction"; "jumps"; "bonds" to tools that the body may pull at, above that at
-        first. "unbalanced": the error of the integrals, and of the run.
+        ("change"); what new meshes have added ("new_meshes"). Energy of changes of temperature ("heat"). Where it went:
+        "strain_energy", above that at first; "dissipated_energy" in materials; "friction"; "jumps"; "bonds" to tools
+        that the body may pull at, above that at first. "unbalanced": the error of the integrals, and of the run.
         """
         self._section_only("work")
         from .evaluate.work import work

@@ -114,6 +114,9 @@ def released(path: Any, source: Any, make_path: Any, state: Any, temperature: An
         raise InputError("Path.released: a membrane has no thickness to keep a shape with: form a solid,"
                          " MixedPressure()")
     if trim is not None:
+        if source.scene.preformed is not None:
+            raise InputError("Path.released: trim: is not known of a run that made its mesh again on the way: leave it"
+                             " out")
         mesh, trimmed = _trimmed(mesh, path.wall(state), trim)
     heat, cools = _heat(source.scene, mesh, temperature, boundaries, duration, path.wall(state))
     problem = Problem(_scene(source.scene, mesh, heat))
@@ -171,7 +174,7 @@ def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
     if 0 not in held and not scene.kinematics.axisymmetric:
         supports.append(_Still(0, anywhere))
     return Scene(mesh=mesh, materials=scene.materials, supports=supports, model=scene.model, heat=heat,
-                 kinematics=scene.kinematics, quadrature_degree=scene.quadrature_degree,
+                 kinematics=scene.kinematics, quadrature_degree=scene.quadrature_degree, preformed=scene.preformed,
                  temperature=None if scene.temperature is None else scene.temperature.T,
                  expansion=dict(scene.expansion) or None)
 

@@ -67,7 +67,7 @@ class States:
     @property
     def scene(self) -> Any:
         """The scene as it was given: on the mesh that the run began with."""
-        return self.segments[0].problem.scene
+        return self.problem.scene.first
 
     @property
     def problem(self) -> Any:
@@ -323,10 +323,19 @@ class States:
             return {name: bound.value(problem.x, state.control) for name, bound in columns.items()}
 
     def _segment(self, state: State) -> Segment:
-        """The segment that a state is of; the last one if it is of none."""
-        if len(self.segments) > 1:
-            return next((s for s in self.segments if any(state is one for one in s.states)), self.segments[-1])
-        return self.segments[-1]
+        """The segment that a state is of, or lies in."""
+        mesh = state.setting.get("mesh", 0)
+        return next((s for s in self.segments if s.states and s.states[0].setting.get("mesh", 0) == mesh),
+                    self.segments[-1])
+
+    def alone(self, state: State) -> Any:
+        """The part of the path on the mesh that a state is on: all of it, unless the mesh was made again on the way."""
+        if len(self.segments) == 1:
+            return self
+        segment = self._segment(state)
+        record = Record(segment.problem, segment.curve)
+        record.segments, record.counts = [segment], self.counts
+        return type(self)(record, self._timed, self._own)
 
     def _view(self, segment: Segment) -> _View:
         key = id(segment.problem)

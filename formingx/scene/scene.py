@@ -132,6 +132,11 @@ class Scene:
     expansion: Mapping[str, ThermalExpansion] = MappingProxyType({})
     thickness: Mapping[str, Any] = MappingProxyType({})
 
+    @property
+    def first(self) -> Scene:
+        """The scene on the mesh that its run began with."""
+        return self if self.preformed is None else self.preformed.before[0].scene.first
+
     def with_mesh(self, mesh: Mesh, preformed: Any = None) -> Scene:
         """The same scene on another mesh of the body: with the same names of layers and boundaries."""
         return Scene(mesh=mesh, materials=self.materials, supports=self.supports, loads=self.loads,

@@ -110,7 +110,7 @@ class Profiles:
         return Profile(at.points[:n].copy(), at.points[n:].copy(), deformed[:n], deformed[n:])
 
     def _make_probe(self) -> Probe:
-        mesh = self._problem.scene.mesh
+        mesh = self._problem.scene.first.mesh
         if self._problem.scene.kinematics.components == 3:
             raise InputError("a sheet in space has no profile: use path.wall(), its section(), or path.view3d")
         faces = next((pair for pair in FACES if all(name in mesh.boundaries for name in pair)), None)

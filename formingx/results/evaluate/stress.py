@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike
 from petsc4py import PETSc
 
 from ... import _compat
+from ...discrete.earlier_meshes import followed
 from ...errors import InputError, as_points, known, pair
 from ...mesh.locate import Place, locate
 from ...mesh.nodes import COORDINATES, of_cells, own_cells
@@ -242,8 +243,8 @@ class Stresses:
         """Where points lie in a layer; those of the last call are not looked for again; collective."""
         before = self._located.get(layer)
         if before is None or not np.array_equal(before[0], points):
-            forms = self.problem.forms
-            before = points.copy(), locate(forms.domain, points, forms.length, self.cells[layer], f"layer {layer!r}")
+            forms, there = self.problem.forms, followed(self.problem, points)
+            before = points.copy(), locate(forms.domain, there, forms.length, self.cells[layer], f"layer {layer!r}")
             self._located[layer] = before
         return before[1]
 

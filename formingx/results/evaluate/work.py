@@ -334,5 +334,10 @@ def work(path: Any) -> dict[str, np.ndarray]:
     lost |= {name: path[name] for name in ("dissipated_energy", "damage_energy") if name in path.columns}
     stored = path["strain_energy"] - path["strain_energy"][0]
     zero = np.zeros(len(path))
+    if len(path.segments) > 1:
+        first = np.cumsum([len(segment.states) for segment in path.segments])[:-1]
+        made = zero.copy()
+        made[first] = stored[first] - stored[first - 1]
+        found["new_meshes"] = np.cumsum(made)
     left = sum(found.values(), zero) - stored - sum(lost.values(), zero)
     return found | {"strain_energy": stored} | lost | {"unbalanced": left}

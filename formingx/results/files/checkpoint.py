@@ -168,7 +168,7 @@ def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
     record = Record(problem, Curve(problem, Tolerances()))
     for k, data in enumerate(found):
         if "mesh" in data:
-            problem = remade.load(scene, data["mesh"])
+            problem = remade.load((problem, record.last), data["mesh"])
             record.segments.append(Segment(problem, Curve(problem, Tolerances())))
         record.segments[-1].states.append(_read_state(folder / _name(k), data, problem))
     kept = next((s.stepping for s in reversed(record.states) if s.stepping), None)

@@ -23,7 +23,7 @@ def describe(problem: Any) -> dict[str, Any]:
     their number; then every part of the scene by its public attributes.
     """
     scene = problem.scene
-    known = set(_PARTS) | {"mesh", "temperature"}
+    known = set(_PARTS) | {"mesh", "temperature", "preformed"}
     extra = sorted(name for name in vars(scene) if name not in known and not name.startswith("_"))
     found = {"mesh": _mesh(problem), "unknowns": problem.n_unknowns,
              **{name: plain(getattr(scene, name)) for name in (*_PARTS, *extra)}}

@@ -137,7 +137,11 @@ def to_xdmf(path: Any, file: Any, states: Any = None) -> None:
 def _write(path: Any, file: Any, states: Any, suffix: str, write: Callable) -> None:
     file, comm = files.named("to_vtx" if suffix == ".bp" else "to_xdmf", file, suffix), path.problem.comm
     chosen = _chosen(path, states)
-    fields = Fields(path)
+    alone = path.alone(chosen[0][1])
+    if any(state not in alone.states for _, state in chosen):
+        raise InputError(f"{'to_vtx' if suffix == '.bp' else 'to_xdmf'}: states: the run made its mesh again on the"
+                         f" way, and a file holds one mesh: give states of one, such as path.segments[0].states")
+    fields = Fields(alone)
     points = _gather(fields.points, comm)
     steps = []
     for number, state in chosen:

@@ -10,7 +10,7 @@ from ...discrete.preformed import Preformed
 from ...discrete.problem import Problem
 from ...errors import InputError
 from ...mesh.grid import Grid, gathered, to_mesh
-from ...scene.scene import Scene
+from ...solve.state import State
 from .description import describe, differences
 
 
@@ -23,20 +23,23 @@ def save(problem: Any) -> dict[str, Any]:
     points[nodes] = grid.points
     layers = {name: nodes[rows[np.argsort(number[mesh.cells.find(mesh.layers[name])])]]
               for name, rows in grid.layers.items()}
+    preformed = problem.scene.preformed._replace(before=None)
     return {"points": points, "layers": layers, "boundaries": {name: nodes[r] for name, r in grid.boundaries.items()},
-            "preformed": problem.scene.preformed._asdict(), "shifts": [c.shift for c in problem.contacts],
+            "preformed": preformed._asdict(), "shifts": [c.shift for c in problem.contacts],
             "scene": describe(problem)["mesh"]}
 
 
-def load(scene: Scene, data: dict[str, Any]) -> Problem:
-    """The problem of the scene on the mesh that `save` gave; an InputError if it is another one."""
+def load(before: tuple[Problem, State], data: dict[str, Any]) -> Problem:
+    """The problem on the mesh that `save` gave, after the last state on the mesh before; an InputError if it is not
+    that."""
+    scene = before[0].scene
     if scene.mesh.comm.size > 1:
         raise InputError("load: the run has made its mesh again, which is known on one rank only: load it on one")
     points = np.array(data["points"])
     grid = Grid(points, np.arange(1, len(points) + 1), {k: np.array(v) for k, v in data["layers"].items()},
                 {k: np.array(v) for k, v in data["boundaries"].items()})
     mesh = to_mesh(lambda: grid, scene.mesh.comm, "checkpoint: its mesh")
-    made = Problem(scene.with_mesh(mesh, Preformed(**data["preformed"])))
+    made = Problem(scene.with_mesh(mesh, Preformed(**data["preformed"])._replace(before=before)))
     for contact, shift in zip(made.contacts, data["shifts"], strict=True):
         if shift is not None:
             contact.shift_distances(np.array(shift))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...discrete.admissible import Least
+from ...discrete.earlier_meshes import followed
 from ...discrete.tooling import Tooling
 from ...errors import InputError
 from .. import files
@@ -193,10 +194,10 @@ def of_path(path: Any) -> Record:
         drawn = drawn if timed else frames(progress(measures, profiles), kinds, stages)
         shown: list[dict[str, np.ndarray]] = [{} for _ in states]
         if profiles[-1] is not None:
-            fields = _Fields(path, profiles[-1])
+            fields = {id(one): _Fields(path.alone(one.states[0]), profiles[-1]) for one in path.segments}
             for i, k in enumerate(drawn):
                 done(i / len(drawn))
-                shown[k] = fields.of(states[k])
+                shown[k] = fields[id(path._segment(states[k]))].of(states[k])
         stepping: dict = next((s.stepping for s in reversed(states) if s.stepping), {})
         tooling = Tooling.of_problem(problem)
         wall = path.wall() if profiles[-1] is not None else None
@@ -292,6 +293,7 @@ class _Fields:
 
     def __init__(self, path: Any, profile: Profile):
         self._path, self._points = path, [profile.rest_bottom, profile.rest_top]
+        self._here = [followed(path.problem, points) for points in self._points]
         solid = path.problem.forms.domain.topology.dim == 2
         self._stressed = solid and len(path.problem.scene.mesh.layers) == 1
         self._faces = [ContactFace(path, contact) for contact in path.problem.contacts]
@@ -305,7 +307,7 @@ class _Fields:
             stress = path.stress(state).at(np.vstack(points))
             here["largest principal stress"] = stress.principal_stresses[:, 0].reshape(2, -1).max(0)
         if self._faces:
-            here["contact pressure"] = sum(_nearest(face.of(state), points) for face in self._faces)
+            here["contact pressure"] = sum(_nearest(face.of(state), self._here) for face in self._faces)
         return here
 
 
