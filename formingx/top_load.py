@@ -141,7 +141,7 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
                   supports=[*[Symmetry("axis")] * ("axis" in body.boundaries), Symmetry(neck, "r"),
                             Displaced(neck, "z")],
                   contacts=[Contact(foot, floor, "none", **_FOOT)])
-    modes, ended = wave_numbers(scene.kinematics, modes), ""
+    modes, ended = wave_numbers(scene, modes), ""
     try:
         path = trace(scene, until=travel_to(-travel), progress=False, step=step or StepControl(largest=_STEP))
     except ConvergenceError as error:

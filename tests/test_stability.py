@@ -240,6 +240,8 @@ def test_membrane_and_loads_that_do_not_know():
         path.stability([2])
     with pytest.raises(InputError, match="whole"):
         path.stability([2.5])
+    with pytest.raises(InputError, match="1e\\+09: waves that are shorter than the shortest edge"):
+        path.stability([1e9])
     with pytest.raises(InputError, match="at least one"):
         path.stability([2], states=[])
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from ..errors import InputError, count, finite, several
 from ..ranks import gathered
@@ -172,7 +173,7 @@ class Watch:
 
     def look(self, modes: Iterable[float], states: Any) -> Stability:
         """See `Path.stability`."""
-        numbers = wave_numbers(self._path.problem.scene.kinematics, modes)
+        numbers = wave_numbers(self._path.problem.scene, modes)
         chosen = _chosen(self._path, states)
         counts: dict[Kind, list[int]] = {}
         losses: list[Loss] = []
@@ -248,7 +249,7 @@ class Unstable:
 
     def watch(self, path: Any) -> None:
         """From now on look at the last state whenever a step of the path is complete."""
-        watch, numbers = Watch(path), wave_numbers(path.problem.scene.kinematics, self.modes)
+        watch, numbers = Watch(path), wave_numbers(path.problem.scene, self.modes)
         first: dict[Kind, int] = {}
 
         def look() -> None:
@@ -277,17 +278,20 @@ def unstable(modes: Iterable[float] = range(9)) -> Unstable:
     return Unstable(modes)
 
 
-def wave_numbers(kinematics: Any, modes: Any) -> list[float]:
+def wave_numbers(scene: Any, modes: Any) -> list[float]:
     """`modes` of `Path.stability` as a list, each once, or an InputError."""
     try:
         numbers = [finite("stability: modes", n) for n in modes]
     except TypeError:
         raise InputError(f"stability: modes = {modes!r}: must be several numbers of waves, such as range(9)") from None
-    axisymmetric = kinematics.axisymmetric
+    axisymmetric, most = scene.kinematics.axisymmetric, _most_waves(scene)
     for n in numbers:
         if n < 0 or axisymmetric and n != int(n):
             raise InputError(f"stability: modes: {n:g}: must be at least 0" + ", and whole: waves round the axis"
                              * axisymmetric)
+        if n > most:
+            raise InputError(f"stability: modes: {n:g}: waves that are shorter than the shortest edge of an element have"
+                             f" no shape on this mesh: must be at most {most:.4g}")
     if not numbers:
         raise InputError("stability: modes: must be at least one")
     return list(dict.fromkeys(numbers))
@@ -307,3 +311,13 @@ def _chosen(path: Any, states: Any) -> list[State]:
     number = len(there) if everything else min(count("stability: states", states), len(there))
     picked = np.unique(np.round(np.linspace(0, len(there) - 1, max(number, 2))).astype(int)) if there else []
     return [there[k] for k in picked]
+
+
+def _most_waves(scene: Any) -> float:
+    """The number of waves as long as the shortest edge of an element, where the body is widest."""
+    domain = scene.mesh.domain
+    domain.topology.create_connectivity(1, domain.topology.dim)
+    edges = np.arange(domain.topology.index_map(1).size_local, dtype=np.int32)
+    shortest = domain.comm.allreduce(float(domain.h(1, edges).min(initial=np.inf)), MPI.MIN)
+    widest = domain.comm.allreduce(float(domain.geometry.x[:, 0].max(initial=0.0)), MPI.MAX)
+    return 2 * np.pi / shortest * (widest if scene.kinematics.axisymmetric else 1.0)
