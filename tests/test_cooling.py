@@ -80,24 +80,34 @@ def pressed():
                                          name="plug", penalty=2e4, ramp=1e-5)])       # stiffer: round-off shows
 
 
-def drawn_over():
-    """How far the touch of a ball without friction spreads from state to state, over the length of an element."""
+def drawn_over(length=0.5, conductance=0.1):
+    """A ball without friction, cold, in steps of a length."""
     n, ball = 12, fx.tools.sphere(radius=0.8, z=0.05)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(n, 1)), temperature=150.0,
                      materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      heat=fx.Cooling(fx.ThermalProperties(conductivity=0.01, density=1.0, heat_capacity=1.0),
-                                     unit="C", tools={"ball": (0.1, 30.0)}, tolerance=5.0),
+                                     unit="C", tools={"ball": (conductance, 30.0)}, tolerance=0.5),
                      contacts=[fx.Contact("top", ball, "none", moves=(0, -1), name="ball")])
-    path = fx.Process(scene).run([fx.Stage("push", drive="ball", until=fx.travel(0.4), duration=0.5)], progress=False,
-                                 accuracy=0.5, step=fx.StepControl(length=0.5))
-    return n * np.diff(path["contact_length"]).max()
+    return fx.Process(scene).run([fx.Stage("push", drive="ball", until=fx.travel(0.4), duration=0.5)], progress=False,
+                                 accuracy=0.5, step=fx.StepControl(length=length, largest=length))
 
 
 def test_what_gives_off_heat_touches_node_by_node(monkeypatch):
     """When a node touches decides how cold it becomes: a step brings one, half an element (where none cools, more)."""
-    assert drawn_over() < 1.01
+    def spreads():
+        return 12 * np.diff(drawn_over()["contact_length"]).max()
+    assert spreads() < 1.01
     monkeypatch.setattr(fx.Cooling, "conducts", lambda cooling, contact: False)
-    assert drawn_over() > 1.01
+    assert spreads() > 1.01
+
+
+def test_what_comes_to_touch_in_a_step_gives_off_heat_for_half_of_it():
+    """All of it would chill too much: 0.9 degrees in the mean of long steps, of 7; half of it 0.3."""
+    means = []
+    for length in (0.5, 0.005):
+        path = drawn_over(length, 0.02)
+        means.append(path.temperature(np.array([[R, 0.025] for R in np.linspace(0.0, 0.7, 15)])).mean())
+    assert 0 < means[1] - means[0] < 0.5
 
 
 def press(scene, travel=0.15, **options):

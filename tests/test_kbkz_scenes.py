@@ -1,6 +1,7 @@
 """K-BKZ in scenes: the kernel, the tangent, closed forms, the integrals of homogeneous tests, restarts and ranks."""
 
 import json
+import warnings
 
 import numpy as np
 import pytest
@@ -69,6 +70,18 @@ def test_kernel_against_tensors_and_differences(name):
         by = np.zeros((4, n))
         by[j] = 1e-6
         assert D[:, j] == pytest.approx((stress(C + by)[0] - stress(C - by)[0]) / 2e-6, rel=1e-5, abs=1e-8)
+
+
+def test_a_guess_far_back_in_time_has_no_stress_and_nothing_is_printed():
+    path = fx.Process(block(fx.KBKZ([(0.1, 1e-6), (0.02, 1.0)]))).run(
+        [fx.Stage("pull", drive="grip", until=fx.travel(0.1), duration=0.1)], progress=False, accuracy="draft")
+    problem, F = path.problem, path.problem.x.duplicate()
+    with problem.at(path.last), warnings.catch_warnings():
+        warnings.simplefilter("error")
+        problem.clock -= 0.05
+        problem.residual(problem.x, path.last.control, F)
+        problem.clock += 0.05
+    assert not np.isfinite(F.norm())
 
 
 @pytest.mark.parametrize("model", [None, fx.Membrane()], ids=["solid", "membrane"])

@@ -1,9 +1,13 @@
 """Step control, alone and in a run."""
 
+from dataclasses import replace
+
 import pytest
 
 import formingx as fx
 from formingx import InputError, StepControl, Tolerances
+from formingx.solve.arc_length import Curve
+from formingx.solve.newton import fixed
 
 
 def test_step_follows_target_over_actual():
@@ -33,6 +37,26 @@ def test_no_step_is_longer_than_the_largest(largest):
     path = fx.trace(scene, until=fx.pole_height(0.1), step=StepControl(largest=largest), progress=False)
     curve = path.record.curve
     assert max(curve.progress(a, b) for a, b in zip(path.states, path.states[1:])) <= largest * (1 + 1e-9)
+
+
+def test_time_goes_one_way(monkeypatch):
+    """A step in time that Newton's method ends behind its beginning, on a path that looks as if it went on, is none."""
+    step, calls = Curve.step, []
+
+    def behind(self, old, length, *given):
+        calls.append(length)
+        if len(calls) != 4:
+            return step(self, old, length, *given)
+        found = self.solve(old.x, old.control - 0.1 * length, fixed(old.control - 0.1 * length), "step", old)
+        return replace(found, direction=old.direction, slope=old.slope)
+    monkeypatch.setattr(Curve, "step", behind)
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(6, 1)),
+                     materials=fx.Viscoelastic(fx.NeoHookean(c10=1.0), [(1.0, 1.0)]),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")])
+    path = fx.Process(scene).run([fx.Stage("blow", drive="air", until=fx.pressure(0.05)),
+                                  fx.Stage("hold", duration=0.5)], progress=False)
+    assert len(calls) > 4 and "the path leads back from here" in path.counts.limits
+    assert min(b.time - a.time for a, b in zip(path.states, path.states[1:])) >= 0
 
 
 def test_convergence_needs_residual_and_correction():

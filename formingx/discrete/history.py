@@ -26,10 +26,10 @@ class History(Protocol):
     def start(self) -> None:
         """Nothing has happened yet."""
 
-    def advance(self, x: np.ndarray, control: float, start: np.ndarray | None = None) -> None:
+    def advance(self, x: np.ndarray, control: float, start: Any = None) -> None:
         """The state that the forms hold now is accepted; x: its owned unknowns. It becomes the beginning of a step.
 
-        start: the unknowns at the beginning of the step that ends now, if that is a state, too.
+        start: the state (x, control) at the beginning of the step that ends now, if there is one.
         """
 
     def get(self) -> Any:

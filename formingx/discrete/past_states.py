@@ -85,6 +85,7 @@ class PastStates:
         self._near = 1.0 if len(felt) < 2 else inner(self._past[-1], cofactor(self._past[-2])) < 4
         self._seen = None
 
+    @np.errstate(over="ignore", invalid="ignore")                   # of a guess far back in time: no state
     def refresh(self) -> None:
         """Make the coefficients exact at the fields and the time that the forms hold now."""
         C, step, rate = self._now()

@@ -56,7 +56,7 @@ class StepError:
         """
         forms, old = self._forms, past[-1]
         start, clock, end = [h.get() for h in forms.histories], forms.clock, forms.time_at(control)
-        after = self._problem.foretell(old.x, x, control)
+        after = self._problem.foretell(old, x, control)
         if not end > old.time or not self._stresses:
             return 0.0, 0.0
         step, first, found = end - old.time, self._at(old.x, old.time), self._at(x, end)

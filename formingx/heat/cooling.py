@@ -198,8 +198,9 @@ class CoolingHistory:
         self._state = [self._first.copy(), *(touch.start() for touch in self._body.touches)]
         self._take()
 
-    def advance(self, x: np.ndarray, control: float, start: np.ndarray | None = None) -> None:
-        """See `History`; heat flows in the body as it is half-way, which makes the step one of second order."""
+    def advance(self, x: np.ndarray, control: float, start: Any = None) -> None:
+        """See `History`; heat flows in the body as it is half-way, and half the step through what comes to touch, or
+        ceases to, in it: which makes the step one of second order."""
         until = self._forms.time_at(control)
         if self._power is not None:                         # the materials have advanced
             power = self._cooling.work_to_heat * self._body.assembled(self._dissipated)
@@ -209,7 +210,12 @@ class CoolingHistory:
         _look_where_it_touches(self._body, self._touches, control)
         self._before = self._time, self._state[0]
         if start is not None:
-            self._problem.place((start[: len(x)] + x) / 2)
+            after = [touch.conductance.copy() for touch, *_ in self._touches]
+            self._problem.place(start.x)
+            _look_where_it_touches(self._body, self._touches, start.control)
+            for (touch, *_), conductance in zip(self._touches, after):
+                touch.conductance[:] = (touch.conductance + conductance) / 2
+            self._problem.place((start.x[: len(x)] + x) / 2)
         self._body.update()
         self._state[0] = self._body.held(self._state[0])
         self._go(until)

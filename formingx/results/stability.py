@@ -290,8 +290,8 @@ def wave_numbers(scene: Any, modes: Any) -> list[float]:
             raise InputError(f"stability: modes: {n:g}: must be at least 0" + ", and whole: waves round the axis"
                              * axisymmetric)
         if n > most:
-            raise InputError(f"stability: modes: {n:g}: waves that are shorter than the shortest edge of an element have"
-                             f" no shape on this mesh: must be at most {most:.4g}")
+            raise InputError(f"stability: modes: {n:g}: waves that are shorter than the shortest edge of an element"
+                             f" have no shape on this mesh: must be at most {most:.4g}")
     if not numbers:
         raise InputError("stability: modes: must be at least one")
     return list(dict.fromkeys(numbers))

@@ -280,6 +280,8 @@ class Run:
         cut = limit and limit.check(old, new, reach, ends=True)
         if cut:
             raise Cutback(cut.why, max(cut.part, 0.1)) if cut.part else _Astray(cut.why, [])
+        if self._at_fold == "jump" and (new.control - old.control) * self._sense < 0 < old.slope * new.slope:
+            raise Failure("the path leads back from here", [])
         if was_passed(self.curve, self.states[:-1], old, new):
             raise _Astray("the iteration fell back to a part of the path that was passed", [])
         error, memory = self._error_in_time(new), self.problem.memory

@@ -31,6 +31,9 @@ from .stepping import SAME_TIME, StepControl
 _IN_TIME = StepControl(length=1e-3, smallest=1e-13)
 """Step control of a material that relaxes: the error in time soon takes over."""
 
+_HELD = replace(_IN_TIME, target=8)
+"""While nothing is driven: what touches hardly moves, and the error in time says how long a step may be."""
+
 _Targets: TypeAlias = list[tuple[Target, Measure]]
 
 
@@ -144,7 +147,7 @@ class Execution:
         """
         step = self._stage.step or self._step
         if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
-            step = step or _IN_TIME                          # a piece that has begun goes on with its own steps
+            step = step or (_IN_TIME if any(self.problem.setting.rate[:-1]) else _HELD)  # begun pieces: their own
         run = Run(self.record, targets, step, self._stage.at_fold, self._accuracy, self._label, wanted)
         start = None if control is None else self._resumed(control)
         run.follow(self._max_steps, self._progress, start)

@@ -63,7 +63,7 @@ class Approach:
         share = max(points // 100, 1) if face.contact.lagged else 1
         self.at_once = (given or 1) * share * (1 if face.law.remembers or conducts else 10)
         slides = face.law.has_friction and not face.contact.sticks
-        one_by_one = given or slides or conducts or face.contact.lagged
+        one_by_one = given or slides or face.contact.lagged
         self.foretold = self.at_once if one_by_one else max(self.at_once, round(LIMITS.share * points))
         self._foreseen = 0                                  # points that the step is going to bring, all ranks
 

@@ -238,7 +238,7 @@ class FaceContact:
         if self._memory is not None:
             self._take(self._memory._replace(touch=self._memory.touch._replace(arrival=arrival)))
 
-    def advance(self, x: np.ndarray, control: float, start: np.ndarray | None = None) -> None:
+    def advance(self, x: np.ndarray, control: float, start: Any = None) -> None:
         """See `History`. (A tool that is away remembers nothing new.)"""
         if self._memory is None or not self.present:
             return
