@@ -39,7 +39,7 @@ def plate_stress(path, state):
 
 def compress(elements, friction="stick"):
     """(path, {ratio as text: state that met it}, how it ended)."""
-    scene = block(fx.MooneyRivlin(c10=1.0, c01=0.1), friction, elements, roll_over=True)
+    scene = block(fx.MooneyRivlin(c10=1.0, c01=0.1), friction, elements, roll_over=True, nodes_per_step=1)
     path, end = press(scene, [travel(r) for r in RATIOS], max_steps=400)
     met = {f"{r:g}": path.met(fx.travel(travel(r))) for r in RATIOS}
     return path, {r: state for r, state in met.items() if state is not None}, end

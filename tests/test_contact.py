@@ -244,7 +244,7 @@ def trough_error(thickness, elements):
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), kinematics=fx.PlaneStrain(),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")],
                      contacts=[fx.Contact("top", tools.cup(radius=1, depth=2, mouth=thickness), "stick")])
-    path = fx.trace(scene, until=fx.pole_height(1.7), step=fx.StepControl(target=8), max_steps=500, progress=False)
+    path = fx.trace(scene, until=fx.pole_height(1.7), progress=False)
     profile = path.profile()
     z = profile.top[:, 1] - thickness
     wall = (z > 0.15) & (z < 0.55)
