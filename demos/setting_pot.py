@@ -61,14 +61,14 @@ def draw(axes, wall, colour, label):
 def main():
     options = parser("setting_pot", __doc__, elements=30, accuracy=1e-2)
     args = options.parse_args()
-    elements = (8, [1, 1]) if args.quick else (args.elements, [4, 2, 1])
+    elements, accuracy = ((8, [1, 1]), 5e-2) if args.quick else ((args.elements, [4, 2, 1]), args.accuracy)
     summary = {}
     figure, (sections, walls) = plots.figure(2, width=5.2)
     for name, colour in COLOURS.items():
         if args.quick and name == "glassy_branch":
             continue
-        path = form(name, elements, args.accuracy)
-        part = path.released(COLD, trim=TRIM, accuracy=args.accuracy, duration=1.0 if args.quick else None)
+        path = form(name, elements, accuracy)
+        part = path.released(COLD, trim=TRIM, accuracy=accuracy, duration=1.0 if args.quick else None)
         summary[name] = {"height": part.height, "least_wall": part.least_wall,
                          "shrinkage_percent": 100 * part.shrinkage, "springback": part.springback,
                          "flange_angle_degrees": part.flange_angle, "forming": cost(path), "release": cost(part.path)}
@@ -83,7 +83,7 @@ def main():
     walls.set(xlabel="reference radius R, cm", ylabel="wall, cm", ylim=(0, None))
     save(figure, args.out / "setting_pot.png")
     summarise(args.out, summary | {"mesh": {"radius_elements": elements[0], "thickness_elements": len(elements[1])},
-                                   "accuracy": args.accuracy, "versions": files.versions()})
+                                   "accuracy": accuracy, "versions": files.versions()})
 
 
 if __name__ == "__main__":

@@ -84,7 +84,7 @@ def draw(paths):
 def main():
     options = parser("viscoelastic_tube", __doc__, elements=14, accuracy=3e-5)
     args = options.parse_args()
-    n, accuracy = (4, 2e-3) if args.quick else (args.elements, args.accuracy)
+    n, accuracy = (4, 5e-3) if args.quick else (args.elements, args.accuracy)
     summary: dict = {"sphere": {}}
     paths = {}
     for kind, group in (("tube", summary), ("sphere", summary["sphere"])):
