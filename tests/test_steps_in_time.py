@@ -51,7 +51,7 @@ def test_what_the_step_control_knows_is_part_of_a_state(tmp_path):
               Stage("out", drive="ball", until=fx.travel(4), speed=20)]
     options = {"accuracy": "draft", "step": StepControl(target=8)}
     whole = run(scene, *stages, checkpoint=tmp_path, **options)
-    for k in range(1, len(whole) - 1, 4):
+    for k in range(1, len(whole) - 1, 9):
         again = run(scene, *stages, start=fx.load(tmp_path, scene, state=k), **options)
         assert len(again) == len(whole)
         for column in whole.columns:
@@ -64,8 +64,8 @@ LAWS = [(fx.Viscoelastic, 1e-3), (fx.Viscoelastic, 0.05), (fx.Viscoelastic, 2.0)
 
 
 @pytest.mark.parametrize("law, tau", LAWS, ids=lambda x: getattr(x, "__name__", x))
-@pytest.mark.parametrize("target", [4, 8])
-def test_accuracy_is_kept_for_any_relaxation_time(law, tau, target):
+@pytest.mark.parametrize("target, accuracy, promised", [(8, "draft", 1e-2), (4, "standard", 2e-3)])
+def test_accuracy_is_kept_for_any_relaxation_time(law, tau, target, accuracy, promised):
     """Stress in every state of a cycle, over the largest, against an ODE solver's; also where it goes through 0.
 
     Networks took from 457 to 10,246 states while steps had the mean rate; K-BKZ came to no end.
@@ -73,12 +73,11 @@ def test_accuracy_is_kept_for_any_relaxation_time(law, tau, target):
     rubber, branches = fx.NeoHookean(c10=0.5), [(1 / tau, tau)]
     material = law(branches, equilibrium=rubber) if law is fx.KBKZ else law(rubber, branches)
     times, stretches = CYCLE
-    for accuracy, promised in (("draft", 1e-2), ("standard", 2e-3)):
-        path = run(block(material), Stage("cycle", follow={"pull": [(t, l - 1) for t, l in zip(times, stretches)]}),
-                   accuracy=accuracy, step=StepControl(target=target))
-        found = -path["support_force"] / np.pi
-        exact = material.stress("uniaxial", 1 + path["travel"], times=path["process_time"])
-        assert np.abs(found - exact).max() < promised * np.abs(exact).max() and len(path) < 300
+    path = run(block(material), Stage("cycle", follow={"pull": [(t, l - 1) for t, l in zip(times, stretches)]}),
+               accuracy=accuracy, step=StepControl(target=target))
+    found = -path["support_force"] / np.pi
+    exact = material.stress("uniaxial", 1 + path["travel"], times=path["process_time"])
+    assert np.abs(found - exact).max() < promised * np.abs(exact).max() and len(path) < 300
 
 
 def test_a_file_without_the_motion_of_a_material_is_read():
@@ -94,14 +93,23 @@ def test_a_file_without_the_motion_of_a_material_is_read():
     assert not found.values["pace"].any() and not found.values["change"].any() and found.values["A_1"].any()
 
 
+DOWN, BETWEEN = {"drive": "ball", "until": fx.travel(7), "speed": 20}, fx.travel(5.0)
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    """A run in small steps."""
+    return run(sheet(0), Stage("in", through=[BETWEEN], **DOWN), accuracy=1e-4)
+
+
 @pytest.mark.parametrize("target, promised", [(4, 1e-2), (8, 1e-2), (8, 2e-3)])
-def test_accuracy_is_kept_under_a_tool_by_any_step_control(target, promised):
+def test_accuracy_is_kept_under_a_tool_by_any_step_control(target, promised, pressed):
     """Force and energy; the step control allowed three states with an error of 7 % before."""
-    def of(accuracy, **options):
-        last = run(sheet(0), Stage("in", drive="ball", until=fx.travel(7), speed=20), accuracy=accuracy, **options).last
-        return np.array([last.measures["ball_force"], last.measures["strain_energy"]
-                         + last.measures["dissipated_energy"]])
-    assert of(promised, step=StepControl(target=target)) == pytest.approx(of(1e-4), rel=promised)
+    def of(path):
+        last = path.last.measures
+        return np.array([last["ball_force"], last["strain_energy"] + last["dissipated_energy"]])
+    path = run(sheet(0), Stage("in", **DOWN), accuracy=promised, step=StepControl(target=target))
+    assert of(path) == pytest.approx(of(pressed), rel=promised)
 
 
 def test_only_what_takes_time_has_an_error_in_time():
@@ -128,21 +136,18 @@ def test_accuracy_is_kept_while_a_body_cools(name):
     def heights(accuracy):
         path = run(scene, *stages, accuracy=accuracy)
         return [path.met(fx.pressure(pressure)).measures["pole_height"], path.last.measures["pole_height"]]
-    exact = heights(2e-4)
+    exact = heights(4e-4)
     for accuracy, promised in (("draft", 1e-2), ("standard", 2e-3)):
         assert heights(accuracy) == pytest.approx(exact, rel=promised)
 
 
-def test_a_state_between_two_is_as_accurate_as_the_run():
+def test_a_state_between_two_is_as_accurate_as_the_run(pressed):
     """It took 2e-3 whatever the run had, and did not know what was dissipated."""
-    target = fx.travel(5.0)
     def measured(state):
         return [state.measures[c] for c in ("ball_force", "strain_energy", "dissipated_energy", "process_time")]
-    stage = {"drive": "ball", "until": fx.travel(7), "speed": 20}
-    exact = measured(run(sheet(0), Stage("in", through=[target], **stage), accuracy=1e-4).met(target))
     for accuracy, step in ((1e-2, StepControl(target=8)), (1e-3, None)):
-        path = run(sheet(0), Stage("in", **stage), accuracy=accuracy, step=step)
-        assert measured(path.at(target)) == pytest.approx(exact, rel=accuracy)
+        path = run(sheet(0), Stage("in", **DOWN), accuracy=accuracy, step=step)
+        assert measured(path.at(BETWEEN)) == pytest.approx(measured(pressed.met(BETWEEN)), rel=accuracy)
 
 
 def test_between_states_of_a_flow_there_is_none_to_find():
