@@ -162,3 +162,17 @@ def test_no_2_where_components_are_meant():
     found = {(name_of(file), ast.unparse(node)) for file in FILES if level(name_of(file)) >= ROOMS.index("scene")
              for node in ast.walk(ast.parse(file.read_text())) if written(node)}
     assert found == TWO_BY_NATURE
+
+
+def test_protocols_say_what_they_take():
+    """No argument or result of an interface is just anything, but what a history remembers and matplotlib gives."""
+    memories = {"get", "put.memory", "save.memory", "load", "carry", "carry.memory", "carry.source"}
+    found = set()
+    for file in (file for file in FILES if name_of(file) != "figures"):
+        for kind in (node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.ClassDef)):
+            if any(ast.unparse(base) == "Protocol" for base in kind.bases):
+                for call in (node for node in kind.body if isinstance(node, ast.FunctionDef)):
+                    said = {f"{call.name}.{arg.arg}": arg.annotation for arg in call.args.args}
+                    said[call.name] = call.returns
+                    found |= {(kind.name, name) for name, note in said.items() if getattr(note, "id", "") == "Any"}
+    assert found <= {("History", name) for name in memories}

@@ -29,11 +29,11 @@ class Search:
 
     Attributes:
         held: weight of the volume that is held, relative, beside relative walls.
-        spare: part of the volume by which what is kept stays below it.
-        kept: part by which a volume or a least wall may be missed, unsaid.
-        damped: of what has most effect: smaller effects count as none.
-        worth: of the sum of squares: after two runs that are better by less nothing more is looked for.
-        shortest: part of a step of a search below which nothing better is looked for.
+        spare: part by which a volume that is to be kept is aimed lower, so that round-off does not exceed it.
+        kept: a volume or a least wall that is missed by more than this part is said.
+        damped: Levenberg's damping over the largest singular value of the sensitivities: less effect counts as none.
+        worth: the search ends after two runs that lower the sum of squares by less than this part of it.
+        shortest: a step is halved, where it is no better, down to this part of it.
     """
 
     held: float = 1e2

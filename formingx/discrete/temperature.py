@@ -42,5 +42,5 @@ class Temperature:
         return cKDTree(self.T.function_space.tabulate_dof_coordinates()[:, :points.shape[-1]]).query(points)[1]
 
     def at_nodes(self, nodes: np.ndarray) -> np.ndarray:
-        """Temperatures at nodes of T, local numbers of any shape, without error."""
+        """Temperatures at nodes of T, by their local numbers, of any shape; within `limits`, as the exact ones."""
         return np.clip(self.T.x.array[nodes], *self.limits)

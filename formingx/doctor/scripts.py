@@ -62,7 +62,7 @@ def _check_python(file: Path) -> None:
 
 @contextmanager
 def _no_runs() -> Iterator[None]:
-    """What runs a scene looks it over instead."""
+    """`trace`, `solve`, `Process.run` and the like look their scene over instead of running it."""
     def trace(scene, *, until, through=(), **_):
         raise _Looked(doctor(scene, targets=[*through, until]))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -219,17 +219,17 @@ class NormalLaw:
         turned = self.tractions(x, old).normal * self.nearest(x).normal[:, 0]
         return np.divide(turned, radius, out=np.zeros(len(x)), where=radius > 0)
 
-    def part(self, points: np.ndarray | slice) -> Any:
+    def part(self, points: np.ndarray | slice) -> Self:
         arrays = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
         return self._with(**{name: value[points] for name, value in arrays.items()})
 
-    def without(self, points: np.ndarray) -> Any:
+    def without(self, points: np.ndarray) -> Self:
         return self._with(shift=self.shift + np.where(points, _FAR, 0.0))
 
-    def with_friction(self, mu: np.ndarray | float) -> Any:
+    def with_friction(self, mu: np.ndarray | float) -> Self:
         return self
 
-    def _with(self, **other: Any) -> Any:
+    def _with(self, **other: Any) -> Self:
         """The same law with other attributes."""
         law = copy.copy(self)
         vars(law).update(other, _near=None)

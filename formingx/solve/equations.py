@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from contextlib import AbstractContextManager
+from os import PathLike
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
@@ -146,7 +147,7 @@ class Findings(Protocol):
 
     facts: dict[str, Any]
 
-    def draw(self, file: Any, title: str) -> None:
+    def draw(self, file: str | PathLike[str], title: str) -> None:
         """A picture of the last good state (rank 0 draws).
 
         Raises:
@@ -301,7 +302,7 @@ class Stages(Protocol):
     def stand(self, state: Standing) -> None:
         """Go on from an accepted state: its setting and its histories are what they were then."""
 
-    def at(self, state: Standing) -> AbstractContextManager[Any]:
+    def at(self, state: Standing) -> AbstractContextManager[Equations]:
         """Stand at a state, its x and control too, and come back on leaving."""
 
     def bring_in(self, number: int, x: Array, control: float) -> None:

@@ -121,7 +121,7 @@ def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc
 
 
 def _spline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Between its knots it is smooth: each part for itself."""
+    """Arcs along the smooth part between each two of its knots."""
     for point in (*entity.control_points, *entity.fit_points):
         _flat(point, name)
     tool = entity.construction_tool()

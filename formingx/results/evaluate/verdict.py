@@ -32,7 +32,7 @@ class Limits:
             flat.
         small: of arc length: half of a difference quotient.
         felt: penetration over the thickness below which it ends no run: at a first touch the body holds nothing yet.
-        thinnest: pole stretch: the square root of a wall that is not above 0 is taken of 1e-300.
+        thinnest: the largest pole stretch; that of a wall that is not above 0 is 1e150.
         pulls: force by which a tool without friction is pulled, over the forces that press on it.
     """
 
@@ -201,7 +201,7 @@ def _pulled(contact: Any, state: State) -> bool:
 
 
 def _lengths(edges: np.ndarray) -> np.ndarray:
-    """Of edges, shape (m, 3, 2): shape (m,)."""
+    """Lengths of curved edges, shape (m, 3, 2), first end, last, middle; shape (m,)."""
     return np.linalg.norm(np.diff(along(edges, 4), axis=1), axis=-1).sum(1)
 
 

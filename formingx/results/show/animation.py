@@ -71,7 +71,7 @@ def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
 
 
 def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool, units: Units) -> list[Any]:
-    """The frames, each a picture."""
+    """The frames of the animation as images, one for each shape."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
