@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .history import History
+from .history import History, Start
 from .material_history import MaterialHistory
 from .past_states import PastStates
 
@@ -93,10 +93,10 @@ class Histories:
             history.put(memory)
         self._foretold = None, []
 
-    def foretell(self, start: Any, x: np.ndarray, control: float) -> list[Any]:
+    def foretell(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
         """What the histories of the forms would remember, were a state accepted; they stay as they are.
 
-        start: the state (x, control) that the step begins at.
+        start: the state that the step begins at.
         """
         self.look_at(x, control)
         before = [history.get() for history in self.forms.histories]

@@ -8,6 +8,13 @@ from typing import Any, Protocol
 import numpy as np
 
 
+class Start(Protocol):
+    """The state that a step begins at: x, own part, and the control. A `State` is one."""
+
+    x: np.ndarray
+    control: float
+
+
 class History(Protocol):
     """What one part of a scene remembers of the states that were accepted: materials, contacts, the temperature.
 
@@ -26,10 +33,10 @@ class History(Protocol):
     def start(self) -> None:
         """Nothing has happened yet."""
 
-    def advance(self, x: np.ndarray, control: float, start: Any = None) -> None:
+    def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
         """The state that the forms hold now is accepted; x: its owned unknowns. It becomes the beginning of a step.
 
-        start: the state (x, control) at the beginning of the step that ends now, if there is one.
+        start: the state at the beginning of the step that ends now, if there is one.
         """
 
     def get(self) -> Any:

@@ -13,6 +13,7 @@ from .. import _compat
 from ..errors import InputError
 from ..ranks import gathered
 from .carry import Carrier, fitted_shapes, shapes_of
+from .history import Start
 
 
 class Memory(NamedTuple):
@@ -50,7 +51,7 @@ class MaterialHistory:
             self._set(name, self._cells, np.asarray(rest, dtype=float).ravel())
         self._terms.start.value = 0.0
 
-    def advance(self, x: np.ndarray, control: float, start: Any = None) -> None:
+    def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
         """See `History`."""
         self._now = None
         for name, values in self._after(self._cells).items():

@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..materials.tensors import IDENTITY, cofactor, deviator_squared, entries, inner, isochoric
 from ..ranks import gathered
 from .carry import Carrier, fitted_shapes, shapes_of
+from .history import Start
 
 _NOTHING = 3e-7
 """A past state that the line between its neighbours replaces to this part of the present stress is left out. (Of the
@@ -101,7 +102,7 @@ class PastStates:
             array[rows] = values.T
         self._seen = C, step
 
-    def advance(self, x: np.ndarray, control: float, start: Any = None) -> None:
+    def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
         """See `History`."""
         (C, step, _), memory = self._now(), self._memory
         states, least = [*memory.states, Past(memory.states[-1].felt + step, C)], memory.least

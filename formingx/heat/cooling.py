@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..discrete.carry import Carrier
+from ..discrete.history import Start
 from ..errors import ConvergenceError, InputError, instance, known, positive, several
 from ..ranks import gathered
 from ..values.table import Table
@@ -198,7 +199,7 @@ class CoolingHistory:
         self._state = [self._first.copy(), *(touch.start() for touch in self._body.touches)]
         self._take()
 
-    def advance(self, x: np.ndarray, control: float, start: Any = None) -> None:
+    def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
         """See `History`; heat flows in the body as it is half-way, and half the step through what comes to touch, or
         ceases to, in it: which makes the step one of second order."""
         until = self._forms.time_at(control)

@@ -11,6 +11,7 @@ from ...errors import InputError
 from ...physics.contact import Contact
 from ...physics.contact_law import Touch, Tractions
 from ..carry import Carrier
+from ..history import Start
 from .increment import Increment
 from .rule import Gauss, Lobatto, Rule, Vertices
 
@@ -238,7 +239,7 @@ class FaceContact:
         if self._memory is not None:
             self._take(self._memory._replace(touch=self._memory.touch._replace(arrival=arrival)))
 
-    def advance(self, x: np.ndarray, control: float, start: Any = None) -> None:
+    def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
         """See `History`. (A tool that is away remembers nothing new.)"""
         if self._memory is None or not self.present:
             return
