@@ -43,7 +43,8 @@ class Formulation(ABC):
         space, w: the mixed `FunctionSpace` and the `Function` of all fields (dimensionless), displacement first.
         displacement_element: the scalar element of a displacement component.
         u, X: displacement and reference position (UFL, user's unit of length, shape (2,)).
-        F: deformation gradient (UFL, shape (3, 3)); elastic_F: less thermal expansion; J: determinant of that.
+        F: deformation gradient (UFL, shape (3, 3)); elastic_F: less thermal expansion; J: determinant of
+            that over `ratio_before`: det F of what a body brings from another mesh (`Preformed`).
         dx, weight: weight * dx is the element of reference volume.
         control: the `Constant` of the dimensionless control; time: process time (UFL), which follows it.
         scales: the user's value (pressure, travel, ...) over the amplitude (`Setting`), for every thing of the scene;
@@ -62,7 +63,7 @@ class Formulation(ABC):
         slack_at_rest: True if the body at rest has no stiffness in some direction.
     """
 
-    slack_at_rest = False
+    slack_at_rest, ratio_before = False, 1.0
 
     def __init__(self, scene: Any):
         self.scene = scene
@@ -90,7 +91,7 @@ class Formulation(ABC):
         self.F = self._deformation_gradient()
         self._free = FreeStretch(self, scene.expansion) if scene.expansion else None
         self.elastic_F = self.elastic(self.F)
-        self.J = kin.volume_ratio(self.elastic_F)
+        self.J = kin.volume_ratio(self.elastic_F) / self.ratio_before
         body = LoadedBody(self)
         self.scales = [load.unit(body) if load.driven else self.length for load in scene.loads]
         self.scales += [self.length] * (len(scene.things) - len(self.scales)) + [1.0]

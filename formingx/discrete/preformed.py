@@ -1,136 +1,182 @@
-"""A body whose mesh is what it was deformed to: F = grad x . F_old, and how a state goes on from there."""
+"""A body whose mesh is what it was deformed to: F = grad x . F_old, and how a state goes on from there.
+
+What is carried is b = F F^T/J, in which stress and energy of a neo-Hookean body are linear: in each new element the
+quadratic field that is nearest to it in the mean over its volume. So the stress does the same virtual work as before in
+every motion of the new elements. (The mean of F is of less stress: what F varies by about it is lost.) With that, det b
+exceeds 1, and so does det F_old: the volume that is kept is det F over it. F_old turns as F did.
+"""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
 import basix
+import basix.ufl
 import numpy as np
 import ufl
 from dolfinx import fem
 
-from ..ranks import gathered
 from .carry import in_own_cells
 
-_NEIGHBOURS = 30
-"""Points that a field is fitted to about an element, at most."""
+_QUADRATIC = basix.ufl.element("Lagrange", "triangle", 2)
+"""Of what is carried, by its values at the corners and at the middles of the edges opposite to them."""
 
-_FEWEST = 14
-"""Of them that lie within its reach, at least."""
+_POSITIONS = basix.ufl.enriched_element([_QUADRATIC, basix.ufl.element("Bubble", "triangle", 3)])
+"""Of positions, by those of the corners, the middles and the centre."""
 
-_SIX = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
-"""Corners of a cell, middles of the edges opposite to them."""
+_PLACES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0], [1 / 3, 1 / 3]])
+"""Corners, middles of the edges opposite to them, centre of a cell."""
 
-_LEAST = 0.5
-"""det F of a point, or of a fit, that is believed."""
+_LATTICE = np.array([(i, j) for i in range(5) for j in range(5 - i)]) / 4
+"""Places all over a cell."""
 
-_ENTRIES = ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))
+_DEGREE = 12
+"""Of the rule for means over new elements, in which old ones end."""
+
+_CANDIDATES = 8
+"""Old elements that a point is looked for in."""
+
+_LEAST = 0.3
+"""Of det b and of the hoop's part in it, over those of the mean: a field that is less somewhere is flattened."""
 
 
 class Preformed(NamedTuple):
-    """What a body brings from its mesh before, at n points: the quadrature points there.
+    """What a body brings from its mesh before, of m cells; on one rank.
 
     Attributes:
-        points: where they are now, shape (n, 2), length.
-        F: deformation gradient so far, entries rr, rz, zr, zz, hoop, shape (n, 5).
-        pressures: of the pressure fields, shape (n, fields), dimensionless.
+        x, rest: where corners, middles and centres are now, and were without displacement, shape (m, 7, 2), length.
+        b: what it had brought to that mesh, at corners and middles: entries rr, rz, zz, hoop of b, cos and sin of the
+            rotation, shape (m, 6, 6).
+        pressures: of the pressure fields at the corners, shape (m, 3, fields), dimensionless.
         before: the problem of that mesh, and its last state.
     """
 
-    points: np.ndarray
-    F: np.ndarray
+    x: np.ndarray
+    rest: np.ndarray
+    b: np.ndarray
     pressures: np.ndarray
     before: Any = None
 
     @classmethod
     def of(cls, problem: Any, state: Any) -> Preformed:
-        """What the body of a state brings; collective."""
+        """What the body of a state brings."""
         forms = problem.forms
         with problem.at(state):
-            F, fields = forms.F, ufl.split(forms.w)[1:]
-            values = [forms.X[0] + forms.u[0], forms.X[1] + forms.u[1], *(F[i] for i in _ENTRIES), *fields]
-            where: Any = basix.make_quadrature(forms.domain.basix_cell(), forms.scene.quadrature_degree)[0]
-            rows: Any = in_own_cells(forms.domain, ufl.as_vector(values), where).reshape(-1, len(values))
-        J = _det(rows[:, 2:7])
-        rows = rows[(J > _LEAST) & (J < 1 / _LEAST)]         # what is crushed tells nothing
-        rows[:, 2:7] /= np.cbrt(_det(rows[:, 2:7]))[:, None]
-        return cls(rows[:, :2], rows[:, 2:7], rows[:, 7:], (problem, state))
+            both = in_own_cells(forms.domain, ufl.as_vector([*(forms.X + forms.u), *forms.X]), _PLACES)
+            fields = ufl.split(forms.w)[1:]
+            pressures = (in_own_cells(forms.domain, ufl.as_vector(fields), _PLACES[:3]) if fields else
+                         np.zeros((len(both), 3, 0)))
+        x, rest = np.split(both, 2, axis=2)
+        b = np.tile([1.0, 0.0, 1.0, 1.0, 1.0, 0.0], (len(x), 6, 1))
+        if forms.scene.preformed is not None:
+            b = forms.scene.preformed._carried(forms)[0]
+        return cls(x, rest, b, pressures, (problem, state))
 
-    def gradient(self, forms: Any) -> Any:
-        """F_old on the elements of a formulation (UFL, shape (3, 3)): quadratic in each, scaled to det F_old = 1."""
-        space = fem.functionspace(forms.domain, ("DG", 2, (5,)))
-        field = fem.Function(space)
-        fitted = self._fitted(forms, self.F, np.array([1, -1, -1, 1, 1]), _SIX)
-        fitted = _without_folds(fitted, self._nearest(forms))
-        field.x.array.reshape(-1, 5)[space.dofmap.list[: len(fitted)]] = fitted
-        field.x.scatter_forward()
-        rr, rz, zr, zz, hoop = ufl.split(field)
-        share = ((rr * zz - rz * zr) * hoop) ** (-1 / 3)
-        return share * ufl.as_tensor([[rr, rz, 0], [zr, zz, 0], [0, 0, hoop]])
+    def gradient(self, forms: Any) -> tuple[Any, Any]:
+        """F_old on the elements of a formulation (UFL, shape (3, 3)), and det F_old."""
+        space = fem.functionspace(forms.domain, ("DG", 2, (6,)))
+        field, values = fem.Function(space), self._carried(forms)[0]
+        field.x.array.reshape(-1, 6)[space.dofmap.list[: len(values)]] = values
+        rr, rz, zz, hoop, along, turned = ufl.split(field)
+        V, c, s, area = _root(rr, rz, zz, along, turned, ufl.sqrt)
+        (a, b), (_, d) = V
+        F = [[a * c + b * s, b * c - a * s, 0], [b * c + d * s, d * c - b * s, 0], [0, 0, ufl.sqrt(hoop)]]
+        return ufl.as_tensor(F), area * ufl.sqrt(hoop)
 
     def unknowns(self, problem: Any) -> np.ndarray:
         """The unknowns of the body as it stands, own part: no displacement, its pressures."""
         x, forms = np.zeros(problem.x.getLocalSize()), problem.forms
-        if self.pressures.shape[1]:
-            fitted = self._fitted(forms, self.pressures, np.ones(self.pressures.shape[1]), _SIX[:3])
-            values = np.zeros(len(forms.w.x.array))
-            for k in range(self.pressures.shape[1]):
-                values[forms.space.sub(1 + k).dofmap.list[: len(fitted)]] = fitted[..., k]
-            x[: problem.n_owned] = values[: problem.n_owned]
+        values, fitted = np.zeros(len(forms.w.x.array)), self._carried(forms)[1]
+        for k in range(fitted.shape[2]):
+            values[forms.space.sub(1 + k).dofmap.list[: len(fitted)]] = fitted[..., k]
+        x[:] = values[: len(x)]
         return x
 
-    def _nearest(self, forms: Any) -> np.ndarray:
-        """F of the point nearest to the middle of each own cell, shape (cells, 5)."""
-        from scipy.spatial import cKDTree
-        middle = in_own_cells(forms.domain, forms.X, np.array([[1 / 3, 1 / 3]]))[:, 0]
-        return gathered(forms.comm, self.F)[cKDTree(gathered(forms.comm, self.points)).query(middle)[1]]
+    def _carried(self, forms: Any) -> tuple[np.ndarray, np.ndarray]:
+        """`b` and `pressures` of the cells of a formulation on the body as it stands: by least squares in each."""
+        rule: Any = basix.make_quadrature(basix.CellType.triangle, _DEGREE)
+        at, weights = rule
+        volume = forms.weight * abs(ufl.JacobianDeterminant(forms.domain))
+        sampled = in_own_cells(forms.domain, ufl.as_vector([*forms.X, volume]), at)
+        cells, places = self._located(sampled[..., :2].reshape(-1, 2))
+        b, pressures = (values.reshape(len(sampled), len(at), -1) for values in (
+            self._b(cells, places, forms.scene.kinematics.axisymmetric),
+            np.einsum("na,nak->nk", np.column_stack([1 - places.sum(1), places]), self.pressures[cells])))
+        weights = sampled[..., 2] * weights
 
-    def _fitted(self, forms: Any, values: np.ndarray, parity: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """What is quadratic in each own cell, fitted to what is near: its values at places of it, shape (n, 2), in
-        each, shape (cells, n, components).
+        def nearest(values: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+            mass = np.einsum("cq,qi,qj->cij", weights, shapes, shapes)
+            return np.linalg.solve(mass, np.einsum("cq,qi,cqk->cik", weights, shapes, values))
+        mean = np.einsum("cq,cqk->ck", weights, b) / weights.sum(1)[:, None]
+        return (_flattened(nearest(b, _tabulated(_QUADRATIC, at)[0]), mean),
+                nearest(pressures, np.column_stack([1 - at.sum(1), at])))
 
-        parity: 1 or -1: what becomes of a component beyond the axis, where the body is seen in a mirror; there the
-        hoop is stretched as the radius. Quadratic least squares, weights falling with the distance from the middle:
-        jumps between the old elements are smoothed.
+    def _b(self, cells: np.ndarray, places: np.ndarray, axisymmetric: bool) -> np.ndarray:
+        """The entries of `b` at places of cells, shape (n, 6)."""
+        x, rest, (shapes, *slopes) = self.x[cells], self.rest[cells], _tabulated(_POSITIONS, places, 1)
+        grad = np.einsum("dna,nai->nid", slopes, x) @ np.linalg.inv(np.einsum("dna,nai->nid", slopes, rest))
+        r, R = (np.einsum("na,na->n", shapes, y[..., 0]) for y in (x, rest))
+        stretch = r / R if axisymmetric else np.ones(len(r))
+        rr, rz, zz, hoop, along, turned = np.einsum("na,nak->kn", _tabulated(_QUADRATIC, places)[0], self.b[cells])
+        V, c, s, _ = _root(rr, rz, zz, along, turned, np.sqrt)
+        F = grad @ np.moveaxis(np.array(V), 2, 0) @ np.moveaxis(np.array([[c, -s], [s, c]]), 2, 0)
+        in_plane = F @ F.transpose(0, 2, 1)
+        turn = np.stack([F[:, 0, 0] + F[:, 1, 1], F[:, 1, 0] - F[:, 0, 1]])
+        b = np.stack([in_plane[:, 0, 0], in_plane[:, 0, 1], in_plane[:, 1, 1], stretch**2 * hoop])
+        return np.concatenate([b / (np.linalg.det(grad) * stretch), turn / np.linalg.norm(turn, axis=0)]).T
+
+    def _located(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The cells that points, shape (n, 2), are in, shape (n,), and where in them, shape (n, 2), by Newton's method.
+
+        New edges cut corners of old ones: points outside the body are in the element next to them, at its edge.
         """
         from scipy.spatial import cKDTree
-        inside = in_own_cells(forms.domain, forms.X, places)
-        corners = in_own_cells(forms.domain, forms.X, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
-        points, values = gathered(forms.comm, self.points), gathered(forms.comm, values)
-        if forms.scene.kinematics.axisymmetric:
-            near = points[:, 0] < 2 * np.sqrt(np.ptp(points[:, 0]) * np.ptp(points[:, 1]) / max(len(corners), 1))
-            points = np.concatenate([points, points[near] * (-1, 1)])
-            values = np.concatenate([values, values[near] * parity])
-        middle = corners.mean(1)
-        away, rows = cKDTree(points).query(middle, min(_NEIGHBOURS, len(points)))
-        size = np.maximum(np.linalg.norm(corners - middle[:, None], axis=2).max(1), away[:, _FEWEST - 1])[:, None]
-        weight = np.exp(-((away / size) ** 2))
-        by, at = (np.stack([np.ones_like(r), r, z, r * r, r * z, z * z], -1) for r, z in (
-            np.moveaxis((x - middle[:, None]) / size[..., None], -1, 0) for x in (points[rows], inside)))
-        fit = np.linalg.pinv(weight[..., None] * by, rcond=1e-3) * weight[:, None]
-        found = at @ (fit @ values[rows])
-        if forms.scene.kinematics.axisymmetric and values.shape[1] == 5:
-            axis = inside[..., 0] < 1e-9 * forms.length
-            found[axis] *= (1, 0, 0, 1, 1)
-            found[axis, 0] = found[axis, 4] = (found[axis, 0] + found[axis, 4]) / 2
-        return found
+        inside = 0.9 * _LATTICE + 0.1 / 3
+        tree = cKDTree((_tabulated(_POSITIONS, inside)[0] @ self.x).reshape(-1, 2))
+        rows = tree.query(points, _CANDIDATES)[1]
+        cells, found = rows[:, 0] // len(inside), inside[rows[:, 0] % len(inside)]
+        least, size = np.full(len(points), -np.inf), np.ptp(points, axis=0).max()
+        for column in rows.T:
+            todo = np.flatnonzero(least < -1e-9)
+            c, at = column[todo] // len(inside), inside[column[todo] % len(inside)]
+            for _ in range(8):
+                shapes, *slopes = _tabulated(_POSITIONS, at, 1)
+                away = points[todo] - np.einsum("na,nai->ni", shapes, self.x[c])
+                slope = np.einsum("dna,nai->nid", slopes, self.x[c])
+                slope[np.abs(np.linalg.det(slope)) < 1e-14 * size**2] = size * np.eye(2)
+                step = np.linalg.solve(slope, away[..., None])[..., 0]
+                at = np.clip(at + step * np.minimum(1, 0.5 / np.maximum(np.abs(step).max(1), 1e-300))[:, None], -1, 2)
+            within = np.where(np.linalg.norm(away, axis=1) < 1e-6 * size, np.minimum(at.min(1), 1 - at.sum(1)), -9.0)
+            better = within > least[todo]
+            for kept, new in ((least, within), (cells, c), (found, at)):
+                kept[todo[better]] = new[better]
+        by = np.maximum(np.column_stack([1 - found.sum(1), found]), 0)
+        return cells, by[:, 1:] / by.sum(1, keepdims=True)
 
 
-def _det(F: np.ndarray) -> np.ndarray:
-    """Of entries, shape (..., 5): shape (...)."""
-    return (F[..., 0] * F[..., 3] - F[..., 1] * F[..., 2]) * F[..., 4]
+def _tabulated(element: Any, at: np.ndarray, derivatives: int = 0) -> np.ndarray:
+    """Shape functions, then their derivatives, at places, shape (n, 2): shape (1 or 3, n, functions)."""
+    return np.asarray(element.tabulate(derivatives, at)) if len(at) else np.zeros((1 + 2 * derivatives, 0, element.dim))
 
 
-def _without_folds(F: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """Quadratic fields, by their values at `_SIX`, shape (cells, 6, 5), as near to constant ones, shape (cells, 5), as
-    it takes for det F to be believed: where F turns within an element, as beside a corner, its entries are no fit."""
-    near, by = near[:, None], F - near[:, None]
-    a, b, c = (np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4).T
-    shapes = np.column_stack([*(s * (2 * s - 1) for s in (a, b, c)), 4 * b * c, 4 * a * c, 4 * a * b])
+def _root(rr: Any, rz: Any, zz: Any, along: Any, turned: Any, sqrt: Any) -> tuple[list[list[Any]], Any, Any, Any]:
+    """V with V^2 = b in the plane, cos and sin of a rotation, det V: of entries of `Preformed.b`."""
+    area = sqrt(rr * zz - rz * rz)
+    trace, length = sqrt(rr + zz + 2 * area), sqrt(along**2 + turned**2)
+    off = rz / trace
+    return [[(rr + area) / trace, off], [off, (zz + area) / trace]], along / length, turned / length, area
+
+
+def _flattened(b: np.ndarray, mean: np.ndarray) -> np.ndarray:
+    """Quadratic fields of the entries of `Preformed.b`, shape (cells, 6, 6), as near to their means, shape (cells, 6),
+    as it takes to be of a body everywhere: where it turns within an element, as beside a corner, they may not be."""
+    mean = mean[:, None]
+    by, shapes = b - mean, _tabulated(_QUADRATIC, _LATTICE)[0]
     for k in range(12):
-        there = near + shapes @ by
-        bad = ((_det(there) < _LEAST) | (there[..., 4] <= 0)).any(1)
+        rr, rz, zz, hoop, along, turned = np.moveaxis(mean + shapes @ by, -1, 0)
+        bad = ((rr <= 0) | ((rr * zz - rz**2) * mean[..., 3] < _LEAST) | (hoop < _LEAST * mean[..., 3])
+               | (np.hypot(along, turned) < _LEAST)).any(1)
         if not bad.any():
             break
-        by[bad] *= 0.7 if k < 11 else 0.0
-    return near + by
+        by[bad] *= 0.7 if k < 10 else 0.0
+    return mean + by

@@ -117,7 +117,10 @@ class Solid(Formulation):
 
     def _deformation_gradient(self) -> Any:
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)
-        return F if self.scene.preformed is None else F * self.scene.preformed.gradient(self)
+        if self.scene.preformed is None:
+            return F
+        before, self.ratio_before = self.scene.preformed.gradient(self)
+        return F * before
 
     def _groups(self) -> list[tuple[Any, list[str]]]:
         return self.bodies
@@ -142,7 +145,7 @@ class Solid(Formulation):
     def elastic_densities(self, names: list[str], F: Any, pressures: Any, of: Any = MaterialTerms.step_energy
                           ) -> list[tuple[Any, dict]]:
         """`energy_densities` of an elastic F and of pressure fields (UFL, dimensionless)."""
-        model, terms, J = self.scene.model, self._terms[names[0]], kin.volume_ratio(F)
+        model, terms, J = self.scene.model, self._terms[names[0]], kin.volume_ratio(F) / self.ratio_before
         W = of(terms, F)
         if model.stress_free:
             W -= terms.rest_stress * ufl.ln(J)

@@ -352,7 +352,7 @@ class Stresses:
         F = ufl.variable(self.problem.forms.F)
         parts = []
         for density, metadata in self.problem.forms.energy_densities(material, names, F):
-            S = ufl.inv(F) * ufl.diff(density, F)
+            S = self.problem.forms.ratio_before * ufl.inv(F) * ufl.diff(density, F)
             parts.append(([S[i] for i in _S], metadata))
         return parts
 
