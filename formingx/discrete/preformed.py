@@ -98,11 +98,11 @@ class Preformed(NamedTuple):
         at, weights = rule
         volume = forms.weight * abs(ufl.JacobianDeterminant(forms.domain))
         sampled = in_own_cells(forms.domain, ufl.as_vector([*forms.X, volume]), at)
-        cells, places = self._located(sampled[..., :2].reshape(-1, 2))
+        cells, places = self._located(np.concatenate(sampled)[:, :-1])
         b, pressures = (values.reshape(len(sampled), len(at), -1) for values in (
             self._b(cells, places, forms.scene.kinematics.axisymmetric),
             np.einsum("na,nak->nk", np.column_stack([1 - places.sum(1), places]), self.pressures[cells])))
-        weights = sampled[..., 2] * weights
+        weights = sampled[..., -1] * weights
 
         def nearest(values: np.ndarray, shapes: np.ndarray) -> np.ndarray:
             mass = np.einsum("cq,qi,qj->cij", weights, shapes, shapes)
@@ -132,7 +132,7 @@ class Preformed(NamedTuple):
         """
         from scipy.spatial import cKDTree
         inside = 0.9 * _LATTICE + 0.1 / 3
-        tree = cKDTree((_tabulated(_POSITIONS, inside)[0] @ self.x).reshape(-1, 2))
+        tree = cKDTree(np.concatenate(_tabulated(_POSITIONS, inside)[0] @ self.x))
         rows = tree.query(points, _CANDIDATES)[1]
         cells, found = rows[:, 0] // len(inside), inside[rows[:, 0] % len(inside)]
         least, size = np.full(len(points), -np.inf), np.ptp(points, axis=0).max()
