@@ -131,7 +131,6 @@ TWO_BY_NATURE = {
     # lines and outlines of sections
     ("discrete.membrane", "ufl.as_vector([-t[1], t[0]])"), ("remeshing", "edges[:, [0, 2]].reshape(-1, 2)"),
     ("remeshing", "np.array(found).reshape(-1, 2)"),
-    
     # in the plane of a section, of tensors with a hoop; in that of a sheet's lid; in a window
     ("results.evaluate.stress", "self.cauchy[:, :2, :2]"), ("results.files.shells", "points[:, :2]"),
     ("results.evaluate.stress", "self.deformation_gradient[:, :2, :2]"), ("results.show.views", "projected[:, :2]"),
