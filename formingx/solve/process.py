@@ -32,7 +32,7 @@ _IN_TIME = StepControl(length=1e-3, smallest=1e-13)
 """Step control of a material that relaxes: the error in time soon takes over."""
 
 _HELD = replace(_IN_TIME, target=8)
-"""While nothing is driven: what touches hardly moves, and the error in time says how long a step may be."""
+"""In contact while nothing is driven: what touches hardly moves; the error in time says how long steps may be."""
 
 _Targets: TypeAlias = list[tuple[Target, Measure]]
 
@@ -147,7 +147,8 @@ class Execution:
         """
         step = self._stage.step or self._step
         if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
-            step = step or (_IN_TIME if any(self.problem.setting.rate[:-1]) else _HELD)  # begun pieces: their own
+            held = self.problem.has_kinks and not any(self.problem.setting.rate[:-1])
+            step = step or (_HELD if held else _IN_TIME)     # a piece that has begun goes on with its own steps
         run = Run(self.record, targets, step, self._stage.at_fold, self._accuracy, self._label, wanted)
         start = None if control is None else self._resumed(control)
         run.follow(self._max_steps, self._progress, start)
