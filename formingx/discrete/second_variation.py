@@ -24,14 +24,13 @@ import ufl
 from dolfinx import fem
 
 from ..errors import InputError
+from ..physics.kinematics import BLOCK
 from ..physics.supports import Held, Symmetry
 from .loaded_body import LoadedBody
 from .matrix import ExtendedMatrix
 
 _AT_REST = 1e-6
 """Forces by a rigid motion (over those of its single unknowns) below which nothing holds it."""
-
-_WITHIN = ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))
 
 
 class _ModedBody(LoadedBody):
@@ -176,7 +175,7 @@ class SecondVariation:
         F, H = forms.elastic_F, forms.elastic(gradient(h))
 
         def changed(within: bool) -> Any:
-            return ufl.as_tensor([[(F[i, j] if (i, j) in _WITHIN else 0) + (H[i, j] if ((i, j) in _WITHIN) is within
+            return ufl.as_tensor([[(F[i, j] if (i, j) in BLOCK else 0) + (H[i, j] if ((i, j) in BLOCK) is within
                                                                             else 0)
                                    for j in range(3)] for i in range(3)])
         now, change = ufl.split(forms.w)[1:], ufl.split(h)[1:]

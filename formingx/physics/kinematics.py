@@ -17,6 +17,9 @@ from ..errors import InputError
 from ..mesh.nodes import COORDINATES
 from .supports import NAMES, Held
 
+BLOCK = ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))
+"""The entries of the F of a section that are not 0: in its plane, and round the axis or along the depth."""
+
 
 class Kinematics:
     """What the motion of a section of the body means in space.

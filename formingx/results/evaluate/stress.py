@@ -33,14 +33,14 @@ from ...discrete.earlier_meshes import followed
 from ...errors import InputError, as_points, known, pair
 from ...mesh.locate import Place, locate
 from ...mesh.nodes import COORDINATES, of_cells, own_cells
+from ...physics.kinematics import BLOCK
 from ...ranks import gathered
 from .patches import Patches
 from .stress_error import Fitted, StressError, StressPeak
 
 # The entries of F and of S that are not zero, in the order (r, z, hoop; out of plane in plane strain).
-_F = ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))
 _S = ((0, 0), (0, 1), (1, 1), (2, 2))
-_COUNT = len(_F) + len(_S)
+_COUNT = len(BLOCK) + len(_S)
 log = logging.getLogger("formingx")
 
 
@@ -363,7 +363,7 @@ class Stresses:
         self.element = basix.ufl.element("Lagrange", domain.basix_cell(), 1)
         self.space = fem.functionspace(domain, basix.ufl.element("Lagrange", domain.basix_cell(), 1,
                                                                  shape=(len(self.cells),)))
-        self._F = [forms.F[i] for i in _F]
+        self._F = [forms.F[i] for i in BLOCK]
         self._selector = fem.Constant(domain, np.zeros(_COUNT, dtype=PETSc.ScalarType))
         trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         mass: Any = 0
@@ -376,7 +376,7 @@ class Stresses:
                 mass += trial[k] * test[k] * dx
                 rhs += sum(self._selector[i] * f for i, f in enumerate(self._F)) * test[k] * dx
                 for S, metadata in parts:
-                    picked = sum(self._selector[len(_F) + i] * s for i, s in enumerate(S))
+                    picked = sum(self._selector[len(BLOCK) + i] * s for i, s in enumerate(S))
                     rhs += picked * test[k] * (dx(metadata=metadata) if metadata else dx)
         self._rhs = forms.compile(rhs)
         self._vector = la.vector(self.space.dofmap.index_map, len(self.cells))
@@ -421,8 +421,8 @@ def _cauchy(values: np.ndarray) -> np.ndarray:
 
 def _unpack(points: np.ndarray, values: np.ndarray) -> Stress:
     F, S = np.zeros((2, len(points), 3, 3))
-    for k, (i, j) in enumerate(_F):
+    for k, (i, j) in enumerate(BLOCK):
         F[:, i, j] = values[:, k]
     for k, (i, j) in enumerate(_S):
-        S[:, i, j] = S[:, j, i] = values[:, len(_F) + k]
+        S[:, i, j] = S[:, j, i] = values[:, len(BLOCK) + k]
     return Stress(points, F, S)
