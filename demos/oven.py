@@ -53,7 +53,7 @@ def draw(axes, path, thickness, colour):
 def main():
     options = parser("oven", __doc__, elements=16, accuracy=1e-2)
     args = options.parse_args()
-    elements, accuracy = ((8, [2, 1, 2]), 2e-2) if args.quick else ((args.elements, [1, 2, 2, 1]), args.accuracy)
+    elements, accuracy = ((8, [2, 1, 2]), 6e-2) if args.quick else ((args.elements, [1, 2, 2, 1]), args.accuracy)
     summary = {"sag_mm": {}, "time_to_limit_s": {}, "temperature_C": {}, "wall": {}, "cost": {}}
     figure, axes = plots.figure(2, width=5.2)
     for k, thickness in enumerate((2,) if args.quick else TIMES):

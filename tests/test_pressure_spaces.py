@@ -24,9 +24,9 @@ def tube(elements, model):
                     supports=[fx.Symmetry("bottom", "z"), fx.Symmetry("top", "z")])
 
 
-@pytest.mark.parametrize("kinematics", [fx.Axisymmetric(), fx.PlaneStrain()], ids=lambda k: type(k).__name__)
-@pytest.mark.parametrize("eps", [0.0, 1e-2])
-@pytest.mark.parametrize("space", SPACES)
+@pytest.mark.parametrize("space, eps, kinematics", [
+    ("P0", 0.0, fx.Axisymmetric()), ("P0", 1e-2, fx.PlaneStrain()), ("P1", 1e-2, fx.Axisymmetric()),
+    ("P1dg", 1e-2, fx.Axisymmetric()), ("P1dg", 0.0, fx.PlaneStrain())])
 def test_residual_and_tangent_are_derivatives(space, eps, kinematics):
     problem = Problem(scene(keeping=fx.MixedPressure(eps=eps, space=space), kinematics=kinematics,
                             loads=[fx.Pressure("bottom")]))
@@ -139,7 +139,7 @@ import formingx as fx
 numbers, counts = [], []
 for space in ("P0", "P1", "P1dg"):
     mesh = fx.mesh.disc(radius=1.25, thickness={"a": 0.04, "b": 0.042}, elements=(12, 1))
-    scene = fx.Scene(mesh=mesh, materials={"a": fx.NeoHookean(c10=2.0), "b": fx.MooneyRivlin(c10=1.0, c01=0.1)},
+    scene = fx.Scene(mesh=mesh, materials={"a": fx.NeoHookean(c10=2.0), "b": fx.NeoHookean(c10=1.1)},
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")],
                      model=fx.MixedPressure(space=space))
     path = fx.trace(scene, until=fx.pole_stretch(3.0), through=[fx.pressure(0.3)], progress=False)

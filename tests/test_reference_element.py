@@ -16,11 +16,12 @@ def as_printed(F, m1, a1, m2, a2):
     return sum(m / a * (sum_of_powers(F, a) - 3) for m, a in ((m1, a1), (m2, a2)))
 
 
-LAWS = pytest.mark.parametrize("material, law", [
-    (fx.MooneyRivlin(c10=1.7, c01=0.35), element.Mooney(1.7, 0.35)),
-    (fx.Ogden(mu=(1.4, 0.5, 0.02), alpha=(2.5, 1.3, 5.0)), element.Ogden((1.4, 0.5, 0.02), (2.5, 1.3, 5.0))),
-    (fx.Hyperelastic(as_printed, of="F", m1=1.4, a1=2.5, m2=-0.3, a2=-2.0), element.Ogden((1.4, -0.3), (2.5, -2.0))),
-], ids=["mooney", "ogden", "ogden-negative"])
+LAWS = {
+    "mooney": (fx.MooneyRivlin(c10=1.7, c01=0.35), element.Mooney(1.7, 0.35)),
+    "ogden": (fx.Ogden(mu=(1.4, 0.5, 0.02), alpha=(2.5, 1.3, 5.0)), element.Ogden((1.4, 0.5, 0.02), (2.5, 1.3, 5.0))),
+    "ogden-negative": (fx.Hyperelastic(as_printed, of="F", m1=1.4, a1=2.5, m2=-0.3, a2=-2.0),
+                       element.Ogden((1.4, -0.3), (2.5, -2.0))),
+}
 
 
 def pair(scene, law, folder):
@@ -40,10 +41,11 @@ def pair(scene, law, folder):
 
 
 @pytest.mark.quick
-@LAWS
-@pytest.mark.parametrize("points", [3, 4, 7])
-def test_residual_and_tangent(material, law, points, tmp_path):
+@pytest.mark.parametrize("name, points", [("mooney", 3), ("mooney", 4), ("mooney", 7), ("ogden", 4),
+                                          ("ogden-negative", 3)])
+def test_residual_and_tangent(name, points, tmp_path):
     """On curved elements, stretched up to twice, sheared, under a pressure that follows: equal to 1e-10."""
+    material, law = LAWS[name]
     mesh = fx.mesh.disc(radius=2.0, inner_radius=0.3, thickness=0.6, elements=(4, 2))
     rng = np.random.default_rng(5)
     X = mesh.domain.geometry.x
@@ -76,11 +78,11 @@ def test_residual_and_tangent(material, law, points, tmp_path):
         by_pressure).max()
 
 
-@LAWS
-def test_stiffness_by_hand_is_the_derivative(material, law):
+@pytest.mark.parametrize("name", LAWS)
+def test_stiffness_by_hand_is_the_derivative(name):
     """The hand-coded stiffness against central differences of its own forces: the referee is sound."""
     nodes = np.array([[1.0, 0.0], [2.0, 0.1], [1.2, 1.0], [1.5, 0.0], [1.6, 0.6], [1.1, 0.5]])
-    body = Body(nodes, np.arange(6)[None], np.array([[0, 3, 1]]), law, element.Penalty(0.05), 4)
+    body = Body(nodes, np.arange(6)[None], np.array([[0, 3, 1]]), LAWS[name][1], element.Penalty(0.05), 4)
     u = 0.05 * np.random.default_rng(1).standard_normal(nodes.shape)
     _, K, _ = body.residual(u, 0.4)
     h = 1e-5

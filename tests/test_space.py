@@ -29,8 +29,8 @@ def disc(size=0.3, material=MATERIALS[0], on="bottom", model=None, **scene):
                     supports=scene.pop("supports", HELD), loads=scene.pop("loads", [fx.Pressure(on)]), **scene)
 
 
-@pytest.mark.parametrize("wrinkles", [None, 0.01])
-@pytest.mark.parametrize("material", MATERIALS, ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("material, wrinkles", [*((material, 0.01) for material in MATERIALS),
+                                                (MATERIALS[0], None), (MATERIALS[3], None)])
 def test_residual_and_tangent_are_derivatives(material, wrinkles):
     problem = Problem(disc(material=material, model=fx.Membrane(wrinkles=wrinkles)))
     assert_derivatives(problem, *random_state(problem, size=0.1 if wrinkles else 0.05))
