@@ -44,8 +44,9 @@ class Model:
     volume_stiffness = 0.0
 
     def __repr__(self) -> str:
-        given = {name: (getattr(self, name), p.default) for name, p in signature(type(self)).parameters.items()}
-        return f"{type(self).__name__}({', '.join(f'{k}={v!r}' for k, (v, usual) in given.items() if v != usual)})"
+        usual = {name: p.default for name, p in signature(type(self)).parameters.items()}
+        given = {name: value for name, value in vars(self).items() if name in usual and value != usual[name]}
+        return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in given.items())})"
 
     def check(self, scene: Any) -> None:
         """Raise an InputError if the scene has what this model cannot have."""

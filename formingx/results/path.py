@@ -35,7 +35,7 @@ class Path(States):
     pilot: Path | None = None
 
     def __repr__(self) -> str:
-        return f"Path({len(self.states)} states, to {self.last!r})"
+        return f"Path({len(self.states)} states{f', to {self.last!r}' if self.states else ''})"
 
     def doubts(self) -> list[tuple[str, str]]:
         """(how bad: "serious" or "minor"; what) of contact in the last state, of wrinkles in space; collective."""
