@@ -16,14 +16,16 @@ import numpy as np
 
 from .discrete.carry import carry
 from .discrete.contact.taken_over import Worn, take_over
+from .discrete.earlier_meshes import scene_on
 from .discrete.outline import Outline
 from .discrete.preformed import Preformed
 from .discrete.problem import Problem
 from .errors import ConvergenceError, InputError, instance, pair, positive
+from .materials.constants import OfMesh
 from .measures.targets import Amplitude, Target
 from .mesh.remeshed import enclosed, remeshed
 from .physics.contact import Contact
-from .physics.supports import Clamped, Symmetry
+from .physics.supports import Support
 from .solve.arc_length import Curve
 from .solve.newton import Failure, Tolerances, fixed
 from .solve.path_following import Run
@@ -92,12 +94,14 @@ def check(who: str, scene: Any, remesh: Any, targets: Sequence[Target]) -> None:
         why = "a sheet in space"
     elif len(scene.mesh.layers) > 1:
         why = "several layers"
-    elif any(material.varies for material in scene.materials.values()):
-        why = "a material with constants that vary"
-    elif scene.temperature is not None or scene.heat is not None:
-        why = "a temperature"
-    elif any(not isinstance(support, Symmetry | Clamped) for support in scene.supports):
-        why = "a support other than Symmetry and Clamped"
+    elif any(isinstance(constant, OfMesh) for material in scene.materials.values()
+             for constant in material.constants().values()):
+        why = "a constant that is given on the mesh: give a function of (R, Z)"
+    elif scene.expansion:
+        why = "thermal expansion"
+    elif any(type(support).stored_energy is not Support.stored_energy or any(
+            getattr(held, "point", None) is not None for held in support.held()) for support in scene.supports):
+        why = "a support at a node, or an elastic one"
     elif any(not contact.separates or contact.points != "nodes" for contact in scene.contacts):
         why = "a contact with separates=False, or at Gauss points"
     elif any(type(contact).law is not Contact.law for contact in scene.contacts):
@@ -236,7 +240,7 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
     layer, = scene.mesh.layers
     mesh = remeshed(edges, names, corners, *sizes, layer, scene.kinematics.axisymmetric, scene.mesh.comm, volume,
                     lambda x, names: _outside(x, names, worn))
-    made = scene.with_mesh(mesh, Preformed.of(old, state))
+    made = scene_on(mesh, Preformed.of(old, state))
     problem = Problem(made)
     problem.limit.one_by_one()
     setting, control = old.setting.on_next_mesh(old.scales, problem.scales, state.control)

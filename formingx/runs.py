@@ -75,8 +75,8 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
             has columns of elements as the first run asks for. True, or arguments of that, such as {"error": 0.02}.
             `Path.pilot` is the first run; a first run that did not reach the target counts as far as it came.
         remesh: a `Remesh`: the mesh is made again, of the body as it is, where elements are crushed; states of kind
-            "remesh", whose `jump` says by how much force, energy and volume changed. For solids of one layer, whose
-            constants do not vary; on one rank.
+            "remesh", whose `jump` says by how much force, energy and volume changed. For solids of one layer, on one
+            rank.
         stop_at: `unstable(modes=range(2, 9))`: end, as a result, once the body is unstable in one of these modes;
             `Path.ended` says which.
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import ufl
 from mpi4py import MPI
 from test_restart import same
 
@@ -128,7 +129,11 @@ def test_what_is_not_carried_is_refused():
         with pytest.raises(fx.InputError, match=message):
             fx.trace(scene, until=fx.travel(0.1), remesh=remesh)
     of("at Gauss points", contacts=[fx.Contact("top", fx.tools.plane(1.0), "none", moves=(0, -1), points=4)])
-    of("a support other than", supports=[fx.Symmetry("axis"), fx.SimplySupported("bottom")])
+    of("separates=False", contacts=[fx.Contact("top", fx.tools.plane(1.0), "stick", moves=(0, -1), separates=False)])
+    of("a support at a node", supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0)])
+    mesh = block("none").mesh
+    of("given on the mesh", mesh=mesh, materials=fx.NeoHookean(c10=1 + ufl.SpatialCoordinate(mesh.domain)[0]))
+    of("thermal expansion", temperature=20.0, expansion=fx.ThermalExpansion(linear=1e-4, stress_free=20.0))
     with pytest.raises(fx.InputError, match="a law of contact of one's own"):
         class Own(fx.Contact):
             def law(self, *given):
@@ -195,7 +200,7 @@ def twice(monkeypatch, **after):
 
 
 RELAX = [fx.Viscoelastic(fx.NeoHookean(c10=0.2), [(1.0, 0.3)]),
-         fx.TransientNetwork(fx.NeoHookean(c10=0.2), [(1.0, 0.3)]),
+         pytest.param(fx.TransientNetwork(fx.NeoHookean(c10=0.2), [(1.0, 0.3)]), marks=pytest.mark.slow),
          fx.KBKZ([(1.0, 0.3), (0.5, 3.0)], damping=fx.PSM(10.0, 0.5))]
 
 
@@ -224,6 +229,51 @@ def test_what_a_material_remembers_goes_on(monkeypatch, tmp_path, material):
         made = [s.kind for s in path.states].index("remesh")
         for state in (made - 1, made):
             same(run(remesh=remesh, start=fx.load(tmp_path / "run", scene, state=state)), path)
+
+
+def test_supports_hold_from_where_they_are(monkeypatch):
+    """One that is driven goes on; a hinge holds the mean of its face."""
+    from formingx import remeshing
+    monkeypatch.setattr(remeshing, "_worn", lambda low, high, remesh, state: state.kind == "target")
+
+    def both(scene, targets, size):
+        options = {"until": targets[1], "through": targets[:1], "progress": False}
+        return fx.trace(scene, **options), fx.trace(scene, remesh=fx.Remesh(size=size, corner=size), **options)
+    pulled = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(4, 4)), materials=fx.NeoHookean(c10=1.0),
+                      supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"), fx.Displaced("top", "z")])
+    whole, path = both(pulled, [fx.travel(0.2), fx.travel(0.5)], 0.3)
+    assert len(path.segments) == 2
+    for name in ("travel", "support_force", "pole_height", "strain_energy"):
+        assert path.last.measures[name] == pytest.approx(whole.last.measures[name], rel=1e-7)
+    hinged = fx.Scene(mesh=fx.mesh.disc(radius=2.0, thickness=0.5, elements=(12, 3)), loads=[fx.Pressure("bottom")],
+                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], materials=fx.NeoHookean(c10=1.0))
+    whole, path = both(hinged, [fx.pressure(0.1), fx.pressure(0.3)], 0.17)
+    for name in ("pole_height", "pole_stretch", "strain_energy"):
+        assert path.last.measures[name] == pytest.approx(whole.last.measures[name], rel=2e-3)
+
+
+@pytest.mark.parametrize("heat", [False, True])
+def test_constants_and_temperatures_go_with_the_material(monkeypatch, tmp_path, heat):
+    """A thick tube whose modulus depends on R and on the temperature, which is given, or falls from outside."""
+    tube = fx.mesh.from_lines([(0.5, 0.0), (0.5, 1.0)], [(1.5, 0.0), (1.5, 1.0)], elements=(6, 6))
+    outside = fx.Cooling(fx.ThermalProperties(conductivity=1.0, density=1.0, heat_capacity=1.0),
+                         [fx.Convection("outer", h=2.0, air=20.0)], unit="C") if heat else None
+    material = fx.MooneyRivlin(c10=lambda R, Z: R**2, c01=fx.of_temperature(lambda T: 1 - T / 150))
+    scene = fx.Scene(mesh=tube, materials=material, loads=[fx.Pressure("inner")], heat=outside,
+                     temperature=100.0 if heat else lambda R, Z: 100 * R / (1 + Z),
+                     supports=[fx.Symmetry("start", normal="z"), fx.Symmetry("end", normal="z")])
+    stages = [fx.Stage("blow", drive=scene.loads[0], until=fx.pressure(1.5), duration=0.2),
+              fx.Stage("wait", duration=0.05)]
+    twice(monkeypatch, blow=0.1, wait=0.22)
+    run = fx.Process(scene).run
+    remesh = fx.Remesh(size=0.18, corner=0.18)
+    whole, path = run(stages, progress=False), run(stages, progress=False, remesh=remesh, checkpoint=tmp_path / "run")
+    assert len(path.segments) == 3 - (not heat)
+    points = [(0.6, 0.4), (1.1, 0.7), (1.45, 0.2)]
+    assert path.temperature(points) == pytest.approx(whole.temperature(points), abs=0.1)
+    for name in ("strain_energy", "enclosed_volume"):
+        assert path.last.measures[name] == pytest.approx(whole.last.measures[name], rel=1e-3)
+    same(fx.load(tmp_path / "run", scene), path, rel=0)
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..mesh.nodes import of_mesh, of_space
 from .carry import Carrier
 from .outline import Outline, along
 from .probes import Probe
@@ -33,14 +34,26 @@ class FollowedProbe(Probe):
         return super()._read() + self.so_far
 
 
-def first_places(problem: Any, points: np.ndarray) -> np.ndarray:
-    """Where points of the mesh of a problem, shape (n, 2), are on the first mesh: fitted to the nodes before."""
-    if problem.scene.preformed is None:
-        return points
-    old, state = problem.scene.preformed.before
-    nodes = old.forms.domain.geometry.x[:, :points.shape[1]]
+def first_places(preformed: Any, points: np.ndarray) -> np.ndarray:
+    """Where points of a new mesh, shape (n, 2), are on the first one: fitted to the nodes of the one before."""
+    old, state = preformed.before
+    nodes = of_mesh(old.forms.domain)
+    first = nodes if old.scene.preformed is None else first_places(old.scene.preformed, nodes)
+    found = Carrier(old.comm, nodes + Probe(old, nodes).displacement_in(state), points).fitted(first)
+    return np.clip(found, first.min(0), first.max(0))
+
+
+def scene_on(mesh: Any, preformed: Any) -> Any:
+    """The scene of the mesh before on a new one of the body as it was left, with its temperature then."""
+    old, state = preformed.before
+    if old.temperature is None:
+        return old.scene.with_mesh(mesh, preformed)
+    with old.at(state):
+        field = old.temperature.T.copy()
+    nodes, T = of_space(field.function_space), field.x.array
     moved = nodes + Probe(old, nodes).displacement_in(state)
-    return Carrier(problem.comm, moved, points).fitted(first_places(old, nodes))
+    return old.scene.with_mesh(mesh, preformed, lambda R, Z: np.clip(
+        Carrier(old.comm, moved, np.column_stack([R, Z])).fitted(T), T.min(), T.max()))
 
 
 def followed(problem: Any, points: np.ndarray) -> np.ndarray:

@@ -72,8 +72,12 @@ class MaterialTerms:
 
     def of_position(self, function: Any) -> fem.Function:
         """f(R, Z) at the quadrature points of the energy, exactly."""
-        found, layer = self.quadrature_function(), self.names[0]
-        found.interpolate(lambda X: function(X[0], self.forms.mid(layer, X[0], X[1])), self.cells)
+        found, layer, brought = self.quadrature_function(), self.names[0], self.forms.scene.preformed
+
+        def values(X: np.ndarray) -> np.ndarray:
+            R, Z = X[:2] if brought is None else brought.first_places(X[:2].T).T
+            return function(R, self.forms.mid(layer, R, Z))
+        found.interpolate(values, self.cells)
         return found
 
     def of_temperature(self, function: Any) -> Any:

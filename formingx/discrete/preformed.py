@@ -17,6 +17,7 @@ import ufl
 from dolfinx import fem
 
 from .carry import in_own_cells
+from .earlier_meshes import first_places
 
 _QUADRATIC = basix.ufl.element("Lagrange", "triangle", 2)
 """Of what is carried, by its values at the corners and at the middles of the edges opposite to them."""
@@ -71,6 +72,10 @@ class Preformed(NamedTuple):
         if forms.scene.preformed is not None:
             b = forms.scene.preformed._carried(forms)[0]
         return cls(x, rest, b, pressures, (problem, state))
+
+    def first_places(self, points: np.ndarray) -> np.ndarray:
+        """Where points of the new mesh, shape (n, 2), are on the first one."""
+        return first_places(self, points)
 
     def gradient(self, forms: Any) -> tuple[Any, Any]:
         """F_old on the elements of a formulation (UFL, shape (3, 3)), and det F_old."""

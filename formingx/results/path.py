@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..discrete.earlier_meshes import followed
 from ..errors import InputError, as_points, count
 from ..figures import Axes
 from ..solve.state import State
@@ -280,8 +281,9 @@ class Path(States):
         """Of the body in a state (default: the last) at reference points (R, Z), shape (n, 2), length: shape (n,)."""
         if self.problem.temperature is None:
             raise InputError("temperature: the scene has none: give Scene a temperature=...")
-        with self.problem.at(state or self.last) as problem:
-            return problem.temperature.at(as_points("Path.temperature: points", points))
+        state = state or self.last
+        with self._segment(state).problem.at(state) as problem:
+            return problem.temperature.at(followed(problem, as_points("Path.temperature: points", points)))
 
     def tool_forces(self) -> dict[str, np.ndarray]:
         """{tool: its force at all states}: positive when it resists its travel; of a tool that stays, along Z."""

@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError, count, known, several, together
+from ..materials.constants import Sample
 from ..materials.expansion import ThermalExpansion
 from ..materials.hyperelastic import Material
 from ..mesh.mesh import Mesh
@@ -137,13 +138,18 @@ class Scene:
         """The scene on the mesh that its run began with."""
         return self if self.preformed is None else self.preformed.before[0].scene.first
 
-    def with_mesh(self, mesh: Mesh, preformed: Any = None) -> Scene:
-        """The same scene on another mesh of the body: with the same names of layers and boundaries."""
+    def with_mesh(self, mesh: Mesh, preformed: Any = None, temperature: Any = None) -> Scene:
+        """The same scene on another mesh of the body, with the same names of layers and boundaries.
+
+        temperature: of the body there, where it is not the one that was given.
+        """
+        if temperature is None and self.temperature is not None:
+            temperature = self.temperature.given
         return Scene(mesh=mesh, materials=self.materials, supports=self.supports, loads=self.loads,
                      contacts=self.contacts, model=self.model, kinematics=self.kinematics,
                      quadrature_degree=self.quadrature_degree, heat=self.heat, expansion=self.expansion or None,
                      thickness=self.thickness or None, preformed=preformed,
-                     temperature=None if self.temperature is None else self.temperature.given)
+                     temperature=temperature)
 
     @property
     def things(self) -> list[Part]:
@@ -240,7 +246,7 @@ class Scene:
         if not material.varies:
             material.check()
             return material.shear_modulus
-        looked_at = sample(self.mesh, layer, self.quadrature_degree, self.temperature)
+        looked_at = self.sample(layer)
         refused, mine = None, -np.inf
         try:
             material.check(looked_at)
@@ -264,6 +270,11 @@ class Scene:
             looked_at = sample(self.mesh, layer, self.quadrature_degree, self.temperature).temperature
             together(self.mesh.comm, [partial(law.stretch, looked_at)])
         return dict(laws)
+
+    def sample(self, layer: str) -> Sample:
+        """The quadrature points of the energy in a layer, as they are on the first mesh."""
+        found = sample(self.mesh, layer, self.quadrature_degree, self.temperature)
+        return found if self.preformed is None else found._replace(points=self.preformed.first_places(found.points))
 
     def shear_modulus(self, layer: str) -> float:
         """Modulus of small shear of a layer, stress; of constants that vary the largest in it, all ranks."""

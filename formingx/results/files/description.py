@@ -10,7 +10,6 @@ from mpi4py import MPI
 from ...materials.constants import Varying
 from ...materials.material import Material
 from ...mesh.nodes import COORDINATES, of_cells, own_cells
-from ...scene.sampling import sample
 from ...scene.summary import text
 
 _PARTS = ("materials", "supports", "loads", "contacts", "model", "kinematics", "quadrature_degree")
@@ -76,7 +75,7 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
 
 def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
     """{name: sum over a layer that changes with the value at any of its points} of functions of a `Sample`."""
-    at = sample(scene.mesh, layer, scene.quadrature_degree, scene.temperature)
+    at = scene.sample(layer)
     numbers = np.sin(1.0 + scene.mesh.domain.topology.original_cell_index[at.cells])
     weights = (numbers[:, None] * np.sin(1.0 + np.arange(len(at.places)))).ravel()
     return {name: float(scene.mesh.comm.allreduce(float(weights @ values(at)), MPI.SUM))

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ...discrete.earlier_meshes import scene_on
 from ...discrete.preformed import Preformed
 from ...discrete.problem import Problem
 from ...errors import InputError
@@ -39,7 +40,7 @@ def load(before: tuple[Problem, State], data: dict[str, Any]) -> Problem:
     grid = Grid(points, np.arange(1, len(points) + 1), {k: np.array(v) for k, v in data["layers"].items()},
                 {k: np.array(v) for k, v in data["boundaries"].items()})
     mesh = to_mesh(lambda: grid, scene.mesh.comm, "checkpoint: its mesh")
-    made = Problem(scene.with_mesh(mesh, Preformed(**data["preformed"])._replace(before=before)))
+    made = Problem(scene_on(mesh, Preformed(**data["preformed"])._replace(before=before)))
     for contact, shift in zip(made.contacts, data["shifts"], strict=True):
         if shift is not None:
             contact.shift_distances(np.array(shift))
