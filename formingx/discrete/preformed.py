@@ -94,7 +94,7 @@ class Preformed(NamedTuple):
         values, fitted = np.zeros(len(forms.w.x.array)), self._carried(forms)[1]
         for k in range(fitted.shape[2]):
             values[forms.space.sub(1 + k).dofmap.list[: len(fitted)]] = fitted[..., k]
-        x[:] = values[: len(x)]
+        x[: problem.n_owned] = values[: problem.n_owned]
         return x
 
     def _carried(self, forms: Any) -> tuple[np.ndarray, np.ndarray]:
