@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .contact.approach import LIMITS, Approach
-from .contact.sequence import Foretold, Response
+from .contact.held import Response
+from .contact.sequence import Foretold
 
 
 class Way(NamedTuple):
@@ -54,6 +55,11 @@ class StepLimit:
         return any(c.foretold > c.at_once for c in self._present) and all(
             hasattr(c.face.law, "friction") and hasattr(c.face.law, "without") for c in self._present)
 
+    def touches(self, state: Any) -> bool:
+        """True if a point touches a tool at a state."""
+        n = self._n
+        return any([c.touches(state.x[:n], state.control) for c in self._present])
+
     def one_by_one(self) -> None:
         """Points are not foretold one after the other."""
         for approach in self._all:
@@ -69,6 +75,14 @@ class StepLimit:
                     for c in self._present], default=way.length)
 
     def _length_foretold(self, way: Way) -> float | None:
+        """Up to where enough nodes have touched one after the other, none through a tool; None: that cannot be told."""
+        found, ahead = self._enough_foretold(way), self._foretold[1]
+        while found is not None and ahead is not None and found > LIMITS.shortest and any(
+                [c.cuts(a, b) for c, a, b in zip(self._present, ahead.at(0.0), ahead.at(found))]):
+            found /= 2
+        return found
+
+    def _enough_foretold(self, way: Way) -> float | None:
         """Up to where enough nodes have touched one after the other; None: that cannot be told."""
         n, present = self._n, self._present
         if self._foretold[0] is not way.x:
@@ -88,7 +102,9 @@ class StepLimit:
                 return min(LIMITS.beyond * arrival.time, way.length)
         else:
             return None
-        return None if ahead.ends <= LIMITS.as_good * way.length else min(LIMITS.beyond * ahead.ends, way.length)
+        if ahead.stops or ahead.ends <= LIMITS.as_good * way.length:
+            return None
+        return min(LIMITS.beyond * ahead.ends, way.length)
 
     def prepare(self, way: Way, ends: bool = False) -> tuple[np.ndarray, float] | None:
         """A step is about to be taken; `ends`: it is to end where something comes into contact, see `check`.
@@ -97,11 +113,12 @@ class StepLimit:
         """
         n, ahead = self._n, self._ahead(way)
         if ahead is not None:
-            found = list(zip(*ahead.places(way.length), strict=True))
+            found: list[tuple] = list(zip(*ahead.places(way.length), strict=True))
         else:
-            found = [c.along(way.x[:n], way.control, way.direction[:n], way.slope, way.length) for c in self._present]
-        for approach, (times, places) in zip(self._present, found):
-            approach.prepare(times, places, way.length, ends)
+            found = [(*c.along(way.x[:n], way.control, way.direction[:n], way.slope, way.length), None)
+                     for c in self._present]
+        for approach, (times, places, guessed) in zip(self._present, found):
+            approach.prepare(times, places, guessed, way.length, ends)
         return None if ahead is None else ahead.bend(way.length)
 
     def _ahead(self, way: Way) -> Foretold | None:

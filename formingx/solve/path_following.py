@@ -213,8 +213,9 @@ class Run:
         lengths, last = [*self.settings.snap_through.lengths, 0.0], self.settings.snap_through.lengths[-1]
         if snaps(self.curve, old, self._at_fold, self._sense):
             return self._snap(old)
-        response = self.curve.response(old) if limit and limit.foretells and old.kind != "start" else None
-        self._way = Way(old.x, old.control, old.direction, old.slope, 0.0, response)    # at rest it knows no contact
+        tells = limit and limit.foretells and (old.kind != "start" or limit.touches(old))   # else it knows no contact
+        response = self.curve.response(old) if tells else None
+        self._way = Way(old.x, old.control, old.direction, old.slope, 0.0, response)
         while True:
             length = min(self.step.length, most)
             length = limit.length(self._way._replace(length=length)) if limit else length
@@ -233,6 +234,8 @@ class Run:
                 self.step.length, held = length, None
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good = self.step.failed()
+                if failed:                                  # what arrives is not as foretold
+                    self._way = self._way._replace(response=None)
                 self._failed(failure.reason, self.step.length)
                 failed += not isinstance(failure, _Astray)
                 soon = (self._jumps_soon and failed > 1 and length < lengths[0]

@@ -67,6 +67,10 @@ class Approach:
         self.foretold = self.at_once if one_by_one else max(self.at_once, round(LIMITS.share * points))
         self._foreseen = 0                                  # points that the step is going to bring, all ranks
 
+    def touches(self, fields: np.ndarray, control: float) -> bool:
+        """True if a point touches the tool."""
+        return bool(self._comm.allreduce(bool(self.face.touching(fields, control).any()), MPI.LOR))
+
     def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """How long a step along a tangent may be: to the first touch, or until enough new points touch.
 
@@ -96,16 +100,18 @@ class Approach:
         times = arrivals(face.law, start, velocity, free, length)
         return times, start + times[:, None] * velocity
 
-    def prepare(self, times: np.ndarray, places: np.ndarray, length: float, ends: bool) -> None:
+    def prepare(self, times: np.ndarray, places: np.ndarray, guessed: np.ndarray | None, length: float,
+                ends: bool) -> None:
         """A step of this length is about to be taken: points arrive at times (arc length, `length`: not), at places.
 
+        guessed: which begin where their forces want them, shape (n,); None: none.
         ends: it is to end where a point touches that sticks (see `touches_by`), which has no friction before.
         """
         face = self.face
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         if not face.contact.lagged:                         # that asks for no place of arrival
             at_end = ends & face.contact.sticks & (times >= LIMITS.at_end * length)
-            face.expect_arrivals(np.where(at_end[:, None], np.nan, places))
+            face.expect_arrivals(np.where(at_end[:, None], np.nan, places), guessed)
 
     def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """More than twice the new points that a step is meant, or foreseen, to bring into contact.
@@ -123,13 +129,15 @@ class Approach:
         return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self.at_once, self._foreseen) + 2)
 
     def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
-        """True if a point's straight way from one state to another, seen from the tool, leads through the tool.
+        """True if a point's straight way from one state to another, seen from the tool, leads through the tool."""
+        return self.cuts(self.face.positions(old, old_control), self.face.positions(new, control))
 
-        That is, deeper than both its ends by `StepLimits.cut_off`: so much a point may cut off an edge that it slides
-        over.
+    def cuts(self, a: np.ndarray, b: np.ndarray) -> bool:
+        """True if a straight way from positions a to b leads deeper than both ends by `StepLimits.cut_off`.
+
+        So much a point may cut off an edge that it slides over.
         """
         law, lengths = self.face.law, self.face.rule.lengths
-        a, b = self.face.positions(old, old_control), self.face.positions(new, control)
         way, most = np.linalg.norm(b - a, axis=1), LIMITS.cut_off * lengths
         ends = np.maximum(np.maximum(law.distance(a), law.distance(b)), 0.0)
         between = (law.distance(a) + law.distance(b) + way) / 2            # no place of the way is deeper

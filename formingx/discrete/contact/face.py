@@ -63,6 +63,7 @@ class FaceContact:
         self._way = solid.length * contact.way
         self.enter(0.0, float(contact.driven), True)
         self._in_tangent = np.zeros((*self.points.shape, self.points.shape[1]))  # stiffness in the tangent last made
+        self._guessed: np.ndarray | None = None
         self._memory: Memory | None = None
         self.start()
 
@@ -127,6 +128,11 @@ class FaceContact:
         """Of the forces in F by tractions, shape (n,)."""
         return self._scale
 
+    @property
+    def stiffness_in_tangent(self) -> np.ndarray:
+        """Of the forces in F by positions, as in the tangent last made, shape (n, components, components), 1/length."""
+        return self._scale[:, None, None] * self._in_tangent
+
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
         """Add forces in F at the points, shape (n, components), to the owned residual."""
         self.rule.add(values, forces)
@@ -135,7 +141,8 @@ class FaceContact:
         """Newton's method begins ahead of a state (owned unknowns; None: of none); collective."""
         if self.contact.present_area and old is not None:   # of a sheet: the wall is thinner by as much as it is wider
             self._harden(np.maximum(self.rule.area_ratio(old), 1.0) ** 2)
-        self.increment = Increment(self.law, self.touch, None if old is None else self.positions(old, control))
+        start = None if old is None else self.positions(old, control)
+        self.increment, self._guessed = Increment(self.law, self.touch, start, self._guessed), None
 
     def leave_out(self, points: np.ndarray) -> None:
         """Some points (a mask, shape (n,)) touch nothing, until another increment begins."""
@@ -234,8 +241,12 @@ class FaceContact:
     def _start_at(self, x: np.ndarray) -> None:
         self._take(Memory(self.law.start(x), np.zeros(len(x), dtype=bool), np.ones(len(x))) if self.remembers else None)
 
-    def expect_arrivals(self, arrival: np.ndarray) -> None:
-        """Where points will be when they touch in the step ahead (`Touch.arrival`)."""
+    def expect_arrivals(self, arrival: np.ndarray, guessed: np.ndarray | None = None) -> None:
+        """Where points will be when they touch in the step ahead (`Touch.arrival`).
+
+        guessed: which are going to be guessed where their forces want them, shape (n,).
+        """
+        self._guessed = guessed
         if self._memory is not None:
             self._take(self._memory._replace(touch=self._memory.touch._replace(arrival=arrival)))
 

@@ -21,12 +21,15 @@ class Increment:
     Args:
         law: of the contact; touch: what the points remember; None without friction.
         start: positions of the points at the state ahead of which Newton's method begins; None: of none.
+        guessed: which begin where their forces want them, so that the law is linearised there at first, shape (n,).
     """
 
-    def __init__(self, law: ContactLaw, touch: Touch | None, start: np.ndarray | None = None):
+    def __init__(self, law: ContactLaw, touch: Touch | None, start: np.ndarray | None = None,
+                 guessed: np.ndarray | None = None):
         self._law, self._touch = law, touch
         self._touched = None if start is None else law.touching(start, touch)
         self._before: Motion | None = None if start is None else law.motion(start, touch)   # at the last iteration
+        self._guessed = guessed
         self._sense: np.ndarray | None = None                                               # of sliding there
         self._last: tuple[np.ndarray, Tractions] | None = None
 
@@ -39,10 +42,15 @@ class Increment:
     def linearise(self, x: np.ndarray) -> np.ndarray:
         """Linearise the law where the last iteration foretold; by how much its forces at x change, shape of x."""
         plain = found = self.tractions(x)
+        now = self._law.motion(x, self._touch)
         if self._before is not None:
-            found = self._law.tractions(x, self._touch, self._sense, self._before.to(x))
+            expected = self._before.to(x)
+            if self._guessed is not None and not __import__("os").environ.get("NOG"):
+                expected = Motion(*(np.where(self._guessed if a.ndim == 1 else self._guessed[:, None], b, a)
+                                    for a, b in zip(expected, now)))
+            found = self._law.tractions(x, self._touch, self._sense, expected)
             self._last = x, found
-        self._sense, self._before = found.sense, self._law.motion(x, self._touch)
+        self._sense, self._before, self._guessed = found.sense, now, None
         return found.force - plain.force
 
     @property

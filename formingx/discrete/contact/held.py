@@ -1,0 +1,287 @@
+"""A few contact points and the body as they feel it: the forces that hold them while they stick and slide.
+
+Along the tangent of a state, by a unit of arc length, points move by u. The factors of that tangent know the stiffness
+S of points that touched; with forces F in its place, their motions are
+
+    dx = u - C (dF - S dx),
+
+C the compliance in the plane in which a step ends. A point that sticks does not move, one that slides stays on its tool
+with T = mu N against it; on a tool of curvature c its forces turn as it goes on, dF = c (t dx) (N t - T n) beside what
+they grow by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from mpi4py import MPI
+
+STICKS, FREE = 0, 2
+"""Status of a point; 1 and -1: it slides that way along the tangent of its tool."""
+
+_ALL_AT_ONCE, _TRIES = 6, 60
+"""Sets of statuses that are looked at: so many in which all that disagree change, then one at a time."""
+
+_ROUGH = 1e30
+"""A coefficient of friction beyond all others that is still finite."""
+
+_NONE = 1e-9
+"""Of the largest, a rate that is as good as none."""
+
+_SOON = 1e-4
+"""Arc length in which what a force grows to counts beside it."""
+
+_LIMIT = 1e-6
+"""How far below the limit of friction, or above no pressure (over the largest), counts as there."""
+
+
+class Response(Protocol):
+    """How a body gives way, in the plane in which a step ends: (x, control), own part; None: no factors are at hand."""
+
+    def to_points(self, chosen: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray] | None:
+        """By forces -1 at own points (numbers) of each face, way by way, all ranks: shapes (n, m), (m,)."""
+
+    def to_rest(self, x: np.ndarray, control: float, forces: list[np.ndarray]) -> tuple[np.ndarray, float] | None:
+        """By what is left over at (x, control); forces: at points of each face, NaN: as the law says, (n, 2)."""
+
+
+class Near(NamedTuple):
+    """The tool at m points: signed distance, normal into it and tangent, shape (m, 2), curvature; beyond: how much
+    deeper in it each would be as its force wants it."""
+
+    normal: np.ndarray
+    tangent: np.ndarray
+    curvature: np.ndarray
+    beyond: np.ndarray
+
+
+class Points:
+    """Points of faces, those of all ranks, whose columns of the compliance are known.
+
+    Args:
+        faces: in contact (`FaceContact`); n: owned unknowns of the fields; size: of (x, control) on this rank;
+            response: of the body.
+
+    Attributes:
+        who: (rank, face, point) of each.
+        columns, steps: of x (own rows) and of the control by forces -1, shapes (n, 2 m), (2 m,).
+        by: how all points of each face move by them, (points, 2, 2 m).
+        friction: T/N where a point slides, infinite: it sticks; elastic_slip: before; shape (m,).
+    """
+
+    def __init__(self, faces: Sequence[Any], n: int, size: int, response: Response):
+        self._faces, self._n, self._response, self._comm = faces, n, response, faces[0].comm
+        none: Any = np.zeros(0)
+        self.who: list[tuple[int, int, int]] = []
+        self.columns, self.steps = np.zeros((size, 0)), none
+        self.by = [np.zeros((len(face.points), 2, 0)) for face in faces]
+        self.friction, self.elastic_slip, self._scale, self._pulls = none, none, none, none.astype(bool)
+        self._S, self._C = np.zeros((0, 2, 2)), np.zeros((0, 0))
+
+    def learn(self, chosen: list[np.ndarray], touched: bool = False) -> bool:
+        """Some more own points (numbers) of each face; touched: the factors know their stiffness; False: no factors."""
+        found = self._response.to_points(chosen)
+        if found is None:
+            return False
+        new = [point for rank in self._comm.allgather([(self._comm.rank, f, int(i)) for f, numbers in enumerate(chosen)
+                                                       for i in numbers]) for point in rank]
+        self.who += new
+        self.columns, self.steps = np.column_stack([self.columns, found[0]]), np.append(self.steps, found[1])
+        for f, face in enumerate(self._faces):
+            by = [face.moved(column[: self._n], step)[..., None] for column, step in zip(found[0].T, found[1])]
+            self.by[f] = np.concatenate([self.by[f], *by], axis=-1)
+        self._C = self.at(self.by).reshape(2 * len(self.who), -1)
+        whole = [np.ones(len(face.points)) for face in self._faces]
+        more = self.at([np.column_stack([np.minimum(face.law.friction, _ROUGH) * one, face.law.elastic_slip * one,
+                                         face.scale, face.law.pulls * one]) for face, one in zip(self._faces, whole)],
+                       new)
+        friction, slip, scale, pulls = more.T
+        self.friction = np.append(self.friction, np.where(friction < _ROUGH, friction, np.inf))
+        self.elastic_slip, self._scale = np.append(self.elastic_slip, slip), np.append(self._scale, scale)
+        self._pulls = np.append(self._pulls, pulls > 0)
+        known = self.at([face.stiffness_in_tangent for face in self._faces], new)
+        self._S = np.concatenate([self._S, known * touched])
+        return True
+
+    def at(self, values: Sequence[np.ndarray], who: Sequence[tuple[int, int, int]] | None = None) -> np.ndarray:
+        """Values of faces' own points, shape (n, ...), at these points, on all ranks, shape (m, ...)."""
+        who = self.who if who is None else who
+        found = np.zeros((len(who), *values[0].shape[1:]))
+        for k, (rank, f, i) in enumerate(who):
+            if rank == self._comm.rank:
+                found[k] = values[f][i]
+        return found if self._comm.size == 1 else self._comm.allreduce(found, MPI.SUM)
+
+    def spread(self, values: np.ndarray, among: list[np.ndarray]) -> None:
+        """Put values of these points, shape (m, ...), where they are among those of all own points of each face."""
+        for (rank, f, i), value in zip(self.who, values, strict=True):
+            if rank == self._comm.rank:
+                among[f][i] = value
+
+    def back(self, at: Sequence[np.ndarray], place: np.ndarray, near: Near) -> np.ndarray:
+        """How points go from where they are to their places on their tools, shape (m, 2)."""
+        along = np.einsum("ni,ni->n", near.tangent, place - self.at(at))
+        return along[:, None] * near.tangent + near.beyond[:, None] * near.normal
+
+    def near(self, at: Sequence[np.ndarray], force: np.ndarray) -> Near:
+        """The tools at all points of the faces, where forces in F, shape (m, 2), act on these."""
+        found = np.zeros((len(self.who), 6))
+        for f, face in enumerate(self._faces):
+            mine = [k for k, (rank, g, _) in enumerate(self.who) if (rank, g) == (self._comm.rank, f)]
+            i = [self.who[k][2] for k in mine]
+            if mine:
+                law = face.law.part(i)
+                near = law.nearest(at[f][i])
+                N = np.einsum("ni,ni->n", force[mine], near.normal) / self._scale[mine]
+                depth = law.depth(N if law.pulls else np.maximum(N, 0.0))
+                found[mine] = np.column_stack([near.normal, near.tangent, near.curvature, depth - near.distance])
+        found = found if self._comm.size == 1 else self._comm.allreduce(found, MPI.SUM)
+        return Near(found[:, :2], found[:, 2:4], found[:, 4], found[:, 5])
+
+    def parts(self, force: np.ndarray, near: Near) -> tuple[np.ndarray, np.ndarray]:
+        """N and T of forces, shape (m,) each."""
+        return np.einsum("ni,ni->n", force, near.normal), np.einsum("ni,ni->n", force, near.tangent)
+
+    def moved_by(self, by: np.ndarray, f: int) -> np.ndarray:
+        """How all own points of a face move by forces -1 times `by`, shape (m, 2)."""
+        return self.by[f] @ by.ravel()
+
+    def held(self, u: np.ndarray, status: np.ndarray, near: Near, force: np.ndarray,
+             to: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """New forces F of points that the body would move by u, and dF - S dx; shapes (m, 2).
+
+        to: by how much those that stick are to move, shape (m, 2), but for their elastic slip g_s T/(mu N); those that
+        slide go to their tools. NaN: there are no such forces.
+        """
+        N, mu = self.parts(force, near)[0], np.where(self.friction < np.inf, self.friction, 0.0)
+        slips = np.divide(self.elastic_slip, mu * N, out=np.zeros(len(N)), where=mu * N > 0)
+        try:
+            small = self._small(u + (self._C @ force.ravel()).reshape(-1, 2), near, force * (status != FREE)[:, None])
+            F, dx = self._solved(small, status, near, to, slips)
+        except np.linalg.LinAlgError:
+            return force, np.full(force.shape, np.nan)
+        return F, F - force - np.einsum("nij,nj->ni", self._S, dx)
+
+    def rates(self, u: np.ndarray, status: np.ndarray, near: Near,
+              force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """Growth of forces and of dF - S dx, and statuses, by unit of arc length; None: none agree with friction.
+
+        status: as before, of which those that disagree with what they lead to are changed.
+        """
+        (N, T), here = self.parts(force, near), status != FREE
+        try:
+            small = self._small(u, near, force)
+        except np.linalg.LinAlgError:
+            return None
+        slack = here & (np.abs(N).max(initial=0.0) * _LIMIT >= N) & ~self._pulls
+        for begin in (status, np.where(slack, FREE, status)):
+            found = self._agreed(small, begin.copy(), near, N, T, here)
+            if found is not None:
+                F, dx, status = found
+                return F, F - np.einsum("nij,nj->ni", self._S, dx), status
+        return None
+
+    def _agreed(self, small: tuple[np.ndarray, np.ndarray], status: np.ndarray, near: Near, N: np.ndarray,
+                T: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """Rates of forces and positions, and statuses that agree with them; here: points that are at their tools."""
+        seen, mu = set(), np.where(self.friction < np.inf, self.friction, 0.0)
+        gives_way = np.trace(self._C.reshape(len(N), 2, len(N), 2).diagonal(axis1=0, axis2=2)) / 2
+        for k in range(_TRIES):
+            try:
+                F, dx = self._solved(small, status, near)
+            except np.linalg.LinAlgError:
+                return None
+            if not np.isfinite(F).all():
+                return None
+            (dN, dT), (into, along), held = self.parts(F, near), self.parts(dx, near), status != FREE
+            none = _LIMIT * (np.abs(N).max() + _SOON * np.abs(dN).max())
+            other, miss = status.copy(), np.zeros(len(N))
+            slides = held & (status != STICKS) & (mu > 0)
+            turns = slides & (status * along < -_NONE * np.abs(along).max())
+            other[turns], miss[turns] = STICKS, np.abs(along[turns])
+            full = held & (status == STICKS) & (self.friction < np.inf) & (np.abs(T) >= mu * ((1 - _LIMIT) * N - none))
+            sense = np.where(np.abs(T) > mu * none, np.sign(T), np.sign(dT))
+            over = sense * dT - mu * dN
+            gives = full & (over > _NONE * np.abs(dT).max())
+            other[gives], miss[gives] = sense[gives], (over * gives_way)[gives]
+            lets = held & ~self._pulls & (none >= N) & (dN < 0)
+            other[lets], miss[lets] = FREE, -(dN * gives_way)[lets]
+            comes = here & ~held & (into > 0)
+            other[comes] = np.where(self.friction[comes] < np.inf, np.where(along[comes] < 0, -1, 1), STICKS)
+            miss[comes] = into[comes]
+            changes = np.flatnonzero(other != status)
+            if not len(changes):
+                return F, dx, status
+            if k >= _ALL_AT_ONCE or status.tobytes() in seen:
+                changes = changes[[np.argmax(miss[changes])]]
+            seen.add(status.tobytes())
+            status[changes] = other[changes]
+        return None
+
+    def change(self, status: np.ndarray, near: Near, force: np.ndarray, rate: np.ndarray) -> tuple[float, np.ndarray]:
+        """Arc length to where the first point lets go or slides, and statuses then."""
+        (N, T), (dN, dT), held = self.parts(force, near), self.parts(rate, near), status != FREE
+        none = _LIMIT * max(np.abs(N).max(initial=0.0), 1e-30)
+        times, other = np.full(len(status), np.inf), status.copy()
+        lets = held & ~self._pulls & (dN < 0) & (none < N)
+        times[lets], other[lets] = -N[lets] / dN[lets], FREE
+        for sense in (1, -1):
+            k = np.flatnonzero(held & (status == STICKS) & (self.friction < np.inf))
+            mu = self.friction[k]
+            left, grows = mu * N[k] - sense * T[k], sense * dT[k] - mu * dN[k]
+            slips = (grows > 0) & (left > _LIMIT * mu * np.abs(N[k]))
+            t = np.divide(left, grows, out=np.full(len(k), np.inf), where=slips)
+            first = t < times[k]
+            times[k[first]], other[k[first]] = t[first], sense
+        if not len(times):
+            return np.inf, status
+        first = int(np.argmin(times))
+        after = status.copy()
+        after[first] = other[first]
+        return float(times[first]), after
+
+    def _small(self, u: np.ndarray, near: Near, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """dx by u, and by each force, with no stiffness of points but that of forces that turn."""
+        N, T = self.parts(force, near)
+        n, t = near.normal, near.tangent
+        turn = near.curvature[:, None, None] * ((N[:, None] * t - T[:, None] * n)[:, :, None] * t[:, None, :])
+        size = 2 * len(N)
+        CK = np.einsum("xni,nij->xnj", self._C.reshape(size, len(N), 2), self._S - turn).reshape(size, size)
+        found = np.linalg.solve(np.eye(size) - CK, np.column_stack([u.ravel(), self._C]))
+        self._turn = turn
+        return found[:, 0], found[:, 1:]
+
+    def _solved(self, small: tuple[np.ndarray, np.ndarray], status: np.ndarray, near: Near,
+                to: np.ndarray | None = None, slips: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Forces (or, without `to`, their rates) and motions, shape (m, 2); slips: elastic, of those that stick."""
+        free, by = small
+        size, held = len(free), status != FREE
+        sticks = np.flatnonzero(held & (status == STICKS) & (self.friction > 0))
+        slides = np.setdiff1d(np.flatnonzero(held), sticks)
+        rows, columns, wanted = [], [], []
+        for way in (near.normal, near.tangent):
+            row = np.zeros((len(sticks), size))
+            for i in (0, 1):
+                row[np.arange(len(sticks)), 2 * sticks + i] = way[sticks, i]
+            rows.append(row)
+            columns.append(row.T)
+            wanted.append(np.zeros(len(sticks)) if to is None else np.einsum("ni,ni->n", to[sticks], way[sticks]))
+        mu = np.where(self.friction < np.inf, self.friction, 0.0)
+        force = near.normal + (mu * status)[:, None] * near.tangent
+        into, against = np.zeros((len(slides), size)), np.zeros((size, len(slides)))
+        for i in (0, 1):
+            into[np.arange(len(slides)), 2 * slides + i] = near.normal[slides, i]
+            against[2 * slides + i, np.arange(len(slides))] = force[slides, i]
+        A, B = np.concatenate([*rows, into]), np.concatenate([*columns, against], axis=1)
+        a = np.concatenate([*wanted, np.zeros(len(slides)) if to is None else near.beyond[slides]])
+        gives = A @ by @ B
+        stiff = np.flatnonzero(np.abs(gives).max(1, initial=0.0) < _NONE * np.abs(gives).max(initial=0.0))
+        gives[stiff, stiff] = np.abs(gives).max(initial=0.0)        # along a support, or across the axis, nothing moves
+        if slips is not None:
+            k = np.arange(len(sticks), 2 * len(sticks))
+            gives[k, k] += slips[sticks]
+        size_of = np.linalg.solve(gives, A @ free - a)
+        dx = (free - by @ (B @ size_of)).reshape(-1, 2)
+        return (B @ size_of).reshape(-1, 2) + np.einsum("nij,nj->ni", self._turn, dx), dx
