@@ -55,10 +55,11 @@ class StepLimit:
         return any(c.foretold > c.at_once for c in self._present) and all(
             hasattr(c.face.law, "friction") and hasattr(c.face.law, "without") for c in self._present)
 
-    def touches(self, state: Any) -> bool:
-        """True if a point touches a tool at a state."""
+    def foretells_from(self, state: Any) -> bool:
+        """True if arrivals ahead of a state are to be foretold: at rest, where nothing touches yet, not."""
         n = self._n
-        return any([c.touches(state.x[:n], state.control) for c in self._present])
+        return self.foretells and (state.kind != "start" or any(
+            [c.touches(state.x[:n], state.control) for c in self._present]))
 
     def one_by_one(self) -> None:
         """Points are not foretold one after the other."""

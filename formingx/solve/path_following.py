@@ -213,8 +213,7 @@ class Run:
         lengths, last = [*self.settings.snap_through.lengths, 0.0], self.settings.snap_through.lengths[-1]
         if snaps(self.curve, old, self._at_fold, self._sense):
             return self._snap(old)
-        tells = limit and limit.foretells and (old.kind != "start" or limit.touches(old))   # else it knows no contact
-        response = self.curve.response(old) if tells else None
+        response = self.curve.response(old) if limit and limit.foretells_from(old) else None
         self._way = Way(old.x, old.control, old.direction, old.slope, 0.0, response)
         while True:
             length = min(self.step.length, most)
@@ -233,11 +232,9 @@ class Run:
             except Failure as failure:
                 self.step.length, held = length, None
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
-                good = self.step.failed()
-                if failed:                                  # what arrives is not as foretold
-                    self._way = self._way._replace(response=None)
+                good, failed = self.step.failed(), failed + (not isinstance(failure, _Astray))
                 self._failed(failure.reason, self.step.length)
-                failed += not isinstance(failure, _Astray)
+                self._way = self._way._replace(response=None if failed > 1 else self._way.response)
                 soon = (self._jumps_soon and failed > 1 and length < lengths[0]
                         and (old.kind != "start" or not self.problem.has_history) and not self._found_no_rest_near(old))
                 if self._may_jump and (not good or soon):

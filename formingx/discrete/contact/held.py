@@ -18,11 +18,17 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from mpi4py import MPI
 
-STICKS, FREE = 0, 2
-"""Status of a point; 1 and -1: it slides that way along the tangent of its tool."""
+STICKS = 0
+"""Status of a point that sticks; 1 and -1: it slides that way along the tangent of its tool."""
 
-_ALL_AT_ONCE, _TRIES = 6, 60
-"""Sets of statuses that are looked at: so many in which all that disagree change, then one at a time."""
+FREE = 2
+"""Status of a point that touches nothing."""
+
+_ALL_AT_ONCE = 6
+"""Of the sets of statuses that are looked at, the first: in them all that disagree change, then one at a time."""
+
+_TRIES = 60
+"""At most so many sets of statuses."""
 
 _ROUGH = 1e30
 """A coefficient of friction beyond all others that is still finite."""
@@ -76,9 +82,10 @@ class Points:
         none: Any = np.zeros(0)
         self.who: list[tuple[int, int, int]] = []
         self.columns, self.steps = np.zeros((size, 0)), none
-        self.by = [np.zeros((len(face.points), 2, 0)) for face in faces]
+        c = self._components = faces[0].points.shape[1]
+        self.by = [np.zeros((*face.points.shape, 0)) for face in faces]
         self.friction, self.elastic_slip, self._scale, self._pulls = none, none, none, none.astype(bool)
-        self._S, self._C = np.zeros((0, 2, 2)), np.zeros((0, 0))
+        self._S, self._C = np.zeros((0, c, c)), np.zeros((0, 0))
 
     def learn(self, chosen: list[np.ndarray], touched: bool = False) -> bool:
         """Some more own points (numbers) of each face; touched: the factors know their stiffness; False: no factors."""
@@ -92,7 +99,7 @@ class Points:
         for f, face in enumerate(self._faces):
             by = [face.moved(column[: self._n], step)[..., None] for column, step in zip(found[0].T, found[1])]
             self.by[f] = np.concatenate([self.by[f], *by], axis=-1)
-        self._C = self.at(self.by).reshape(2 * len(self.who), -1)
+        self._C = self.at(self.by).reshape(len(self.steps), -1)
         whole = [np.ones(len(face.points)) for face in self._faces]
         more = self.at([np.column_stack([np.minimum(face.law.friction, _ROUGH) * one, face.law.elastic_slip * one,
                                          face.scale, face.law.pulls * one]) for face, one in zip(self._faces, whole)],
@@ -127,7 +134,8 @@ class Points:
 
     def near(self, at: Sequence[np.ndarray], force: np.ndarray) -> Near:
         """The tools at all points of the faces, where forces in F, shape (m, 2), act on these."""
-        found = np.zeros((len(self.who), 6))
+        c = self._components
+        found = np.zeros((len(self.who), c + c + 2))
         for f, face in enumerate(self._faces):
             mine = [k for k, (rank, g, _) in enumerate(self.who) if (rank, g) == (self._comm.rank, f)]
             i = [self.who[k][2] for k in mine]
@@ -138,7 +146,7 @@ class Points:
                 depth = law.depth(N if law.pulls else np.maximum(N, 0.0))
                 found[mine] = np.column_stack([near.normal, near.tangent, near.curvature, depth - near.distance])
         found = found if self._comm.size == 1 else self._comm.allreduce(found, MPI.SUM)
-        return Near(found[:, :2], found[:, 2:4], found[:, 4], found[:, 5])
+        return Near(found[:, :c], found[:, c:-2], found[:, -2], found[:, -1])
 
     def parts(self, force: np.ndarray, near: Near) -> tuple[np.ndarray, np.ndarray]:
         """N and T of forces, shape (m,) each."""
@@ -158,7 +166,8 @@ class Points:
         N, mu = self.parts(force, near)[0], np.where(self.friction < np.inf, self.friction, 0.0)
         slips = np.divide(self.elastic_slip, mu * N, out=np.zeros(len(N)), where=mu * N > 0)
         try:
-            small = self._small(u + (self._C @ force.ravel()).reshape(-1, 2), near, force * (status != FREE)[:, None])
+            small = self._small(u + (self._C @ force.ravel()).reshape(u.shape), near,
+                                force * (status != FREE)[:, None])
             F, dx = self._solved(small, status, near, to, slips)
         except np.linalg.LinAlgError:
             return force, np.full(force.shape, np.nan)
@@ -187,7 +196,7 @@ class Points:
                 T: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """Rates of forces and positions, and statuses that agree with them; here: points that are at their tools."""
         seen, mu = set(), np.where(self.friction < np.inf, self.friction, 0.0)
-        gives_way = np.trace(self._C.reshape(len(N), 2, len(N), 2).diagonal(axis1=0, axis2=2)) / 2
+        gives_way = self._C.diagonal().reshape(len(N), -1).mean(1)
         for k in range(_TRIES):
             try:
                 F, dx = self._solved(small, status, near)
@@ -247,8 +256,8 @@ class Points:
         N, T = self.parts(force, near)
         n, t = near.normal, near.tangent
         turn = near.curvature[:, None, None] * ((N[:, None] * t - T[:, None] * n)[:, :, None] * t[:, None, :])
-        size = 2 * len(N)
-        CK = np.einsum("xni,nij->xnj", self._C.reshape(size, len(N), 2), self._S - turn).reshape(size, size)
+        size = len(self._C)
+        CK = np.einsum("xni,nij->xnj", self._C.reshape(size, *u.shape), self._S - turn).reshape(size, size)
         found = np.linalg.solve(np.eye(size) - CK, np.column_stack([u.ravel(), self._C]))
         self._turn = turn
         return found[:, 0], found[:, 1:]
@@ -260,20 +269,20 @@ class Points:
         size, held = len(free), status != FREE
         sticks = np.flatnonzero(held & (status == STICKS) & (self.friction > 0))
         slides = np.setdiff1d(np.flatnonzero(held), sticks)
-        rows, columns, wanted = [], [], []
+        rows, columns, wanted, c = [], [], [], self._components
         for way in (near.normal, near.tangent):
             row = np.zeros((len(sticks), size))
-            for i in (0, 1):
-                row[np.arange(len(sticks)), 2 * sticks + i] = way[sticks, i]
+            for i in range(c):
+                row[np.arange(len(sticks)), c * sticks + i] = way[sticks, i]
             rows.append(row)
             columns.append(row.T)
             wanted.append(np.zeros(len(sticks)) if to is None else np.einsum("ni,ni->n", to[sticks], way[sticks]))
         mu = np.where(self.friction < np.inf, self.friction, 0.0)
         force = near.normal + (mu * status)[:, None] * near.tangent
         into, against = np.zeros((len(slides), size)), np.zeros((size, len(slides)))
-        for i in (0, 1):
-            into[np.arange(len(slides)), 2 * slides + i] = near.normal[slides, i]
-            against[2 * slides + i, np.arange(len(slides))] = force[slides, i]
+        for i in range(c):
+            into[np.arange(len(slides)), c * slides + i] = near.normal[slides, i]
+            against[c * slides + i, np.arange(len(slides))] = force[slides, i]
         A, B = np.concatenate([*rows, into]), np.concatenate([*columns, against], axis=1)
         a = np.concatenate([*wanted, np.zeros(len(slides)) if to is None else near.beyond[slides]])
         gives = A @ by @ B
@@ -283,5 +292,5 @@ class Points:
             k = np.arange(len(sticks), 2 * len(sticks))
             gives[k, k] += slips[sticks]
         size_of = np.linalg.solve(gives, A @ free - a)
-        dx = (free - by @ (B @ size_of)).reshape(-1, 2)
-        return (B @ size_of).reshape(-1, 2) + np.einsum("nij,nj->ni", self._turn, dx), dx
+        dx = (free - by @ (B @ size_of)).reshape(near.normal.shape)
+        return (B @ size_of).reshape(dx.shape) + np.einsum("nij,nj->ni", self._turn, dx), dx

@@ -29,8 +29,11 @@ _CHANGES = 100
 _TAKEN_OVER = 80
 """Points that slid before are held by forces of their own, if they are not more than these."""
 
-_SAME_PLACE, _ABOUT_THERE = 1e-3, 1e-2
-"""By how much an iteration may still move an arrival that sticks, one that may slide, over its length of face."""
+_SAME_PLACE = 1e-3
+"""By how much an iteration may still move an arrival that sticks, over the length of face that is its own."""
+
+_ABOUT_THERE = 1e-2
+"""The same of one that may slide."""
 
 _FAR = 1e30
 """Squares of positions beyond all bounds, length^2."""
@@ -95,7 +98,8 @@ class _Piece(NamedTuple):
         more = m - len(self.status)
         if not more:
             return self
-        grown = {name: np.concatenate([getattr(self, name), np.zeros((more, 2))])
+        none = np.zeros((more, self.force.shape[1]))
+        grown = {name: np.concatenate([getattr(self, name), none])
                  for name in ("place", "force", "rate", "extra", "growth")}
         return self._replace(status=np.append(self.status, np.full(more, FREE)), **grown)
 
@@ -124,7 +128,7 @@ class Foretold:
                          for face, free in zip(faces, self._free)]
         self._arrivals: list[Arrival] = []
         self._points = Points(faces, n, len(x), response)
-        none = np.zeros((0, 2))
+        none = np.zeros((0, start[0].shape[1]))
         self._pieces = [_Piece(0.0, start, self._along, np.zeros(0, dtype=int), none, none, none, none, none,
                                (np.zeros(len(x)), 0.0))]
         self._end: _Piece | None = None                     # of the last piece, in equilibrium
