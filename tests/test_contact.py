@@ -7,6 +7,7 @@ import pytest
 
 import formingx as fx
 from formingx.discrete.contact.increment import Increment
+from formingx.discrete.contact.sequence import Foretold
 from formingx.discrete.problem import Problem
 from formingx.discrete.step_limit import Way
 from formingx.physics.contact import Law
@@ -442,6 +443,33 @@ def test_a_foretold_step_ends_near_its_state():
     straight = replace(new, x=old.x + length * old.direction, control=old.control + length * old.slope)
     bent = replace(straight, x=straight.x + dx, control=straight.control + dc)
     assert curve.distance(new, bent) < 0.5 * curve.distance(new, straight)
+
+
+def test_what_slides_is_held_in_the_sequence_as_in_the_tangent():
+    """Held by forces of their own, points that slide move as in the tangent; those at rest on a tool stay there."""
+    mould = tools.cup(radius=38.0, depth=60.0, mouth=1.2, draft=6.0, fillet=5.0, lip=2.0)
+    plug = tools.male(radius=22.0, height=120.0, base=-120.0, draft=3.0, fillet=6.0)
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(20, 1)), materials=fx.NeoHookean(c10=0.4),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", mould, "stick", separates=False),
+                               fx.Contact("bottom", plug, 0.3, moves=(0, 1))])
+    path = fx.trace(scene, until=fx.travel(30.0), step=fx.StepControl(target=8), progress=False)
+    problem, curve, n = path.problem, path.record.curve, path.problem.n_owned
+    assert path.counts.failures <= 3                        # from rest, with 16 nodes flat on the plug, it took 6
+    sliding = 0
+    for old in path.states[2:-1]:
+        with problem.at(old):
+            faces = problem.present
+            ahead = Foretold(faces, n, old.x, old.control, old.direction, old.slope, curve.response(old), 4)
+            law = faces[1].tractions(old.x[:n], old.control)
+            nothing = ahead.bend(1e-12)
+            assert nothing is not None and np.abs(nothing[0]).max() < 1e-8
+            if len(law.sense[law.normal > 0]) > 1 and np.all(law.sense[law.normal > 0] != 0):
+                speed = faces[1].moved(old.direction[:n], old.slope)
+                change = np.abs(np.subtract(ahead.at(1e-6)[1], ahead.at(0.0)[1]) / 1e-6 - speed).max()
+                assert change < 1e-3 * np.abs(speed).max()
+                sliding += 1
+    assert sliding > 3
 
 
 def _residual(problem, x, control, F):
