@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -77,6 +78,11 @@ class Design:
             raise InputError(f"Design: build = {build!r}: must be a function of the parameters that returns a scene and"
                              f" its target or stages")
         self._build, self.parameters = build, Parameters(parameters)
+        try:
+            inspect.signature(build).bind(**dict.fromkeys(parameters))
+        except TypeError as error:
+            raise InputError(f"Design: parameters {', '.join(map(repr, parameters))}: build{inspect.signature(build)}"
+                             f" cannot be called with these: {error}") from None
         self._step, self._tolerances, self._most = step, tolerances, max_steps
         self.paths = 0                                       # taken so far
 
