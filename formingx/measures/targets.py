@@ -7,6 +7,7 @@ import ufl
 
 from ..discrete.probes import probe
 from ..errors import InputError, finite, known, pair, positive
+from ..mesh.nodes import of_space
 
 _GAUSS = (0.5 - 12**-0.5, 0.5 + 12**-0.5)
 """Points of Gauss's rule from 0 to 1, both of weight 1/2."""
@@ -129,10 +130,16 @@ class Sag(Bound):
         dofs = np.unique(forms.space.sub(0).sub(forms.scene.kinematics.components - 1).dofmap.list[:, nodes])
         self._problem, self._dofs = problem, dofs[dofs < problem.n_owned]
         self.size = self._scale = forms.length
+        self._so_far: np.ndarray | float = 0.0               # u_z of the nodes before this mesh was made, over length
+        if (brought := forms.scene.preformed) is not None:
+            space, numbers = forms.space.sub(0).sub(forms.scene.kinematics.components - 1).collapse()
+            order = np.argsort(numbers)
+            nodes_at = of_space(space)[order[np.searchsorted(numbers, self._dofs, sorter=order)]]
+            self._so_far = (nodes_at - brought.first_places(nodes_at))[:, -1] / forms.length
 
     def _deepest(self, x: Any) -> tuple[float, int]:
         """(sag over the length, rank where that is)."""
-        mine = -x.array_r[self._dofs].min(initial=0.0)
+        mine = -(x.array_r[self._dofs] + self._so_far).min(initial=0.0)
         found = self._problem.comm.allgather(float(mine))
         return max(found), int(np.argmax(found))
 
@@ -144,7 +151,7 @@ class Sag(Bound):
             depth, rank = self._deepest(x)
             row = np.zeros(self._problem.n_owned)
             if self._problem.comm.rank == rank and len(self._dofs):
-                row[self._dofs[np.argmin(x.array_r[self._dofs])]] = -1.0
+                row[self._dofs[np.argmin(x.array_r[self._dofs] + self._so_far)]] = -1.0
             self._problem.fill(gradient, row)
             return depth - target / self._scale, 0.0
         return c

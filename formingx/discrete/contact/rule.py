@@ -64,6 +64,7 @@ class Lobatto(Rule):
 
     def __init__(self, solid: Any, on: str, assemble: Any):
         kinematics, vectors, numbers = solid.scene.kinematics, *_displacements(solid)
+        self._brought = solid.scene.preformed
         nodes = np.sort(fem.locate_dofs_topological(vectors, 1, solid.scene.mesh.facets_of(on)))
         own = numbers[nodes, 0] < solid.space.dofmap.index_map.size_local
         self.dofs = numbers[nodes[own]]
@@ -98,6 +99,21 @@ class Lobatto(Rule):
         count = np.maximum(np.bincount(edges.ravel(), minlength=len(rest)), 1)
         first = sum(self._comm.allgather(len(self.points))[:self._comm.rank])
         return (np.bincount(edges.ravel(), ratio.ravel(), len(rest)) / count)[first:][:len(self.points)]
+
+    @property
+    def extent(self) -> np.ndarray:
+        """As it was on the body's first mesh."""
+        return self._first_lengths
+
+    @cached_property
+    def _first_lengths(self) -> np.ndarray:
+        """The mean of what the edges on both sides of a node say."""
+        if self._brought is None:
+            return self.lengths
+        first, (a, b) = self._brought.first_places(self.points), self.edges[:, :2].T
+        ratio = np.linalg.norm(first[b] - first[a], axis=1) / np.linalg.norm(self.points[b] - self.points[a], axis=1)
+        ends, count = np.repeat(ratio, 3), np.bincount(self.edges.ravel(), minlength=len(first))
+        return self.lengths * np.bincount(self.edges.ravel(), ends, len(first)) / np.maximum(count, 1)
 
     @property
     def has_area(self) -> np.ndarray:
