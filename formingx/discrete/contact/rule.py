@@ -110,7 +110,7 @@ class Lobatto(Rule):
         """The mean of what the edges on both sides of a node say."""
         if self._brought is None:
             return self.lengths
-        first, (a, b) = self._brought.first_places(self.points), self.edges[:, :2].T
+        first, (a, b, _) = self._brought.first_places(self.points), self.edges.T
         ratio = np.linalg.norm(first[b] - first[a], axis=1) / np.linalg.norm(self.points[b] - self.points[a], axis=1)
         ends, count = np.repeat(ratio, 3), np.bincount(self.edges.ravel(), minlength=len(first))
         return self.lengths * np.bincount(self.edges.ravel(), ends, len(first)) / np.maximum(count, 1)
