@@ -62,7 +62,9 @@ def push(mesh, mu, fillet, travels):
 def run(case):
     """Pilots and the run of one coefficient of friction: its numbers, and what is drawn of it."""
     mu, fillet, travels = case
-    pilots = [travels[:1]] if len(travels) < 3 or mu >= ROUGH else [travels[:1], travels[:2]]
+    pilots = [travels[:1]] if mu >= ROUGH or len(travels) < 3 else [travels[:1], travels[:2]]
+    if fillet == SHARP:
+        pilots = [travels[:1]] * 2
     mesh, columns = sheet(FIRST, mu), []
     for on_the_way in pilots:
         path, _ = push(mesh, mu, fillet, on_the_way)

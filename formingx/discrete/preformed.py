@@ -49,6 +49,7 @@ class Preformed(NamedTuple):
         b: what it had brought to that mesh, at corners and middles: entries rr, rz, zz, hoop of b, cos and sin of the
             rotation, shape (m, 6, 6).
         pressures: of the pressure fields at the corners, shape (m, 3, fields), dimensionless.
+        held: stiffness of the volume of each point besides (`Model.volume_stiffness`), dimensionless.
         before: the problem of that mesh, and its last state.
     """
 
@@ -56,6 +57,7 @@ class Preformed(NamedTuple):
     rest: np.ndarray
     b: np.ndarray
     pressures: np.ndarray
+    held: float = 0.0
     before: Any = None
 
     @classmethod
@@ -71,7 +73,9 @@ class Preformed(NamedTuple):
         b = np.tile([1.0, 0.0, 1.0, 1.0, 1.0, 0.0], (len(x), 6, 1))
         if forms.scene.preformed is not None:
             b = forms.scene.preformed._carried(forms)[0]
-        return cls(x, rest, b, pressures, (problem, state))
+        scene = forms.scene
+        held = scene.model.volume_stiffness * max(map(scene.shear_modulus, scene.mesh.layers)) / forms.stress
+        return cls(x, rest, b, pressures, held, (problem, state))
 
     def first_places(self, points: np.ndarray) -> np.ndarray:
         """Where points of the new mesh, shape (n, 2), are on the first one."""
@@ -104,9 +108,10 @@ class Preformed(NamedTuple):
         volume = forms.weight * abs(ufl.JacobianDeterminant(forms.domain))
         sampled = in_own_cells(forms.domain, ufl.as_vector([*forms.X, volume]), at)
         cells, places = self._located(np.concatenate(sampled)[:, :-1])
-        b, pressures = (values.reshape(len(sampled), len(at), -1) for values in (
-            self._b(cells, places, forms.scene.kinematics.axisymmetric),
-            np.einsum("na,nak->nk", np.column_stack([1 - places.sum(1), places]), self.pressures[cells])))
+        b, J = self._b(cells, places, forms.scene.kinematics.axisymmetric)
+        pressures = np.einsum("na,nak->nk", np.column_stack([1 - places.sum(1), places]), self.pressures[cells])
+        pressures += self.held * (J - 1)[:, None]
+        b, pressures = (values.reshape(len(sampled), len(at), -1) for values in (b, pressures))
         weights = sampled[..., -1] * weights
 
         def nearest(values: np.ndarray, shapes: np.ndarray) -> np.ndarray:
@@ -116,8 +121,8 @@ class Preformed(NamedTuple):
         return (_flattened(nearest(b, _tabulated(_QUADRATIC, at)[0]), mean),
                 nearest(pressures, np.column_stack([1 - at.sum(1), at])))
 
-    def _b(self, cells: np.ndarray, places: np.ndarray, axisymmetric: bool) -> np.ndarray:
-        """The entries of `b` at places of cells, shape (n, 6)."""
+    def _b(self, cells: np.ndarray, places: np.ndarray, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray]:
+        """The entries of `b` at places of cells, shape (n, 6), and J there, shape (n,)."""
         x, rest, (shapes, *slopes) = self.x[cells], self.rest[cells], _tabulated(_POSITIONS, places, 1)
         grad = np.einsum("dna,nai->nid", slopes, x) @ np.linalg.inv(np.einsum("dna,nai->nid", slopes, rest))
         r, R = (np.einsum("na,na->n", shapes, y[..., 0]) for y in (x, rest))
@@ -128,7 +133,8 @@ class Preformed(NamedTuple):
         in_plane = F @ F.transpose(0, 2, 1)
         turn = np.stack([F[:, 0, 0] + F[:, 1, 1], F[:, 1, 0] - F[:, 0, 1]])
         b = np.stack([in_plane[:, 0, 0], in_plane[:, 0, 1], in_plane[:, 1, 1], stretch**2 * hoop])
-        return np.concatenate([b / (np.linalg.det(grad) * stretch), turn / np.linalg.norm(turn, axis=0)]).T
+        J = np.linalg.det(grad) * stretch
+        return np.concatenate([b / J, turn / np.linalg.norm(turn, axis=0)]).T, J
 
     def _located(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The cells that points, shape (n, 2), are in, shape (n,), and where in them, shape (n, 2), by Newton's method.

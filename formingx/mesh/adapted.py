@@ -13,6 +13,9 @@ from .sheet import Sheet
 _GROWTH = 0.25
 """By how much a column may be longer than its neighbour, over the neighbour."""
 
+_LEAST = 1 / 8
+"""Of the length of a column in the run: shorter ones are not asked for, as what a long one sees there is too rough."""
+
 _SAMPLES = 16
 """Places of a column at which sizes are looked up."""
 
@@ -22,9 +25,11 @@ _MOST = 20_000             # columns
 def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = None) -> Mesh:
     """The mesh of a run made again, with columns of elements as its states ask for: small where they matter, no more.
 
-    A column is as long, at rest, as the strictest of its states allows, and at most 1.25 times its neighbour. What lies
-    through the sheet stays: elements, layers and their interfaces. For meshes of `disc`, `sphere`, `parison` and
-    `from_lines`; of a `sheet` in space triangles are made smaller, to a quarter at the least, never larger. Collective.
+    A column is as long, at rest, as the strictest of its states allows, and at most 1.25 times its neighbour; but not
+    shorter than an eighth of that of the run, as long ones know no better: then adapt again, to a run on the new mesh.
+    What lies through the sheet stays: elements, layers and their interfaces. For meshes of `disc`, `sphere`, `parison`
+    and `from_lines`; of a `sheet` in space triangles are made smaller, to a quarter at the least, never larger.
+    Collective.
 
     Args:
         path: a run, on coarse elements for one (a pilot run), as far as it came.
@@ -99,7 +104,7 @@ def _ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(faces, axis=1), axis=2).mean(0))])
     joints = s[::_SAMPLES]
     length = np.diff(joints)
-    wanted = np.minimum(factors * length, length.max())
+    wanted = np.minimum(np.maximum(factors, _LEAST) * length, length.max())
     away = np.maximum(np.maximum(joints[:-1] - s[:, None], s[:, None] - joints[1:]), 0.0)
     size = (wanted + _GROWTH * away).min(1)
     number = np.concatenate([[0.0], np.cumsum(np.diff(s) * (1 / size[1:] + 1 / size[:-1]) / 2)])
