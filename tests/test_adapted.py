@@ -28,7 +28,7 @@ def test_pilot_puts_columns_on_the_edge():
     assert 20 < len(sizes) < 45 and sizes.max() == pytest.approx(0.5, rel=0.15)
     assert 2.4 < ends[np.argmin(sizes)] < 4.0 and sizes.min() < 0.3
     assert np.all(sizes[1:] / sizes[:-1] < 1.4) and np.all(sizes[:-1] / sizes[1:] < 1.4)
-    shortest = np.diff(fx.mesh.adapted(path.pilot, share=1e-4).columns.ends).min()      # no run is asked for all at once
+    shortest = np.diff(fx.mesh.adapted(path.pilot, share=1e-4).columns.ends).min()
     assert 0.5 / 8 / 1.2 < shortest < 0.5 / 8 * 1.01
     fine = plugged(disc((100, 1))).last.measures["tool_force"]
     pilot = path.pilot.last.measures["tool_force"]
