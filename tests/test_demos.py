@@ -300,7 +300,7 @@ def test_compression_extreme_quick(tmp_path):
     both = summary("compression_extreme", tmp_path, "--quick")
     found, stuck = both["frictionless"], both["stuck_coarse"]
     assert stuck["remeshes"] >= 1 and stuck["least_J"] > 0.2
-    assert abs(stuck["force_N"]["3.4"] - 23818) < 0.8 * abs(24778 - 23818)    # 24 x 16, and 8 x 4 fixed elements
+    assert abs(stuck["force_N"]["3.4"] - 23823) < 0.8 * abs(24789 - 23823)    # 24 x 16, and 8 x 4 fixed elements
     assert all(abs(v) < 1e-12 for v in stuck["jumps"]["volume"])
     assert all(abs(v) < 0.02 for v in stuck["jumps"]["force"] + stuck["jumps"]["energy"])
     for over in (found["force_over_exact"], *(grid["force_over_exact"] for grid in found["grids"].values())):

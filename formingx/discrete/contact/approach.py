@@ -35,7 +35,7 @@ class StepLimits:
     near: float = 1e-3
     share: float = 0.05
     at_end: float = 0.95
-    slides: float = 1e-2
+    slides: float = 2e-3
     nearer: float = 0.7
     cut_off: float = 0.5
     places: int = 4000
