@@ -159,7 +159,8 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
     process = {"stages": ("several", [fx.Stage("up", drive="air", until=fx.pressure(0.1))]),
                "step": ("optional thing", None), "tolerances": ("optional thing", None),
                "max_steps": ("count or None", 200), "progress": ("flag", False), "start": ("optional thing", None),
-               "checkpoint": ("folder", None), **kept, "accuracy": ("accuracy", "standard"), "pilot": ("flag", False)}
+               "checkpoint": ("folder", None), **kept, "accuracy": ("accuracy", "standard"), "pilot": ("flag", False),
+               "remesh": ("optional thing", None)}
     part = {"name": ("label", "plug"), "of": ("word", "top"), "within": ("pair", (0.0, 0.5)), "along": ("word", "r")}
     return [
         *materials, *boundary, *targets, *tools,

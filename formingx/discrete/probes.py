@@ -23,7 +23,7 @@ class Probe:
         points: reference coordinates (R, Z), in space (x, y), shape (n, 2), the same on all ranks.
 
     Attributes:
-        so_far: displacement of the points before this mesh was made, shape (n, 2), length.
+        so_far: displacement of the points before this mesh was made, shape (n, components), length.
 
     Raises:
         InputError: a point outside the mesh.
@@ -35,7 +35,8 @@ class Probe:
         place = locate(forms.domain, forms.nearest(points), forms.length)
         self._components = forms.scene.kinematics.components
         self._subs = [forms.space.sub(0).sub(i).dofmap for i in range(self._components)]
-        self._problem, self.points, self.so_far = problem, points, 0 * points
+        self._problem, self.points = problem, points
+        self.so_far = np.zeros((len(points), self._components))
         self._mine, self._cells, self._reference = place
         self._dofs = self._dofs_of(place.cells)
         self._weights = _basis(forms.displacement_element, 0, self._reference)

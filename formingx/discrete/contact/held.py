@@ -13,6 +13,7 @@ they grow by.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -24,23 +25,30 @@ STICKS = 0
 FREE = 2
 """Status of a point that touches nothing."""
 
-_ALL_AT_ONCE = 6
-"""Of the sets of statuses that are looked at, the first: in them all that disagree change, then one at a time."""
 
-_TRIES = 60
-"""At most so many sets of statuses."""
+@dataclass(frozen=True)
+class Agreement:
+    """When what points do, and the forces on them, agree.
 
-_ROUGH = 1e30
-"""A coefficient of friction beyond all others that is still finite."""
+    Attributes:
+        all_at_once: of the sets of statuses that are looked at, the first: in them all that disagree change,
+            then one at a time.
+        tries: at most so many sets of statuses.
+        rough: a coefficient of friction beyond all others that is still finite.
+        none: of the largest, a rate that is as good as none.
+        soon: arc length in which what a force grows to counts beside it.
+        limit: how far below the limit of friction, or above no pressure (over the largest), counts as there.
+    """
 
-_NONE = 1e-9
-"""Of the largest, a rate that is as good as none."""
+    all_at_once: int = 6
+    tries: int = 60
+    rough: float = 1e30
+    none: float = 1e-9
+    soon: float = 1e-4
+    limit: float = 1e-6
 
-_SOON = 1e-4
-"""Arc length in which what a force grows to counts beside it."""
 
-_LIMIT = 1e-6
-"""How far below the limit of friction, or above no pressure (over the largest), counts as there."""
+LIMITS = Agreement()
 
 
 class Response(Protocol):
@@ -101,11 +109,11 @@ class Points:
             self.by[f] = np.concatenate([self.by[f], *by], axis=-1)
         self._C = self.at(self.by).reshape(len(self.steps), -1)
         whole = [np.ones(len(face.points)) for face in self._faces]
-        more = self.at([np.column_stack([np.minimum(face.law.friction, _ROUGH) * one, face.law.elastic_slip * one,
+        more = self.at([np.column_stack([np.minimum(face.law.friction, LIMITS.rough) * one, face.law.elastic_slip * one,
                                          face.scale, face.law.pulls * one]) for face, one in zip(self._faces, whole)],
                        new)
         friction, slip, scale, pulls = more.T
-        self.friction = np.append(self.friction, np.where(friction < _ROUGH, friction, np.inf))
+        self.friction = np.append(self.friction, np.where(friction < LIMITS.rough, friction, np.inf))
         self.elastic_slip, self._scale = np.append(self.elastic_slip, slip), np.append(self._scale, scale)
         self._pulls = np.append(self._pulls, pulls > 0)
         known = self.at([face.stiffness_in_tangent for face in self._faces], new)
@@ -184,7 +192,7 @@ class Points:
             small = self._small(u, near, force)
         except np.linalg.LinAlgError:
             return None
-        slack = here & (np.abs(N).max(initial=0.0) * _LIMIT >= N) & ~self._pulls
+        slack = here & (np.abs(N).max(initial=0.0) * LIMITS.limit >= N) & ~self._pulls
         for begin in (status, np.where(slack, FREE, status)):
             found = self._agreed(small, begin.copy(), near, N, T, here)
             if found is not None:
@@ -197,7 +205,7 @@ class Points:
         """Rates of forces and positions, and statuses that agree with them; here: points that are at their tools."""
         seen, mu = set(), np.where(self.friction < np.inf, self.friction, 0.0)
         gives_way = self._C.diagonal().reshape(len(N), -1).mean(1)
-        for k in range(_TRIES):
+        for k in range(LIMITS.tries):
             try:
                 F, dx = self._solved(small, status, near)
             except np.linalg.LinAlgError:
@@ -205,15 +213,16 @@ class Points:
             if not np.isfinite(F).all():
                 return None
             (dN, dT), (into, along), held = self.parts(F, near), self.parts(dx, near), status != FREE
-            none = _LIMIT * (np.abs(N).max() + _SOON * np.abs(dN).max())
+            none = LIMITS.limit * (np.abs(N).max() + LIMITS.soon * np.abs(dN).max())
             other, miss = status.copy(), np.zeros(len(N))
             slides = held & (status != STICKS) & (mu > 0)
-            turns = slides & (status * along < -_NONE * np.abs(along).max())
+            turns = slides & (status * along < -LIMITS.none * np.abs(along).max())
             other[turns], miss[turns] = STICKS, np.abs(along[turns])
-            full = held & (status == STICKS) & (self.friction < np.inf) & (np.abs(T) >= mu * ((1 - _LIMIT) * N - none))
+            most = mu * ((1 - LIMITS.limit) * N - none)
+            full = held & (status == STICKS) & (self.friction < np.inf) & (np.abs(T) >= most)
             sense = np.where(np.abs(T) > mu * none, np.sign(T), np.sign(dT))
             over = sense * dT - mu * dN
-            gives = full & (over > _NONE * np.abs(dT).max())
+            gives = full & (over > LIMITS.none * np.abs(dT).max())
             other[gives], miss[gives] = sense[gives], (over * gives_way)[gives]
             lets = held & ~self._pulls & (none >= N) & (dN < 0)
             other[lets], miss[lets] = FREE, -(dN * gives_way)[lets]
@@ -223,7 +232,7 @@ class Points:
             changes = np.flatnonzero(other != status)
             if not len(changes):
                 return F, dx, status
-            if k >= _ALL_AT_ONCE or status.tobytes() in seen:
+            if k >= LIMITS.all_at_once or status.tobytes() in seen:
                 changes = changes[[np.argmax(miss[changes])]]
             seen.add(status.tobytes())
             status[changes] = other[changes]
@@ -232,7 +241,7 @@ class Points:
     def change(self, status: np.ndarray, near: Near, force: np.ndarray, rate: np.ndarray) -> tuple[float, np.ndarray]:
         """Arc length to where the first point lets go or slides, and statuses then."""
         (N, T), (dN, dT), held = self.parts(force, near), self.parts(rate, near), status != FREE
-        none = _LIMIT * max(np.abs(N).max(initial=0.0), 1e-30)
+        none = LIMITS.limit * max(np.abs(N).max(initial=0.0), 1e-30)
         times, other = np.full(len(status), np.inf), status.copy()
         lets = held & ~self._pulls & (dN < 0) & (none < N)
         times[lets], other[lets] = -N[lets] / dN[lets], FREE
@@ -240,7 +249,7 @@ class Points:
             k = np.flatnonzero(held & (status == STICKS) & (self.friction < np.inf))
             mu = self.friction[k]
             left, grows = mu * N[k] - sense * T[k], sense * dT[k] - mu * dN[k]
-            slips = (grows > 0) & (left > _LIMIT * mu * np.abs(N[k]))
+            slips = (grows > 0) & (left > LIMITS.limit * mu * np.abs(N[k]))
             t = np.divide(left, grows, out=np.full(len(k), np.inf), where=slips)
             first = t < times[k]
             times[k[first]], other[k[first]] = t[first], sense
@@ -286,7 +295,7 @@ class Points:
         A, B = np.concatenate([*rows, into]), np.concatenate([*columns, against], axis=1)
         a = np.concatenate([*wanted, np.zeros(len(slides)) if to is None else near.beyond[slides]])
         gives = A @ by @ B
-        stiff = np.flatnonzero(np.abs(gives).max(1, initial=0.0) < _NONE * np.abs(gives).max(initial=0.0))
+        stiff = np.flatnonzero(np.abs(gives).max(1, initial=0.0) < LIMITS.none * np.abs(gives).max(initial=0.0))
         gives[stiff, stiff] = np.abs(gives).max(initial=0.0)        # along a support, or across the axis, nothing moves
         if slips is not None:
             k = np.arange(len(sticks), 2 * len(sticks))

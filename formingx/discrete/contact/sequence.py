@@ -10,6 +10,7 @@ sticks depends on it.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,35 +18,38 @@ from mpi4py import MPI
 
 from .held import FREE, STICKS, Points, Response
 
-_ITERATIONS = 8
-"""At most so many for an arrival."""
 
-_TO_TOOLS = 4
-"""Iterations, of the contact alone, that bring points to their tools."""
+@dataclass(frozen=True)
+class Foretelling:
+    """How far, and how exactly, arrivals are foretold.
 
-_CHANGES = 100
-"""At most so many points let go or begin to slide from one arrival to the next."""
+    Attributes:
+        iterations: at most so many for an arrival.
+        to_tools: iterations, of the contact alone, that bring points to their tools.
+        changes: at most so many points let go or begin to slide from one arrival to the next.
+        taken_over: points that slid before are held by forces of their own, if they are not more than these.
+        same_place: by how much an iteration may still move an arrival that sticks, over the length of face that
+            is its own.
+        about_there: the same of one that may slide.
+        far: squares of positions beyond all bounds, length^2.
+        soon: part of a step within which two points arrive together.
+        earlier: at most so many points turn out to have arrived before the one that is looked at.
+        late: part of the way to an arrival by which an iteration may move it: beyond, where it is is not known.
+    """
 
-_TAKEN_OVER = 80
-"""Points that slid before are held by forces of their own, if they are not more than these."""
+    iterations: int = 8
+    to_tools: int = 4
+    changes: int = 100
+    taken_over: int = 80
+    same_place: float = 1e-3
+    about_there: float = 1e-2
+    far: float = 1e30
+    soon: float = 0.02
+    earlier: int = 3
+    late: float = 1.0
 
-_SAME_PLACE = 1e-3
-"""By how much an iteration may still move an arrival that sticks, over the length of face that is its own."""
 
-_ABOUT_THERE = 1e-2
-"""The same of one that may slide."""
-
-_FAR = 1e30
-"""Squares of positions beyond all bounds, length^2."""
-
-_SOON = 0.02
-"""Part of a step within which two points arrive together."""
-
-_EARLIER = 3
-"""At most so many points turn out to have arrived before the one that is looked at."""
-
-_LATE = 1.0
-"""Part of the way to an arrival by which an iteration may move it: beyond, where it is is not known."""
+LIMITS = Foretelling()
 
 
 class Arrival(NamedTuple):
@@ -176,7 +180,7 @@ class Foretold:
         piece = piece.of(m).after(length)
         if not len(piece.status):
             return None
-        for _ in range(_TO_TOOLS):
+        for _ in range(LIMITS.to_tools):
             piece = self._held(piece)
         if not np.isfinite(piece.extra).all():
             return None
@@ -206,7 +210,7 @@ class Foretold:
         slide = [~free & (face.rule.area > 0) & (face.law.friction < np.inf)
                  for face, free in zip(self._faces, self._free)]
         number = self._comm.allreduce(sum(int(np.sum(s)) for s in slide), MPI.SUM)
-        if not 0 < number <= _TAKEN_OVER:
+        if not 0 < number <= LIMITS.taken_over:
             return True
         if not self._points.learn([np.flatnonzero(s) for s in slide], touched=True):
             return False
@@ -252,7 +256,7 @@ class Foretold:
 
     def _find(self, length: float) -> bool:
         """The next arrival within a length, on the last piece or off its end."""
-        for _ in range(_CHANGES):
+        for _ in range(LIMITS.changes):
             last = self._pieces[-1]
             if last.begins >= length:
                 return False
@@ -290,7 +294,7 @@ class Foretold:
             near = law.nearest(x)
             for _ in range(3):
                 gap, rate = float(near.distance[0]) + law.theta, float(near.normal[0] @ w[0])
-                if abs(gap) < _SAME_PLACE * law.theta or not rate > 0:
+                if abs(gap) < LIMITS.same_place * law.theta or not rate > 0:
                     break
                 by -= gap / rate
                 near = law.nearest(x + by * w)
@@ -302,11 +306,11 @@ class Foretold:
         """Bring the path back to equilibrium where the last point found arrives, and that with it; False: it fails."""
         last, arrival = self._pieces[-1], self._arrivals[-1]
         self._end = end = last.after(arrival.time)
-        if arrival.time - last.begins < _SOON * length:
+        if arrival.time - last.begins < LIMITS.soon * length:
             return True
         tried: list[tuple[_Piece, _Piece]] = []
-        for _ in range(_ITERATIONS * _EARLIER):
-            if len(tried) == _ITERATIONS:
+        for _ in range(LIMITS.iterations * LIMITS.earlier):
+            if len(tried) == LIMITS.iterations:
                 return False
             arrival, moved = self._arrivals[-1], self._moved(arrival.time, end)
             if moved is None:
@@ -318,10 +322,10 @@ class Foretold:
                 return False
             end = mixed
             found = self._meets(*arrival.who, end.begins, end.at)
-            if not (found.time > last.begins and abs(found.time - arrival.time) < _LATE * arrival.time):
+            if not (found.time > last.begins and abs(found.time - arrival.time) < LIMITS.late * arrival.time):
                 return False
             self._arrivals[-1], self._end = found, (end := end.after(found.time))
-            near = (_SAME_PLACE if found.sticks else _ABOUT_THERE) * found.length
+            near = (LIMITS.same_place if found.sticks else LIMITS.about_there) * found.length
             if np.linalg.norm(found.place - arrival.place) < near:
                 times = self._back(end, last, found)
                 if not self._first(times, found.time, end):
@@ -353,7 +357,7 @@ class Foretold:
         by = np.array([np.concatenate([(b - a).ravel() for a, b in zip(before.at, after.at)])
                        for before, after in tried])
         gram = self._comm.allreduce(by @ by.T)
-        if not gram.trace() < _FAR:
+        if not gram.trace() < LIMITS.far:
             return None
         ahead = gram[-1, -1] - gram[-1, :-1] - gram[:-1, -1, None] + gram[:-1, :-1]
         right = gram[-1, -1] - gram[:-1, -1]

@@ -138,7 +138,7 @@ def _write(path: Any, file: Any, states: Any, suffix: str, write: Callable) -> N
     file, comm = files.named("to_vtx" if suffix == ".bp" else "to_xdmf", file, suffix), path.problem.comm
     chosen = _chosen(path, states)
     alone = path.alone(chosen[0][1])
-    if any(state not in alone.states for _, state in chosen):
+    if any(path.alone(state).problem is not alone.problem for _, state in chosen):
         raise InputError(f"{'to_vtx' if suffix == '.bp' else 'to_xdmf'}: states: the run made its mesh again on the"
                          f" way, and a file holds one mesh: give states of one, such as path.segments[0].states")
     fields = Fields(alone)
