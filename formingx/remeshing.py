@@ -41,6 +41,9 @@ _SHARES = (1.0, 0.9, 1.1, 0.8)
 _GOOD = 0.4
 """Part of the way from the limits of J to 1 that is good."""
 
+_FAILED = 4
+"""At most so many states in a row of which no new mesh is found."""
+
 _POCKET = 0.25
 """Of the size of an element: a pocket between the body and a tool that is not so deep is closed."""
 
@@ -127,11 +130,18 @@ def follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[],
     """
     record = path.record
     record.on_state.append(lambda state: _look(record, state, remesh))
-    worn = bool(record.states) and _is_worn(record, record.last, remesh)
+    worn, failed = bool(record.states) and _is_worn(record, record.last, remesh), 0
     while not (worn and done()):
         record.problem.limit.one_by_one()                    # a mesh that wears is looked at as each node arrives
         if worn:
-            _take_up(path, remesh, tolerances)
+            try:
+                _take_up(path, remesh, tolerances)
+                failed = 0
+            except ConvergenceError as error:                # the next state may have a mesh
+                failed += 1
+                if failed > _FAILED or _ratios(record, record.last)[0] < remesh.volume_ratio[0] / 2:
+                    raise
+                log.info("the old mesh is kept for a state: %s", error)
         record.ended = ""
         try:
             part()

@@ -75,6 +75,22 @@ def test_a_mesh_without_a_state_ends_no_path(monkeypatch):
     assert len(caught.value.path.segments) == 1 and caught.value.path.last.measures["travel"] > 0
 
 
+def test_the_old_mesh_is_kept_while_no_new_one_has_a_state(monkeypatch):
+    """The next state is tried: the run goes on."""
+    from formingx import remeshing
+    failed = []
+
+    def fails(path, remesh, tolerances, best=remeshing._best):
+        if not failed:
+            failed.append(len(path.states))
+            raise fx.ConvergenceError("nothing is found")
+        return best(path, remesh, tolerances)
+    monkeypatch.setattr(remeshing, "_best", fails)
+    path = pressed("stick", 0.55, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)))
+    first = next(k for k, state in enumerate(path.states) if state.kind == "remesh")
+    assert first == failed[0] + 1 and path.last.measures["travel"] == pytest.approx(0.55)
+
+
 @pytest.mark.parametrize("options, message", [
     ({"size": -1.0}, "Remesh: size = -1"), ({"size": 1.0, "corner": 2.0}, "corner = 2"),
     ({"size": 1.0, "volume_ratio": (1.1, 1.5)}, "volume_ratio")])
