@@ -318,7 +318,7 @@ def test_compression_extreme(tmp_path):
         assert fine["force_N"][name] == pytest.approx(force, rel=by)
         assert coarse["force_N"][name] == pytest.approx(force, rel=3 * by)
     assert fine["least_J"] > 0.4 and fine["remeshes"] >= 2
-    assert max(map(abs, fine["jumps"]["force"])) < 2e-3 and max(map(abs, fine["jumps"]["energy"])) < 2e-3
+    assert max(map(abs, fine["jumps"]["force"])) < 3e-3 and max(map(abs, fine["jumps"]["energy"])) < 4e-3
     assert all(375e3 < one["force_N"]["8"] < 391e3 for one in (fine, coarse))
 
 
