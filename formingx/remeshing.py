@@ -44,6 +44,9 @@ _GOOD = 0.4
 _FAILED = 4
 """At most so many states in a row of which no new mesh is found."""
 
+_CRUSHED = 0.5
+"""Of the least J of a good mesh: an old one with less is not kept for another state."""
+
 _POCKET = 0.25
 """Of the size of an element: a pocket between the body and a tool that is not so deep is closed."""
 
@@ -130,17 +133,19 @@ def follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[],
     """
     record = path.record
     record.on_state.append(lambda state: _look(record, state, remesh))
-    worn, failed = bool(record.states) and _is_worn(record, record.last, remesh), 0
+    worn = bool(record.states) and _worn(record, record.last, remesh)
+    failed: list[State] = []
     while not (worn and done()):
         record.problem.limit.one_by_one()                    # a mesh that wears is looked at as each node arrives
         if worn:
             try:
                 _take_up(path, remesh, tolerances)
-                failed = 0
+                failed = []
             except ConvergenceError as error:                # the next state may have a mesh
-                failed += 1
-                if failed > _FAILED or _ratios(record, record.last)[0] < remesh.volume_ratio[0] / 2:
+                crushed = _ratios(record, record.last)[0] < _CRUSHED * remesh.volume_ratio[0]
+                if crushed or len(failed) == _FAILED or any(record.last is state for state in failed):
                     raise
+                failed.append(record.last)
                 log.info("the old mesh is kept for a state: %s", error)
         record.ended = ""
         try:
@@ -216,16 +221,15 @@ def _look(record: Record, state: State, remesh: Remesh) -> None:
             if name and before.get(name):
                 state.jump[what] = state.measures[name] / before[name] - 1
         log.info("a new mesh: %s", state.jump)
-    elif _is_worn(record, state, remesh):
+    elif _worn(record, state, remesh):
         record.ended = _WORN
 
 
-def _is_worn(record: Record, state: State, remesh: Remesh) -> bool:
-    return state.kind not in ("start", "remesh") and _worn(*_ratios(record, state), remesh, state)
-
-
-def _worn(low: float, high: float, remesh: Remesh, state: State) -> bool:
+def _worn(record: Record, state: State, remesh: Remesh) -> bool:
     """True if the mesh of a state is to be made again."""
+    if state.kind in ("start", "remesh"):
+        return False
+    low, high = _ratios(record, state)
     return not (remesh.volume_ratio[0] <= low and high <= remesh.volume_ratio[1])
 
 

@@ -25,7 +25,7 @@ def pressed(friction, travel, **options):
 def test_a_homogeneous_block_does_not_feel_it(monkeypatch):
     """Without friction F_old is the same everywhere: the force goes on, as do volume, energy and columns."""
     from formingx import remeshing
-    monkeypatch.setattr(remeshing, "_worn", lambda low, high, remesh, state: state.kind == "target")
+    monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.kind == "target")
     path = fx.trace(block("none"), until=fx.travel(0.6), through=[fx.travel(0.5)], progress=False,
                     remesh=fx.Remesh(size=0.3))
     state, = (s for s in path.states if s.kind == "remesh")
@@ -39,6 +39,26 @@ def test_a_homogeneous_block_does_not_feel_it(monkeypatch):
     for name in ("tool_force", "strain_energy", "travel"):
         assert path.last.measures[name] == pytest.approx(whole[name], rel=5e-4)
     assert len(path.segments) == 2 and len(path["tool_force"]) == len(path)
+    freed = path.released()
+    assert freed.path.last.measures["strain_energy"] < 1e-5 and freed.diameter == pytest.approx(2.0, rel=1e-4)
+
+
+def test_stages_go_on_where_they_were(monkeypatch):
+    """A mesh made at the end of a stage, and one within a stage that has no time: no stage runs twice, time stands."""
+    from formingx import remeshing
+    monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.setting["mesh"] == 0 and state.kind
+                        == "target" or state.setting["mesh"] == 1 and state.measures["travel"] > 0.4)
+    scene = block("none")
+    plate = scene.contacts[0]
+    stages = [fx.Stage("press", drive=plate, until=fx.travel(0.3), duration=0.5),
+              fx.Stage("push", drive=plate, until=fx.travel(0.5))]
+    path = fx.Process(scene).run(stages, progress=False, remesh=fx.Remesh(size=0.3))
+    made = [state for state in path.states if state.kind == "remesh"]
+    assert [state.stage for state in made] == ["press", "push"]
+    assert [state.stage for state in path.states if state.kind == "start"] == ["press", "push"]
+    assert made[0].met[:2] == fx.travel(0.3)[:2]
+    assert all(state.time == pytest.approx(0.5) for state in path.states[path.states.index(made[0]):])
+    assert path.last.measures["tool_force"] == pytest.approx(pressed("none", 0.5).last.measures["tool_force"], rel=5e-4)
 
 
 def test_a_stuck_block_goes_on():
@@ -202,6 +222,13 @@ def test_results_go_on_from_mesh_to_mesh(tmp_path):
     path.to_xdmf(tmp_path / "first.xdmf", path.segments[0].states)
     with pytest.raises(fx.InputError, match="a file holds one mesh"):
         path.to_xdmf(tmp_path / "all.xdmf", "all")
+    with pytest.raises(fx.InputError, match="filling: is not known of a run that made its mesh again"):
+        path.filling()
+    with pytest.raises(fx.InputError, match="trim: is not known of a run that made its mesh again"):
+        path.released(trim=0.5)
+    virial = [axial_stress(path, state) / state.measures["tool_force"] / (1 - state.measures["travel"])
+              for state in (before, after)]
+    assert virial[0] == pytest.approx(-1, abs=1e-4) and virial[1] == pytest.approx(virial[0], abs=2e-5)
     for state in (before, after):
         table, stress = path.contact("top", state), path.stress(state).at([(0.0, 0.5)])
         assert (table.pressure > 0).any() and stress.cauchy[0, 2, 2] < 0
@@ -209,10 +236,24 @@ def test_results_go_on_from_mesh_to_mesh(tmp_path):
     fx.report([tmp_path / "run", path], tmp_path / "both.html")
 
 
+def axial_stress(path, state):
+    """The integral of the stress along Z over the body: minus the force of a plate times its height."""
+    import basix
+
+    from formingx.discrete.carry import in_own_cells
+    problem = path.segment(state).problem
+    forms = problem.forms
+    places, weights = map(np.asarray, basix.make_quadrature(basix.CellType.triangle, problem.scene.quadrature_degree))
+    with problem.at(state):
+        volume = forms.J * forms.weight * abs(ufl.JacobianDeterminant(forms.domain))
+        volumes = in_own_cells(forms.domain, ufl.as_vector([volume]), places)[..., 0] * weights
+    return volumes.ravel() @ path.stress(state).at_quadrature_points().cauchy[:, 1, 1]
+
+
 def twice(monkeypatch, **after):
     """The mesh is made again once in each of these stages, after these times."""
     from formingx import remeshing
-    monkeypatch.setattr(remeshing, "_worn", lambda low, high, remesh, state: state.time > after.get(state.stage, 1e9)
+    monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.time > after.get(state.stage, 1e9)
                         and state.setting["mesh"] == list(after).index(state.stage))
 
 
@@ -236,6 +277,11 @@ def test_what_a_material_remembers_goes_on(monkeypatch, tmp_path, material):
     remesh = fx.Remesh(size=0.25, corner=0.25)
     whole, path = run(), run(remesh=remesh, checkpoint=tmp_path / "run")
     assert [s.stage for s in path.states if s.kind == "remesh"] == ["blow", "creep"]
+    for state in (s for s in path.states if s.kind == "remesh" and type(material) is not fx.TransientNetwork):
+        kept = state.memory[-1]                              # of no change of volume, and so it stays
+        values = [past.C.T for past in kept.states] if hasattr(kept, "states") else kept.values.values()
+        rr, zz, rz, hoop = np.concatenate([v.reshape(-1, 4) for v in values]).T
+        assert (rr * zz - rz**2) * hoop == pytest.approx(np.ones(len(rr)), abs=1e-12)
     for stage in ("blow", "creep"):
         there, here = whole.state(stage=stage), path.state(stage=stage)
         assert here.time == pytest.approx(there.time)
@@ -251,7 +297,7 @@ def test_what_a_material_remembers_goes_on(monkeypatch, tmp_path, material):
 def test_supports_hold_from_where_they_are(monkeypatch):
     """One that is driven goes on; a hinge holds the mean of its face."""
     from formingx import remeshing
-    monkeypatch.setattr(remeshing, "_worn", lambda low, high, remesh, state: state.kind == "target")
+    monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.kind == "target")
 
     def both(scene, targets, size):
         options = {"until": targets[1], "through": targets[:1], "progress": False}
@@ -354,7 +400,7 @@ def test_a_deformation_is_carried_to_other_elements():
 def remeshed_at(monkeypatch, travel, n):
     """The path of a stuck block of n x n elements, remeshed once in between by as large ones, and its state then."""
     from formingx import remeshing
-    monkeypatch.setattr(remeshing, "_worn", lambda low, high, remesh, state: state.kind == "target")
+    monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.kind == "target")
     path = fx.trace(block("stick", elements=(n, n)), until=fx.travel(travel + 0.01), through=[fx.travel(travel)],
                     progress=False, remesh=fx.Remesh(size=1.3 / n, corner=1.3 / n))
     state, = (s for s in path.states if s.kind == "remesh")

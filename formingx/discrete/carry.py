@@ -152,6 +152,6 @@ def shapes_of(forms: Any, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
     if not len(cells):
         return np.zeros((0, 3, 3))
     F = forms.elastic_F
-    found = fem.Expression(ufl.as_vector([F[i, j] for i in range(3) for j in range(3)]), places,
-                           jit_options=_compat.JIT_OPTIONS).eval(forms.domain, cells).reshape(-1, 3, 3)
+    found = _compat.compile_expression(ufl.as_vector([F[i, j] for i in range(3) for j in range(3)]), places).eval(
+        forms.domain, cells).reshape(-1, 3, 3)
     return found / np.cbrt(np.linalg.det(found))[:, None, None]

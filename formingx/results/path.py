@@ -48,13 +48,13 @@ class Path(States):
     def profile(self, state: State | None = None) -> Profile:
         """Deformed outline and thickness of a sheet at a state (default: the last)."""
         state = state or self.last
-        return self._view(self._segment(state)).profiles.of(state)
+        return self._view(self.segment(state)).profiles.of(state)
 
     def stress(self, state: State | None = None) -> StressField:
         """Stresses and stretches at a state (default: the last), layer by layer."""
         self._section_only("stress", "look at path.wall(): stretches")
         state = state or self.last
-        return self._view(self._segment(state)).stresses.of(state)
+        return self._view(self.segment(state)).stresses.of(state)
 
     def to_csv(self, file: Any) -> None:
         """Write one row per state: stage (of a process), kind, iterations and every measure (rank 0 writes)."""
@@ -167,7 +167,7 @@ class Path(States):
         self._section_only("hoop_resultants", "use path.wall().wrinkled")
         from .evaluate.hoop import hoop_resultants
         state = state or self.last
-        return hoop_resultants(self, self._segment(state).problem, state)
+        return hoop_resultants(self, self.segment(state).problem, state)
 
     def formed(self, state: State | None = None, *, size: float | None = None) -> Any:
         """The body of a state (default: the last) as a new `Mesh`, free of stress; an InputError if it is none.
@@ -177,7 +177,7 @@ class Path(States):
         """
         self._section_only("formed", "use to_stl, or shell_model")
         from .formed import formed
-        return formed(self._segment(state or self.last).problem, state or self.last, size)
+        return formed(self.segment(state or self.last).problem, state or self.last, size)
 
     def column_factors(self, share: float | None, error: float | None) -> np.ndarray:
         """Wanted over present length of the mesh's columns, shape (n,), by which `formingx.mesh.adapted` goes."""
@@ -248,7 +248,7 @@ class Path(States):
         from .released import released
         state = state or self.last
         make = lambda record: Path(record, True)                           # noqa: E731
-        return released(self, self._segment(state).problem, make, state, temperature, trim, boundaries, duration,
+        return released(self, self.segment(state).problem, make, state, temperature, trim, boundaries, duration,
                         accuracy, units)
 
     def filling(self, tool: Any = None) -> Any:
@@ -282,7 +282,7 @@ class Path(States):
         if self.problem.temperature is None:
             raise InputError("temperature: the scene has none: give Scene a temperature=...")
         state = state or self.last
-        with self._segment(state).problem.at(state) as problem:
+        with self.segment(state).problem.at(state) as problem:
             return problem.temperature.at(followed(problem, as_points("Path.temperature: points", points)))
 
     def tool_forces(self) -> dict[str, np.ndarray]:

@@ -77,7 +77,7 @@ class Loss:
             why = "is a limit point, through which the path itself goes on" if self.limit_point else (
                 "varies round the body, or its image turns round: its branch is none of this scene")
             raise InputError(f"Loss.branch: the mode {why}; branches of n = 0 can be followed")
-        segment = self.path._segment(self.left)
+        segment = self.path.segment(self.left)
         curve, problem = segment.curve, segment.problem
         start = State(self.state.x.copy(), self.state.control, self.found.x, 0.0, kind="branch point",
                       memory=self.left.memory, stage=self.left.stage, setting=self.left.setting, time=self.state.time)
@@ -182,7 +182,7 @@ class Watch:
         def count_at(state: State, kind: Kind) -> int:
             key = id(state), kind
             if key not in known:
-                known[key] = self.of(self._path._segment(state)).count(state, kind)
+                known[key] = self.of(self._path.segment(state)).count(state, kind)
             return known[key]
         kinds = [Kind(n, flipped) for n in numbers
                  for flipped in (None, *self.of(self._path.segments[-1]).variation.mirrors)]
@@ -198,7 +198,7 @@ class Watch:
         """What happens between two states: found between neighbours of the path, however far these are."""
         if count_at(a, kind) == count_at(b, kind):
             return []
-        segment = self._path._segment(a)
+        segment = self._path.segment(a)
         states = [s for s in segment.states if s.kind != "limit point" or kind.number]
         if b not in states or a not in states:
             return []
@@ -254,7 +254,7 @@ class Unstable:
 
         def look() -> None:
             state = path.last
-            modes = watch.of(path._segment(state))
+            modes = watch.of(path.segment(state))
             for kind in (Kind(n, flipped) for n in numbers for flipped in (None, *modes.variation.mirrors)):
                 count = modes.count(state, kind)
                 if not (kind.number or kind.flipped):

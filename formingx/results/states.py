@@ -40,9 +40,10 @@ class States:
         record: what the solver keeps of the run (`formingx.solve.record.Record`).
     """
 
-    def __init__(self, record: Record, timed: bool = False, columns: Mapping[str, Any] | None = None):
+    def __init__(self, record: Record, timed: bool = False, columns: Mapping[str, Any] | None = None,
+                 views: dict[int, _View] | None = None):
         self.record, self._timed, self._own = record, timed, {} if columns is None else columns
-        self._views: dict[int, _View] = {}
+        self._views = {} if views is None else views         # by id(problem)
         self._walls: Any = None
         self._watch: Any = None
         self._view(record.segments[-1])                      # so that nothing is compiled on the way
@@ -122,7 +123,7 @@ class States:
 
     def value(self, measure: str | Bound, state: State) -> float:
         """A column, by its name, or a measure bound to the state's problem (`Target.bind`), at a state."""
-        segment = self._segment(state)
+        segment = self.segment(state)
         if isinstance(measure, str):
             self._check(measure)
             measure = self._view(segment).columns[measure]
@@ -225,12 +226,12 @@ class States:
         """A body on the smooth (cubic) path from a state to the next; for drawing: it is no solution."""
         if a.setting != b.setting:                           # a stage begins
             return b
-        x, control = self._segment(b).curve.interpolate(a, b, fraction)
+        x, control = self.segment(b).curve.interpolate(a, b, fraction)
         return replace(b, x=x, control=control)
 
     def distance(self, a: State, b: State) -> float:
         """Arc length from a state to the next along the tangent (dimensionless)."""
-        return self._segment(b).curve.progress(a, b) if a.setting == b.setting else 0.0
+        return self.segment(b).curve.progress(a, b) if a.setting == b.setting else 0.0
 
     def curve(self, *columns: str, points: int = 12) -> list[np.ndarray]:
         """Columns along the smooth path through the states, `points` to each piece; for drawing.
@@ -322,7 +323,7 @@ class States:
         with segment.problem.at(state) as problem:
             return {name: bound.value(problem.x, state.control) for name, bound in columns.items()}
 
-    def _segment(self, state: State) -> Segment:
+    def segment(self, state: State) -> Segment:
         """The segment that a state is of, or lies in."""
         mesh = state.setting.get("mesh", 0)
         return next((s for s in self.segments if s.states and s.states[0].setting.get("mesh", 0) == mesh),
@@ -332,10 +333,10 @@ class States:
         """The part of the path on the mesh that a state is on: all of it, unless the mesh was made again on the way."""
         if len(self.segments) == 1:
             return self
-        segment = self._segment(state)
+        segment = self.segment(state)
         record = Record(segment.problem, segment.curve)
         record.segments, record.counts = [segment], self.counts
-        return type(self)(record, self._timed, self._own)
+        return type(self)(record, self._timed, self._own, self._views)
 
     def _view(self, segment: Segment) -> _View:
         key = id(segment.problem)

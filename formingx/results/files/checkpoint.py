@@ -110,7 +110,7 @@ class Checkpoint:
         return files.on_root(problem.comm, lambda: _plainly(begin, folder, "cannot be begun"))
 
     def _write_state(self, number: int, state: State) -> None:
-        segment = self._path._segment(state)
+        segment = self._path.segment(state)
         problem = segment.problem
         final = self.folder / _name(number)
         part = final.with_name(final.name + ".part")

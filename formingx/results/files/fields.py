@@ -137,11 +137,10 @@ def to_xdmf(path: Any, file: Any, states: Any = None) -> None:
 def _write(path: Any, file: Any, states: Any, suffix: str, write: Callable) -> None:
     file, comm = files.named("to_vtx" if suffix == ".bp" else "to_xdmf", file, suffix), path.problem.comm
     chosen = _chosen(path, states)
-    alone = path.alone(chosen[0][1])
-    if any(path.alone(state).problem is not alone.problem for _, state in chosen):
+    if len({id(path.segment(state)) for _, state in chosen}) > 1:
         raise InputError(f"{'to_vtx' if suffix == '.bp' else 'to_xdmf'}: states: the run made its mesh again on the"
                          f" way, and a file holds one mesh: give states of one, such as path.segments[0].states")
-    fields = Fields(alone)
+    fields = Fields(path.alone(chosen[0][1]))
     points = _gather(fields.points, comm)
     steps = []
     for number, state in chosen:

@@ -23,7 +23,7 @@ def draw(loss: Any, file: Any, scale: float) -> None:
 def _outline(loss: Any) -> list[tuple[np.ndarray, np.ndarray]]:
     """[(deformed points (m, 2), amplitudes there (m, 3))] of each boundary; collective."""
     path, state = loss.path, loss.state
-    segment = path._segment(loss.left)
+    segment = path.segment(loss.left)
     mesh = segment.problem.scene.mesh
     from ...discrete.probes import probe
     lines = []

@@ -197,7 +197,7 @@ def of_path(path: Any) -> Record:
             fields = {id(one): _Fields(path.alone(one.states[0]), profiles[-1]) for one in path.segments}
             for i, k in enumerate(drawn):
                 done(i / len(drawn))
-                shown[k] = fields[id(path._segment(states[k]))].of(states[k])
+                shown[k] = fields[id(path.segment(states[k]))].of(states[k])
         stepping: dict = next((s.stepping for s in reversed(states) if s.stepping), {})
         tooling = Tooling.of_problem(problem)
         wall = path.wall() if profiles[-1] is not None else None
