@@ -45,7 +45,7 @@ class Increment:
         now = self._law.motion(x, self._touch)
         if self._before is not None:
             expected = self._before.to(x)
-            if self._guessed is not None and not __import__("os").environ.get("NOG"):
+            if self._guessed is not None:
                 expected = Motion(*(np.where(self._guessed if a.ndim == 1 else self._guessed[:, None], b, a)
                                     for a, b in zip(expected, now)))
             found = self._law.tractions(x, self._touch, self._sense, expected)
