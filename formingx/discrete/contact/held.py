@@ -48,7 +48,7 @@ class Agreement:
     limit: float = 1e-6
 
 
-LIMITS = Agreement()
+_AGREEMENT = Agreement()
 
 
 class Response(Protocol):
@@ -109,11 +109,11 @@ class Points:
             self.by[f] = np.concatenate([self.by[f], *by], axis=-1)
         self._C = self.at(self.by).reshape(len(self.steps), -1)
         whole = [np.ones(len(face.points)) for face in self._faces]
-        more = self.at([np.column_stack([np.minimum(face.law.friction, LIMITS.rough) * one, face.law.elastic_slip * one,
-                                         face.scale, face.law.pulls * one]) for face, one in zip(self._faces, whole)],
-                       new)
+        more = self.at([np.column_stack([np.minimum(face.law.friction, _AGREEMENT.rough) * one,
+                                         face.law.elastic_slip * one, face.scale, face.law.pulls * one])
+                        for face, one in zip(self._faces, whole)], new)
         friction, slip, scale, pulls = more.T
-        self.friction = np.append(self.friction, np.where(friction < LIMITS.rough, friction, np.inf))
+        self.friction = np.append(self.friction, np.where(friction < _AGREEMENT.rough, friction, np.inf))
         self.elastic_slip, self._scale = np.append(self.elastic_slip, slip), np.append(self._scale, scale)
         self._pulls = np.append(self._pulls, pulls > 0)
         known = self.at([face.stiffness_in_tangent for face in self._faces], new)
@@ -192,7 +192,7 @@ class Points:
             small = self._small(u, near, force)
         except np.linalg.LinAlgError:
             return None
-        slack = here & (np.abs(N).max(initial=0.0) * LIMITS.limit >= N) & ~self._pulls
+        slack = here & (np.abs(N).max(initial=0.0) * _AGREEMENT.limit >= N) & ~self._pulls
         for begin in (status, np.where(slack, FREE, status)):
             found = self._agreed(small, begin.copy(), near, N, T, here)
             if found is not None:
@@ -205,7 +205,7 @@ class Points:
         """Rates of forces and positions, and statuses that agree with them; here: points that are at their tools."""
         seen, mu = set(), np.where(self.friction < np.inf, self.friction, 0.0)
         gives_way = self._C.diagonal().reshape(len(N), -1).mean(1)
-        for k in range(LIMITS.tries):
+        for k in range(_AGREEMENT.tries):
             try:
                 F, dx = self._solved(small, status, near)
             except np.linalg.LinAlgError:
@@ -213,16 +213,16 @@ class Points:
             if not np.isfinite(F).all():
                 return None
             (dN, dT), (into, along), held = self.parts(F, near), self.parts(dx, near), status != FREE
-            none = LIMITS.limit * (np.abs(N).max() + LIMITS.soon * np.abs(dN).max())
+            none = _AGREEMENT.limit * (np.abs(N).max() + _AGREEMENT.soon * np.abs(dN).max())
             other, miss = status.copy(), np.zeros(len(N))
             slides = held & (status != STICKS) & (mu > 0)
-            turns = slides & (status * along < -LIMITS.none * np.abs(along).max())
+            turns = slides & (status * along < -_AGREEMENT.none * np.abs(along).max())
             other[turns], miss[turns] = STICKS, np.abs(along[turns])
-            most = mu * ((1 - LIMITS.limit) * N - none)
+            most = mu * ((1 - _AGREEMENT.limit) * N - none)
             full = held & (status == STICKS) & (self.friction < np.inf) & (np.abs(T) >= most)
             sense = np.where(np.abs(T) > mu * none, np.sign(T), np.sign(dT))
             over = sense * dT - mu * dN
-            gives = full & (over > LIMITS.none * np.abs(dT).max())
+            gives = full & (over > _AGREEMENT.none * np.abs(dT).max())
             other[gives], miss[gives] = sense[gives], (over * gives_way)[gives]
             lets = held & ~self._pulls & (none >= N) & (dN < 0)
             other[lets], miss[lets] = FREE, -(dN * gives_way)[lets]
@@ -232,7 +232,7 @@ class Points:
             changes = np.flatnonzero(other != status)
             if not len(changes):
                 return F, dx, status
-            if k >= LIMITS.all_at_once or status.tobytes() in seen:
+            if k >= _AGREEMENT.all_at_once or status.tobytes() in seen:
                 changes = changes[[np.argmax(miss[changes])]]
             seen.add(status.tobytes())
             status[changes] = other[changes]
@@ -241,7 +241,7 @@ class Points:
     def change(self, status: np.ndarray, near: Near, force: np.ndarray, rate: np.ndarray) -> tuple[float, np.ndarray]:
         """Arc length to where the first point lets go or slides, and statuses then."""
         (N, T), (dN, dT), held = self.parts(force, near), self.parts(rate, near), status != FREE
-        none = LIMITS.limit * max(np.abs(N).max(initial=0.0), 1e-30)
+        none = _AGREEMENT.limit * max(np.abs(N).max(initial=0.0), 1e-30)
         times, other = np.full(len(status), np.inf), status.copy()
         lets = held & ~self._pulls & (dN < 0) & (none < N)
         times[lets], other[lets] = -N[lets] / dN[lets], FREE
@@ -249,7 +249,7 @@ class Points:
             k = np.flatnonzero(held & (status == STICKS) & (self.friction < np.inf))
             mu = self.friction[k]
             left, grows = mu * N[k] - sense * T[k], sense * dT[k] - mu * dN[k]
-            slips = (grows > 0) & (left > LIMITS.limit * mu * np.abs(N[k]))
+            slips = (grows > 0) & (left > _AGREEMENT.limit * mu * np.abs(N[k]))
             t = np.divide(left, grows, out=np.full(len(k), np.inf), where=slips)
             first = t < times[k]
             times[k[first]], other[k[first]] = t[first], sense
@@ -295,7 +295,7 @@ class Points:
         A, B = np.concatenate([*rows, into]), np.concatenate([*columns, against], axis=1)
         a = np.concatenate([*wanted, np.zeros(len(slides)) if to is None else near.beyond[slides]])
         gives = A @ by @ B
-        stiff = np.flatnonzero(np.abs(gives).max(1, initial=0.0) < LIMITS.none * np.abs(gives).max(initial=0.0))
+        stiff = np.flatnonzero(np.abs(gives).max(1, initial=0.0) < _AGREEMENT.none * np.abs(gives).max(initial=0.0))
         gives[stiff, stiff] = np.abs(gives).max(initial=0.0)        # along a support, or across the axis, nothing moves
         if slips is not None:
             k = np.arange(len(sticks), 2 * len(sticks))

@@ -49,7 +49,7 @@ class Foretelling:
     late: float = 1.0
 
 
-LIMITS = Foretelling()
+_FORETELLING = Foretelling()
 
 
 class Arrival(NamedTuple):
@@ -180,7 +180,7 @@ class Foretold:
         piece = piece.of(m).after(length)
         if not len(piece.status):
             return None
-        for _ in range(LIMITS.to_tools):
+        for _ in range(_FORETELLING.to_tools):
             piece = self._held(piece)
         if not np.isfinite(piece.extra).all():
             return None
@@ -210,7 +210,7 @@ class Foretold:
         slide = [~free & (face.rule.area > 0) & (face.law.friction < np.inf)
                  for face, free in zip(self._faces, self._free)]
         number = self._comm.allreduce(sum(int(np.sum(s)) for s in slide), MPI.SUM)
-        if not 0 < number <= LIMITS.taken_over:
+        if not 0 < number <= _FORETELLING.taken_over:
             return True
         if not self._points.learn([np.flatnonzero(s) for s in slide], touched=True):
             return False
@@ -256,7 +256,7 @@ class Foretold:
 
     def _find(self, length: float) -> bool:
         """The next arrival within a length, on the last piece or off its end."""
-        for _ in range(LIMITS.changes):
+        for _ in range(_FORETELLING.changes):
             last = self._pieces[-1]
             if last.begins >= length:
                 return False
@@ -294,7 +294,7 @@ class Foretold:
             near = law.nearest(x)
             for _ in range(3):
                 gap, rate = float(near.distance[0]) + law.theta, float(near.normal[0] @ w[0])
-                if abs(gap) < LIMITS.same_place * law.theta or not rate > 0:
+                if abs(gap) < _FORETELLING.same_place * law.theta or not rate > 0:
                     break
                 by -= gap / rate
                 near = law.nearest(x + by * w)
@@ -306,11 +306,11 @@ class Foretold:
         """Bring the path back to equilibrium where the last point found arrives, and that with it; False: it fails."""
         last, arrival = self._pieces[-1], self._arrivals[-1]
         self._end = end = last.after(arrival.time)
-        if arrival.time - last.begins < LIMITS.soon * length:
+        if arrival.time - last.begins < _FORETELLING.soon * length:
             return True
         tried: list[tuple[_Piece, _Piece]] = []
-        for _ in range(LIMITS.iterations * LIMITS.earlier):
-            if len(tried) == LIMITS.iterations:
+        for _ in range(_FORETELLING.iterations * _FORETELLING.earlier):
+            if len(tried) == _FORETELLING.iterations:
                 return False
             arrival, moved = self._arrivals[-1], self._moved(arrival.time, end)
             if moved is None:
@@ -322,10 +322,10 @@ class Foretold:
                 return False
             end = mixed
             found = self._meets(*arrival.who, end.begins, end.at)
-            if not (found.time > last.begins and abs(found.time - arrival.time) < LIMITS.late * arrival.time):
+            if not (found.time > last.begins and abs(found.time - arrival.time) < _FORETELLING.late * arrival.time):
                 return False
             self._arrivals[-1], self._end = found, (end := end.after(found.time))
-            near = (LIMITS.same_place if found.sticks else LIMITS.about_there) * found.length
+            near = (_FORETELLING.same_place if found.sticks else _FORETELLING.about_there) * found.length
             if np.linalg.norm(found.place - arrival.place) < near:
                 times = self._back(end, last, found)
                 if not self._first(times, found.time, end):
@@ -357,7 +357,7 @@ class Foretold:
         by = np.array([np.concatenate([(b - a).ravel() for a, b in zip(before.at, after.at)])
                        for before, after in tried])
         gram = self._comm.allreduce(by @ by.T)
-        if not gram.trace() < LIMITS.far:
+        if not gram.trace() < _FORETELLING.far:
             return None
         ahead = gram[-1, -1] - gram[-1, :-1] - gram[:-1, -1, None] + gram[:-1, :-1]
         right = gram[-1, -1] - gram[:-1, -1]
