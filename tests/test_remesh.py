@@ -44,21 +44,29 @@ def test_a_homogeneous_block_does_not_feel_it(monkeypatch):
 
 
 def test_stages_go_on_where_they_were(monkeypatch):
-    """A mesh made at the end of a stage, and one within a stage that has no time: no stage runs twice, time stands."""
+    """A mesh made at the end of a stage, one within a stage that has no time, one on the way back: no stage runs twice,
+    time stands."""
     from formingx import remeshing
-    monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.setting["mesh"] == 0 and state.kind
-                        == "target" or state.setting["mesh"] == 1 and state.measures["travel"] > 0.4)
+
+    def worn(record, state, remesh):
+        travel = state.measures["travel"]
+        return (state.kind == "target", travel > 0.4, state.stage == "back" and travel < 0.45, False)[
+            state.setting["mesh"]]
+    monkeypatch.setattr(remeshing, "_worn", worn)
     scene = block("none")
     plate = scene.contacts[0]
     stages = [fx.Stage("press", drive=plate, until=fx.travel(0.3), duration=0.5),
-              fx.Stage("push", drive=plate, until=fx.travel(0.5))]
+              fx.Stage("push", drive=plate, until=fx.travel(0.5)), fx.Stage("back", drive=plate, until=fx.travel(0.3))]
     path = fx.Process(scene).run(stages, progress=False, remesh=fx.Remesh(size=0.3))
     made = [state for state in path.states if state.kind == "remesh"]
-    assert [state.stage for state in made] == ["press", "push"]
-    assert [state.stage for state in path.states if state.kind == "start"] == ["press", "push"]
+    assert [state.stage for state in made] == ["press", "push", "back"]
+    assert [state.stage for state in path.states if state.kind == "start"] == ["press", "push", "back"]
     assert made[0].met[:2] == fx.travel(0.3)[:2]
     assert all(state.time == pytest.approx(0.5) for state in path.states[path.states.index(made[0]):])
-    assert path.last.measures["tool_force"] == pytest.approx(pressed("none", 0.5).last.measures["tool_force"], rel=5e-4)
+    assert np.all(np.diff(path["travel"][path.states.index(made[-1]):]) < 0)
+    for travel, stage in ((0.5, "push"), (0.3, "back")):
+        whole = pressed("none", travel).last.measures["tool_force"]
+        assert path.state(stage=stage).measures["tool_force"] == pytest.approx(whole, rel=5e-4)
 
 
 def test_a_stuck_block_goes_on():
