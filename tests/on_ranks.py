@@ -39,32 +39,32 @@ class Ranks:
 
     def run(self, script: str, arguments: list[str], timeout: float) -> list[str]:
         """What each rank prints. A script that fails on a rank, or takes too long, ends them all."""
-        for line in self._lines:
-            line.send((script, arguments))
         printed = {}
-        while len(printed) < len(self._lines):
-            ready = wait([line for line in self._lines if line not in printed], timeout)
-            try:
+        try:
+            for line in self._lines:
+                line.send((script, arguments))
+            while len(printed) < len(self._lines):
+                ready = wait([line for line in self._lines if line not in printed], timeout)
                 assert ready, f"no answer of all ranks for {timeout} s"
                 for line in ready:
                     printed[line], failed = line.recv()
                     assert not failed, f"rank {self._lines.index(line)}:\n{printed[line]}{failed}"
-            except (AssertionError, EOFError) as error:
-                said = self._said.read_text()
-                self.end()
-                raise AssertionError(f"{error}\n{said}") from None
+        except (AssertionError, EOFError, OSError) as error:
+            raise AssertionError(f"{str(error) or 'a rank crashed'}\n{self.end(patience=1)}") from None
         return [printed[line] for line in self._lines]
 
-    def end(self) -> None:
-        """Hang up; processes that do not end by that are stopped."""
+    def end(self, patience: float = 20) -> str:
+        """Hang up; processes that do not end by that are stopped. What they said beside what scripts print."""
         for line in self._lines:
             line.close()
-        for stop in (lambda: None, self._process.terminate, self._process.kill):
+        for stop, seconds in ((lambda: None, patience), (self._process.terminate, 20), (self._process.kill, 20)):
             stop()
             with contextlib.suppress(subprocess.TimeoutExpired):
-                self._process.wait(20)
+                self._process.wait(seconds)
                 break
+        said = self._said.read_text()
         self._folder.cleanup()
+        return said
 
 
 def execute(script: str, arguments: list[str]) -> str:

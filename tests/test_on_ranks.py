@@ -21,3 +21,10 @@ def test_a_rank_that_waits_for_another_one():
     with pytest.raises(AssertionError, match="no answer of all ranks for 1 s"):
         two.run(STUCK, [], 1)
     assert not two.alive
+
+
+def test_a_rank_that_crashes():
+    two = Ranks(2)
+    with pytest.raises(AssertionError, match="a rank crashed\n(?s:.)*Aborted"):
+        two.run("import os; os.abort()", [], 60)
+    assert not two.alive
