@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import run_json, run_script
+from conftest import printed_by, run_json, run_script
 
 SCRIPT = """
 import json, sys
@@ -125,6 +125,22 @@ def test_ranks_agree_on_a_process_and_on_verdicts():
     for key in ("last", "walls"):
         assert two[key] == pytest.approx(one[key], rel=1e-6)
     assert two["ledger"] == pytest.approx(one["ledger"], abs=1e-6 * abs(one["last"][2]))
+
+
+LAYER = """
+import formingx as fx, ufl
+mesh = fx.mesh.disc(radius=1.0, thickness={"low": 1.0, "high": 8.0}, elements=(1, (1, 8)))
+c10 = 1 + ufl.SpatialCoordinate(mesh.domain)[0] ** 2
+scene = fx.Scene(mesh=mesh, materials={name: fx.NeoHookean(c10=c10) for name in mesh.layers},
+                 supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")])
+print(*(len(scene.sample(name).cells) for name in ("low", "high")))
+"""
+
+
+def test_a_rank_without_cells_of_a_layer():
+    """It compiles constants over the mesh with the others, which waited for it for ever."""
+    cells = [[int(n) for n in line.split()] for line in printed_by(LAYER, ranks=2, timeout=120)]
+    assert [sum(counts) for counts in zip(*cells)] == [2, 16] and 0 in cells[0] + cells[1]
 
 
 DESIGN = """

@@ -148,10 +148,9 @@ def _matrices(entries: np.ndarray) -> np.ndarray:
 
 
 def shapes_of(forms: Any, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """The deformation gradient that materials see, scaled to det F = 1, at places in some cells, shape (n, 3, 3)."""
-    if not len(cells):
-        return np.zeros((0, 3, 3))
+    """The deformation gradient that materials see, scaled to det F = 1, at places in some cells, shape (n, 3, 3);
+    collective."""
     F = forms.elastic_F
-    found = _compat.compile_expression(ufl.as_vector([F[i, j] for i in range(3) for j in range(3)]), places).eval(
-        forms.domain, cells).reshape(-1, 3, 3)
+    expression = _compat.compile_expression(ufl.as_vector([F[i, j] for i in range(3) for j in range(3)]), places)
+    found = (expression.eval(forms.domain, cells) if len(cells) else np.zeros(0)).reshape(-1, 3, 3)
     return found / np.cbrt(np.linalg.det(found))[:, None, None]

@@ -130,9 +130,8 @@ class OfMesh(Varying):
         domain = ufl.domain.extract_unique_domain(self._expression)
         if self._expression.ufl_shape != () or domain is not None and domain is not sample.domain.ufl_domain():
             raise InputError(f"the constant {self!r} must be a scalar of the scene's own mesh")
-        if not len(sample.cells):
-            return np.zeros(0)
-        return _compat.compile_expression(self._expression, sample.places).eval(sample.domain, sample.cells).ravel()
+        compiled = _compat.compile_expression(self._expression, sample.places)         # by all ranks
+        return compiled.eval(sample.domain, sample.cells).ravel() if len(sample.cells) else np.zeros(0)
 
     def expression(self, fields):
         return fields.of_mesh(self._expression)
