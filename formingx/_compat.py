@@ -53,8 +53,8 @@ class _Numbered(MultiFunction):
 
 
 def _looked_up_once(compiled: Any) -> Any:
-    """`compiled()`; what is asked for again is not looked for in the compiler's folders: it lists a whole one, so there
-    are 16."""
+    """`compiled()`; what is asked for again is not looked for. The compiler lists a folder to find a form: so there are
+    16 of them."""
     compiler = jit.ffcx_jit
 
     def once(comm: Any, what: Any, jit_options: dict[str, Any], **more: Any) -> Any:
