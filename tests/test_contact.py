@@ -1,11 +1,14 @@
 """Contact: laws against differences, balances, closed forms of stick and of sliding, independence of the step."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 import formingx as fx
+from formingx.discrete.contact.held import FREE, STICKS, Near, Points
 from formingx.discrete.contact.increment import Increment
 from formingx.discrete.contact.sequence import Foretold
 from formingx.discrete.problem import Problem
@@ -407,7 +410,7 @@ def test_nodes_foretold_one_after_the_other():
     single = form(cup("stick", (30, 1), nodes_per_step=1), 30.0)
     inside = many.profile().reference_radius < 9.7
     off = np.abs(many.profile().thickness / one.profile().thickness - 1)[inside]
-    assert off[0] < 5e-3 and off[1:].max() < 1.5e-3            # the first touches where the sheet is all but flat
+    assert off.max() < 6e-4             # 3.7e-3 where one may slide by 1e-2 of its length of face before it sticks
     assert 3 * many.counts.steps < 1.2 * single.counts.steps and many.counts.failures < 0.1 * single.counts.steps
 
 
@@ -470,6 +473,23 @@ def test_what_slides_is_held_in_the_sequence_as_in_the_tangent():
                 assert change < 1e-3 * np.abs(speed).max()
                 sliding += 1
     assert sliding > 3
+
+
+@pytest.mark.parametrize("before, force, moves, after, rate", [
+    (1, (1.0, 0.3), (0.0, 1.0), 1, (0.0, 0.0)),             # slides on
+    (1, (1.0, 0.3), (0.0, -1.0), STICKS, (0.0, -1.0)),      # turns back
+    (STICKS, (1.0, 0.3), (0.0, 1.0), 1, (0.0, 0.0)),        # is at the limit of friction
+    (STICKS, (1.0, 0.3), (0.0, -1.0), STICKS, (0.0, -1.0)),
+    (STICKS, (0.0, 0.0), (-1.0, 0.0), FREE, (0.0, 0.0))])   # goes away
+def test_a_point_sticks_slides_or_lets_go(before, force, moves, after, rate):
+    """One of unit compliance, mu = 0.3; (normal, tangential)."""
+    face = SimpleNamespace(comm=MPI.COMM_SELF, points=np.zeros((1, 2)))
+    points = Points([face], 0, 0, None)
+    points._C, points._S, points._pulls = np.eye(2), np.zeros((1, 2, 2)), np.zeros(1, dtype=bool)
+    points.friction, points.elastic_slip = np.array([0.3]), np.zeros(1)
+    near = Near(np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]]), np.zeros(1), np.zeros(1))
+    found = points.rates(np.array([moves]), np.array([before]), near, np.array([force]))
+    assert found is not None and found[2] == [after] and found[0][0] == pytest.approx(rate)
 
 
 def _residual(problem, x, control, F):
