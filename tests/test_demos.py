@@ -320,6 +320,8 @@ def test_compression_extreme(tmp_path):
     assert fine["least_J"] > 0.4 and fine["remeshes"] >= 2
     assert max(map(abs, fine["jumps"]["force"])) < 3e-3 and max(map(abs, fine["jumps"]["energy"])) < 4e-3
     assert all(375e3 < one["force_N"]["8"] < 391e3 for one in (fine, coarse))
+    for name, by in (("5.23", 0.015), ("6.5", 0.02), ("8", 0.04)):
+        assert fine["force_N"][name] == pytest.approx(coarse["force_N"][name], rel=by)
 
 
 @pytest.mark.slow
