@@ -304,8 +304,9 @@ def _sharp_edges(body: Body) -> Found:
             turn = np.degrees((b.angles[0] - a.angles[1] + np.pi) % (2 * np.pi) - np.pi)
             if turn > _SHARP:                                # the solid is to the left: convex
                 yield repr(contact), (f"its edge at (R, Z) = ({a.ends[1][0]:.4g}, {a.ends[1][1]:.4g}) is sharp: forces"
-                                      f" there scatter by 1 %, by where nodes lie, and smaller elements make that no"
-                                      f" better: give it a fillet that some elements along the sheet follow")
+                                      f" there are off by 1 to 3 %, by where nodes lie, and more elements through the"
+                                      f" thickness alone ({rows:.2g} here) make that no better: give it a fillet that"
+                                      f" some elements along the sheet follow")
                 break
 
 

@@ -62,9 +62,8 @@ class Approach:
         points = face.comm.allreduce(len(face.rule.points))
         share = max(points // 100, 1) if face.contact.lagged else 1
         self.at_once = (given or 1) * share * (1 if face.law.remembers or conducts else 10)
-        slides = face.law.has_friction and not face.contact.sticks
-        one_by_one = given or slides or face.contact.lagged
-        self.foretold = self.at_once if one_by_one else max(self.at_once, round(LIMITS.share * points))
+        foretells = face.contact.sticks and not given and not face.contact.lagged      # where it sticks depends on it
+        self.foretold = max(self.at_once, round(LIMITS.share * points)) if foretells else self.at_once
         self._foreseen = 0                                  # points that the step is going to bring, all ranks
 
     def touches(self, fields: np.ndarray, control: float) -> bool:
