@@ -177,7 +177,7 @@ class Path(States):
         """
         self._section_only("formed", "use to_stl, or shell_model")
         from .formed import formed
-        return formed(self.segment(state or self.last).problem, state or self.last, size)
+        return formed(self.segment(state).problem, state or self.last, size)
 
     def column_factors(self, share: float | None, error: float | None) -> np.ndarray:
         """Wanted over present length of the mesh's columns, shape (n,), by which `formingx.mesh.adapted` goes."""

@@ -323,9 +323,9 @@ class States:
         with segment.problem.at(state) as problem:
             return {name: bound.value(problem.x, state.control) for name, bound in columns.items()}
 
-    def segment(self, state: State) -> Segment:
-        """The segment that a state is of, or lies in."""
-        mesh = state.setting.get("mesh", 0)
+    def segment(self, state: State | None = None) -> Segment:
+        """The segment that a state (None: the last) is of, or lies in."""
+        mesh = (state or self.last).setting.get("mesh", 0)
         return next((s for s in self.segments if s.states and s.states[0].setting.get("mesh", 0) == mesh),
                     self.segments[-1])
 
