@@ -93,7 +93,7 @@ def check(who: str, scene: Any, remesh: Any, targets: Sequence[Target]) -> None:
     instance(f"{who}: remesh", remesh, Remesh, "a formingx.Remesh")
     why = ""
     if scene.mesh.comm.size > 1:
-        why = "several ranks: gmsh makes a mesh on one: run without mpirun"
+        why = "several ranks (gmsh makes a mesh on one): run without mpirun"
     elif not scene.model.solid:
         why = "a membrane"
     elif scene.kinematics.components > 2:
@@ -102,7 +102,7 @@ def check(who: str, scene: Any, remesh: Any, targets: Sequence[Target]) -> None:
         why = "several layers"
     elif any(isinstance(constant, OfMesh) for material in scene.materials.values()
              for constant in material.constants().values()):
-        why = "a constant that is given on the mesh: give a function of (R, Z)"
+        why = "a constant that is a Function on the mesh: give a function of (R, Z)"
     elif scene.expansion:
         why = "thermal expansion"
     elif any(type(support).stored_energy is not Support.stored_energy or any(
@@ -113,11 +113,11 @@ def check(who: str, scene: Any, remesh: Any, targets: Sequence[Target]) -> None:
     elif any(type(contact).law is not Contact.law for contact in scene.contacts):
         why = "a law of contact of one's own"
     if why:
-        raise InputError(f"{who}: remesh: is not known with {why}")
+        raise InputError(f"{who}: remesh: is not available with {why}")
     for target in targets:
         if not target.name.endswith(("travel", "pressure", "process_time")):
-            raise InputError(f"{who}: remesh: target {target}: must be a travel, a pressure or a process_time: what"
-                             f" jumps as a mesh is made again may jump over it")
+            raise InputError(f"{who}: remesh: target {target}: must be a travel, a pressure or a process_time: other"
+                             f" measures change a little at each remeshing, and may jump over their target")
 
 
 def follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[], None],
@@ -202,7 +202,8 @@ def _best(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, S
         if found[-1][0] > _GOOD:
             break
     if not found:
-        raise ConvergenceError(f"no state was found on a new mesh, of {len(_SHARES)} that were tried: {why}")
+        raise ConvergenceError(f"remesh: no equilibrium was found on a new mesh ({len(_SHARES)} sizes were tried):"
+                               f" {why}")
     _, segment, start = max(found, key=lambda one: one[0])
     return segment, start
 
@@ -295,8 +296,8 @@ def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> 
         problem.enter(still, x, 0.0)
         Run(record, [(target, Amplitude(problem, None))]).follow(200, False, curve.resume(x, 0.0))
     except (ConvergenceError, Failure) as error:
-        raise ConvergenceError(f"no state was found on a new mesh: {error}; give Remesh another size, or a range of"
-                               f" volume_ratio nearer to 1") from None
+        raise ConvergenceError(f"remesh: no equilibrium was found on a new mesh: {error}; give Remesh another size, or"
+                               f" a range of volume_ratio nearer to 1") from None
     problem.enter(first, record.last.x, control)
     problem.clock += time - problem.time_at(control)         # of a flow it is no part of the setting
     return record.last.x

@@ -95,7 +95,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     if remesh is not None:
         remeshing.check("trace", scene, remesh, [*through, until])
         if pilot is not False or stop_at is not None:
-            raise InputError("trace: remesh: with pilot or stop_at: is not known; leave them out")
+            raise InputError("trace: remesh: cannot be combined with pilot or stop_at")
     if pilot is not False:
         return _after_pilot("trace", pilot, start, resume, scene, checkpoint, lambda scene, checkpoint: trace(
             scene, until=until, through=through, step=step, tolerances=tolerances, max_steps=max_steps,
@@ -237,7 +237,7 @@ class Process:
         if remesh is not None:
             remeshing.check("Process", self.scene, remesh, [t for s in stages for t in (*s.through, s.until) if t])
             if pilot is not False:
-                raise InputError("Process: remesh: with pilot: is not known; leave it out")
+                raise InputError("Process: remesh: cannot be combined with pilot")
         if pilot is not False:
             return _after_pilot("Process", pilot, start, resume, self.scene, checkpoint, lambda scene, checkpoint:
                                 Process(scene).run(stages, step=step, tolerances=tolerances, max_steps=max_steps,
@@ -314,8 +314,8 @@ def _after_pilot(who: str, pilot: Any, start: Any, resume: bool, scene: Scene, c
                  run: Callable[[Scene, Any], Path]) -> Path:
     """The path of a run on the mesh that a first run asks for."""
     if start is not None or resume:
-        raise InputError(f"{who}: pilot={pilot!r}: the run begins at rest; with start or resume it goes on with the"
-                         f" mesh that it has: give one of them")
+        raise InputError(f"{who}: pilot={pilot!r}: a pilot run begins at rest and makes the mesh; with start or resume"
+                         f" a run goes on with the mesh that it has: give only one of them")
     if pilot is not True and not isinstance(pilot, Mapping):
         raise InputError(f"{who}: pilot = {pilot!r}: must be True, False or arguments of mesh.adapted, such as"
                          f" {{'error': 0.02}}")
@@ -330,7 +330,8 @@ def _after_pilot(who: str, pilot: Any, start: Any, resume: bool, scene: Scene, c
         if error.path is None or len(error.path) < 3:
             raise
         first = error.path
-        log.warning("the pilot run ended early, at %s; the mesh is made by what it has", first.describe(first.last))
+        log.warning("the pilot run ended early, at %s; the mesh is adapted to what it has"
+                    " computed", first.describe(first.last))
     made = adapted(first, **options)
     log.info("pilot run: %d states on %d elements; adapted: %d", len(first), *(
         mesh.domain.topology.index_map(2).size_global for mesh in (scene.mesh, made)))
@@ -343,11 +344,12 @@ def _check_start(state: State, stages: list[Stage], problem: Problem) -> None:
     """An InputError unless a process of these stages can go on from the state."""
     number = state.setting.get("stage", -1)
     if len(state.x) != problem.x.getLocalSize() or not 0 <= number < len(stages):
-        raise InputError("Process: start: must be of this process: its last state is of another scene or stage")
+        raise InputError("Process: start: must be a path of this process: its last state belongs to another scene or"
+                         " stage")
     if stages[number].name != state.stage:
         raise InputError(f"Process: start: its last state is of stage {state.stage!r}, number {number + 1}, but"
-                         f" stage {number + 1} is {stages[number].name!r} now: give the stages of the whole"
-                         f" process, those that are done too")
+                         f" stage {number + 1} is {stages[number].name!r} now: give all stages of the"
+                         f" process, also those that are done")
 
 
 def _path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measure] | None, beyond: bool,

@@ -91,7 +91,7 @@ class TopLoad:
         return float(np.trapezoid(F, x))
 
     def __str__(self) -> str:
-        what = "" if self.peak else ", and it may grow further"
+        what = "" if self.peak else " (the last state: it may grow further)"
         lines = ["top load, elastic:",
                  f"  axisymmetric path: largest force {self.largest_force:.5g} at travel {self.at_travel:.4g}{what}"]
         for n in self.stability.numbers:

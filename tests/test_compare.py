@@ -102,7 +102,7 @@ def test_units(tmp_path):
     for units in ({"pressure": "kg/cm2", "pole_height": "cm"}, {"pressure": 0.070306957964, "pole_height": 2.54}):
         found = fx.compare(ours, tmp_path / "theirs.csv", columns=names, units=units)
         assert max(d.maximum for d in found.differences.values()) < 1e-6
-    with pytest.raises(fx.InputError, match=r"column 'p' is in 'psi': say what to make of it"):
+    with pytest.raises(fx.InputError, match=r"column 'p' is in 'psi': give units="):
         fx.compare(ours, tmp_path / "theirs.csv", columns=names)
     with pytest.raises(fx.InputError, match="'psi' cannot be turned into 'cm'"):
         fx.compare(ours, tmp_path / "theirs.csv", columns=names, units={"pressure": "cm", "pole_height": "cm"})

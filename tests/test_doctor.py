@@ -94,7 +94,7 @@ MM = fx.Units(length="mm", stress="MPa")
     ({"pressure": 0.09e6}, "pressure = 90000: it is 1.1e.05 times shear modulus = 0.8 MPa"),
     ({"moves": (0, -1)}, r"moves away from the body: over a travel of 22 mm .* from 0 mm .*moves = \(0, 1\)"),
     ({"mould": fx.tools.Tool([(28.0, 31.2), (28.0, 1.2), (80.0, 1.2)], [0.0, 3.0, 0.0])},
-     r"does not close: from \(R, Z\) = \(0, 1.2\).* pressure = 0.09 is more than the 0.04405 MPa"),
+     r"is open: straight ahead of \(R, Z\) = \(0, 1.2\).* pressure = 0.09 is more than the 0.04405 MPa"),
 ])
 def test_what_engineers_mistake(given, words):
     """In the pot of the README, in which nothing else is found."""
@@ -179,8 +179,8 @@ def test_rows_of_elements_under_a_sharp_edge():
     (lambda: formed((20, 1), fx.tools.cup(fillet=0.02, **CUP)), [], "warning",
      "fillet of radius 0.02 .* is 0.0314 long, 0.5 elements .* use 80 or more"),
     (lambda: formed(penalty=1.0), [], "warning", "6.6 % of the thickness into the tool"),
-    (lambda: formed(penalty=1e12), [], "warning", "of 16 digits"),
-    (lambda: formed(ramp=0.2), [], "warning", "20 % of the thickness before it"),
+    (lambda: formed(penalty=1e12), [], "warning", "round-off"),
+    (lambda: formed(ramp=0.2), [], "warning", "at a gap of 20 % of the thickness"),
     (lambda: formed(penalty=2e3), [fx.pressure(120.0)], "warning", "the target pressure"),
     (lambda: formed(), [fx.pressure(3e3)], "warning", "7.5e.02 times shear modulus .*units of stress"),
     (lambda: formed(tool=fx.tools.cup(radius=1250.0, depth=400.0, mouth=82.0, fillet=100.0)), [], "warning",

@@ -514,7 +514,7 @@ def test_a_verdict_is_named(inflated):
     record = report.of_path(inflated)
     record.verdicts = ["the body folds" if k > 3 else "" for k in range(len(inflated))]
     (bad, text), = record.findings()
-    assert bad == "serious" and "From state 4 on" in text and "not to be used: the body folds" in text
+    assert bad == "serious" and "From state 4 on" in text and "must not be used: the body folds" in text
 
 
 def test_command_line(inflated, tmp_path, capsys):

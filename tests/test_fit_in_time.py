@@ -104,8 +104,8 @@ def test_result_is_admissible():
     (fx.Viscoelastic, {"uniaxial": (L, L)}, "needs the time"),
     (fx.Viscoelastic, [(L, L)], "number 1 is .*must be a TimedTest"),
     (fx.Viscoelastic, [fx.TimedTest("uniaxial", [0, 1], [1, 2], [0])], "stress has the shape"),
-    (fx.Viscoelastic, [fx.TimedTest("uniaxial", [0, 0], [1, 2], [0, 1])], "no test takes time"),
-    (fx.Viscoelastic, [fx.TimedTest("uniaxial", [0, 1], [1, 2], [0, 0])], "no stress was measured"),
+    (fx.Viscoelastic, [fx.TimedTest("uniaxial", [0, 0], [1, 2], [0, 1])], "no test lasts any time"),
+    (fx.Viscoelastic, [fx.TimedTest("uniaxial", [0, 1], [1, 2], [0, 0])], "no stress is given"),
     (fx.Viscoelastic, [fx.TimedTest("uniaxial", [0, 1], [1, 2], [0, 1])], "2 points cannot fix the 3 constants"),
     (fx.Viscoelastic, [fx.TimedTest("shear", [0, 1], [1, 2], [0, 1])], "'shear' is not known"),
 ])

@@ -72,7 +72,7 @@ def test_a_balloon_snaps_to_the_state_of_the_same_pressure(balloon):
 def test_a_target_that_a_balloon_snaps_past_is_named(balloon):
     """No state of the path has it, and the run does not go on without end."""
     scene = balloon[0].scene()
-    with pytest.raises(fx.ConvergenceError, match=r"the body snaps past it, from 1\.\d+ to \d+\.") as caught:
+    with pytest.raises(fx.ConvergenceError, match=r"the body snaps past the target, from 1\.\d+ to \d+\.") as caught:
         fx.trace(scene, until=fx.pole_stretch(2.5), at_fold="jump")
     assert caught.value.path.last.kind == "jump"
 
@@ -239,7 +239,7 @@ def test_a_body_at_rest_where_no_state_is_found_is_not_moved_on():
                      loads=[fx.Pressure("bottom", name="air")], contacts=[plug],
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
     rows = [(0.0, 0.0), (0.1, 0.02), (0.93557094, 0.95713907)]
-    with pytest.raises(fx.ConvergenceError, match="another branch starts there") as error:
+    with pytest.raises(fx.ConvergenceError, match="another path branches off there") as error:
         fx.Process(scene).run([fx.Stage("on", follow={"air": rows, "plug": rows})], progress=False)
     assert error.value.path.counts.iterations < 9000        # 11600 with 400 solutions of a body that stands still
 

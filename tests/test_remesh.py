@@ -177,7 +177,7 @@ def test_what_is_not_carried_is_refused():
     of("separates=False", contacts=[fx.Contact("top", fx.tools.plane(1.0), "stick", moves=(0, -1), separates=False)])
     of("a support at a node", supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0)])
     mesh = block("none").mesh
-    of("given on the mesh", mesh=mesh, materials=fx.NeoHookean(c10=1 + ufl.SpatialCoordinate(mesh.domain)[0]))
+    of("Function on the mesh", mesh=mesh, materials=fx.NeoHookean(c10=1 + ufl.SpatialCoordinate(mesh.domain)[0]))
     of("thermal expansion", temperature=20.0, expansion=fx.ThermalExpansion(linear=1e-4, stress_free=20.0))
     with pytest.raises(fx.InputError, match="a law of contact of one's own"):
         class Own(fx.Contact):
@@ -230,9 +230,9 @@ def test_results_go_on_from_mesh_to_mesh(tmp_path):
     path.to_xdmf(tmp_path / "first.xdmf", path.segments[0].states)
     with pytest.raises(fx.InputError, match="a file holds one mesh"):
         path.to_xdmf(tmp_path / "all.xdmf", "all")
-    with pytest.raises(fx.InputError, match="filling: is not known of a run that made its mesh again"):
+    with pytest.raises(fx.InputError, match="filling: is not available for a remeshed run"):
         path.filling()
-    with pytest.raises(fx.InputError, match="trim: is not known of a run that made its mesh again"):
+    with pytest.raises(fx.InputError, match="trim: is not available for a remeshed run"):
         path.released(trim=0.5)
     virial = [axial_stress(path, state) / state.measures["tool_force"] / (1 - state.measures["travel"])
               for state in (before, after)]

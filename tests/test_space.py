@@ -491,12 +491,12 @@ def test_views_are_written(tmp_path):
 
 
 def test_a_run_that_ends_early_says_why():
-    with pytest.raises(fx.ConvergenceError, match="max_steps = 3 ran out") as failure:
+    with pytest.raises(fx.ConvergenceError, match="max_steps = 3 were used up") as failure:
         fx.trace(trough(), until=fx.pressure(1.0), max_steps=3, progress=False)
     assert len(failure.value.path) == 4
     loose = fx.Scene(mesh=disc().mesh, thickness=0.01, materials=MATERIALS[0], supports=HELD[:1],
                      loads=[fx.Gravity(density=1e-3)])
-    with pytest.raises(fx.ConvergenceError, match="Forces left over.* displacement"):
+    with pytest.raises(fx.ConvergenceError, match="Out-of-balance forces.* displacement"):
         fx.solve(loose, to=1.0, increments=2)
 
 

@@ -309,7 +309,7 @@ def test_imperfections_knock_down(caplog):
     """A tube that bulges from the start bears less, by the power 2/3 of its imperfection (Koiter, 1945)."""
     mesh = fx.mesh.disc(radius=1.0, inner_radius=0.8, thickness=np.pi, elements=(2, 10))
     path = inflate(mesh, 2.02)
-    said = [record.getMessage() for record in caplog.records if "another path begins" in record.getMessage()]
+    said = [record.getMessage() for record in caplog.records if "another path branches off" in record.getMessage()]
     caplog.clear()
     loss = path.stability([0]).first
     (before, behind), = path.branch_points

@@ -61,7 +61,7 @@ def test_open_and_report_say_it_too(tmp_path):
     fx.trace(foot(), until=fx.travel(-0.85), progress=False, beyond=True, checkpoint=tmp_path / "run")
     for found in (record.of_checkpoint(*checkpoint.contents(tmp_path / "run")),
                   record.of_path(fx.load(tmp_path / "run", foot()))):
-        assert any("the run is not to be used:" in text and "inside out" in text for text in found.warnings())
+        assert any("the results must not be used:" in text and "inside out" in text for text in found.warnings())
 
 
 @pytest.mark.parametrize("height, gap", [(1.0, 0.05), (2.0, 0.07)])

@@ -99,12 +99,12 @@ class _Data:
         measured = [np.isfinite(t.stress) for t in self.tests]
         self.stress = np.concatenate([t.stress[m] for t, m in zip(self.tests, measured)])
         if not len(self.stress) or not np.any(self.stress):
-            raise InputError("fit: data: no stress was measured, or all are 0")
+            raise InputError("fit: data: no stress is given, or all are 0")
         self.scale = np.abs(self.stress).max()
         steps = np.concatenate([np.diff(t.times) for t in self.tests])
         longest = max(t.times[-1] - t.times[0] for t in self.tests)
         if not longest > 0:
-            raise InputError("fit: data: no test takes time")
+            raise InputError("fit: data: no test lasts any time: the times of each are all the same")
         low, high = np.log(steps[steps > 0].min() / 10), np.log(10 * longest)
         self.log_tau = np.linspace(low, high, 2 + int(_PER_DECADE * (high - low) / np.log(10)))
         self._stretches = np.hstack([homogeneous.along(t.mode, t.stretches[m]) for t, m in zip(self.tests, measured)])

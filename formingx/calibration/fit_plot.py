@@ -16,8 +16,8 @@ def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -
         axes = figure(count)[1]
     panels = np.ravel(axes)
     if len(panels) != count:
-        raise InputError(f"Fit.plot: axes: {len(panels)} given: these tests need {count}, one for tests that are held,"
-                         f" one for the others")
+        raise InputError(f"Fit.plot: axes: {len(panels)} given: these tests need {count}, one for relaxation tests"
+                         f" (held stretch), one for the others")
     if isinstance(data, dict):
         _stretched(material, data, panels[0])
     else:

@@ -89,7 +89,7 @@ class Answer:
                  f"{'volume':24}{self.before.volume:12.5g}{self.best.volume:12.5g}"]
         p = self.best.parameters
         lines += [f"{name:24}{x:12.5g}{y:12.5g}" for name, x, y in zip(p.names, self.before.vector, self.best.vector)]
-        lines += [f"the wall was foretold to {100 * off:.2g} % by the run before"]
+        lines += [f"the run before predicted the wall to {100 * off:.2g} %"]
         lines += [f"bounds: {', '.join(met)}" for met in [self.at_bounds()] if met]
         lines += [f"no effect: {', '.join(none)}" for none in [self.without_effect()] if none]
         lines += [f"the best run: {text}" for kind, text in self.best.path.doubts() if kind == "serious"]

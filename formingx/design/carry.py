@@ -40,11 +40,11 @@ def carry(path: Path, end: Any, neighbours: Sequence[Neighbour]) -> None:
 class _Carrier:
     def __init__(self, path: Path, end: Any, neighbours: Sequence[Neighbour]):
         if len(path.segments) > 1:
-            raise Failure("it changed its mesh on the way", [])
+            raise Failure("the body was remeshed", [])
         if path.ended:
             raise Failure(path.ended, [])
         if any(face.contact.lagged for face in path.problem.contacts):
-            raise Failure("contact in space is not carried along", [])
+            raise Failure("there is no derivative of contact in space yet", [])
         self.path, self.neighbours = path, neighbours
         self.problem, self.curve = path.problem, path.record.curve
         self._single = isinstance(end, Target)
@@ -54,7 +54,7 @@ class _Carrier:
         for one in neighbours:
             one.plans = [] if self._single else [plan(one.problem.scene, stage) for stage in one.end]
             if [_kind(p) for p in one.plans] != [_kind(p) for p in self._plans]:
-                raise Failure(f"{one.name} changes what its stages do", [])
+                raise Failure(f"parameter {one.name} changes what the stages drive or how they end", [])
 
     def run(self) -> None:
         """From the first state to the last."""
@@ -62,9 +62,11 @@ class _Carrier:
         history = self.problem.has_history
         if history and any(state.kind == "jump" for state in states):
             jump = next(state for state in states if state.kind == "jump")
-            raise Failure(f"its derivative ends where the body snaps, at {self.path.describe(jump)}", [])
+            raise Failure(f"the body snaps at {self.path.describe(jump)}, where the result does not depend smoothly on"
+                          " parameters", [])
         if history and any(p.in_flow for p in self._plans):
-            raise Failure("a flow is not carried along where something has a history", [])
+            raise Failure("there is none yet for a stage that follows or holds a measure (follow={measure: ...},"
+                          " hold=...) in a scene with friction, relaxation or heat", [])
         before: State | None = None
         for k, state in enumerate(states):
             last = k == len(states) - 1 or states[k + 1].setting != state.setting
@@ -83,7 +85,7 @@ class _Carrier:
                 self._put_on_tools(state)
             before = state
         if states[-1].met is None:
-            raise Failure("it did not end at its target", [])
+            raise Failure("it did not reach its target", [])
 
     def _begin(self, state: State) -> None:
         """The first state: the body at rest, or in equilibrium with what acts on it."""
@@ -213,7 +215,7 @@ class _Carrier:
             return fixed(state.control), [fixed((one.then - one.problem.setting.base[-1])
                                                 / one.problem.setting.rate[-1]) for one in self.neighbours]
         if p is not None and p.in_flow:
-            raise Failure("a flow is not carried along", [])
+            raise Failure("there is none yet for a stage that follows or holds a measure", [])
         if key not in self._until:
             targets = [(self.problem, self._end if p is None else p.stage.until),
                        *((one.problem, one.end if p is None else one.plans[setting.stage].stage.until)
@@ -222,7 +224,7 @@ class _Carrier:
             self._until[key] = mine, others
         target = self._end if p is None else p.stage.until
         if state.met is None or state.met[:2] != target[:2]:
-            raise Failure(f"it did not come to {target}", [])
+            raise Failure(f"it did not reach its target {target}", [])
         return self._until[key]
 
     def _gaps(self) -> tuple[Any, list[Any]]:

@@ -157,7 +157,7 @@ class Design:
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
         best, taken, foretold, before = first, [first], first.wall, 1.0
         notes: list[str] = []
-        why = f"{most} runs were taken"
+        why = f"runs = {most} were used up"
         while len(taken) + len(notes) < most:
             try:
                 left, by = aim.residual(best)
@@ -219,7 +219,7 @@ class Design:
         first = self._run(self.parameters.start.copy())
         inside = _inside(first, within)
         unit = min(least, first.wall[inside].min())
-        best, taken, foretold, reach, why = first, [first], first.wall, 0.25, f"{most} runs were taken"
+        best, taken, foretold, reach, why = first, [first], first.wall, 0.25, f"runs = {most} were used up"
         notes: list[str] = []
 
         def cost(run: DesignRun) -> float:

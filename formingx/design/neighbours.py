@@ -63,11 +63,11 @@ class Neighbour:
         self.path: Any = None
         mine, its = (s.mesh.domain.geometry.dofmap for s in (scene, base.scene))
         if mine.shape != its.shape or not np.array_equal(mine, its) or len(scene.things) != len(base.scene.things):
-            raise InputError(f"Design: {name} changes the elements of the mesh, or how many things there are: only what"
-                             f" moves nodes or changes numbers has a derivative")
+            raise InputError(f"Design: {name} changes the elements of the mesh, or the number of loads, supports or"
+                             f" contacts: there are derivatives only by what moves nodes or changes numbers")
         self.problem = Problem(scene)
         if self.problem.x.getSize() != base.x.getSize():
-            raise InputError(f"Design: {name} changes the number of unknowns: that has no derivative")
+            raise InputError(f"Design: {name} changes the number of unknowns: there is no derivative by that")
         self.F, self.gradient = self.problem.x.duplicate(), self.problem.x.duplicate()
         self.x: Any = None                                   # own part, shape (n,)
         self.control, self.memory = 0.0, self.problem.memory
@@ -137,7 +137,7 @@ def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: 
     g = newton.gradient.array_r.copy()
     slope = problem.comm.allreduce(float(g @ b)) + by_control
     if not abs(slope) > 1e-300:
-        raise Failure("what ends the run does not change along its path there", [])
+        raise Failure("the quantity of the target does not change along the path at its end", [])
     problem.x.array_w[:] = state.x
     problem.residual(problem.x, state.control, newton.F)
     left_over = newton.F.array_r.copy()                      # round-off, and the forces of points that are left out

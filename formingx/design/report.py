@@ -30,7 +30,7 @@ def of_answer(answer: Any, file: Any, title: str, deviations: Mapping[str, float
     said += [("", f"At bounds: {', '.join(met)}.")] * bool(met)
     said += [("", f"Without effect on the wall: {', '.join(none)}.")] * bool(none)
     how = [f"Why it ended: {answer.why}.",
-           f"The run before the best foretold its wall to {100 * off:.2g} %.",
+           f"The run before the best predicted its wall to {100 * off:.2g} %.",
            f"By the derivatives of the best run, these parameters could bring the unevenness to {attainable:.3g},"
            f" whatever the volume; it is {b:.3g}."]
     rows = [[str(k), *(page.number(v) for v in (one.wall[answer.inside].std() / one.wall[answer.inside].mean(),
@@ -114,7 +114,7 @@ def _walls(answer: Any, spread: Any, deviations: Any) -> str:
     drawing, axes = figure(1, width=9, height=4)
     s = answer.best.profile.reference_length
     axes.plot(s, answer.before.wall, color="0.6", label="before")
-    axes.plot(s, answer.foretold, "--", color="C1", linewidth=1, label="foretold by the run before the best")
+    axes.plot(s, answer.foretold, "--", color="C1", linewidth=1, label="predicted by the run before the best")
     if not np.all(answer.inside):
         axes.axvspan(*s[answer.inside][[0, -1]], color="0.96", zorder=0, label="what counts")
     _line(axes, answer.best, "C0", "after", spread, deviations)
@@ -145,7 +145,7 @@ def _heat_map(effects: Any) -> str:
     drawing, axes = figure(1, width=9, height=float(np.clip(1.6 + 0.28 * len(effects.names), 2.6, 9)))
     effects.plot(axes)
     return "<h2>What changes the wall, and where</h2>" + page.figure(
-        drawing, "Change of the wall that the derivatives foretell, where a parameter goes over a tenth of its range.")
+        drawing, "Change of the wall that the derivatives predict where a parameter changes by a tenth of its range.")
 
 
 def _effects(run: Any, effects: Any, before: Any = None) -> str:

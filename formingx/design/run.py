@@ -131,8 +131,8 @@ class DesignRun:
         try:
             return Neighbour(*self._make(moved), self.path.problem, name)
         except InputError as error:
-            raise InputError(f"Design: no derivative by {name}: beside {self.vector[k]:.6g} it makes no scene:"
-                             f" {error}") from None
+            raise InputError(f"Design: no derivative by {name}: next to its value {self.vector[k]:.6g} build(...)"
+                             f" fails: {error}") from None
 
     def derivative(self, measure: Any) -> tuple[np.ndarray, np.ndarray]:
         """A measure of the last state, shape (m,), and its derivatives by the parameters, shape (m, n).

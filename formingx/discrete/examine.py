@@ -83,7 +83,7 @@ class Examination:
             facts["failed_J"], facts["at_failed_J"], _ = _smallest_J(problem, failed)
         facts["residual"], facts["worst"], point = _residuals(problem, x, attempt.control)
         if self._last is not None and self._shape:
-            self._marks.append(("largest force left over", _moved(problem, self._last, point)))
+            self._marks.append(("largest out-of-balance force", _moved(problem, self._last, point)))
         facts["flipped"] = _flips(problem, attempt)
 
     def draw(self, file: Any, title: str) -> None:

@@ -234,8 +234,9 @@ class Formulation(ABC):
             return _compat.compile_form(form)
         except TimeoutError as error:
             raise TimeoutError(
-                f"a form is being compiled by another process for more than {_compat.JIT_OPTIONS['timeout']} s, or a"
-                f" compilation was killed: if no other run is going on, remove the folder .cache/fenics") from error
+                f"waited {_compat.JIT_OPTIONS['timeout']} s for another process to compile a form; a compilation that"
+                " was killed leaves such a wait behind: if no other run is going on, remove the folder"
+                " .cache/fenics") from error
 
     def integral(self, form: Any) -> float:
         """The value of a UFL integral over all ranks, compiled for this one use."""

@@ -84,6 +84,6 @@ class LoadedBody:
         vector.scatter_reverse(la.InsertMode.add)
         total = self._forms.comm.allreduce(float(np.abs(vector.array[:index_map.size_local]).sum()))
         if not 0 < total < np.inf:
-            raise InputError(f"{load!r}: the sum of its forces at rest is {total:g} per unit: give it a"
-                             f" unit(body) of its own")
+            raise InputError(f"{load!r}: a load of value 1 on the undeformed body has forces that add up to {total:g},"
+                             f" so its size cannot be scaled: give it a method unit(body)")
         return self.stress * self.volume / total

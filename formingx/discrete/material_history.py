@@ -107,7 +107,7 @@ class MaterialHistory:
             found[name] = np.tile(rest, (len(numbers), q, 1))
         if set(found) != set(self._sizes) or not np.array_equal(numbers[rows], self._numbers) \
                 or any(v.shape != (len(numbers), q, self._sizes[name]) for name, v in found.items()):
-            raise InputError(f"what {self._terms.material} remembers is of another mesh, or another material")
+            raise InputError(f"the history of {self._terms.material} belongs to another mesh, or to another material")
         return Memory(float(data["time"]), {name: found[name][rows] for name in self._sizes})
 
     def carry(self, source: MaterialHistory, memory: Memory, x: np.ndarray, control: float,

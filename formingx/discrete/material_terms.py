@@ -99,7 +99,7 @@ class MaterialTerms:
     def of_mesh(self, expression: Any) -> Any:
         """A UFL scalar of the scene's mesh, where the fields live on it."""
         if self.forms.domain is not self.forms.scene.mesh.domain:
-            raise InputError(f"{self.material}: a membrane has a mesh of its own: give the constant as a function of"
+            raise InputError(f"{self.material}: a membrane has its own mesh: give the constant as a function of"
                              f" (R, Z)")
         return expression
 

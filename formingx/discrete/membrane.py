@@ -45,8 +45,8 @@ class MidSurface(Formulation):
     @property
     def bodies(self) -> list[tuple[Any, list[str]]]:
         """Not there: raises an InputError."""
-        raise InputError("a membrane knows no stress through its thickness, nor between its layers: use a solid model,"
-                         " MixedPressure() for one")
+        raise InputError("a membrane has no stress through its thickness, nor between its layers: use a solid model,"
+                         " MixedPressure()")
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
         """(normal of the mid-surface away from the loaded face, the whole mid-surface)."""

@@ -209,7 +209,7 @@ class PastStates:
         if not np.array_equal(numbers[rows], self._numbers) or not found or any(
                 C.shape != shape or (felt.ndim > 0) != bool(self._aT) for felt, C in found) \
                 or ("least" in data) != self._law.irreversible:
-            raise InputError(f"what {self._terms.material} remembers is of another mesh, or another material")
+            raise InputError(f"the history of {self._terms.material} belongs to another mesh, or to another material")
 
         def own(values: np.ndarray) -> np.ndarray:
             return values[rows].transpose(1, 0, 2).reshape(values.shape[1], -1)

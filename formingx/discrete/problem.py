@@ -167,8 +167,8 @@ class Problem(Histories, Units):
                 contact.come_in(x, control)
                 depth = penetration(contact, x, control)
                 if depth > 1e-6 * self.forms.length:
-                    raise InputError(f"{contact.contact!r} comes in where the body is, which reaches {depth:.6g} into"
-                                     f" the tool")
+                    raise InputError(f"{contact.contact!r} takes part again where the body is, which reaches"
+                                     f" {depth:.6g} into the tool")
 
     @contextlib.contextmanager
     def at(self, state: Any) -> Iterator[Problem]:

@@ -61,12 +61,12 @@ class SecondVariation:
     def __init__(self, problem: Any):
         forms = problem.forms
         if forms.domain.geometry.dim == 3:
-            raise InputError("stability: is not there yet for a sheet in space")
+            raise InputError("stability: is not available yet for a sheet in space")
         if forms.domain.topology.dim != 2:
-            raise InputError("stability: a membrane has no bending stiffness: where its hoop is compressed it wrinkles"
-                             " in more and more waves; look at its stresses, or take a solid, MixedPressure()")
+            raise InputError("stability: a membrane has no bending stiffness: under hoop compression it wrinkles in"
+                             " ever shorter waves; look at its stresses, or use a solid model, MixedPressure()")
         for support, _ in forms.elastic_supports:
-            raise InputError(f"stability: {support!r} has an energy: how that changes with a mode is not known")
+            raise InputError(f"stability: is not available with an elastic support, {support!r}")
         self.problem, self.comm, self._forms = problem, problem.comm, forms
         self.space = forms.mode_space()
         self._axisymmetric = problem.scene.kinematics.axisymmetric

@@ -133,7 +133,7 @@ class StepLimit:
         """
         n, contacts = self._n, self._present
         if any([c.grew_too_much(old.x[:n], old.control, new.x[:n], new.control) for c in contacts]):
-            return Cut("too much came into contact in one step")
+            return Cut("too many points came into contact in one step")
         if self.passes_through(old, new):
             return Cut("a tool would pass through the face that it touches")
         if ends and length > LIMITS.shortest:

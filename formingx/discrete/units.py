@@ -26,9 +26,10 @@ class Units:
     @property
     def why_not_finite(self) -> str:
         """What makes a residual infinite or not a number in this scene."""
-        limits = {f"{m} came to its limit, I1 < {m.largest_I1:.6g}": None
+        limits = {f"{m} was stretched beyond its limit, I1 < {m.largest_I1:.6g}": None
                   for m in self.scene.materials.values() if m.largest_I1 < np.inf}
-        return ", or ".join(["an element turned inside out", *(limits or ["the material left its domain"])])
+        strained = limits or ["a material was strained beyond what its law allows"]
+        return ", or ".join(["an element turned inside out", *strained])
 
     def shown(self, control: float) -> tuple[str, float]:
         """What the control stands for, in words, and its value in the user's units."""

@@ -34,6 +34,6 @@ def springs_back(scene: Scene) -> Iterator[tuple[str, str]]:
                 continue
             if cold > _RISES * hot > 0:
                 yield f"layer {layer!r}", (
-                    f"{name}, of what is left when all has relaxed, is {cold / hot:.3g} times as large at {low:.4g}"
-                    f" degrees as at {high:.4g}: as it cools, a stretched body pulls back with so much more, as if it"
-                    f" had not set. What sets keeps its shape: see fx.Sets, docs/heat.md")
+                    f"{name}, of the relaxed material, is {cold / hot:.3g} times as large at {low:.4g} degrees as at"
+                    f" {high:.4g}: as the stretched part cools, it pulls back with that much more force, instead of"
+                    f" setting in its shape. For a material that sets see fx.Sets and docs/heat.md")

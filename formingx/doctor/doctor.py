@@ -50,7 +50,7 @@ def doctor(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Seque
         InputError: `scene` is not a Scene or a Path, a target not a target, a stage not a stage or of another scene.
 
     >>> print(fx.doctor(scene, targets=[fx.pole_height(12.0)]))
-    nothing was found that stands against this scene
+    no fault was found in this scene
     """
     if isinstance(scene, Path):
         of_run = list(_run(scene))
@@ -86,16 +86,16 @@ def _run(path: Path) -> Iterator[Finding]:
 
 def _driven(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
     if not scene.drivable:
-        yield Finding("warning", "loads", "nothing is driven: only a process that waits can run; give one load no"
-                                          " value, as Pressure('bottom'), or add a Displaced support")
+        yield Finding("warning", "loads", "nothing is driven: only a process of stages that wait can run; give one"
+                                          " load no value, as Pressure('bottom'), or add a Displaced support")
 
 
 def _edges(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
     """Edges of a sheet in space that nothing holds: a flat membrane has no stiffness across them."""
     if scene.kinematics.components == 3:
         for name in sorted({*scene.mesh.boundaries} - {"bottom", "top", *(support.on for support in scene.supports)}):
-            yield Finding("warning", f"boundary {name!r}", f"nothing holds this edge of the sheet: where a whole one"
-                          f" was cut (part='quarter'), it needs Symmetry({name!r}, {'y' if name == 'y0' else 'x'!r})")
+            yield Finding("warning", f"boundary {name!r}", f"nothing holds this edge of the sheet: a symmetry cut"
+                          f" (part='quarter') needs Symmetry({name!r}, {'y' if name == 'y0' else 'x'!r})")
 
 
 def _elements(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
@@ -129,16 +129,16 @@ def _layers(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
         span = np.ptp(sheet.corners[mine][:, :, 1], axis=1).max(initial=0.0)
         if depth > 0.2 * sheet.length and span > 0.99 * np.ptp(sheet.corners[mine][:, :, 1]):
             yield Finding("warning", f"layer {name!r}", f"it is {depth / sheet.length:.3g} of the body's length thick,"
-                                                        f" and one element spans it: use two or more through it")
+                                                        f" with one element through it: use two or more")
     hard, soft = (pick(sheet.moduli, key=sheet.moduli.__getitem__) for pick in (max, min))
     ratio = sheet.moduli[hard] / sheet.moduli[soft]
     depth, edge = sheet.area[sheet.layer == soft].sum() / sheet.length, sheet.edge[sheet.layer == soft].min()
     if 100 < ratio <= 1e5 and edge > _LONGEST * depth:
         yield Finding("warning", f"layer {soft!r}",
                       f"it is {ratio:.3g} times softer than {hard!r} and {depth:.3g} thick, its elements {edge:.3g}"
-                      f" long or more: its shear grows towards a rim within a few thicknesses, and its stretch jumps"
-                      f" by up to 70 % from element to element; use elements no longer than it is thick, at the rim at"
-                      f" least (concentrate)")
+                      f" long or more: near a rim its shear rises within a few thicknesses, and on such elements its"
+                      f" stretch jumps by up to 70 % from one to the next; use elements no longer than it is thick, at"
+                      f" least near the rim (concentrate)")
     if ratio > 1e5:
         yield Finding("warning", "materials", f"layer {hard!r} (shear modulus {sheet.moduli[hard]:.4g}) is {ratio:.2g}"
                                               f" times stiffer than {soft!r} ({sheet.moduli[soft]:.4g}): are the units"
@@ -186,11 +186,11 @@ def _contact_penalties(scene: Scene, sheet: Body, targets: Any) -> Iterator[Find
                           f" the face {100 * depth:.2g} % of the thickness into the tool: use"
                           f" {traction / (0.001 * stress):.1g} or more")
         if contact.penalty > 1e9:
-            yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g}: few of 16 digits are left"
-                          f" for the body; 2e5 is the default")
+            yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g}: so stiff that round-off"
+                          f" leaves few digits for the body; the default is 2e5")
         if contact.ramp > 0.05:
-            yield Finding("warning", repr(contact), f"ramp = {contact.ramp:g}: the face feels the tool already"
-                          f" {100 * contact.ramp:.3g} % of the thickness before it; the default is 1e-5 or less")
+            yield Finding("warning", repr(contact), f"ramp = {contact.ramp:g}: contact forces begin at a gap of"
+                          f" {100 * contact.ramp:.3g} % of the thickness; the default is 1e-5 or less")
 
 
 def _volume_penalty(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding]:
@@ -208,8 +208,8 @@ def _volume_penalty(scene: Scene, sheet: Body, targets: Any) -> Iterator[Finding
             yield Finding("warning", "DisplacementPenalty", f"points = 4 with eps = {model.eps:g}: the tangent becomes"
                           f" indefinite in bending at eps <= 1e-3: use points=3, or MixedPressure()")
         elif model.eps < 1e-4 or model.points == 7 and model.eps < 1e-3:
-            yield Finding("warning", "DisplacementPenalty", f"eps = {model.eps:g} with {model.points} points: the steps"
-                          f" become so short that runs do not end (1285 iterations at 1e-4 with three points): use"
+            yield Finding("warning", "DisplacementPenalty", f"eps = {model.eps:g} with {model.points} points: steps"
+                          f" become so short that runs hardly end (1285 iterations at 1e-4 with three points): use"
                           f" MixedPressure(), whose cost does not depend on eps")
 
 
@@ -246,4 +246,4 @@ def _targets(scene: Scene, sheet: Body, targets: Sequence[Target]) -> Iterator[F
             yield Finding("warning", str(target), f"that is {abs(target.value) / sheet.length:.3g} times the length of"
                                                   f" the body, {sheet.length:.4g}: are the units of length the same?")
         if target.name == "pole_stretch" and target.value < 1 and not scene.contacts:
-            yield Finding("warning", str(target), "a sheet starts at 1, and is stretched where it is inflated")
+            yield Finding("warning", str(target), "a sheet starts at 1, and its pole stretch grows as it is inflated")

@@ -31,6 +31,6 @@ class Report:
         return not self.findings
 
     def __str__(self) -> str:
-        return "\n".join(map(str, self.findings)) or "nothing was found that stands against this scene"
+        return "\n".join(map(str, self.findings)) or "no fault was found in this scene"
 
     __repr__ = __str__

@@ -16,10 +16,10 @@ def check(body: Any) -> Iterator[tuple[str, str]]:
         for about, stretch in _draws(body):
             if stretch > most:
                 yield f"materials[{name!r}]", (
-                    f"{about} draws it about {stretch:.3g}-fold in all directions, and a step of strain bears most at"
-                    f" {most:.3g}: drawn faster than it relaxes, it thins without end where it is thinnest. Draw less,"
-                    f" slower or hotter, or check the damping: fitted to shear or uniaxial data it is often too strong"
-                    f" in equibiaxial extension")
+                    f"{about} stretches it about {stretch:.3g}-fold in all directions, but stretched suddenly it"
+                    f" carries its largest stress at {most:.3g}: drawn faster than it relaxes, it thins without end at"
+                    " its thinnest place. Draw less deep, slower or hotter, or check the damping: one fitted to shear"
+                    f" or uniaxial data is often too strong in equibiaxial extension")
 
 
 def _draws(body: Any) -> Iterator[tuple[str, float]]:

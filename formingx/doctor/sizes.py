@@ -171,10 +171,11 @@ def _pressures(body: Body) -> Found:
                          f" nothing: are the units of stress the same (Pa, kPa, MPa)?")
         free = not body.scene.contacts and abs(value) > 1e3 * body.natural
         if free or abs(value) > _PRESSED * stiff:
-            size, what = (body.natural, "shear modulus x thickness / length") if free else (stiff, "shear modulus")
-            yield name, (f"it is {abs(value) / size:.2g} times {what} = {body.say(size, 'pressure')}: a sheet bears"
-                         f" about one of it, in a mould walls fill corners as small as they are thick at some ten: are"
-                         f" the units of stress the same (Pa, kPa, MPa)?")
+            size, what, enough = (stiff, "shear modulus", "some ten times that fill a corner as small as the wall")
+            if free:
+                size, what, enough = body.natural, "shear modulus x thickness / length", "a free sheet bears about that"
+            yield name, (f"it is {abs(value) / size:.2g} times {what} = {body.say(size, 'pressure')}: {enough}: are the"
+                         f" units of stress the same (Pa, kPa, MPa)?")
 
 
 def _bears(body: Body) -> Found:
@@ -185,8 +186,8 @@ def _bears(body: Body) -> Found:
         for name, value in body.pressures():
             if _BEYOND * peak.pressure < abs(value) <= 1e3 * body.natural:
                 yield name, (f"a free {'tube' if pushed.tall else 'sheet'} of {_names(body)} bears at most about"
-                             f" {body.say(peak.pressure, 'pressure')} (where it is stretched {peak.stretch:.3g}-fold):"
-                             f" no state has more. Aim at a pole height, a stretch or a volume, behind that pressure;"
+                             f" {body.say(peak.pressure, 'pressure')} (at a stretch of {peak.stretch:.3g}). Give a pole"
+                             f" height, a pole stretch or a volume as the target: these grow past that maximum;"
                              f" {_STIFFENS} bear more")
 
 
@@ -204,10 +205,11 @@ def _blow_ratio(body: Body) -> Found:
                                           f" {ratio:.3g}-fold in this mould: are the units of length the same (mm and"
                                           f" cm)?")
         elif (found := pushed.left(ratio)) is not None and found[0] < _LEFT:
-            yield "materials", (f"a tube of {_names(body)} bears most at a blow ratio of {found[1].stretch:.3g}"
-                                f" ({body.say(found[1].pressure, 'pressure')}), and {100 * found[0]:.0f} % of that on"
-                                f" the way to this mould's {ratio:.3g}: it bulges at one place, jumps, and may have no"
-                                f" state up to the mould; {_STIFFENS} not. Or a larger parison")
+            yield "materials", (f"a tube of {_names(body)} has its largest pressure,"
+                                f" {body.say(found[1].pressure, 'pressure')}, at a blow ratio of"
+                                f" {found[1].stretch:.3g}, and only {100 * found[0]:.0f} % of it on the way to this"
+                                f" mould's ratio of {ratio:.3g}: it bulges at one place, snaps, and may find no"
+                                f" equilibrium before the mould. Use a larger parison; {_STIFFENS} not bulge")
 
 
 def _closing(body: Body) -> Found:
@@ -227,10 +229,10 @@ def _closing(body: Body) -> Found:
         if aims or deep:
             why = f"{aims[0][0]} is more than the {body.say(peak.pressure, 'pressure')} that the sheet bears alone" \
                 if aims and peak else "a sheet bears little alone"
-            yield repr(pushed.tools[0]), (f"the tool does not close: from (R, Z) = ({open_at[0, 0]:.4g},"
-                                          f" {open_at[0, 1]:.4g}) straight on there is nothing, and {why}: the body"
-                                          f" goes past its end. Give the profile a floor to R = 0, or aim at a pole"
-                                          f" height or a volume")
+            yield repr(pushed.tools[0]), (f"the mould is open: straight ahead of (R, Z) = ({open_at[0, 0]:.4g},"
+                                          f" {open_at[0, 1]:.4g}) it has no surface, and {why}: the body would be"
+                                          f" blown past its end. Give the profile a floor to R = 0, or a pole height"
+                                          f" or a volume as the target")
 
 
 def _across(pushed: Pushed, points: np.ndarray) -> np.ndarray:
@@ -304,9 +306,9 @@ def _sharp_edges(body: Body) -> Found:
             turn = np.degrees((b.angles[0] - a.angles[1] + np.pi) % (2 * np.pi) - np.pi)
             if turn > _SHARP:                                # the solid is to the left: convex
                 yield repr(contact), (f"its edge at (R, Z) = ({a.ends[1][0]:.4g}, {a.ends[1][1]:.4g}) is sharp: forces"
-                                      f" there are off by 1 to 3 %, by where nodes lie, and more elements through the"
-                                      f" thickness alone ({rows:.2g} here) make that no better: give it a fillet that"
-                                      f" some elements along the sheet follow")
+                                      f" there are off by 1 to 3 %, depending on where nodes lie, and more elements"
+                                      f" through the thickness ({rows:.2g} here) do not help: give it a fillet that"
+                                      f" spans some elements along the sheet")
                 break
 
 

@@ -236,7 +236,7 @@ class CoolingHistory:
             if self._time == until:
                 self._dt = max(dt, trial)
                 return
-        raise ConvergenceError(f"heat: {_MOST_STEPS} steps did not lead to time {until:.6g}")
+        raise ConvergenceError(f"heat: time {until:.6g} was not reached in {_MOST_STEPS} steps")
 
     def get(self) -> Memory:
         """See `History`."""
@@ -263,7 +263,7 @@ class CoolingHistory:
         """See `History`."""
         rows = _rows(self._body.points, data["points"])
         if ("power" in data) != (self._dissipated is not None):
-            raise InputError("what is remembered of the temperature is of another work_to_heat")
+            raise InputError("the temperature history belongs to a scene with another work_to_heat")
         power = np.array(data["power"])[rows] if "power" in data else None
         lines = [np.array(d["above_back"])[_rows(touch.points, d["points"])].reshape(len(touch.points), -1)
                  for touch, d in zip(self._body.touches, data["lines"], strict=True)]
@@ -325,7 +325,7 @@ def doubts(problem: Any, states: Sequence[Any]) -> list[tuple[str, str]]:
     if errors[worst] <= allowed:
         return []
     return [("serious", f"The error of the temperature in space is about {errors[worst]:.2g} degrees at time"
-                        f" {states[looked[worst]].time:.4g}: thinner layers of elements at faces that touch or lose"
+                        f" {states[looked[worst]].time:.4g}: use thinner elements at faces that touch a tool or lose"
                         f" heat{_such_as(problem.scene, errors[worst] / allowed, duration)}.")]
 
 
@@ -367,5 +367,5 @@ def _rows(points: np.ndarray, others: Any) -> np.ndarray:
         return np.zeros(0, dtype=int)
     away, rows = cKDTree(others).query(points)
     if np.any(away > 1e-9 * np.abs(others).max()):
-        raise InputError("what is remembered of the temperature is of another mesh")
+        raise InputError("the temperature history belongs to another mesh")
     return rows

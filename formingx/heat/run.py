@@ -149,7 +149,7 @@ def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: flo
                                            f" error does not fall below {tolerance:g}", run)
                 continue
             if len(run.times) > max_steps:
-                raise ConvergenceError(f"heat: max_steps = {max_steps}: taken by time {t:.6g}", run)
+                raise ConvergenceError(f"heat: max_steps = {max_steps} were used up at time {t:.6g}", run)
             t = float(end) if trial == end - t else t + trial
             state = found.state
             run.record(t, found)

@@ -45,8 +45,8 @@ class Table(NamedTuple):
             raise InputError(f"{self.name}: column {column!r}: row {row} of the data is empty or not a finite number")
         if wanted is None:
             if unit is not None:
-                raise InputError(f"{self.name}: column {column!r} is in {unit!r}: say what to make of it with units,"
-                                 f" a factor or the unit of the other side")
+                raise InputError(f"{self.name}: column {column!r} is in {unit!r}: give units=..., a factor or the"
+                                 f" unit of the other side")
             return values
         if not isinstance(wanted, str):
             return values * positive(f"units of {column!r}", wanted)

@@ -50,20 +50,20 @@ def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str
     def said(value: float, of: str = "") -> str:
         return f"{value:.4g} {of}".rstrip()
     rows = [(f"at {name}" if name else "", "")] if name else []
-    rows.append(("shear modulus at once", said(material.shear_modulus, unit)))
+    rows.append(("instantaneous shear modulus", said(material.shear_modulus, unit)))
     for mode in MODES:
         largest = material.largest_stretch(mode)
         if np.isfinite(largest):
-            rows.append((f"no state above a stretch, {mode}", said(largest)))
+            rows.append((f"largest stretch, {mode}", said(largest)))
     for mode in MODES if hasattr(material, "rupture_stretch") else ():
         if np.isfinite(most := material.rupture_stretch(mode)):
-            rows.append((f"ruptures beyond a step of strain, {mode}", said(most)))
+            rows.append((f"stretch at which it ruptures when stretched suddenly, {mode}", said(most)))
     branches = getattr(material, "spectrum", getattr(material, "branches", []))
     if branches:
         times = [shift * tau for _, tau in branches]
         rows.append(("relaxation times", f"{min(times):.3g} to {max(times):.3g} {unit_of_time}"))
         rest = material.equilibrium
-        rows.append(("shear modulus when all has relaxed", said(rest.shear_modulus if rest else 0.0, unit)))
+        rows.append(("relaxed shear modulus", said(rest.shear_modulus if rest else 0.0, unit)))
     elif not material.internal and not hasattr(material, "constant_rate"):
         stable = material.check_stability((0.5, min(_MOST, _PART * material.largest_stretch("equibiaxial"))))
         low, high = stable.drucker["equibiaxial"]

@@ -63,8 +63,8 @@ def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = Non
     columns = of_columns(mesh)
     factors = path.column_factors(share, error)
     if not np.any(np.isfinite(factors)):
-        raise InputError("adapted: no state asks for a size: nothing bends or touches a fillet, and error is None: give"
-                         " error=0.02, or a run that goes further")
+        raise InputError("adapted: the run gives no reason for other elements: nothing bends or touches a fillet, and"
+                         " error is None: give error=0.02, or a run that goes further")
     return columns.make(_ends(columns, factors))
 
 
@@ -73,7 +73,7 @@ def _sheet(mesh: Sheet, points: np.ndarray, sizes: np.ndarray) -> Mesh:
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import cKDTree
     if mesh.of_size is None:
-        raise InputError("adapted: the sheet is not one of fx.mesh.sheet: its outline is not known")
+        raise InputError("adapted: must be a sheet made by fx.mesh.sheet: of another the outline is not known")
     inside, near = LinearNDInterpolator(points, sizes), cKDTree(points)
 
     def size(x: float, y: float) -> float:
@@ -86,13 +86,12 @@ def of_columns(mesh: Mesh) -> Columns:
     """The columns of a mesh; an InputError if it has none, or its nodes were moved."""
     columns = mesh.columns
     if columns is None:
-        raise InputError("adapted: the mesh is not one of columns: make it by disc, sphere, parison or from_lines,"
-                         " or, in space, by sheet")
+        raise InputError("adapted: must be a mesh made by disc, sphere, parison or from_lines, or, in space, by sheet")
     nodes = np.concatenate(list(columns.place(columns.ends)[[0, -1]]))
     off = max(np.min(np.linalg.norm(nodes[:, None] - mesh.nodes_of(name), axis=2), axis=1).reshape(2, -1)[k].max()
               for k, name in enumerate(columns.faces))
     if off > 1e-9 * np.ptp(nodes, axis=0).max():
-        raise InputError(f"adapted: nodes of the mesh were moved by {off:.3g} since it was made: make it where it is")
+        raise InputError(f"adapted: nodes of the mesh were moved by {off:.3g} since it was made: make it at its place")
     return columns
 
 
@@ -109,8 +108,8 @@ def _ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
     size = (wanted + _GROWTH * away).min(1)
     number = np.concatenate([[0.0], np.cumsum(np.diff(s) * (1 / size[1:] + 1 / size[:-1]) / 2)])
     if number[-1] > _MOST:
-        raise InputError(f"adapted: {number[-1]:.3g} columns are asked for: at most {_MOST}: share or error is too"
-                         f" small")
+        raise InputError(f"adapted: share and error ask for {number[-1]:.3g} elements along the sheet, at most {_MOST}"
+                         f" are allowed: make share or error larger")
     pieces = np.union1d(columns.fixed, old[[0, -1]])
     marks = np.interp(pieces, at, number)
     ends = [pieces[:1]]

@@ -220,7 +220,7 @@ class _Numbers:
         if not binary:
             try:
                 if re.search(rb"[^\s+\-.0-9a-zA-Z]", body):      # NumPy takes 1_0 for a number
-                    raise ValueError("a character that no number has")
+                    raise ValueError("a character that is not part of a number")
                 self._values = np.array(body.split(), dtype=float)
             except ValueError as error:
                 raise InputError(f"{where}: {error}: must be numbers") from None

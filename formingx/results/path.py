@@ -265,7 +265,7 @@ class Path(States):
             from .space.part import filling as filling_in_space
             return filling_in_space(self, contact_of(self, tool, "filling")[0])
         if len(self.segments) > 1:
-            raise InputError("filling: is not known of a run that made its mesh again on the way: take that of a mesh,"
+            raise InputError("filling: is not available for a remeshed run as a whole: take that of one mesh,"
                              " path.alone(state).filling()")
         from .evaluate.filling import filling
         return filling(self, contact_of(self, tool, "filling")[0])
@@ -342,7 +342,7 @@ class Path(States):
     def _section_only(self, what: str, instead: str = "") -> None:
         """An InputError in space."""
         if self._in_space:
-            raise InputError(f"{what}: is not there yet for a sheet in space" + (f": {instead}" if instead else ""))
+            raise InputError(f"{what}: is not available yet for a sheet in space" + (f": {instead}" if instead else ""))
 
     @property
     def _in_space(self) -> bool:

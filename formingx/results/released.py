@@ -111,12 +111,11 @@ def released(path: Any, source: Any, make_path: Any, state: Any, temperature: An
     """See `Path.released`; make_path: of a record."""
     mesh, trimmed = source.scene.mesh, float(path.wall(state).r[-1])
     if source.forms.domain is not mesh.domain:
-        raise InputError("Path.released: a membrane has no thickness to keep a shape with: form a solid,"
+        raise InputError("Path.released: a membrane has no bending stiffness to keep a shape: form a solid,"
                          " MixedPressure()")
     if trim is not None:
         if source.scene.preformed is not None:
-            raise InputError("Path.released: trim: is not known of a run that made its mesh again on the way: leave it"
-                             " out")
+            raise InputError("Path.released: trim: is not available for a remeshed run: leave it out")
         mesh, trimmed = _trimmed(mesh, path.wall(state), trim)
     heat, cools = _heat(source.scene, mesh, temperature, boundaries, duration, path.wall(state))
     problem = Problem(_scene(source.scene, mesh, heat))

@@ -95,7 +95,8 @@ class States:
 
     @property
     def branch_points(self) -> list[tuple[State, State]]:
-        """Neighbours between which another path begins: the tangent's determinant changes its sign, no limit point.
+        """Neighbours between which another path branches off: the tangent's determinant changes its sign without
+        limit point.
 
         Modes n = 0 alone, and an odd number of them; `Path.stability` sees all. Two factorisations a stretch between
         limit points; none with a history.
@@ -204,8 +205,8 @@ class States:
     def _run_to(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
         """The state that a run would come to that goes on from `left` to the target."""
         if left.time < right.time and not left.setting["rate"][-1]:
-            raise InputError(f"the path passes {target} within a flow, between two of its states: run with"
-                             f" through=[...] to have a state there")
+            raise InputError(f"the path passes {target} between two of its states, in a stage that follows or holds a"
+                             f" measure: none can be solved for there afterwards; run with through=[...] to have one")
         record = Record(segment.problem, segment.curve)
         record.segments[-1].states.append(replace(left, met=None))
         record.stage = left.stage

@@ -41,10 +41,10 @@ def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -
         if name != driven.quantity:
             return f"the run drives {driven!r}, which has no {name}"
         if value < 0 and driven in scene.contacts and driven.separates:
-            return f"it lies behind the start: {driven!r} would move away from the body"
+            return f"the travel is negative: {driven!r} would move away from the body"
     if off is None and name == "force" and value < 0 and driven in scene.contacts and driven.separates \
             and not driven.friction_by_temperature and driven.mu == 0:
-        return f"{driven!r} pushes and never pulls"
+        return f"{driven!r} can only push: the force must not be negative"
     if name.startswith("u_") and "_at_" in name and value != 0:
         holds = _holder(scene, name, [t for t in there if t in scene.supports])
         if holds is not None:
@@ -70,7 +70,9 @@ def beyond_all(scene: Scene, quantity: str | None, value: float) -> str | None:
     if quantity not in units:
         return None
     what, unit = units[quantity]
-    return f"it is {abs(value) / unit:.2g} times {what}, {unit:.4g}" if abs(value) > _MOST * unit else None
+    if abs(value) <= _MOST * unit:
+        return None
+    return f"it is {abs(value) / unit:.2g} times {what}, {unit:.4g}: are the units right?"
 
 
 def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:

@@ -68,8 +68,8 @@ def _check_overlap(scene: Scene, who: str, present: dict[int, Contact], outlines
                 if depth[worst] > near:
                     at = ", ".join(f"{x:.6g}" for x in points[worst] + where[j] * b.way)
                     axes = ", ".join(scene.kinematics.axes).replace("r, z", "R, Z")
-                    raise InputError(f"{who}: tools overlap: with {_at(a, where[i])} and {_at(b, where[j])} one reaches"
-                                     f" {depth[worst]:.6g} into the other at ({axes}) = ({at}); leave one out"
+                    raise InputError(f"{who}: tools overlap: {_at(a, where[i])} and {_at(b, where[j])} reach"
+                                     f" {depth[worst]:.6g} into each other at ({axes}) = ({at}); leave one out"
                                      f" with without=[...], or end the travel earlier")
 
 

@@ -43,8 +43,8 @@ class Limits:
 
 _LIMITS = Limits()
 
-ANOTHER_PATH = ("between %s and %s another path begins, without a limit point: the body may take that one;"
-                " path.stability([0]) finds the mode, and where")
+ANOTHER_PATH = ("between %s and %s another path branches off (a bifurcation, not a limit point), and a real body may"
+                " follow it: path.stability([0]) finds where, and its mode")
 """Of two neighbours, described."""
 
 
@@ -107,20 +107,21 @@ class Diagnosis:
     def __str__(self) -> str:
         at = f", at {self.what} {self.aimed:.8g}" if self.aimed is not None else ""
         lines = [f"Step {self.step} failed after {self.what} {self.control:.8g}{at}: {self.reason}." if self.step else
-                 f"There is no first state: {self.reason}."]
-        lines += [f"Cause: {cause}." for cause in self.causes] or ["Cause: the numbers below single out none."]
+                 f"No equilibrium was found at the start: {self.reason}."]
+        lines += [f"Cause: {cause}." for cause in self.causes] or ["Cause: not clear from the numbers below."]
         if self.residual:
             parts = ", ".join(f"{k} {v:.3g}" if np.isfinite(v) else f"{k} not finite" for k, v in self.residual.items())
-            at = f"; the largest at {self.worst}" if self.worst else ""
-            lines.append(f"Forces left over, over the support forces: {parts}{at}.")
+            at = f"; the largest force at {self.worst}" if self.worst else ""
+            lines.append(f"Out-of-balance forces, relative to the support forces: {parts}{at}.")
         if self.smallest_J is not None:
             new = self.failed_J is not None and abs(self.failed_J - self.smallest_J) > 0.01 * abs(self.smallest_J)
             failed = f"; in the failed attempt {self.failed_J:.4g} at {self.at_failed_J}" if new else ""
-            lines.append(f"Smallest J: {self.smallest_J:.4g} at {self.at_J}{failed}.")
+            lines.append(f"Smallest J (deformed over original volume): {self.smallest_J:.4g} at {self.at_J}{failed}.")
         if self.condition is not None:
             lines.append(f"Condition number of the tangent: {self.condition:.2g}.")
         if self.touching or self.flipped:
-            flips = f"; {self.flipped} changed state in the last iteration" if self.flipped is not None else ""
+            flips = (f"; {self.flipped} changed between open, sticking and sliding in the last iteration"
+                     if self.flipped is not None else "")
             lines.append(f"Nodes in contact: {self.touching}{flips}.")
         lines += [f"Try {'; '.join(self.advice)}."] if self.advice else []
         return "\n".join(lines)
@@ -177,7 +178,7 @@ def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, St
 
 
 def warn_of_branch(record: Any, old: State) -> None:
-    """Say so where another path begins within the step from a state to the last: their factors told, at no cost."""
+    """Say so where another path branches off within the step from a state to the last: no extra cost."""
     new, usual = record.last, ["step", "target", *["start"] * (not record.equations.slack_at_rest)]
     if old.orientation * new.orientation < 0 and old.kind in usual and new.kind in usual:
         log.warning(ANOTHER_PATH, record.describe(old), record.describe(new))
@@ -265,9 +266,9 @@ def _verdict(facts: dict[str, Any], fixed_control: bool, pace: str,
 def _of_material(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """(cause, advice) of a material near the end of its domain."""
     if (facts.get("I1") or 0) > _LIMITS.material:
-        yield (f"a material is near the end of its domain: I1 - 3 is {100 * facts['I1']:.3g} % of what its limit"
-               f" allows at {facts['limit']}",
-               "a target that needs less stretch there, a larger limit of the material, or shorter steps"
+        yield (f"a material is stretched nearly to its limit: I1 - 3 is {100 * facts['I1']:.3g} % of the largest that"
+               f" it allows, at {facts['limit']}",
+               "a target that needs less stretch there, a material with a higher limit, or shorter steps"
                " (StepControl(largest=...))")
 
 
@@ -275,10 +276,11 @@ def _of_rupture(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """(cause, advice) of a damped melt that thins without end."""
     if facts.get("drawn"):
         drawn, most = facts["drawn"]
-        yield (f"the sheet thins without end at {facts['ruptures']}: it is drawn there as by {drawn:.3g} in all"
-               f" directions, and a step of strain bears most at {most:.3g}; the material has no state beyond",
-               "less draw, a slower or hotter run, or the damping: fitted to shear or uniaxial data it is often too"
-               " strong in equibiaxial extension")
+        yield (f"the sheet thins without end at {facts['ruptures']}: it is as thin there as at an equibiaxial stretch"
+               f" of {drawn:.3g}, and stretched suddenly this material carries its largest stress at {most:.3g}; beyond"
+               f" there is no equilibrium",
+               "a shallower draw, a slower or hotter process, or another damping function: one fitted to shear or"
+               " uniaxial data is often too strong in equibiaxial extension")
 
 
 def _of_elements(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -287,25 +289,25 @@ def _of_elements(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     infinite = any(np.isinf(v) for v in facts.get("residual", {}).values())
     inverted = failed_J is not None and failed_J <= 0
     if J is not None and (_LIMITS.volume > J or facts["shape"] < _LIMITS.shape and (inverted or infinite)):
-        now = f"J = {J:.3g}" if _LIMITS.volume > J else f"its shape is {facts['shape']:.2g} of what it was at rest"
+        now = f"J = {J:.3g}" if _LIMITS.volume > J else f"its shape quality is {facts['shape']:.2g} times that at rest"
         R, Z = facts["at_J"].R, facts["at_J"].Z
         yield (f"an element is about to turn inside out: {now} in the last good state, at {facts['at_J']}"
                + (f" (in the failed attempt J = {failed_J:.3g})" if inverted else ""),
                f"smaller elements around (R, Z) = ({R:.4g}, {Z:.4g}), in a disc with concentrate={{{R:.4g}: 0.2}}, or"
-               f" elements that start long in the direction in which they are squeezed there")
+               f" elements that are long at the start in the direction in which they are compressed there")
 
 
 def _of_limits(facts: dict[str, Any], fixed_control: bool, target: float | None) -> Iterator[tuple[str, str]]:
     """(cause, advice) of a limit point before the target."""
     what, limits = facts["what"], facts.get("limit_points", ())
     if target is not None and limits and abs(target) > max(map(abs, limits)):
-        yield (f"the {what} has its maximum, {max(limits, key=abs):.6g}, at a limit point that was passed, and"
-               f" {target:.6g} lies beyond it",
-               "a target that grows beyond a limit point (pole_height, pole_stretch, enclosed_volume)")
+        yield (f"the {what} has its maximum, {max(limits, key=abs):.6g}, at a limit point that was passed, and the"
+               f" target {target:.6g} lies above it",
+               "a target that goes on growing past a limit point (pole_height, pole_stretch, enclosed_volume)")
     ahead, aimed = facts.get("limit_ahead"), facts.get("aimed")
     if ahead is not None and fixed_control:
-        yield (f"a limit point lies ahead: the {what} can rise no further than about {ahead:.6g}, as the slope"
-               f" of the path tells" + (f"; {aimed:.6g} was asked for" if aimed is not None else ""),
+        yield (f"a limit point lies ahead: extrapolated from the last states, the {what} rises to about {ahead:.6g} and"
+               f" no further" + (f"; {aimed:.6g} was asked for" if aimed is not None else ""),
                "`trace`, which passes limit points, or a lower target")
 
 
@@ -313,18 +315,18 @@ def _of_branches(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """(cause, advice) of another branch, and of contact that does not settle."""
     what = facts["what"]
     for a, b in facts.get("turned", ()):
-        yield (f"the tangent lost definiteness between {what} {a:.6g} and {b:.6g} without a limit point: another"
-               f" branch starts there, possibly buckling",
+        yield (f"the tangent stiffness became indefinite between {what} {a:.6g} and {b:.6g} without a limit point:"
+               f" another path branches off there (a bifurcation, such as buckling)",
                f"a small imperfection in the load or the mesh, or a target before {what} {b:.6g}")
     if _singular(facts) and not facts.get("turned") and facts.get("limit_ahead") is None:
-        yield (f"the tangent becomes singular, and there is no limit point: its condition number has grown from"
-               f" {facts['condition_before']:.1g} to {facts['condition']:.1g} in {_LIMITS.before} states; another"
-               f" branch starts here, where the body buckles or a point of contact is about to slip away",
-               "smaller elements; contact at points=4 (Contact), where there is any")
+        yield ("the tangent stiffness becomes singular, and there is no limit point: its condition number has grown"
+               f" from {facts['condition_before']:.1g} to {facts['condition']:.1g} in {_LIMITS.before} states; the"
+               f" body buckles here, or a contact point is about to slip off its tool",
+               "smaller elements; Contact(..., points=4), where there is contact")
     if facts.get("flipped"):
-        yield (f"contact does not settle: {facts['flipped']} nodes changed state in the last iteration",
-               "smaller elements along the face in contact, contact at points=4, a wider ramp or a lower penalty"
-               " (Contact)")
+        yield (f"contact does not settle: {facts['flipped']} nodes changed between open, sticking and sliding in the"
+               f" last iteration",
+               "smaller elements along the face in contact, or Contact with points=4, a wider ramp or a lower penalty")
 
 
 def _singular(facts: dict[str, Any]) -> bool:
@@ -336,6 +338,6 @@ def _singular(facts: dict[str, Any]) -> bool:
 def _of_numbers(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """(cause, advice) of round-off."""
     if (facts.get("condition") or 0) > _LIMITS.round_off and not _singular(facts):
-        yield (f"round-off: the condition number of the tangent is {facts['condition']:.1g}, next to nothing of"
-               f" 16 digits is left",
-               "a larger eps, a lower contact penalty, or layers less different in stiffness")
+        yield (f"round-off: the condition number of the tangent stiffness is {facts['condition']:.1g}, and hardly any"
+               f" of 16 digits are left",
+               "a larger eps, a lower contact penalty, or layers that differ less in stiffness")

@@ -351,7 +351,7 @@ class Units(Protocol):
     @property
     def why_not_finite(self) -> str:
         """What makes a residual infinite or not a number."""
-        return "F is not defined there"
+        return "the equations are not defined there"
 
     def examine(self, last: Standing | None, attempt: Attempt | None) -> Findings | None:
         """What the last good state and a failed attempt tell, for a `Diagnosis`; collective."""

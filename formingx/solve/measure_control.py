@@ -111,7 +111,7 @@ class Flow(Run):
         by, slope = x - old.x, control - old.control
         way, limit = Way(old.x, old.control, by, slope, 1.0), problem.limit
         if limit and limit.length(way) < _STEPS.contact:
-            raise Failure("too much would come into contact in one step", [])
+            raise Failure("too many points would come into contact in one step", [])
         if limit:
             limit.prepare(way)
         new = self.curve.solve(x, control, self._measure.equation(value), "step", old, chords=True)

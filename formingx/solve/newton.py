@@ -332,7 +332,8 @@ class BorderedNewton:
             if points and active.changed == len(history) != self.settings.left_alone:
                 step, share = points.correct(self.solver, self.a, step, self._border), 1.0
                 if points.failed == 2 and problem.has_history:
-                    raise Failure("contact does not settle: no state of the points that change is consistent", history)
+                    raise Failure("contact does not settle: no combination of touching, sticking and sliding is"
+                                  " in equilibrium at the points that change", history)
             work = abs(self.F.dot(self.a))
             work0 = work0 or work or 1.0
             x.axpy(share, self.a)
@@ -356,15 +357,16 @@ class BorderedNewton:
         grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
         diverged = len(history) > 2 and min(iteration.correction for iteration in history[-3:]) > settings.diverged
         if diverged or grown and not (self.problem.has_kinks and moved < settings.small):
-            raise Failure("the iteration diverges", history)
+            raise Failure("Newton's method diverges", history)
         if active.returns >= settings.cycles:
-            raise Failure("contact does not settle: the same points touch, stick and slide in turns", history)
+            raise Failure("contact does not settle: the same points change between open, sticking and sliding"
+                          " over and over", history)
         most = min(self.tolerances.settling, settings.hurried) if self._hurried else self.tolerances.settling
         settling = len(history) - min(active.found, settings.exempt) >= most
         if len(quiet) >= self.tolerances.iterations or settling:
             unsettled = settling and len(history) - active.changed < 3
-            raise Failure("contact does not settle: " * unsettled + f"no convergence in {len(history)} iterations",
-                          history)
+            where = "contact does not settle: " * unsettled
+            raise Failure(f"{where}no convergence in {len(history)} Newton iterations", history)
 
     def _solve(self, x: PETSc.Vec, control: float, chord: bool, rescale: bool) -> bool:
         """`self.a` = -K^-1 F and, but in a chord iteration, a new K and `self.b` as in `tangent`; False if singular."""
@@ -383,7 +385,7 @@ class BorderedNewton:
         c, c_control = constraint(x, control, self.gradient)
         self._slope = self.gradient.dot(self.b) + c_control
         if self._slope == 0 or not np.isfinite(self._slope):
-            raise Failure("the quantity that is aimed at does not change along the path here", history)
+            raise Failure("the quantity of the target does not change along the path here", history)
         step = (-c - self.gradient.dot(self.a)) / self._slope
         self.a.axpy(step, self.b)
         return step

@@ -31,8 +31,8 @@ from .stepping import Cutback, StepControl, TimeError
 
 log = logging.getLogger("formingx")
 
-_TRY = (" Try a target within what was met, a smaller first step (step=StepControl(length=...)), more elements where"
-        " the body deforms most, or more max_steps.")
+_TRY = (" Try a target within the range that was reached, a smaller first step (step=StepControl(length=...)), more"
+        " elements where the body deforms most, or more max_steps.")
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Run:
             self._complete_step()
             while self.aim.is_open():
                 if max_steps is not None and record.counts.steps - before >= max_steps:
-                    self._give_up(f"{max_steps} states were accepted before it", pace=self.aim.pace(max_steps))
+                    self._give_up(f"max_steps = {max_steps} states were taken before it", pace=self.aim.pace(max_steps))
                 self._check_progress()
                 old = self.states[-1]
                 for state in self._next(old):
@@ -275,15 +275,15 @@ class Run:
                 new = self.curve.step(old, length, self._predictor, behind, bend)
         if target is not None:
             if not 0 < self.curve.progress(old, new) < 2 * length:
-                raise _Astray("the target was met on a far part of the path", [])
+                raise _Astray("the target was met on a distant part of the path", [])
             new.met = target
         cut = limit and limit.check(old, new, reach, ends=True)
         if cut:
             raise Cutback(cut.why, max(cut.part, 0.1)) if cut.part else _Astray(cut.why, [])
         if self._at_fold == "jump" and (new.control - old.control) * self._sense < 0 < old.slope * new.slope:
-            raise Failure("the path leads back from here", [])
+            raise Failure("the path turns back here", [])
         if was_passed(self.curve, self.states[:-1], old, new):
-            raise _Astray("the iteration fell back to a part of the path that was passed", [])
+            raise _Astray("the iteration fell back to a part of the path that was passed already", [])
         error, memory = self._error_in_time(new), self.problem.memory
         try:
             new = let_go(self.curve, limit, old, new, lambda state: self._jump(state, 0.0)) if limit else new
@@ -315,7 +315,8 @@ class Run:
         if error > self.settings.inaccurate:
             part = max(0.8 * error ** (-1 / 3), 0.1)
             past = self.states[-1].control
-            raise Cutback("the error in time", part, lasts=True, control=past + part * (new.control - past))
+            raise Cutback("the error in time stays above the allowed"
+                          " one", part, lasts=True, control=past + part * (new.control - past))
         return error
 
     def _snap(self, old: State) -> list[State]:
@@ -328,7 +329,7 @@ class Run:
         except Failure as failure:
             if not self.problem.setting.rests:              # what is driven was to go on
                 self._give_up(f"the {self._driven} has a limit point here, and {failure.reason}", failure.attempt)
-            self.record.ended = f"the body snaps at {self.record.describe(old)}: no state follows"
+            self.record.ended = f"the body snaps at {self.record.describe(old)}, and no equilibrium follows"
             return []
 
     def _jump(self, old: State, length: float, step: float = 0.0) -> State:
@@ -376,7 +377,7 @@ class Run:
         absurd = self.problem.absurd(control)
         if absurd is not None:
             value = self.problem.shown(control)[1]
-            self._give_up(f"the {self._driven} has come to {value:.4g}, and nothing holds it: {absurd}")
+            self._give_up(f"the {self._driven} has come to {value:.4g}, and nothing resists it: {absurd}")
         self._stop_if(self.aim.stalled())
 
     def _stop_if(self, why: str) -> None:
@@ -395,7 +396,7 @@ class Run:
             except Failure as failure:
                 raise Failure(f"a limit point lies ahead but could not be located: {failure.reason}", []) from None
             if (limit.control - old.control) * old.slope < 0:   # it belongs to what a jump has passed
-                raise Failure("a limit point lies ahead, but it was located behind", [])
+                raise Failure("a limit point lies ahead, but it was located behind the last state", [])
             found.append(limit)
         for target, bound in self.aim.open:
             if target is new.met:
@@ -419,7 +420,7 @@ class Run:
         except Unusable as unusable:
             if not self.states:
                 raise
-            self._give_up(f"at {record.describe(state)} {unusable}; beyond=True goes on all the same")
+            self._give_up(f"at {record.describe(state)} {unusable}; beyond=True goes on, to look at what follows")
         if self.problem.has_kinks:
             self.curve.look_ahead(state)
         self.aim.accept(state)
@@ -440,8 +441,8 @@ class Run:
         limits = "".join(f" A limit point was passed at {record.describe(s)}." for s in states
                          if s.kind == "limit point")
         return ConvergenceError(
-            f"{f'Stage {record.stage!r}: ' * bool(record.stage)}{self.aim.until} was not reached: {why} The nearest met"
-            f" was {values[best]:.6g}, at {record.describe(states[best])}.{limits} The last good state is"
+            f"{f'Stage {record.stage!r}: ' * bool(record.stage)}{self.aim.until} was not reached: {why} The nearest"
+            f" value was {values[best]:.6g}, at {record.describe(states[best])}.{limits} The last good state is"
             f" {record.describe(record.last)}; it is kept in the error's `path`."
             + ("" if diagnosis.advice else _TRY), diagnosis=diagnosis)
 

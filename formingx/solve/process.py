@@ -217,7 +217,7 @@ class Execution:
         corners = [] if callable(course) else course[:, 0].tolist()
         if corners and corners[0] > now:
             raise InputError(f"{stage.who}: the table begins at time {corners[0]:g}, but the process time is"
-                             f" {now:g}: time would stand still between")
+                             f" {now:g}: nothing is given for the time between")
         last = corners[-1] if end is None else end.value
         if last <= now:
             raise InputError(f"{stage.who}: ends at time {last:g}, but the process time is {now:g} already: time cannot"

@@ -113,8 +113,8 @@ class Aim:
         self._best = max(self._best, gained)
         kept = 0.0 if self.of_control else 0.5
         if self._best > 0.05 and gained < kept * self._best or gained < -0.05:
-            return ("the path turned back, which a crease at a singular corner (a clamped rim on a fine mesh) can"
-                    " cause")
+            return ("the path turned back, away from the target; a crease at a singular corner (a clamped rim on a fine"
+                    " mesh) can cause that")
         return ""
 
     def jumped_past(self, state: State) -> str:
@@ -122,7 +122,7 @@ class Aim:
         if state.kind == "jump" and self.is_open():
             before, now = self.values[-2:]
             if (before - self.until.value) * (now - self.until.value) < 0:
-                return f"the body snaps past it, from {before:.6g} to {now:.6g}: no state lies between"
+                return f"the body snaps past the target, from {before:.6g} to {now:.6g}: no equilibrium lies between"
         return ""
 
     def stalled(self) -> str:
@@ -130,17 +130,17 @@ class Aim:
         if len(self.values) > self.patience:
             now, then = (self.gained(self.values[k]) for k in (-1, -1 - self.patience))
             if abs(now - then) < 1e-3:
-                return f"the last {self.patience} states came no nearer to it"
+                return f"the last {self.patience} states came no nearer to the target"
         return ""
 
     def pace(self, max_steps: int) -> str:
         """How far a run had come when its steps ran out."""
         aim, (before, now) = self.until.value, self.values[-2:]
         if not (aim - now) * (now - before) > 0:
-            return f"max_steps = {max_steps} ran out, and the last step led away from the target"
-        return (f"max_steps = {max_steps} ran out in good health at {100 * self.gained():.3g} % of the target: the last"
-                f" step gained {now - before:.4g} of the {aim - now:.4g} that are left, which makes about"
-                f" {int(np.ceil((aim - now) / (now - before)))} steps more at that pace")
+            return f"max_steps = {max_steps} were used up, and the last step led away from the target"
+        return (f"max_steps = {max_steps} were used up at {100 * self.gained():.3g} % of the way to the target, without"
+                f" trouble: the last step gained {now - before:.4g} of the {aim - now:.4g} that are left, so about"
+                f" {int(np.ceil((aim - now) / (now - before)))} more steps are needed at that pace")
 
 
 class Progress:
@@ -190,8 +190,8 @@ class Progress:
         if not self._here or now - self._said < self.silence:
             return
         spent, won = now - self._said, self._gained - self._gained_then
-        left = f"about {_in_words((1 - self._gained) * spent / won)} left" if won > 0 else "no nearer than then"
-        limits = ", ".join(f"{by} ({n} times)" for by, n in self._limits.most_common(2)) or "nothing but its size"
+        left = f"about {_in_words((1 - self._gained) * spent / won)} left" if won > 0 else "no nearer to it since"
+        limits = ", ".join(f"{by} ({n} times)" for by, n in self._limits.most_common(2)) or "their own control only"
         self._bar.clear()
         log.log(self._level, "%s: %.3g %% of the way in %d states and %s of processor time; since the last line steps"
                 " of %.2g, limited by %s; %s", self._words, 100 * self._gained, self._states,

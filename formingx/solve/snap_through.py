@@ -228,9 +228,9 @@ def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: Sna
                     state.direction, state.slope = -state.direction, -state.slope
                 return state
             eta *= motion.move(motion.at.x if motion.solved else origin, eta)
-        where = "it comes to rest nowhere" if motion.solved else "none is found from here, however viscous the body is"
-        raise (NoEquilibrium if motion.solved else Failure)(f"no state follows that the body could snap to: {where}",
-                                                            [])
+        kind, where = (NoEquilibrium, "it comes to rest nowhere") if motion.solved else (
+            Failure, "even the largest artificial viscosity finds no next state")
+        raise kind(f"no equilibrium is found that the body could snap to: {where}", [])
     except Failure:
         problem.memory = kept
         raise
@@ -299,4 +299,4 @@ def let_go(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callabl
             new = replace(found, direction=sense * found.direction, slope=sense * found.slope, met=new.met)
         except Failure:
             new = jump(new)
-    raise Failure("what lets go of a tool in space touches it again and again", [])
+    raise Failure("points that let go of a tool touch it again and again", [])

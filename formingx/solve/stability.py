@@ -120,7 +120,7 @@ class Modes:
     def _count(self, kind: Kind) -> int:
         self.variation.fill(*kind)
         if not self._solver.factorise():
-            raise Failure("the second variation is singular: something in the body has no stiffness at all", [])
+            raise Failure("the stiffness is singular for every mode: some part of the body has no stiffness", [])
         return self._solver.negative_pivots() - self.variation.negative
 
     def locate(self, a: State, b: State, kind: Kind, index: int) -> Located:

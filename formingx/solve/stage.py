@@ -101,8 +101,8 @@ class Stage:
     def _check(self, follow: Any) -> None:
         who, until = self.who, self.until
         if self.hold is not None and (self.drive is None or self.duration is None or until or follow is not None):
-            raise InputError(f"{who}: hold = {self.hold}: give it drive=..., what gives way, and duration=..., and"
-                             f" neither until nor follow")
+            raise InputError(f"{who}: hold = {self.hold}: give it drive=..., what is adjusted to hold it, and"
+                             f" duration=..., and neither until nor follow")
         if follow is not None and (self.speed or self.duration):
             raise InputError(f"{who}: follow has times of its own: give no speed or duration")
         if self.speed and (self.drive is None or self.duration):

@@ -64,7 +64,7 @@ def _check_entity(kind: str, tags: list[tuple[int, str]], line: int, others: tup
     where = f"the {kind} that ends before line {line + 1}"
     if kind not in _NEEDED:
         if kind not in _LETTERING and kind not in others:
-            raise ValueError(f"{where}: no kind of curve or of lettering that is known")
+            raise ValueError(f"{where}: an unknown kind of entity")
         return
     many = Counter(code for code, _ in tags)
     wrong = [code for code in _NEEDED[kind] if many[code] != 1]

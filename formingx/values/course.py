@@ -41,7 +41,7 @@ def course(function: Callable, until: float, start: float = 0.0, *, tolerance: f
         order = np.argsort(t)
         t, f = t[order], f[order]
     raise InputError(f"course: the function is not smooth near t = {middle[bent][0]:.6g}: {_MOST} points do not follow"
-                     f" it to {tolerance:g} of its span: give Stage a table")
+                     f" it to {tolerance:g} of its range: give Stage a table")
 
 
 def _at(function: Callable, t: np.ndarray) -> np.ndarray:

@@ -302,7 +302,7 @@ class FaceContact:
         from scipy.spatial import cKDTree
         away, rows = cKDTree(np.array(data["points"]).reshape(-1, self.points.shape[1])).query(self.points)
         if np.any(away > 1e-9 * self._length):
-            raise InputError("checkpoint: a contact node of the scene is not in it: it is of another mesh")
+            raise InputError("checkpoint: a contact point of the scene is not in it: it belongs to another mesh")
         like = self.law.start(self.points)
         touch = Touch(*(np.array(data[name], dtype=float)[rows].reshape(getattr(like, name).shape)
                         for name in Touch._fields))

@@ -88,5 +88,5 @@ class Increment:
 
     @property
     def _now(self) -> tuple[np.ndarray, Tractions]:
-        assert self._last is not None, "an increment is asked before `tractions`"
+        assert self._last is not None, "call `tractions` first"
         return self._last

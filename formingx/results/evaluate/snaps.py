@@ -59,5 +59,5 @@ def doubts(snap: Snap | None) -> list[tuple[str, str]]:
     times = f"{snap.jumps} times, most" if snap.jumps > 1 else "once,"
     return [("serious", f"The body snapped {times} in state {snap.state}: there the wall went from {snap.before:.4g} to"
                         f" {snap.after:.4g} of the original at R = {snap.point:.5g}. With friction or relaxing material"
-                        f" the state of rest that it comes to depends on the way there, so what follows is known no"
-                        f" better than it changes with the steps: compare runs with StepControl(target=4) and 8.")]
+                        f" where it comes to rest depends on the way there, so all that follows is only as certain as"
+                        f" runs with other steps agree: compare StepControl(target=4) and StepControl(target=8).")]

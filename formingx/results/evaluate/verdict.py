@@ -110,13 +110,13 @@ class Verdict:
             bad, cells, (R, Z) = problem.inside_out()
             if bad > max(_LIMITS.fewest, _LIMITS.inside_out * cells):
                 yield (f"{bad} of {cells} elements are inside out, the worst at (R, Z) = ({R:.5g}, {Z:.5g}):"
-                       f" make the mesh again on the way (trace(remesh=Remesh(size=...)), a crushed block), or by a"
-                       f" first run (trace(pilot=True), a sheet over an edge)")
+                       " remesh on the way (trace(remesh=Remesh(size=...)), for a crushed block), or adapt the mesh"
+                       f" by a pilot run (trace(pilot=True), for a sheet over an edge)")
             edges = self._outline.edges()
             for deep in self._deepest(edges, state, own=False):
-                yield (f"the body stands {deep.depth:.4g} deep in the tool of {deep.name!r} at (r, z) ="
-                       f" ({deep.place[0]:.5g}, {deep.place[1]:.5g}): a face without contact, or elements that are too"
-                       f" large for the tool")
+                yield (f"the body is {deep.depth:.4g} deep in the tool of {deep.name!r} at (r, z) ="
+                       f" ({deep.place[0]:.5g}, {deep.place[1]:.5g}): a face without a Contact is there, or the"
+                       f" elements are too large for the tool")
             for sunk in self._sunk(edges, state):
                 yield (f"the body did not follow the tool of {sunk.name!r}: contact points are {sunk.depth:.4g} deep in"
                        f" it, {100 * sunk.share * _LIMITS.sunk:.2g} % of the wall that is left there: give Contact a"
@@ -128,8 +128,8 @@ class Verdict:
                     yield (f"the body did not follow the tool of {_name(contact)!r}: penetration changes the force by"
                            f" about {100 * off:.2g} %: {_harder(contact, off)}")
                 if _pulled(contact, state):
-                    yield (f"the body pulls at the tool of {_name(contact)!r}, which has no friction and lets go: it is"
-                           f" behind it")
+                    yield (f"the body pulls at the tool of {_name(contact)!r}, which has no friction and cannot hold"
+                           f" it: it is behind the tool")
         place = self._outline.fold(edges)
         if place is not None:
             yield f"the body folds: its boundary goes through itself near (r, z) = ({place[0]:.5g}, {place[1]:.5g})"

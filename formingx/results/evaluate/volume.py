@@ -27,5 +27,5 @@ def doubts(error: float, where: str, furthest: Any) -> list[tuple[str, str]]:
     if not 1 / _FURTHEST < J < _FURTHEST:
         found.append(("minor" if J > 0 else "serious",
                       f"J is {J:.3g} in the last state at (R, Z) = ({furthest.point[0]:.5g}, {furthest.point[1]:.5g}):"
-                      f" the stress of the element there means nothing."))
+                      f" the stress in that element is meaningless."))
     return found

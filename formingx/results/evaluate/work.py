@@ -324,7 +324,7 @@ def _called(scene: Any, thing: Any) -> str:
 def work(path: Any) -> dict[str, np.ndarray]:
     """See `Path.work`."""
     if "strain_energy" not in path.columns:
-        raise InputError("Path.work: a material of the scene stores no energy that its state alone would tell (KBKZ)")
+        raise InputError("Path.work: is not available with K-BKZ: what it stores is no function of its state")
     ledgers = [Ledger(segment).rows() for segment in path.segments]
     names = dict.fromkeys(name for rows in ledgers for name in rows)
     empty = [np.zeros(len(segment.states)) for segment in path.segments]

@@ -88,7 +88,7 @@ class Checkpoint:
         def begin():
             if not (folder / "scene.json").exists():
                 if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-                    raise InputError(f"checkpoint {str(folder)!r} is there already and is no checkpoint")
+                    raise InputError(f"checkpoint {str(folder)!r} exists already and is not a checkpoint")
                 folder.mkdir(parents=True, exist_ok=True)
                 files.replace(folder / "scene.json", lambda stream: json.dump(about, stream, indent=1))
                 return 0
@@ -296,7 +296,8 @@ def _plain_state(state: State) -> dict[str, Any]:
 
 def _read_memory(problem: Any, memory: list[dict[str, Any]]) -> list[Any]:
     if len(memory) != len(problem.histories):
-        raise InputError("checkpoint: its states remember other things than this scene does: it is of another scene")
+        raise InputError("checkpoint: its states have other histories (friction, relaxation, heat) than this scene: it"
+                         " belongs to another scene")
     return [history.load(data) for history, data in zip(problem.histories, memory, strict=True)]
 
 

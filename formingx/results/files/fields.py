@@ -138,8 +138,8 @@ def _write(path: Any, file: Any, states: Any, suffix: str, write: Callable) -> N
     file, comm = files.named("to_vtx" if suffix == ".bp" else "to_xdmf", file, suffix), path.problem.comm
     chosen = _chosen(path, states)
     if len({id(path.segment(state)) for _, state in chosen}) > 1:
-        raise InputError(f"{'to_vtx' if suffix == '.bp' else 'to_xdmf'}: states: the run made its mesh again on the"
-                         f" way, and a file holds one mesh: give states of one, such as path.segments[0].states")
+        raise InputError(f"{'to_vtx' if suffix == '.bp' else 'to_xdmf'}: states: the run was remeshed, and a file"
+                         f" holds one mesh: give states of one, such as path.segments[0].states")
     fields = Fields(path.alone(chosen[0][1]))
     points = _gather(fields.points, comm)
     steps = []

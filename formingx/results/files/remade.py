@@ -35,7 +35,7 @@ def load(before: tuple[Problem, State], data: dict[str, Any]) -> Problem:
     that."""
     scene = before[0].scene
     if scene.mesh.comm.size > 1:
-        raise InputError("load: the run has made its mesh again, which is known on one rank only: load it on one")
+        raise InputError("load: a remeshed run can be loaded on one rank only")
     points = np.array(data["points"])
     grid = Grid(points, np.arange(1, len(points) + 1), {k: np.array(v) for k, v in data["layers"].items()},
                 {k: np.array(v) for k, v in data["boundaries"].items()})
@@ -45,5 +45,5 @@ def load(before: tuple[Problem, State], data: dict[str, Any]) -> Problem:
         if shift is not None:
             contact.shift_distances(np.array(shift))
     if found := list(differences(data["scene"], describe(made)["mesh"])):
-        raise InputError(f"checkpoint: its mesh was made in another order here: {found[0]}")
+        raise InputError(f"checkpoint: its mesh came out with another numbering here: {found[0]}")
     return made

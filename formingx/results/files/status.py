@@ -38,10 +38,10 @@ class Status:
             name, goal, now = self.target
             lines[0] += f": {name.replace('_', ' ')} {now:.6g} of {goal:.6g}"
         spent = f"{self.spent:.0f} s" if self.spent >= 10 else f"{self.spent:.2g} s"
-        left = "no nearer in the last steps" if self.left is None else \
+        left = "no nearer to the target in the last steps" if self.left is None else \
             "the target is met" if self.left == 0 else f"about {self.left:.2g} s to the end of the stage"
         limits = ", ".join(f"{why} ({n} times)" for why, n in sorted(self.limits.items(), key=lambda one: -one[1])[:3])
-        lines += [f"after {spent}: {left}", f"steps limited by: {limits or 'nothing but their size'}",
+        lines += [f"after {spent}: {left}", f"steps limited by: {limits or 'their own control only'}",
                   f"verdict: {self.verdict or 'good'}"]
         return "\n".join(lines)
 

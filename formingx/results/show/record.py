@@ -125,8 +125,8 @@ class Record:
         found += self._of_volume() + self._of_verdict() + edges.doubts(self.edge)
         found += tension.doubts(self.compression) + snaps.doubts(self.snap)
         if self.counts.get("failures", 0) > len(self.kinds):
-            found.append(("note", f"{self.counts['failures']} attempts at a step failed and were repeated with half its"
-                                  f" length; the results do not suffer."))
+            found.append(("note", f"{self.counts['failures']} attempts at a step failed and were repeated with a"
+                                  f" shorter step; that does not impair the results."))
         return sorted(found, key=lambda one: ("serious", "minor", "note").index(one[0]))
 
     @property
@@ -164,7 +164,7 @@ class Record:
     def _of_verdict(self) -> list[tuple[str, str]]:
         k = next((k for k, verdict in enumerate(self.verdicts) if verdict), None)
         return [] if k is None else [
-            ("serious", f"From{self._from(np.arange(len(self.kinds)) >= k)[6:]} the run is not to be used:"
+            ("serious", f"From{self._from(np.arange(len(self.kinds)) >= k)[6:]} the results must not be used:"
                         f" {self.verdicts[k]}.")]
 
     def warnings(self) -> list[str]:
