@@ -98,7 +98,7 @@ def test_refusals():
         plugged(mesh, pilot={"sizes": 1})
     with pytest.raises(fx.InputError, match="pilot = 3"):
         plugged(mesh, pilot=3)
-    with pytest.raises(fx.InputError, match="pilot=True: the run begins at rest"):
+    with pytest.raises(fx.InputError, match="pilot=True: a pilot run begins at rest"):
         plugged(mesh, pilot=True, resume=True, checkpoint="nowhere")
     mesh.domain.geometry.x[:, 1] *= 0.99
     with pytest.raises(fx.InputError, match="were moved"):

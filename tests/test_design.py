@@ -253,7 +253,7 @@ def test_where_a_run_has_no_derivative_it_says_so():
         scene, stages = pot(mu, 1.0)
         return scene, [*stages[:1], fx.Stage("hold", drive="air", hold=fx.pole_height(1.05), duration=1.0)]
     run = fx.Design(held, {"mu": (0.3, 0, 1)}, step=fx.StepControl(target=8)).run()
-    with pytest.raises(fx.InputError, match="no derivative: a flow"):
+    with pytest.raises(fx.InputError, match="no derivative: there is none yet for a stage that follows"):
         run.derivative("wall")
 
 

@@ -83,7 +83,7 @@ def test_a_soft_layer_of_long_elements():
 def test_good_scenes(scene):
     report = fx.doctor(scene(), targets=[fx.pole_height(0.3)] if scene().contacts else [fx.pole_stretch(2.0)])
     assert report.healthy and report.findings == []
-    assert "nothing was found" in str(report)
+    assert "no fault was found" in str(report)
 
 
 MM = fx.Units(length="mm", stress="MPa")
@@ -114,11 +114,11 @@ def test_the_table_of_a_stage_is_looked_at():
 @pytest.mark.parametrize("make, targets, words", [
     (lambda: treloar(), [fx.pressure(0.56)], r"a free sheet of NeoHookean\(c10=2.0\) bears at most about 0.4816"),
     (lambda: pushed_from(z=3.0), [fx.travel(2.0)], "touches nothing on its way: .* no nearer to 'top' than 0.9"),
-    (lambda: bottle(fx.NeoHookean(c10=0.4), 3.0), [fx.pressure(1.0)], r"ratio of 1.58.* 63 % .* mould's 3: .*Gent"),
+    (lambda: bottle(fx.NeoHookean(c10=0.4), 3.0), [fx.pressure(1.0)], r"ratio of 1.58.* 63 % .* mould's ratio of 3: .*Gent"),
     (lambda: bottle(fx.MooneyRivlin(c10=0.4, c01=0.02), 3.0), [fx.pressure(1.0)], "76 % .* material that stiffens"),
     (lambda: bottle(fx.Gent(mu=0.8, Jm=30.0), 10.0), [fx.pressure(1.0)], "blown up 10-fold .* units of length"),
-    (lambda: formed(tool=drilled()), [fx.pressure(1.0)], "does not close"),
-    (lambda: formed(tool=drilled()), [], "does not close"),
+    (lambda: formed(tool=drilled()), [fx.pressure(1.0)], "the mould is open"),
+    (lambda: formed(tool=drilled()), [], "the mould is open"),
 ])
 def test_what_no_state_follows(make, targets, words):
     finding, = fx.doctor(make(), targets=targets).findings
@@ -211,7 +211,7 @@ def test_findings(make, targets, severity, words):
     (lambda: formed(), fx.enclosed_volume(4.0), "has room for 2"),
     (lambda: treloar(), fx.travel(1.0), "has no travel"),
     (lambda: treloar(support=fx.Clamped("rim")), fx.displacement(0.1, at=(1.25, 0.041)), "Clamped.* holds"),
-    (lambda: pushed(), fx.travel(-0.1), "behind the start"),
+    (lambda: pushed(), fx.travel(-0.1), "the travel is negative"),
     (lambda: thick(2, materials=fx.Gent(mu=1.0, Jm=10.0)), fx.pole_stretch(3.0), "must be less than 2.54"),
 ])
 def test_targets_that_cannot_be_met(make, target, words):

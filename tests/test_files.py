@@ -337,7 +337,7 @@ def test_report_of_a_run_that_failed(tmp_path):
         fx.trace(treloar(), until=fx.pole_stretch(8.0), max_steps=4, progress=False)
     caught.value.path.report(tmp_path / "failed.html", failure=caught.value)
     text = page(tmp_path / "failed.html")
-    assert "The run could not go on" in text and "4 states were accepted" in text
+    assert "The run could not go on" in text and "max_steps = 4 were used up" in text
     assert "The path ended early: it aimed at pole stretch 8" in text
 
 

@@ -324,7 +324,7 @@ def test_nothing_there(tmp_path):
     (tmp_path / "file").write_text("x")
     with pytest.raises(fx.InputError, match="is not a folder"):
         fx.load(tmp_path / "file", treloar())
-    with pytest.raises(fx.InputError, match="is there already and is no checkpoint"):
+    with pytest.raises(fx.InputError, match="exists already and is not a checkpoint"):
         treloar_path(tmp_path / "file")
     with pytest.raises(fx.InputError, match="start: must be a path of this very scene"):
         fx.trace(treloar(), until=fx.pole_stretch(2.0), start="run")

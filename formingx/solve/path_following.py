@@ -103,7 +103,7 @@ class Run:
             self._complete_step()
             while self.aim.is_open():
                 if max_steps is not None and record.counts.steps - before >= max_steps:
-                    self._give_up(f"max_steps = {max_steps} states were taken before it", pace=self.aim.pace(max_steps))
+                    self._give_up(f"max_steps = {max_steps} were used up before it", pace=self.aim.pace(max_steps))
                 self._check_progress()
                 old = self.states[-1]
                 for state in self._next(old):
