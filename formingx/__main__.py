@@ -32,6 +32,8 @@ def main(arguments: list[str] | None = None) -> int:
             options = _parser().parse_args(words)
             {"compare": _compare, "doctor": _doctor, "open": _open, "report": _report, "status": _status,
              "watch": _watch, None: lambda _: _say(_overview())}[options.command](options)
+    except BrokenPipeError:                                 # a reader, such as head, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (InputError, OSError) as error:
         if MPI.COMM_WORLD.rank == 0:
             print(f"formingx: {error}", file=sys.stderr)
@@ -56,25 +58,28 @@ def _parser() -> argparse.ArgumentParser:
     two.add_argument("--columns", nargs="+", metavar="OURS=THEIRS", default=[],
                      help="columns that belong together, at least two (a bare NAME: the same on both sides)")
     two.add_argument("--units", nargs="+", metavar="OURS=UNIT", default=[],
-                     help="for a column of ours: a factor for theirs, or our unit if their header states theirs")
+                     help="of a column of ours: a factor to multiply theirs by, or our unit, if their header states"
+                          " theirs")
     two.add_argument("--out", type=Path, default=Path("results") / "compare",
                      help="folder for curves.png and pairs.csv (default: %(default)s)")
-    look = commands.add_parser("open", help="say what is in a checkpoint",
-                               description="Say what is in a checkpoint: the scene, the states, how the run ended.")
+    look = commands.add_parser("open", help="show what is in a checkpoint",
+                               description="Show what is in a checkpoint: the scene, the states, how the run ended.")
     show = commands.add_parser("report", help="make a report of a checkpoint", description="Make one HTML file of a"
                                " checkpoint: inputs, curves, thickness, convergence.")
-    now = commands.add_parser("status", help="say how far a run has come", description="Say where a run with a"
+    now = commands.add_parser("status", help="show how far a run has come", description="Show where a run with a"
                               " checkpoint stands: stage, target, what limits its steps, verdict, time left.")
-    watch = commands.add_parser("watch", help="say it again and again", description="The status of a run whenever it"
-                                " has new states, until it has had none for --patience seconds, or Ctrl-C.")
+    watch = commands.add_parser("watch", help="show the status again and again", description="Show the status of a run"
+                                " whenever it has new states, until it has had none for --patience seconds, or Ctrl-C.")
     for one in (look, show, now, watch):
         one.add_argument("folder", metavar="FOLDER", help="a checkpoint (trace(..., checkpoint=FOLDER), Path.save)")
     show.add_argument("--out", type=Path, help="the HTML file (default: report.html in the checkpoint)")
     show.add_argument("--title", default="", help="heading of the report")
-    show.add_argument("--units", metavar="LENGTH,STRESS", help="what the numbers of the script are in, such as mm,MPa")
-    show.add_argument("--density", type=float, help="in g/cm3, for the weight")
+    show.add_argument("--units", metavar="LENGTH,STRESS", help="units of length and stress of the script, such as"
+                                                               " mm,MPa")
+    show.add_argument("--density", type=float, help="of the material in g/cm3, for the weight")
     show.add_argument("--trim", type=float, metavar="R", help="radius at which the part is cut off")
-    watch.add_argument("--every", type=float, default=5.0, metavar="SECONDS", help="between two looks (default: 5)")
+    watch.add_argument("--every", type=float, default=5.0, metavar="SECONDS", help="time between two looks (default:"
+                                                                                   " 5)")
     watch.add_argument("--patience", type=float, default=600.0, metavar="SECONDS",
                        help="how long a run may be without a new state (default: 600)")
     return parser
@@ -85,8 +90,8 @@ def _overview() -> str:
              "  demo NAME [OPTIONS]        run a demo (demo NAME --help: its options)",
              "  doctor SCRIPT              look over the scene of a script before it runs",
              "  compare OURS THEIRS        compare two curves (compare --help)",
-             "  open FOLDER                say what is in a checkpoint",
-             "  status, watch FOLDER       say how far a run has come that writes a checkpoint",
+             "  open FOLDER                show what is in a checkpoint",
+             "  status, watch FOLDER       show how far a run with a checkpoint has come, once or again and again",
              "  report FOLDER              make one HTML file of a checkpoint (report --help)", ""]
     demos = _demos()
     if not demos:

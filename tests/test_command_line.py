@@ -1,5 +1,6 @@
 """python -m formingx as a user runs it."""
 
+import os
 import re
 import subprocess
 import sys
@@ -23,6 +24,15 @@ def test_overview_lists_every_demo():
     assert "compare OURS THEIRS" in text and "common" not in text
     for file in (ROOT / "demos").glob("*.py"):               # what demos share has no main
         assert (f"\n  {file.stem} " in text) == ("def main" in file.read_text())
+
+
+def test_a_reader_that_has_seen_enough_is_no_error():
+    """`python -m formingx | head`"""
+    there, end = os.pipe()
+    os.close(there)
+    with open(end, "wb") as closed:
+        done = subprocess.run([sys.executable, "-m", "formingx"], stdout=closed, stderr=subprocess.PIPE, timeout=300)
+    assert (done.returncode, done.stderr) == (0, b"")
 
 
 def test_demo_runs_with_its_options(tmp_path):

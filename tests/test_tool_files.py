@@ -284,7 +284,7 @@ def test_a_file_that_ends_its_reader(tmp_path, monkeypatch, body, words):
 
 
 @pytest.mark.parametrize("old, new, words", [
-    (" 11\n", " 41\n", "has 0 values of group code 11"), ("\nLINE\n", "\nLIME\n", "no kind of curve"),
+    (" 11\n", " 41\n", "has 0 values of group code 11"), ("\nLINE\n", "\nLIME\n", "an unknown kind of entity"),
     ("  0\nEOF\n", "", "cut off"), (" 20\n", " 20.\n", "no group code")])
 def test_damaged_dxf(tmp_path, old, new, words):
     """ezdxf ends such a line in (0, 0), or leaves it out."""
