@@ -58,8 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     two.add_argument("--columns", nargs="+", metavar="OURS=THEIRS", default=[],
                      help="columns that belong together, at least two (a bare NAME: the same on both sides)")
     two.add_argument("--units", nargs="+", metavar="OURS=UNIT", default=[],
-                     help="of a column of ours: a factor to multiply theirs by, or our unit, if their header states"
-                          " theirs")
+                     help="of a column of ours: a factor for theirs, or our unit, if their header states theirs")
     two.add_argument("--out", type=Path, default=Path("results") / "compare",
                      help="folder for curves.png and pairs.csv (default: %(default)s)")
     look = commands.add_parser("open", help="show what is in a checkpoint",
@@ -74,12 +73,11 @@ def _parser() -> argparse.ArgumentParser:
         one.add_argument("folder", metavar="FOLDER", help="a checkpoint (trace(..., checkpoint=FOLDER), Path.save)")
     show.add_argument("--out", type=Path, help="the HTML file (default: report.html in the checkpoint)")
     show.add_argument("--title", default="", help="heading of the report")
-    show.add_argument("--units", metavar="LENGTH,STRESS", help="units of length and stress of the script, such as"
-                                                               " mm,MPa")
+    show.add_argument("--units", metavar="LENGTH,STRESS", help="units of the script, such as mm,MPa")
     show.add_argument("--density", type=float, help="of the material in g/cm3, for the weight")
     show.add_argument("--trim", type=float, metavar="R", help="radius at which the part is cut off")
-    watch.add_argument("--every", type=float, default=5.0, metavar="SECONDS", help="time between two looks (default:"
-                                                                                   " 5)")
+    watch.add_argument("--every", type=float, default=5.0, metavar="SECONDS",
+                       help="time between two looks (default: 5)")
     watch.add_argument("--patience", type=float, default=600.0, metavar="SECONDS",
                        help="how long a run may be without a new state (default: 600)")
     return parser

@@ -114,7 +114,7 @@ def test_the_table_of_a_stage_is_looked_at():
 @pytest.mark.parametrize("make, targets, words", [
     (lambda: treloar(), [fx.pressure(0.56)], r"a free sheet of NeoHookean\(c10=2.0\) bears at most about 0.4816"),
     (lambda: pushed_from(z=3.0), [fx.travel(2.0)], "touches nothing on its way: .* no nearer to 'top' than 0.9"),
-    (lambda: bottle(fx.NeoHookean(c10=0.4), 3.0), [fx.pressure(1.0)], r"ratio of 1.58.* 63 % .* mould's ratio of 3: .*Gent"),
+    (lambda: bottle(fx.NeoHookean(c10=0.4), 3.0), [fx.pressure(1.0)], r"1.58.* 63 % .*mould's ratio of 3: .*Gent"),
     (lambda: bottle(fx.MooneyRivlin(c10=0.4, c01=0.02), 3.0), [fx.pressure(1.0)], "76 % .* material that stiffens"),
     (lambda: bottle(fx.Gent(mu=0.8, Jm=30.0), 10.0), [fx.pressure(1.0)], "blown up 10-fold .* units of length"),
     (lambda: formed(tool=drilled()), [fx.pressure(1.0)], "the mould is open"),

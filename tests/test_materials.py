@@ -369,7 +369,8 @@ def test_any_two_stretches_and_true_stress(material):
 @pytest.mark.parametrize("material, options, words", [
     (fx.Gent(mu=0.3, Jm=40.0), {}, ["largest stretch, equibiaxial", "4.637"]),
     (fx.KBKZ([(0.3, 1.0)], fx.PSM(10.0, 0.05), shift=fx.WLF(17.44, 51.6, 100.0)),
-     {"temperatures": [100.0, 120.0]}, ["stretch at which it ruptures when stretched suddenly, equibiaxial", "1.795", "at 120"])])
+     {"temperatures": [100.0, 120.0]},
+     ["stretch at which it ruptures when stretched suddenly, equibiaxial", "1.795", "at 120"])])
 def test_a_card(tmp_path, material, options, words):
     """One page, with its picture inside; a temperature that is missing is said."""
     page = material.report(tmp_path / "card.html", **options).read_text()
