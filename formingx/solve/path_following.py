@@ -315,8 +315,7 @@ class Run:
         if error > self.settings.inaccurate:
             part = max(0.8 * error ** (-1 / 3), 0.1)
             past = self.states[-1].control
-            raise Cutback("the error in time stays above the allowed"
-                          " one", part, lasts=True, control=past + part * (new.control - past))
+            raise Cutback("the error in time", part, lasts=True, control=past + part * (new.control - past))
         return error
 
     def _snap(self, old: State) -> list[State]:
