@@ -135,6 +135,6 @@ def test_a_failure_says_what_happened():
             if x.array_r[0] > 1:
                 out.array_w[:] = np.nan
 
-    with pytest.raises(fx.ConvergenceError, match="F is not defined there") as caught:
+    with pytest.raises(fx.ConvergenceError, match="the equations are not defined there") as caught:
         followed(2.0, arch=Breaks)
     assert "deflection = 2 was not reached" in str(caught.value) and caught.value.diagnosis.limit_points

@@ -262,7 +262,7 @@ def test_a_tool_that_leaves():
     assert np.abs(end(path, "gone").x).max() < 1e-8
     assert same(end(path, "blow"), alone.last) and same(end(path, "home"), end(path, "blow"), 1e-12)
     assert end(path, "gone").measures["tool_force"] == 0 < path.last.measures["tool_force"]
-    with pytest.raises(fx.InputError, match="Stage 'again'.*comes in where the body is, which reaches 2.51"):
+    with pytest.raises(fx.InputError, match="Stage 'again'.*takes part again where the body is, which reaches 2.51"):
         run(plugged("stick"), air("blow", 0.02, without=["plug"]), plug("again", 1.0))
 
 
@@ -395,7 +395,7 @@ AT_REST = Stage("up", drive="air", until=fx.pressure(0.1))
     (lambda: fx.trace(plugged(), until=fx.pressure(1)), "one control drives a run"),
     (lambda: fx.solve(plugged(), to=1), "one control drives a run"),
     (lambda: run(plugged(more=[FLOOR]), plug("a", 1), plug("b", 2.5)),
-     "'b': tools overlap.*at travel 2.0.*into the other"),
+     "'b': tools overlap.*at travel 2.0.*into each other"),
     (lambda: run(plugged(more=[FLOOR]), Stage("b", follow={"plug": [(1, 2.5)]}, step=STEP)), "'b': tools overlap"),
     (lambda: run(plugged(plug=tools.cylinder(radius=12, z=0.5)), plug("a", 1)), "'a'.*whole height.*'rim'"),
     (lambda: plugged(more=[fx.Contact("top", PLUG, moves=(1, -1), name="plug")]), "two things are called 'plug'"),

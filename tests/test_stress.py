@@ -188,7 +188,7 @@ def test_quadrature_points_of_a_layer(stack):
 
 def test_wrong_requests(stack):
     field = stack.stress()
-    with pytest.raises(fx.InputError, match="a membrane knows no stress through its thickness"):
+    with pytest.raises(fx.InputError, match="a membrane has no stress through its thickness"):
         fx.trace(treloar((8, 1), model=fx.Membrane()), until=fx.pole_stretch(1.2)).stress()
     with pytest.raises(fx.InputError, match="which layer.*'a', 'b', 'c', 'd'"):
         field.at([(0, 0.1)])
