@@ -249,15 +249,20 @@ class Law(NormalLaw):
                  shear_limit: Callable | None = None):
         super().__init__(tool, k, theta, shift)
         self.shear_limit = shear_limit or (lambda pressure, mu: (mu * pressure, mu))
-        self.mu, self.elastic_slip, self.pulls = mu, elastic_slip, pulls
-        self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
-        self.remembers = self.has_friction or pulls
+        self.elastic_slip, self.pulls = elastic_slip, pulls
+        self._rub(mu)
         self._slid: tuple[Nearest, Touch, tuple] | None = None      # of what is near, and remembered: the slip
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
         """The same law with other coefficients of friction."""
-        has_friction = np.ndim(mu) > 0 or bool(mu > 0)
-        return self._with(mu=mu, has_friction=has_friction, remembers=has_friction or self.pulls)
+        law = self._with()
+        law._rub(mu)
+        return law
+
+    def _rub(self, mu: np.ndarray | float) -> None:
+        self.mu, self._slides = mu, bool(np.all(np.isfinite(mu)))
+        self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
+        self.remembers = self.has_friction or self.pulls
 
     def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
         """Which points at x touch, or are held, shape (n,)."""
@@ -328,12 +333,12 @@ class Law(NormalLaw):
             return Tractions(force, N, zero, zero, lambda: outer(n, (k * slope)[:, None] * n)
                              + outer(t, (pressed * bend)[:, None] * t), lambda: _touch(x, kept_at, zero))
         assert old is not None
-        g, dg = self._slip(x, near, old)
+        g, dg = self._slip(x, near, t, old)
         foretold = g if expected is None else expected.slip
         s, rising = self._resistance(at, pressed, slope)
         T, sliding = s * g + rising * ahead * foretold, np.zeros(len(x), dtype=bool)
         sense_now, bent, grows = zero, T, 0.0
-        if np.all(np.isfinite(self.mu)):
+        if self._slides:
             trial = s * foretold
             turned = False if sense is None else np.sign(trial) * sense < 0
             limit, grows = self.shear_limit(pressed, self.mu)
@@ -357,8 +362,10 @@ class Law(NormalLaw):
     def _resistance(self, d: np.ndarray, pressed: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Stiffness T/g of elastic slip at distances d, and its derivative by them, shape (n,) each."""
         sticks, k = np.asarray(self.mu >= _STICKS), self.k
+        rising = (np.abs(d) < self.theta) * (k / (2 * self.theta) * (not self.pulls))
+        if not sticks.ndim and sticks:
+            return k * slope, rising
         limit, grows = self.shear_limit(pressed, np.where(sticks, 0.0, self.mu))
-        rising = (np.abs(d) < self.theta) * k / (2 * self.theta) * (not self.pulls)
         return (np.where(sticks, k * slope, limit / self.elastic_slip),
                 np.where(sticks, rising, grows / self.elastic_slip * k * slope))
 
@@ -377,7 +384,7 @@ class Law(NormalLaw):
     def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
         """Distance and slip of points x, shape (n, 2), and their gradients."""
         near = self.nearest(x)
-        g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, old)
+        g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, near.tangent, old)
         return Motion(x, near.distance, near.normal, g, dg)
 
     def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
@@ -395,7 +402,7 @@ class Law(NormalLaw):
         pressed = self.tractions(x + press[:, None] * near.normal, old)
         return np.where((press > 0)[:, None, None], pressed.stiffness, now.stiffness)
 
-    def _slip(self, x: np.ndarray, near: Nearest, old: Touch) -> tuple[np.ndarray, np.ndarray]:
+    def _slip(self, x: np.ndarray, near: Nearest, tangent: np.ndarray, old: Touch) -> tuple[np.ndarray, np.ndarray]:
         """Elastic slip g of points, shape (n,), if none slides, and its gradient, shape (n, 2); found once."""
         if self._slid is not None and self._slid[0] is near and self._slid[1] is old:
             return self._slid[2]
@@ -403,9 +410,9 @@ class Law(NormalLaw):
         motion = x - np.where(touched[:, None], old.position, old.arrival)
         slips = ~np.isnan(motion[:, 0])
         motion = np.where(slips[:, None], motion, 0.0)
-        along = np.einsum("ni,ni->n", near.tangent, motion)
+        along = np.einsum("ni,ni->n", tangent, motion)
         across = np.einsum("ni,ni->n", near.normal, motion)
-        found = old.slip + along, near.tangent * (slips * (1 - near.curvature * across))[:, None]
+        found = old.slip + along, tangent * (slips * (1 - near.curvature * across))[:, None]
         self._slid = near, old, found
         return found
 

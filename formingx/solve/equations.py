@@ -90,8 +90,11 @@ class Increment(Protocol):
     def taken(self, points: Array) -> tuple[Array, Array]:
         """Forces and stiffnesses that `linearise` has taken, of some points, shapes (m, 2), (m, 2, 2)."""
 
-    def foretold(self, by: Array, points: Array | slice = slice(None)) -> Tractions:
-        """The law at some points that move on by so much, shape (m, 2), length."""
+    def foretold(self, by: Array) -> Tractions:
+        """The law at the points if they move on by so much, shape (n, 2), length."""
+
+    def ahead(self, points: Array | slice) -> Callable[[Array], Tractions]:
+        """`foretold` of some of the points."""
 
     def expect(self, points: Array, sense: Array) -> None:
         """The next iteration takes this sense of sliding for the points in a mask, shape (n,)."""

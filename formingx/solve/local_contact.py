@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from mpi4py import MPI
@@ -152,8 +152,9 @@ class _Points:
 
     def __init__(self, problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array],
                  solver: DirectSolver, border: Border):
-        self._comm, self._contacts, self._chosen = problem.comm, contacts, chosen
+        self._comm, self._contacts = problem.comm, contacts
         self._c = contacts[0].points.shape[1]               # components
+        self._some = [(c, i) for c, i in zip(contacts, chosen) if len(i)]
         counts = self._comm.allgather(self._c * sum(map(len, chosen)))
         first = sum(counts[: self._comm.rank])
         self._own = slice(first, first + counts[self._comm.rank])
@@ -168,10 +169,11 @@ class _Points:
         """How a correction and its step change, own part; None if no consistent state was found."""
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._taken()
+        laws = [c.increment.ahead(i) for c, i in self._some]
         y, by, least, halved = y0, np.zeros_like(y0), np.inf, 0
         accuracy = _LOCAL.accuracy * min(c.increment.ramp for c in self._contacts)
         for k in range(_LOCAL.iterations):
-            f, S = self._law(y - by)
+            f, S = self._law(laws, y - by)
             more = f - f0 + np.einsum("nij,nj->ni", S - S0, (y - by).reshape(-1, self._c)).ravel()
             R = y - by - y0 + self._C @ more
             miss = np.abs(R).max()
@@ -209,24 +211,24 @@ class _Points:
 
     def _moved(self, dx: Array, step: float) -> Array:
         """Own points' part of a correction, seen from their tools, flat."""
-        return np.concatenate([c.moved(dx, step)[i].ravel() for c, i in zip(self._contacts, self._chosen)])
+        return np.concatenate([np.zeros(0), *(c.moved(dx, step)[i].ravel() for c, i in self._some)])
 
     def _taken(self) -> tuple[Array, Array]:
         """Forces and stiffnesses that the iteration has taken."""
-        return self._all([c.increment.taken(i) for c, i in zip(self._contacts, self._chosen)])
+        return self._all([c.increment.taken(i) for c, i in self._some])
 
-    def _law(self, y: Array) -> tuple[Array, Array]:
+    def _law(self, laws: list[Any], y: Array) -> tuple[Array, Array]:
         """Forces and stiffnesses of the law, linearised where the points would be."""
         mine, at, found = y[self._own].reshape(-1, self._c), 0, []
-        for contact, i in zip(self._contacts, self._chosen):
-            law = contact.increment.foretold(mine[at:at + len(i)], i)
-            found.append((law.force, law.stiffness))
-            at += len(i)
+        for law, (_, i) in zip(laws, self._some):
+            there, at = law(mine[at:at + len(i)]), at + len(i)
+            found.append((there.force, there.stiffness))
         return self._all(found)
 
     def _all(self, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-        force, stiffness = (np.concatenate(part) for part in zip(*parts))
+        none = np.zeros((0, self._c)), np.zeros((0, self._c, self._c))      # on a rank without points
+        force, stiffness = (np.concatenate(part) for part in zip(*(parts or [none])))
         return self._gather(force).ravel(), self._gather(stiffness)
 
     def _gather(self, values: Array) -> Array:
-        return np.concatenate(self._comm.allgather(values))
+        return values if self._comm.size == 1 else np.concatenate(self._comm.allgather(values))

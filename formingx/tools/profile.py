@@ -164,21 +164,20 @@ class Tool:
 
     def nearest(self, x: np.ndarray) -> Nearest:
         """Signed distance of points x, shape (n, 2), its gradient and its curvature."""
-        x = as_points("Tool: x", x)
-        rel, arcs = x[:, None] - self._origin, self._arcs
-        at, d = (np.einsum("ijk,jk->ij", rel, way) for way in (self._along, self._left))
-        across, up = rel[:, arcs, 0], rel[:, arcs, 1]
-        angle = np.mod(self._sign[arcs] * (np.arctan2(up, across) - self._start[arcs]), TURN)
-        at[:, arcs] = np.where(angle > TURN - _FLAT, 0.0, angle)
-        d[:, arcs] = self._sign[arcs] * (self._radius[arcs] - np.maximum(np.hypot(across, up), 1e-300))
+        x, arcs = as_points("Tool: x", x), slice(self._lines, None)
+        R, Z = x[:, :1] - self._R, x[:, 1:] - self._Z
+        at, d = (R * way[0] + Z * way[1] for way in (self._along, self._left))
+        if self._lines < len(self._R):
+            across, up = R[:, arcs], Z[:, arcs]
+            at[:, arcs] = np.mod(self._sign[arcs] * (np.arctan2(up, across) - self._start), TURN)
+            d[:, arcs] = self._sign[arcs] * (self._radius - np.hypot(across, up))
         beyond = (at < self._low) | (at > self._high)
         beyond[beyond.all(axis=1)] = False                  # behind an arc with an open end: all pieces, as if longer
         d[beyond] = np.inf
-        best, i = np.argmin(np.abs(d), axis=1), np.arange(len(x))
-        s, line, rel = self._sign[best], np.isnan(self._radius[best]), rel[i, best]
-        rho = np.maximum(np.hypot(rel[:, 0], rel[:, 1]), 1e-300)
-        normal = np.where(line[:, None], self._left[best], -s[:, None] * (rel / rho[:, None]))
-        return Nearest(d[i, best], normal, np.where(line, 0.0, -s / rho))
+        best, i = np.abs(d).argmin(axis=1), np.arange(len(x))
+        rel = x - self._origin[best]
+        curvature = -self._sign[best] / np.maximum(np.hypot(rel[:, 0], rel[:, 1]), 1e-300)      # 0 of lines
+        return Nearest(d[i, best], self._left.T[best] + curvature[:, None] * rel, curvature)
 
     def moved(self, r: float = 0.0, z: float = 0.0) -> Tool:
         """The tool shifted by (r, z), lengths."""
@@ -233,30 +232,31 @@ class Tool:
         return Tool.of_pieces(pieces, self.closed)
 
     def _tabulate(self) -> None:
-        """One row per piece and per sharp corner, for `nearest`."""
-        rows = []               # origin, travel, radius (nan: line), sign, start, low, high
+        """One row per piece and per sharp corner, for `nearest`: lines, then arcs and corners, arcs of no radius."""
+        rows, arcs = [], []     # origin, travel, sign (0: line), low, high; of arcs radius, start
         tol = 1e-9 * self.size
         ends = self._ends()
         for i, p in enumerate(self.pieces):
             opens = (i == 0 and ends[0] is None, i == len(self.pieces) - 1 and ends[1] is None)
             if isinstance(p, Line):
                 length = math.dist(p.a, p.b)
-                rows.append((p.a, (p.b - p.a) / length, math.nan, 1.0, 0.0, -math.inf if opens[0] else -tol,
+                rows.append((*p.a, *(p.b - p.a) / length, 0.0, -math.inf if opens[0] else -tol,
                              math.inf if opens[1] else length + tol))
             else:
-                whole = abs(p.sweep) >= TURN - _FLAT
-                start = p.start - math.copysign(math.pi / 2, p.sweep) * opens[0]
+                whole, sign = abs(p.sweep) >= TURN - _FLAT, math.copysign(1.0, p.sweep)
+                start = p.start - sign * (math.pi / 2 * opens[0] + _FLAT)
                 sweep = abs(p.sweep) + math.pi / 2 * (opens[0] + opens[1])
-                rows.append((p.centre, np.zeros(2), p.radius, math.copysign(1.0, p.sweep), start, -1.0,
-                             math.inf if whole or sweep >= TURN else sweep + _FLAT))
+                arcs.append((*p.centre, 0.0, 0.0, sign, 0.0,
+                             math.inf if whole or sweep >= TURN else sweep + 2 * _FLAT, p.radius, start))
         joints = list(zip(self.pieces, self.pieces[1:] + (self.pieces[:1] if self.closed else ())))
         corners = [(p.ends[1], _turn(p.angles[1], q.angles[0])) for p, q in joints] + [e for e in ends if e is not None]
-        rows += [(c, np.zeros(2), 0.0, math.copysign(1.0, turn), 0.0, -1.0, math.inf)
+        arcs += [(*c, 0.0, 0.0, math.copysign(1.0, turn), 0.0, math.inf, 0.0, 0.0)
                  for c, turn in corners if abs(turn) > _FLAT]
-        self._origin, self._along = (np.array([row[k] for row in rows]) for k in (0, 1))
-        self._radius, self._sign, self._start, self._low, self._high = np.array([row[2:] for row in rows], float).T
-        self._left = np.column_stack([-self._along[:, 1], self._along[:, 0]])
-        self._arcs = np.flatnonzero(~np.isnan(self._radius))       # and corners: arcs of no radius
+        self._lines, self._origin = len(rows), np.array([row[:2] for row in rows + arcs])
+        self._R, self._Z, along_R, along_Z, self._sign, self._low, self._high = np.array(
+            [row[:7] for row in rows + arcs]).T.copy()
+        self._along, self._left = np.array([along_R, along_Z]), np.array([-along_Z, along_R])
+        self._radius, self._start = np.array([row[7:] for row in arcs]).reshape(-1, 2).T
 
     def _ends(self) -> tuple:
         """For both ends: (point, turn of the mirrored corner) on R = 0, else None: the profile goes on."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...physics.contact_law import ContactLaw, Motion, Touch, Tractions
@@ -74,13 +76,17 @@ class Increment:
         """Forces and stiffnesses per area that `linearise` has taken, of m points: (m, c), (m, c, c)."""
         return self._now[1].force[points], self._now[1].stiffness[points]
 
-    def foretold(self, by: np.ndarray, points: np.ndarray | slice = slice(None)) -> Tractions:
-        """The law at m points, linearised where they come to if they move on by so much, shape (m, c), length."""
+    def foretold(self, by: np.ndarray) -> Tractions:
+        """The law, linearised where points come to if they move on by so much, shape (n, c), length."""
+        return self.ahead(slice(None))(by)
+
+    def ahead(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Tractions]:
+        """`foretold` of m of the points: what gives their tractions if they move on, shape (m, c)."""
         assert self._before is not None
         touch = self._touch and Touch(*(part[points] for part in self._touch))
         before = Motion(*(part[points] for part in self._before))
-        x = self._now[0][points]
-        return self._law.part(points).tractions(x, touch, None, before.to(x + by))
+        law, x = self._law.part(points), self._now[0][points]
+        return lambda by: law.tractions(x, touch, None, before.to(x + by))
 
     def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
         """Which way points (a mask, shape (n,)) are going to slide."""
