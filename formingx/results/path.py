@@ -291,7 +291,7 @@ class Path(States):
         return tool_forces(self)
 
     def work(self) -> dict[str, np.ndarray]:
-        """The ledger: {what: energy up to each state, shape (states,)}, stress length^3 (per depth: length^2).
+        """The energy balance: {what: energy up to each state, shape (states,)}, stress length^3 (per depth: length^2).
 
         Work done on the body by each load (its column; of a fixed one "pressure_on_bottom"), each driven support (its
         name, or "support") and each tool that moves; by forces that a stage leaves without balance, as they fade

@@ -1,4 +1,4 @@
-"""The ledger of a run: work that is put into the body, by what puts it in, and where it went.
+"""The energy balance of a run: work that is put into the body, by what puts it in, and where it went.
 
 Between two states of one control the body moves on the cubic through both and their tangents. Loads are integrated
 along it (Gauss's rule). Reactions of supports and tools are no smooth functions of a guessed body, so their force is a
@@ -75,7 +75,7 @@ class _Reaction(NamedTuple):
 
 
 class Ledger:
-    """The ledger of the states of one problem.
+    """The energy balance of the states of one problem.
 
     Args:
         segment: the `Segment`.
@@ -309,7 +309,7 @@ def _slid(law: Any, x: np.ndarray, touch: Any, end: np.ndarray) -> np.ndarray:
 
 
 def _called(scene: Any, thing: Any) -> str:
-    """What a thing is called in the ledger."""
+    """What a thing is called in the energy balance."""
     if thing in scene.contacts:
         return Tooling(scene.contacts, 0, 1.0).names[scene.contacts.index(thing)]
     if thing in scene.supports:
