@@ -41,6 +41,12 @@ _SHARES = (1.0, 0.9, 1.1, 0.8)
 _GOOD = 0.4
 """Part of the way from the limits of J to 1 that is good."""
 
+_FEWEST = 3
+"""States on a mesh, after which it may be the reason why no state follows."""
+
+_CHANGED = 0.1
+"""A change of the volume of elements from which on the mesh may be the reason."""
+
 _FAILED = 4
 """At most so many states in a row of which no new mesh is found."""
 
@@ -152,8 +158,8 @@ def follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[],
             part()
         except ConvergenceError as error:
             low, high = _ratios(record, record.last) if record.states else (1.0, 1.0)
-            if len(record.segments[-1].states) < 3 or low > 0.9 and high < 1.1:
-                raise
+            if len(record.segments[-1].states) < _FEWEST or low > 1 - _CHANGED and high < 1 + _CHANGED:
+                raise                                        # the mesh is not the reason
             log.info("a new mesh, as no state was found: %s", error)
             record.ended = _WORN
         worn = record.ended == _WORN

@@ -9,7 +9,7 @@ from test_contact import cup, form
 from test_cooling import press, pressed
 
 import formingx as fx
-from formingx.discrete.carry import Carrier, carry
+from formingx.discrete.carry import Carrier, carry, fitted_shapes
 from formingx.discrete.problem import Problem
 
 
@@ -31,6 +31,28 @@ def test_quadratics_are_exact_and_other_functions_converge_with_order_three():
         errors.append(np.sqrt(np.mean((carrier.fitted(smooth(source)) - smooth(target)) ** 2)))
         assert Carrier(MPI.COMM_SELF, source, source).fitted(smooth(source)) == pytest.approx(smooth(source), rel=1e-12)
     assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 2.5), errors
+
+
+def test_strains_since_a_past_state_are_carried_as_logarithms():
+    """Of C = F^T exp(H) F, H a quadratic without trace, at any F of det 1: exact, so det C stays 1."""
+    rng = np.random.default_rng(0)
+    source, target = rng.uniform(-1, 1, (400, 2)), rng.uniform(-0.9, 0.9, (50, 2))
+
+    def shapes(X):
+        """(C, entries 11, 22, 12, 33; F)."""
+        R, Z = X.T
+        H, F = np.zeros((2, len(X), 3, 3))
+        H[:, 0, 0], H[:, 1, 1] = 1.5 * R - Z**2, 0.5 + R * Z
+        H[:, 0, 1] = H[:, 1, 0] = Z + R**2
+        H[:, 2, 2] = -H[:, 0, 0] - H[:, 1, 1]
+        F[:, 0, 0], F[:, 0, 1], F[:, 1, 1], F[:, 2, 2] = np.exp(R), Z, np.exp(np.sin(Z)), np.exp(-R - np.sin(Z))
+        w, v = np.linalg.eigh(H)
+        C = np.swapaxes(F, 1, 2) @ (v * np.exp(w)[:, None]) @ np.swapaxes(v, 1, 2) @ F
+        return np.stack([C[:, 0, 0], C[:, 1, 1], C[:, 0, 1], C[:, 2, 2]], axis=1), F
+    (values, there), (wanted, here) = shapes(source), shapes(target)
+    found = fitted_shapes(Carrier(MPI.COMM_SELF, source, target), values, there, here)
+    assert found == pytest.approx(wanted, rel=1e-9, abs=1e-9)
+    assert (found[:, 0] * found[:, 1] - found[:, 2] ** 2) * found[:, 3] == pytest.approx(np.ones(50), rel=1e-9)
 
 
 def blown(elements):

@@ -139,6 +139,22 @@ def test_an_accepted_state_keeps_its_forces(mu):
     np.testing.assert_allclose(again.force, first.force, atol=1e-12 * K)
 
 
+@pytest.mark.parametrize("mu", [0.3, np.inf])
+def test_points_that_are_guessed_are_linearised_where_they_begin(mu):
+    """In the first iteration: by the law where they are, not where their motion is predicted; then as the others."""
+    law = Law(TOOL, mu, K, THETA, SLIP)
+    x, tangent = points_near(TOOL, SIDES)
+    old = Touch(x - 0.01 * tangent, np.full(len(x), -2 * THETA), np.zeros(len(x)), x - 0.3 * SLIP * tangent)
+    start, guessed = x - 0.2 * tangent, np.random.default_rng(0).random(len(x)) < 0.5         # round fillets
+    mixed, plain = Increment(law, old, start, guessed), Increment(law, old, start)
+    by, other = mixed.linearise(x), plain.linearise(x)
+    assert np.all(by[guessed] == 0) and np.abs(other[guessed]).max() > 0.1 * K * THETA
+    np.testing.assert_array_equal(by[~guessed], other[~guessed])
+    exact = derivative(lambda y: law.tractions(y, old).force, x, 1e-7)
+    np.testing.assert_allclose(mixed.tractions(x).stiffness[guessed], exact[guessed], atol=1e-5 * K)
+    assert np.abs(mixed.linearise(x + 0.2 * tangent)[guessed]).max() > 0.1 * K * THETA
+
+
 @pytest.mark.quick
 @pytest.mark.parametrize("depth", [-0.5 * THETA, 3 * THETA, 300 * THETA])
 def test_a_point_slides_after_the_same_slip_at_every_pressure(depth):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
 import logging
 from collections.abc import Callable, Mapping, Sequence
@@ -109,17 +110,12 @@ class Design:
 
     def _run(self, vector: np.ndarray) -> DesignRun:
         scene, end = self._make(vector)
+        scene = copy.copy(scene)                             # what the script made is left as it is
+        scene.one_by_one = True
         self.paths += 1
         options: dict[str, Any] = {"step": self._step, "tolerances": self._tolerances, "max_steps": self._most,
                                    "progress": False}
-        left_open = [contact for contact in scene.contacts if contact.nodes_per_step is None]
-        for contact in left_open:
-            contact.nodes_per_step = 1
-        try:
-            path = trace(scene, until=end, **options) if isinstance(end, Target) else Process(scene).run(end, **options)
-        finally:                                             # contacts may be the script's own, of other runs, too
-            for contact in left_open:
-                contact.nodes_per_step = None
+        path = trace(scene, until=end, **options) if isinstance(end, Target) else Process(scene).run(end, **options)
         return DesignRun(self._make, self.parameters, vector, path, end, self._tolerances)
 
     def fit(self, *, wall: Any = None, even: bool = False, within: tuple[float, float] | None = None,

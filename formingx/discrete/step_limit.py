@@ -44,6 +44,8 @@ class StepLimit:
         self._n, heat = problem.n_owned, problem.scene.heat
         self._all = [Approach(face, heat is not None and heat.conducts(face.contact)) for face in problem.contacts]
         self._foretold: tuple[Any, Foretold | None] = (None, None)      # ahead of a state, by its x
+        if problem.scene.one_by_one:
+            self.one_by_one()
 
     @property
     def _present(self) -> list[Approach]:

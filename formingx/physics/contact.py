@@ -97,6 +97,7 @@ class Contact(Part):
     """
 
     quantity = "travel"
+    told = ("mu",)
     on: str
     tool: Any
     mu: Any

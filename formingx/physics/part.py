@@ -16,6 +16,7 @@ class Part:
         symmetric: True if its part of the tangent is symmetric.
         moves: (r, z) of its motion per unit of travel; None: it does not move as a whole.
         holds_rotation: True if it holds the rotation of what it holds.
+        told: attributes of which its repr tells in words; a summary leaves their numbers out.
     """
 
     name: str | None = None
@@ -25,6 +26,7 @@ class Part:
     symmetric: Any = False
     moves: tuple[float, float] | None = None
     holds_rotation = False
+    told: tuple[str, ...] = ()
 
     def constraints(self) -> list[Any]:
         """What is held: a list of `Held` or `MeanHeld`."""

@@ -67,11 +67,23 @@ class Support(Part):
         return [*self.constraints(), *(Held(_component(f"{self!r}: resists", c), on=self.on) for c in self.resists)]
 
     def __repr__(self) -> str:
-        along = f", {NAMES[self.component]!r}" if hasattr(self, "component") else ""
-        return f"{type(self).__name__}({self.on!r}{along})"
+        return f"{type(self).__name__}({self.on!r})"
 
 
-class Symmetry(Support):
+class _OneComponent(Support):
+    """Holds one component of the displacement of a boundary, `value` by name."""
+
+    told = ("component",)
+
+    def __init__(self, on: str, name: str, value: str):
+        super().__init__(on)
+        self.component = _component(f"{type(self).__name__}({on!r}): {name}", value)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.on!r}, {NAMES[self.component]!r})"
+
+
+class Symmetry(_OneComponent):
     """No displacement across a symmetry line that lies along Z (an axis, `normal="r"`) or R (`normal="z"`).
 
     Args:
@@ -83,8 +95,7 @@ class Symmetry(Support):
     """
 
     def __init__(self, on: str, normal: str = "r", mirror: bool = False):
-        super().__init__(on)
-        self.component = _component(f"Symmetry({on!r}): normal", normal)
+        super().__init__(on, "normal", normal)
         self.mirror = instance(f"Symmetry({on!r}): mirror", mirror, bool, "True or False")
 
     def constraints(self):
@@ -154,7 +165,7 @@ class PinnedNode(Support):
         return f"PinnedNode({self.point[0]!r}, {self.point[1]!r})"
 
 
-class Displaced(Support):
+class Displaced(_OneComponent):
     """One displacement component of a boundary follows the run's control (a length).
 
     Args:
@@ -172,9 +183,8 @@ class Displaced(Support):
     quantity = "travel"
 
     def __init__(self, on: str, component: str = "z", name: str | None = None):
-        super().__init__(on)
+        super().__init__(on, "component", component)
         self.name = name
-        self.component = _component(f"Displaced({on!r}): component", component)
 
     def constraints(self):
         return [Held(self.component, on=self.on, driven=True)]

@@ -128,6 +128,9 @@ class Scene:
             heat.check(self)
             self.heat = heat
 
+    one_by_one = False
+    """True: steps of a run take one node into contact, where a contact leaves `nodes_per_step` open."""
+
     temperature: GivenTemperature | None = None
     heat: Any = None
     expansion: Mapping[str, ThermalExpansion] = MappingProxyType({})

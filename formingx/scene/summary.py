@@ -25,7 +25,7 @@ def summary(scene: Any) -> dict[str, str]:
             usual = {name: p.default for name, p in signature(type(thing)).parameters.items()}
             numbers = "".join(f", {name.replace('_', ' ')} {value!r}" for name, value in vars(thing).items()
                               if isinstance(value, int | float) and repr(value) not in text(thing)
-                              and name != "component" and value != usual.get(name))
+                              and name not in thing.told and value != usual.get(name))
             lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if thing.driven else "")
     return lines | {"model": text(scene.model), "kinematics": text(scene.kinematics),
                     "quadrature degree": str(scene.quadrature_degree),
