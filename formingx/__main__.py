@@ -68,7 +68,8 @@ def _parser() -> argparse.ArgumentParser:
     now = commands.add_parser("status", help="show how far a run has come", description="Show where a run with a"
                               " checkpoint stands: stage, target, what limits its steps, verdict, time left.")
     watch = commands.add_parser("watch", help="show the status again and again", description="Show the status of a run"
-                                " whenever it has new states, until it has had none for --patience seconds, or Ctrl-C.")
+                                " whenever it has new states, until it ends, has had none for --patience seconds, or"
+                                " Ctrl-C.")
     for one in (look, show, now, watch):
         one.add_argument("folder", metavar="FOLDER", help="a checkpoint (trace(..., checkpoint=FOLDER), Path.save)")
     show.add_argument("--out", type=Path, help="the HTML file (default: report.html in the checkpoint)")
@@ -198,6 +199,8 @@ def _status(options: argparse.Namespace) -> None:
 
 
 def _watch(options: argparse.Namespace) -> None:
+    if not checkpoint.begun(options.folder):
+        _say(f"waiting up to {options.patience:g} s for a run to write its first state to {options.folder}")
     for found in status.watch(options.folder, options.every, options.patience):
         _say(str(found))
 

@@ -13,14 +13,13 @@ from typing import Any
 from . import remeshing
 from .discrete.problem import Problem
 from .errors import ConvergenceError, InputError, Interrupted, count, finite, instance, known, several
-from .heat import cooling
 from .measures.columns import Measure
 from .measures.targets import Amplitude, Target
 from .mesh.adapted import adapted, of_columns
 from .mesh.sheet import Sheet
 from .physics.contact import Contact
 from .remeshing import Remesh
-from .results.evaluate import edges, snaps, tension, volume
+from .results.evaluate import volume
 from .results.files.checkpoint import Checkpoint, holds_states, read
 from .results.path import Path
 from .results.stability import Unstable
@@ -367,7 +366,9 @@ def _path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measur
 def _keep(path: Path, checkpoint: Any) -> None:
     """Let a checkpoint be written after each step."""
     if checkpoint is not None:
-        path.record.on_step.append(Checkpoint(checkpoint, path).write)
+        kept = Checkpoint(checkpoint, path)
+        path.record.on_step.append(kept.write)
+        path.record.on_end.append(kept.end)
 
 
 def _from_checkpoint(who: str, resume: bool, checkpoint: Any, scene: Scene, start: Any) -> Any:
@@ -394,7 +395,9 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
     try:
         yield carried
     except (ConvergenceError, InputError) as error:
-        error.path = so_far()
+        error.path = path = so_far()
+        if path is not None and isinstance(error, ConvergenceError):       # on all ranks
+            _end(path, str(error))
         raise
     except KeyboardInterrupt:
         path = so_far()
@@ -407,12 +410,15 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
     for bad, text in doubts(paths[0]):
         if bad == "serious" and paths[0].problem.comm.rank == 0:
             log.warning("%s", text)
+    _end(paths[0], "")
+
+
+def _end(path: Path, failure: str) -> None:
+    """Tell those who keep the run how it ended."""
+    for told in path.record.on_end:
+        told(failure)
 
 
 def doubts(path: Path) -> list[tuple[str, str]]:
     """(how bad, what) of all that a run says when it ends; collective."""
-    return [*volume.doubts(path.last.measures["volume_error"], "the last state",
-                           path.problem.furthest_volume_ratio(path.last)),
-            *cooling.doubts(path.problem, path.segments[-1].states), *path.doubts(),
-            *edges.doubts(edges.coarsest(path, path.last)), *tension.doubts(tension.first_compression(path)),
-            *snaps.doubts(snaps.largest(path))]
+    return [*volume.doubts(path.last.measures["volume_error"], "the last state"), *path.doubts()]

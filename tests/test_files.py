@@ -26,6 +26,7 @@ import formingx as fx
 from formingx import _compat
 from formingx.__main__ import main
 from formingx.discrete.tooling import Tooling
+from formingx.results.files import checkpoint
 from formingx.results.files.description import describe
 from formingx.results.files.fields import Fields
 from formingx.results.files.solid import solid
@@ -454,7 +455,7 @@ def test_warnings(formed, inflated):
     assert f"J - 1 is up to {100 * worst:.2g} %" in record.warnings()[0]
     n = len(formed)
     record.measures |= {"penetration": np.full(n, 0.1), "mass_error": np.full(n, -0.02), "volume_error": np.zeros(n)}
-    record.furthest = None
+    record.doubts = []
     assert [w[:24] for w in record.warnings()] == ["The body penetrates a to", "The mass changes by up t"]
 
 
@@ -493,6 +494,7 @@ def test_report_of_a_warm_process(tmp_path, capsys):
     said, again = capsys.readouterr().out.split(f"{len(path)} states, stage 'hold': ")[1:]
     assert said == again and "process time 1.5 of 1.5" in said and "the target is met" in said and "good" in said
     assert f"contact arriving ({limits['contact arriving']} times)" in said
+    (tmp_path / "run" / "end.json").unlink()
     for k in range(len(path) - 2, len(path)):               # as it was two states earlier
         shutil.rmtree(tmp_path / "run" / f"{k:04d}")
     assert main(["status", str(tmp_path / "run")]) == 0 and "to the end of the stage" in capsys.readouterr().out
@@ -505,7 +507,7 @@ def test_findings_say_where_they_begin(formed):
     n = len(formed)
     deep = np.where(np.arange(n) >= n // 2, 0.1, 0.0)
     record.measures |= {"penetration": deep, "mass_error": -deep, "volume_error": np.zeros(n)}
-    record.furthest = None
+    record.doubts = []
     assert all(f"from state {n // 2} on (pressure = " in text for text in record.warnings())
     assert len(record.warnings()) == 2
 
@@ -529,7 +531,8 @@ def test_command_line(inflated, tmp_path, capsys):
     assert main(["report", str(folder), "--out", "/proc/report.html"]) == 2
     assert main(["open", str(tmp_path / "nothing")]) == 2
     error = capsys.readouterr().err
-    assert "'/proc/report.html' could not be written" in error and "is not there" in error and "Trace" not in error
+    assert "'/proc/report.html' could not be written" in error and "there is no folder" in error
+    assert "Trace" not in error
 
 
 def test_open_shows_a_screenful(plugged, tmp_path, capsys):
@@ -606,3 +609,41 @@ def test_a_folder_of_something_else_is_left_alone(inflated, tmp_path):
         with pytest.raises(fx.InputError, match="is there already"):
             write(tmp_path / f"run.{'bp' if write == inflated.to_vtx else 'xdmf'}")
     assert (tmp_path / "run.bp" / "thesis.tex").exists() and (tmp_path / "run.h5").is_symlink()
+
+
+def test_a_checkpoint_says_how_its_run_ended(tmp_path, capsys):
+    """What a run said when it ended stands in its folder: in a report of it, too; a run that goes on takes it away."""
+    body = treloar()
+    with pytest.raises(fx.ConvergenceError) as failed:
+        fx.trace(body, until=fx.pressure(50.0), checkpoint=tmp_path / "run", max_steps=5, progress=False)
+    assert main(["watch", str(tmp_path / "run")]) == 0                 # it does not wait for more
+    said = capsys.readouterr().out
+    assert "the run could not go on" in said and str(failed.value).split(":")[0] in said
+    assert main(["report", str(tmp_path / "run")]) == 0
+    assert "The run could not go on" in page(tmp_path / "run" / "report.html")
+    start = fx.load(tmp_path / "run", body)
+    path = fx.trace(body, until=fx.pole_height(0.1 + start.last.measures["pole_height"]), start=start, progress=False,
+                    checkpoint=tmp_path / "run")
+    (tmp_path / "run" / "end.json").unlink()
+    path.doubts = lambda: [("serious", "it snapped")]
+    path.save(tmp_path / "run")
+    assert main(["status", str(tmp_path / "run")]) == 0
+    said = capsys.readouterr().out
+    assert "the target is met" in said and "could not go on" not in said and "serious: it snapped" in said
+    record = report.of_checkpoint(*checkpoint.contents(tmp_path / "run"))
+    assert ("serious", "it snapped") in map(tuple, record.findings())
+
+
+@pytest.mark.parametrize("words, there", [
+    ("there is no folder", None), ("is empty", ""), ("folder of a study", "study.json"),
+    ("folders that do: 3", "3/scene.json"), ("holds no run", "notes.txt")])
+def test_folders_without_a_run(tmp_path, capsys, words, there):
+    folder = tmp_path / "ein Ordner für ihn"
+    if there is not None:
+        folder.mkdir()
+        (folder / there).parent.mkdir(exist_ok=True)
+        (folder / there).touch() if there else None
+    for command in (["status"], ["open"], ["report"], ["watch", "--patience", "0.01"]):
+        assert main([*command, str(folder)]) == 2
+    out, err = capsys.readouterr()
+    assert err.count(words) == 4 and ("waiting" in out) == (not there)

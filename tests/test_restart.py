@@ -319,7 +319,7 @@ def test_bad_state(given, message, copied):
 
 
 def test_nothing_there(tmp_path):
-    with pytest.raises(fx.InputError, match="is not there"):
+    with pytest.raises(fx.InputError, match="there is no folder"):
         fx.load(tmp_path / "nothing", treloar())
     (tmp_path / "file").write_text("x")
     with pytest.raises(fx.InputError, match="is not a folder"):

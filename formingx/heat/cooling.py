@@ -190,6 +190,27 @@ class CoolingHistory:
             estimate.destroy()
         return np.array(found)
 
+    def doubts(self, states: Sequence[Any]) -> list[tuple[str, str]]:
+        """(how bad, what), as of a verdict, of the temperatures in states: where the mesh is too coarse; collective."""
+        states = [state for state in states if state.time > 0]
+        if not states:
+            return []
+        begun = [k + 1 for k, (a, b) in enumerate(zip(states, states[1:])) if a.stage != b.stage]
+        looked = sorted({*np.linspace(0, len(states) - 1, _LOOKS).astype(int).tolist(), *(k - 1 for k in begun)})
+        looked = [k for j, k in enumerate(looked) if not j or states[k].time > states[looked[j - 1]].time]
+        errors = self.errors_in_space([states[k] for k in looked])
+        temperatures = [states[k].memory[-1].temperature for k in looked]          # that of the heat is last
+        scene, comm = self._problem.scene, self._problem.comm
+        ends = comm.allgather([float(f(T)) for T in temperatures for f in (np.min, np.max) if len(T)])
+        worst, span = int(np.argmax(errors)), np.ptp(np.concatenate(ends))
+        duration = float(np.diff([0.0, *(states[k].time for k in looked)])[worst])    # since it was looked at last
+        allowed = max(self._cooling.tolerance, _WARNS * span)
+        if errors[worst] <= allowed:
+            return []
+        return [("serious", f"The error of the temperature in space is about {errors[worst]:.2g} degrees at time"
+                            f" {states[looked[worst]].time:.4g}: use thinner elements at faces that touch a tool or"
+                            f" lose heat{_such_as(scene, errors[worst] / allowed, duration)}.")]
+
     def start(self) -> None:
         """See `History`."""
         self._time = 0.0
@@ -305,28 +326,6 @@ def _look_where_it_touches(body: Conduction, touches: Sequence[tuple[Any, Any, n
     for touch, contact, conductance in touches:
         depth = contact.contact.tool.signed_distance(touch.points + u[touch.dofs] - contact.travelled(control))
         touch.conductance[:] = conductance * (contact.present & (depth > -_NEAR * contact.thickness))
-
-
-def doubts(problem: Any, states: Sequence[Any]) -> list[tuple[str, str]]:
-    """(how bad, what), as of a verdict, of the temperatures in states: where the mesh is too coarse for them."""
-    history = next((h for h in problem.forms.histories if isinstance(h, CoolingHistory)), None)
-    states = [state for state in states if state.time > 0]
-    if history is None or not states:
-        return []
-    begun = [k + 1 for k, (a, b) in enumerate(zip(states, states[1:])) if a.stage != b.stage]
-    looked = sorted({*np.linspace(0, len(states) - 1, _LOOKS).astype(int).tolist(), *(k - 1 for k in begun)})
-    looked = [k for j, k in enumerate(looked) if not j or states[k].time > states[looked[j - 1]].time]
-    errors = history.errors_in_space([states[k] for k in looked])
-    temperatures = [states[k].memory[-1].temperature for k in looked]              # that of the heat is last
-    ends = problem.comm.allgather([float(f(T)) for T in temperatures for f in (np.min, np.max) if len(T)])
-    worst, span = int(np.argmax(errors)), np.ptp(np.concatenate(ends))
-    duration = float(np.diff([0.0, *(states[k].time for k in looked)])[worst])        # since it was looked at last
-    allowed = max(problem.scene.heat.tolerance, _WARNS * span)
-    if errors[worst] <= allowed:
-        return []
-    return [("serious", f"The error of the temperature in space is about {errors[worst]:.2g} degrees at time"
-                        f" {states[looked[worst]].time:.4g}: use thinner elements at faces that touch a tool or lose"
-                        f" heat{_such_as(problem.scene, errors[worst] / allowed, duration)}.")]
 
 
 def _such_as(scene: Any, times: float, duration: float) -> str:

@@ -13,6 +13,7 @@ from ..errors import InputError, as_points, count
 from ..figures import Axes
 from ..solve.state import State
 from ..units import NONE, Units
+from .evaluate import edges, snaps, tension, volume
 from .evaluate.profile import Profile
 from .evaluate.stress import StressField
 from .show.picture import Picture
@@ -39,11 +40,15 @@ class Path(States):
         return f"Path({len(self.states)} states{f', to {self.last!r}' if self.states else ''})"
 
     def doubts(self) -> list[tuple[str, str]]:
-        """(how bad: "serious" or "minor"; what) of contact in the last state, of wrinkles in space; collective."""
-        if self._in_space:
-            from .space import show
-            return show.doubts(self, self.wall())
-        return self._view(self.segments[-1]).verdict.doubts(self.last)
+        """(how bad: "serious" or "minor"; what) a run says when it ends, but for `volume_error`; collective."""
+        from .space import show
+        found = volume.doubts_of_point(self.problem.furthest_volume_ratio(self.last))
+        for history in self.problem.histories:
+            found += getattr(history, "doubts", lambda states: [])(self.segments[-1].states)
+        found += show.doubts(self, self.wall()) if self._in_space else self._view(
+            self.segments[-1]).verdict.doubts(self.last)
+        found += edges.doubts(edges.coarsest(self, self.last)) + tension.doubts(tension.first_compression(self))
+        return found + snaps.doubts(snaps.largest(self))
 
     def profile(self, state: State | None = None) -> Profile:
         """Deformed outline and thickness of a sheet at a state (default: the last)."""
@@ -69,7 +74,9 @@ class Path(States):
             OSError: it cannot be written.
         """
         from .files.checkpoint import Checkpoint
-        Checkpoint(folder, self).write()
+        kept = Checkpoint(folder, self)
+        kept.write()
+        kept.end()
 
     def to_vtx(self, folder: Any, states: Any = None) -> None:
         """Write fields of states (default: the last) for ParaView, a time step each: `formingx.results.files.fields`.

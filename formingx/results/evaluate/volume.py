@@ -12,20 +12,20 @@ _FURTHEST = 2.0
 """J, or 1/J, at a point beside the quadrature points above which a report warns."""
 
 
-def doubts(error: float, where: str, furthest: Any) -> list[tuple[str, str]]:
-    """(how bad: "serious" or "minor"; what) of a state.
+def doubts(error: float, where: str) -> list[tuple[str, str]]:
+    """(how bad: "serious" or "minor"; what) of a root mean square of J - 1, in the state that is named by `where`."""
+    if error <= BOUND:
+        return []
+    return [("serious" if error > 4 * BOUND else "minor",
+             f"The elements do not keep their volumes: the root mean square of J - 1 is up to {100 * error:.2g} %"
+             f" ({where}): use a finer mesh; the corner of a clamped rim is singular.")]
 
-    error: root mean square of J - 1, of the state that is named by `where`; furthest: a `Least`, where J is furthest
-    from 1 in the last state, or None.
-    """
-    found = []
-    if error > BOUND:
-        found.append(("serious" if error > 4 * BOUND else "minor",
-                      f"The elements do not keep their volumes: the root mean square of J - 1 is up to"
-                      f" {100 * error:.2g} % ({where}): use a finer mesh; the corner of a clamped rim is singular."))
+
+def doubts_of_point(furthest: Any) -> list[tuple[str, str]]:
+    """The same of a `Least`, where J is furthest from 1 in the last state, or None."""
     J = 1.0 if furthest is None else furthest.value
-    if not 1 / _FURTHEST < J < _FURTHEST:
-        found.append(("minor" if J > 0 else "serious",
-                      f"J is {J:.3g} in the last state at (R, Z) = ({furthest.point[0]:.5g}, {furthest.point[1]:.5g}):"
-                      f" the stress in that element is meaningless."))
-    return found
+    if 1 / _FURTHEST < J < _FURTHEST:
+        return []
+    return [("minor" if J > 0 else "serious",
+             f"J is {J:.3g} in the last state at (R, Z) = ({furthest.point[0]:.5g}, {furthest.point[1]:.5g}): the"
+             f" stress in that element is meaningless.")]

@@ -3,6 +3,7 @@
     run/scene.json        what the scene is, and versions
     run/0000/state.json   the state's numbers, and checksums
     run/0000/arrays.bin   its arrays (`arrays.pack`): unknowns and tangent of the path, what its histories remember
+    run/end.json          how the run ended, and what it said then; not there while it goes on, or if it was killed
 
 A state is written beside its place and then renamed: what has its name is complete, whenever a run is killed. Fields
 are kept by the order of the cells in the script's mesh, which does not depend on the number of ranks; what histories
@@ -16,6 +17,7 @@ import json
 import logging
 import os
 import shutil
+import time
 import zlib
 from collections.abc import Callable
 from dataclasses import asdict, fields
@@ -47,6 +49,7 @@ FORMAT = 5                 # of the files written
 _READ = (4, 5)
 _FIELDS = ("x", "direction")
 _ARRAYS = "arrays.bin"
+_END = "end.json"
 log = logging.getLogger("formingx")
 
 
@@ -78,6 +81,13 @@ class Checkpoint:
                 self._write_state(number, path.states[number])
                 self._there = number + 1
                 done((self._there - first) / (len(path) - first))
+
+    def end(self, failure: str = "") -> None:
+        """Write that the run has ended, what failed, and what is to be said of it (`Path.doubts`); collective."""
+        about = {"failure": failure, "doubts": self._path.doubts()}
+        files.on_root(self._comm, lambda: _plainly(
+            lambda: files.replace(self.folder / _END, lambda stream: json.dump(about, stream, indent=1)),
+            self.folder, f"{_END} could not be written; its states are kept"))
 
     def _begin(self) -> int:
         """Make the folder, or check what is in it; the number of states there."""
@@ -141,6 +151,7 @@ class Checkpoint:
                 if not final.exists():
                     raise
                 raise FileExistsError(errno.EEXIST, "another run wrote it: each needs a folder of its own") from error
+            (self.folder / _END).unlink(missing_ok=True)    # it goes on
 
         def act():
             what = f"state {number} could not be written"
@@ -184,8 +195,23 @@ def holds_states(folder: Any, comm: Any) -> bool:
     return files.on_root(comm, lambda: (folder / "scene.json").exists() and bool(_states(folder)))
 
 
-def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]]]:
-    """(how many states a checkpoint holds, what state.json says of the last ones); a run may be writing to it.
+def begun(folder: Any) -> bool:
+    """False while a run may still begin to write to a folder: it is not there, is empty, or holds no state.
+
+    Raises:
+        InputError: it holds something else.
+    """
+    folder = place("checkpoint", folder)
+    if not folder.exists() or folder.is_dir() and all(one.suffix == ".part" for one in folder.iterdir()):
+        return False
+    _read_json(folder / "scene.json")
+    return bool(_states(folder))
+
+
+def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]], float]:
+    """(how many states a checkpoint holds, what state.json says of the last ones, how many seconds ago it was written).
+
+    A run may be writing to it.
 
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
@@ -195,11 +221,24 @@ def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]]]:
     n = len(_states(folder))
     if not n:
         raise InputError(f"checkpoint {str(folder)!r} holds no state")
-    return n, [_read_data(folder, k, checksums=False) for k in range(max(n - count, 0), n)]
+    age = max(time.time() - (folder / _name(n - 1) / "state.json").stat().st_mtime, 0.0)
+    return n, [_read_data(folder, k, checksums=False) for k in range(max(n - count, 0), n)], age
+
+
+def ended(folder: Any) -> dict[str, Any] | None:
+    """{"failure": words, or "", "doubts": [(how bad, what)]} of a run that has ended; None: it did not, or is older."""
+    file = place("checkpoint", folder) / _END
+    if not file.exists():
+        return None
+    found = _read_json(file)
+    if not (isinstance(found.get("failure"), str) and isinstance(found.get("doubts"), list) and all(
+            isinstance(one, list) and list(map(type, one)) == [str, str] for one in found["doubts"])):
+        raise InputError(f"checkpoint: {str(file)!r} is damaged: it does not say how the run ended")
+    return found
 
 
 def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """(what scene.json says, what each state.json says) of a checkpoint; no scene is needed.
+    """(what scene.json says, with how it "ended"; what each state.json says) of a checkpoint; no scene is needed.
 
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
@@ -210,7 +249,7 @@ def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     states = _read_states(folder, len(_states(folder)), MPI.COMM_WORLD)
     if not states:
         raise InputError(f"checkpoint {str(folder)!r} holds no state")
-    return about, states
+    return about | {"ended": ended(folder)}, states
 
 
 def _read_states(folder: FilePath, count: int, comm: Any) -> list[dict]:
@@ -355,11 +394,28 @@ def _read_json(file: FilePath) -> Any:
             raise ValueError("it holds no table")
         return found
     except FileNotFoundError:
-        raise InputError(f"checkpoint: {str(file)!r} is not there") from None
+        raise InputError(f"checkpoint: {_instead(file)}") from None
     except NotADirectoryError:
         raise InputError(f"checkpoint: {str(file.parent)!r} is not a folder") from None
     except (ValueError, OSError, RecursionError) as error:
         raise InputError(f"checkpoint: {str(file)!r} is damaged or cannot be read: {error}") from None
+
+
+def _instead(file: FilePath) -> str:
+    """What is found in place of a file that is not there."""
+    folder = file.parent
+    if file.name != "scene.json":
+        return f"{str(file)!r} is not there"
+    if not folder.exists():
+        return f"there is no folder {str(folder)!r}"
+    if not any(folder.iterdir()):
+        return f"the folder {str(folder)!r} is empty"
+    if (folder / "study.json").exists():
+        return (f"{str(folder)!r} is the folder of a study: it keeps numbers of runs, not their states; the same"
+                f" fx.study(..., folder=...) reads them, and its report() shows them")
+    inside = sorted(one.parent.name for one in folder.glob("*/scene.json"))
+    return f"{str(folder)!r} holds no run" + (f", but folders that do: {', '.join(inside[:5])}"
+                                              f"{', ...' * (len(inside) > 5)}" if inside else "")
 
 
 def _checksums(data: dict, content: dict[str, bytes]) -> dict[str, int]:

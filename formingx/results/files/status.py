@@ -5,11 +5,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from ...errors import InputError, non_negative, positive
+from ...errors import non_negative, positive
 from . import checkpoint
 
 _RECENT = 20
 """Of so many steps the pace is taken."""
+_MET = 1e-9
+"""Distance from a target, over it, at which it is met."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,9 @@ class Status:
         spent, left: seconds that the run has worked, and about how many it takes to the end of the stage at the pace of
             its last steps; None: it came no nearer in them.
         limits: {what made steps shorter: how often}, in the whole run.
+        age: seconds since the last state was written.
+        ended: {"failure": what ended it, or "", "doubts": [(how bad, what)]} of a run that has ended; None: it goes on,
+            or was killed.
     """
 
     states: int
@@ -31,9 +36,11 @@ class Status:
     spent: float
     left: float | None
     limits: dict[str, int]
+    age: float
+    ended: dict[str, Any] | None
 
     def __str__(self) -> str:
-        lines = [f"{self.states} states" + f", stage {self.stage!r}" * bool(self.stage)]
+        lines = [f"{self.states} state{'s' * (self.states != 1)}" + f", stage {self.stage!r}" * bool(self.stage)]
         if self.target:
             name, goal, now = self.target
             lines[0] += f": {name.replace('_', ' ')} {now:.6g} of {goal:.6g}"
@@ -41,8 +48,15 @@ class Status:
         left = "no nearer to the target in the last steps" if self.left is None else \
             "the target is met" if self.left == 0 else f"about {self.left:.2g} s to the end of the stage"
         limits = ", ".join(f"{why} ({n} times)" for why, n in sorted(self.limits.items(), key=lambda one: -one[1])[:3])
+        if self.ended is None:
+            left += f"; the last state is {_words(self.age)} old"
+        elif self.left != 0:
+            left = "the run could not go on" if self.ended["failure"] else "the run ended before its target"
         lines += [f"after {spent}: {left}", f"steps limited by: {limits or 'their own control only'}",
                   f"verdict: {self.verdict or 'good'}"]
+        if self.ended is not None:
+            lines += [self.ended["failure"]] * bool(self.ended["failure"])
+            lines += [f"{bad}: {what}" for bad, what in self.ended["doubts"] if bad == "serious"]
         return "\n".join(lines)
 
 
@@ -52,43 +66,48 @@ def of_folder(folder: Any) -> Status:
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
     """
-    n, states = checkpoint.latest(folder, _RECENT)
-    last = states[-1]
+    n, states, age = checkpoint.latest(folder, _RECENT)
+    last, ended = states[-1], checkpoint.ended(folder)
     done = [s for s in states if s["stepping"] and s["stage"] == last["stage"]]
     kept: dict[str, Any] = done[-1]["stepping"] if done else {}
     counts = kept.get("counts", {})
     name, goal = kept.get("until", ("", 0.0))
     if name not in last["measures"]:
         return Status(n, last["stage"], last["verdict"], None, counts.get("seconds", 0.0), None,
-                      counts.get("limits", {}))
+                      counts.get("limits", {}), age, ended)
     now, before = done[-1]["measures"][name], done[0]["measures"][name]
     won = 1 - abs(goal - now) / abs(goal - before) if goal != before else 0.0
     took = counts["seconds"] - done[0]["stepping"]["counts"]["seconds"]
-    left = 0.0 if now == goal else took * (1 - won) / won if won > 0 else None
+    left = 0.0 if abs(now - goal) <= _MET * abs(goal) else took * (1 - won) / won if won > 0 else None
     return Status(n, last["stage"], last["verdict"], (name, goal, now), counts["seconds"], left,
-                  counts.get("limits", {}))
+                  counts.get("limits", {}), age, ended)
+
+
+def _words(seconds: float) -> str:
+    """A duration with two digits."""
+    size, unit = next(((s, u) for s, u in ((86400, "days"), (3600, "h"), (60, "min")) if seconds >= 2 * s), (1, "s"))
+    return f"{seconds / size:.2g} {unit}"
 
 
 def watch(folder: Any, every: float = 5.0, patience: float = 600.0) -> Iterator[Status]:
-    """The status now, and whenever there are new states, until there have been none for `patience` seconds.
+    """The status now, and whenever there are new states, until the run ends or has had none for `patience` seconds.
 
-    A folder that is not there yet, or holds no state, is waited for as long.
+    A folder that is not there yet, or empty, or holds no state, is waited for as long: see `checkpoint.begun`.
 
     Args:
         every: seconds between two looks.
+
+    Raises:
+        InputError: it holds something else, is damaged, or holds no state by then.
     """
     every, patience = positive("watch: every", every), non_negative("watch: patience", patience)
     seen, since = -1, time.monotonic()
     while True:
-        try:
-            found = of_folder(folder)
-        except InputError:
-            if time.monotonic() - since >= patience:
-                raise
-            found = None
-        if found is not None and found.states != seen:
+        waited = time.monotonic() - since >= patience
+        found = of_folder(folder) if checkpoint.begun(folder) or waited else None
+        if found is not None and (found.states != seen or found.ended is not None):
             yield found
-            seen, since = found.states, time.monotonic()
-        if time.monotonic() - since >= patience:
+            seen, since, waited = found.states, time.monotonic(), patience == 0
+        if waited or found is not None and found.ended is not None:
             return
         time.sleep(min(every, patience))

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ...discrete.admissible import Least
 from ...discrete.earlier_meshes import followed
 from ...discrete.tooling import Tooling
 from ...errors import InputError
 from .. import files
-from ..evaluate import edges, snaps, tension, volume
+from ..evaluate import volume
 from ..evaluate.contact_face import ContactFace, ContactTable, tool_forces
 from ..evaluate.filling import corners_of
 from ..evaluate.profile import Profile, distance_to_line, fine
@@ -46,9 +45,7 @@ class Record:
             the profiles say; of those that are drawn. (A checkpoint knows the temperature alone.)
         heat: {tool: (conductance, its temperature in words)} where tools take heat; unit: of temperatures, or "".
         layers: of the last state, as in `Wall`; script: the file that ran; or "".
-        furthest: where J is furthest from 1 in the last state, or None: not known of a checkpoint or a membrane.
-        edge: `edges.coarsest` in the last state, or None; compression: `tension.first_compression`, or None; snap:
-            `snaps.largest`, or None.
+        doubts: `Path.doubts`; of a checkpoint what the run said when it ended, as is failure: what ended it, or "".
         verdicts: of the n states, `State.verdict`.
     """
 
@@ -68,11 +65,9 @@ class Record:
     fields: list[dict[str, np.ndarray]]
     layers: dict[str, np.ndarray]
     script: str = ""
-    furthest: Least | None = None
-    edge: edges.Edge | None = None
-    compression: tuple[int, tension.Resultant] | None = None
+    doubts: Sequence[tuple[str, str]] = ()
+    failure: str = ""
     verdicts: Sequence[str] = ()
-    snap: snaps.Snap | None = None
     heat: dict[str, tuple[float, str]] = field(default_factory=dict)
     unit: str = ""
 
@@ -122,8 +117,7 @@ class Record:
                           f"The mass changes by up to {100 * worst:.2g} %"
                           f"{self._from(np.abs(self.measures['mass_error']) > MASS)}: a smaller eps, or a finer mesh,"
                           f" keeps it."))
-        found += self._of_volume() + self._of_verdict() + edges.doubts(self.edge)
-        found += tension.doubts(self.compression) + snaps.doubts(self.snap)
+        found += [*self._of_volume(), *self._of_verdict(), *self.doubts]
         if self.counts.get("failures", 0) > len(self.kinds):
             found.append(("note", f"{self.counts['failures']} attempts at a step failed and were repeated with a"
                                   f" shorter step; that does not impair the results."))
@@ -159,7 +153,7 @@ class Record:
         first = int(np.argmax(errors > volume.BOUND))
         begins = f"; more than {100 * volume.BOUND:g} % from state {first} on" if first < k else ""
         where = f"state {k}, {words(self.control)} = {self.measures[self.control][k]:.5g}{begins}"
-        return volume.doubts(errors[k], where, self.furthest)
+        return volume.doubts(errors[k], where)
 
     def _of_verdict(self) -> list[tuple[str, str]]:
         k = next((k for k, verdict in enumerate(self.verdicts) if verdict), None)
@@ -205,14 +199,13 @@ def of_path(path: Any) -> Record:
                       kinds, stages, measures, [list(s.history) for s in states], profiles, vars(path.counts),
                       stepping.get("until"), tooling, [tooling.travels(s.setting, s.control) for s in states],
                       tool_forces(path), shown, dict(wall.layers) if wall else {}, sys.argv[0],
-                      problem.furthest_volume_ratio(path.last), edges.coarsest(path, path.last),
-                      tension.first_compression(path), [s.verdict for s in states], snaps.largest(path),
-                      **_heat(plain(problem.scene.heat)))
+                      path.doubts(), verdicts=[s.verdict for s in states], **_heat(plain(problem.scene.heat)))
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:
     """The record of what `formingx.results.files.checkpoint.contents` gives."""
     stepping: dict = next((s["stepping"] for s in reversed(states) if s["stepping"]), {})
+    ended = about.get("ended") or {"doubts": (), "failure": ""}
     tooling = Tooling.of_description(about["scene"])
     measures = {c: np.array([s["measures"][c] for s in states]) for c in states[0]["measures"]}
     profiles = [s["profile"] and Profile(**{k: np.array(v) for k, v in s["profile"].items()}) for s in states]
@@ -223,7 +216,7 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
                   [tooling.travels(s.get("setting", {}), s["control"]) for s in states],
                   {name: measures[column] for name, column in tooling.force_columns.items() if column in measures},
                   _temperatures(states, profiles[-1]), {}, verdicts=[s["verdict"] for s in states],
-                  **_heat(about["scene"].get("heat")))
+                  **ended, **_heat(about["scene"].get("heat")))
 
 
 def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:

@@ -79,7 +79,8 @@ def _part(record: Record, units: Units, density: float | None, trim: Any) -> Par
 def _page(records: list[Record], names: list[str], parts: list, title: str, failure: Any, units: Units) -> str:
     alone = len(records) == 1
     body = [f"<h1>{html.escape(title)}</h1>", *(f"<p class=lead>{_lead(record, units)}</p>" for record in records[:1])]
-    body += _trouble(failure)
+    for record, name in zip(records, names):
+        body += _trouble(failure or record.failure, "" if alone else f"{name}: ")
     body += [_warnings(record, "" if alone else f"{name}: ") for record, name in zip(records, names)]
     body += ["<p id=trouble class='note bad' hidden>This browser cannot draw what follows (it needs DecompressionStream"
              " and WebGL: Chrome 80, Firefox 113, Safari 16.4 or later); the tables need nothing.</p>", _PROCESS]
@@ -105,11 +106,12 @@ _PROCESS = """<div id=process><div class=controls><button id=play>Play</button>
 <div class=views><div id=section></div><div id=solid></div></div></div>"""
 
 
-def _trouble(failure: Any) -> list[str]:
-    """What a run that could not go on says."""
-    if failure is None:
+def _trouble(failure: Any, lead: str) -> list[str]:
+    """What a run that could not go on says: an error, or its words alone."""
+    if not failure:
         return []
-    found = [f"<div class='note bad'><h2>The run could not go on</h2><p>{page.lines(str(failure))}</p></div>"]
+    found = [f"<div class='note bad'><h2>{html.escape(lead)}The run could not go on</h2>"
+             f"<p>{page.lines(str(failure))}</p></div>"]
     shape = _drawn(lambda file: failure.diagnosis.picture(file)) if getattr(failure, "diagnosis", None) else None
     return found + ([page.picture(shape, "The last good state, its elements coloured by J.", "small")] if shape else [])
 
