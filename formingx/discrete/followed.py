@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,35 +18,35 @@ class Followed:
 
     Args:
         forms: the `Formulation`; values: a `Function` of a quadrature element, which holds f(T).
-        parts: [(cells, by local numbers; f; the temperature there by the `values` of `Temperature.in_cells`)].
+        parts: [(cells, by local numbers; f)]; temperatures: there, as `take` wants them.
     """
 
-    def __init__(self, forms: Any, values: fem.Function, parts: Sequence[tuple[Any, Callable, Callable]]):
+    def __init__(self, forms: Any, values: fem.Function, parts: Sequence[tuple[Any, Callable]],
+                 temperatures: Iterable[np.ndarray]):
         self._temperature, self._values, self._parts = forms.temperature, values, parts
         self._rate = None
         if forms.scene.heat is not None:
             self._rate, self._since = fem.Function(values.function_space), forms.constant(0.0)
-        self.take_temperature()
+        self.take(temperatures)
 
     def at(self, time: Any) -> Any:
         """f at a time (UFL scalar) of the step."""
         return self._values if self._rate is None else self._values * ufl.exp(self._rate * (time - self._since))
 
-    def take_temperature(self) -> None:
-        """The temperature has changed.
+    def take(self, temperatures: Iterable[np.ndarray]) -> None:
+        """The temperature has changed: in the cells of each part it is as `Temperature.now_and_before` gives it.
 
         Raises:
             InputError: f has no value at a temperature.
         """
         temperature = self._temperature
-        for cells, function, at in self._parts:
+        for (cells, function), there in zip(self._parts, temperatures, strict=True):
             rows = self._values.function_space.dofmap.list[cells]
-            now = function(at(None))
+            now, *before = function(there)
             self._values.x.array[rows] = now
-            if self._rate is not None and temperature.before is not None:
-                before = function(at(temperature.before))
+            if self._rate is not None and before:
                 with np.errstate(all="ignore"):
-                    rate = np.log(now / before) / (temperature.time - temperature.time_before)
+                    rate = np.log(now / before[0]) / (temperature.time - temperature.time_before)
                 self._rate.x.array[rows] = np.where(np.isfinite(rate), rate, 0.0)
                 self._since.value = temperature.time
             elif self._rate is not None:

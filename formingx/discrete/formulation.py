@@ -187,9 +187,9 @@ class Formulation(ABC):
         """What strains the material of a deformation gradient F (UFL, shape (3, 3)): all but thermal expansion."""
         return F if self._free is None else self._free.elastic(F)
 
-    def temperatures(self, terms: MaterialTerms, values: Any = None) -> np.ndarray:
-        """The temperature (or other values of it) at the quadrature points of a material, (cells, points)."""
-        return self.temperature.in_cells(terms.cells, terms.places, values)
+    def temperatures(self, terms: MaterialTerms) -> np.ndarray:
+        """`Temperature.now_and_before` at the quadrature points of a material."""
+        return np.asarray(self.temperature.now_and_before(terms.cells, terms.places))
 
     def take_temperature(self) -> None:
         """The temperature has changed: constants follow it; scales stay as they are; collective.

@@ -19,19 +19,23 @@ class FreeStretch:
         forms: the `Formulation`; expansion: {layer: `ThermalExpansion`}.
 
     Attributes:
-        stretch: UFL. take_temperature(): see `Followed`.
+        stretch: UFL.
     """
 
     def __init__(self, forms: Any, expansion: dict[str, Any]):
         cell, degree = forms.domain.basix_cell(), forms.scene.quadrature_degree
-        places, temperature = basix.make_quadrature(cell, degree)[0], forms.temperature
         element = basix.ufl.quadrature_element(cell, scheme="default", degree=degree)
         stretch = fem.Function(fem.functionspace(forms.domain, element), name="free stretch")
         stretch.x.array[:] = 1.0
-        parts = [(cells, law.stretch, partial(temperature.in_cells, cells, places))
-                 for name, law in expansion.items() for cells in [forms.cells_of([name])]]
-        self._followed = Followed(forms, stretch, parts)
-        self.stretch, self.take_temperature = self._followed.at(forms.time), self._followed.take_temperature
+        self._cells = [forms.cells_of([name]) for name in expansion]
+        self._there = partial(forms.temperature.now_and_before, places=basix.make_quadrature(cell, degree)[0])
+        self._followed = Followed(forms, stretch, [(cells, law.stretch) for cells, law in
+                                                   zip(self._cells, expansion.values())], map(self._there, self._cells))
+        self.stretch = self._followed.at(forms.time)
+
+    def take_temperature(self) -> None:
+        """See `Followed.take`."""
+        self._followed.take(map(self._there, self._cells))
 
     def elastic(self, F: Any) -> Any:
         """The elastic part of a deformation gradient F, shape (3, 3)."""

@@ -94,16 +94,13 @@ class Histories:
         self._foretold = None, []
 
     def foretell(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
-        """What the histories of the forms would remember, were a state accepted; they stay as they are.
+        """What the histories of the forms remember if a state is accepted; who asks puts them back.
 
         start: the state that the step begins at.
         """
         self.look_at(x, control)
-        before = [history.get() for history in self.forms.histories]
         for history in self.forms.histories:
             history.advance(x[: self.n_owned], control, start)
         after = [history.get() for history in self.forms.histories]
-        for history, memory in zip(self.forms.histories, before):
-            history.put(memory)
         self._foretold = x, after
         return after

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import basix
@@ -83,7 +82,7 @@ class MaterialTerms:
     def of_temperature(self, function: Any) -> Any:
         """f(T) at the quadrature points of the energy, exactly, at the end of a step, or in its middle."""
         forms, found = self.forms, self.quadrature_function()
-        followed = Followed(forms, found, [(self.cells, function, partial(forms.temperatures, self))])
+        followed = Followed(forms, found, [(self.cells, function)], [forms.temperatures(self)])
         self._followed.append(followed)
         return followed.at(forms.time - (self._time_step / 2 if self._in_middle else 0))
 
@@ -93,8 +92,9 @@ class MaterialTerms:
         Raises:
             InputError: a constant has no value at a temperature.
         """
+        there = [self.forms.temperatures(self)] if self._followed else []
         for followed in self._followed:
-            followed.take_temperature()
+            followed.take(there)
 
     def of_mesh(self, expression: Any) -> Any:
         """A UFL scalar of the scene's mesh, where the fields live on it."""

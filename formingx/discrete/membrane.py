@@ -87,14 +87,14 @@ class MidSurface(Formulation):
         topology = self.domain.topology
         return np.arange(topology.index_map(1).size_local + topology.index_map(1).num_ghosts, dtype=np.int32)
 
-    def temperatures(self, terms: Any, values: Any = None) -> np.ndarray:
-        """That halfway between the faces of the layer."""
+    def temperatures(self, terms: Any) -> np.ndarray:
+        """That halfway between the faces of the layer; it does not change."""
         nodes = of_cells(self.domain, terms.cells)
         geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(self.domain).degree)
         shapes: Any = geometry.tabulate(0, terms.places)
         R, Z = np.einsum("qk,nkd->dnq", shapes[0], nodes)
         points = np.column_stack([R.ravel(), self.mid(terms.names[0], R.ravel(), Z.ravel())])
-        return self.temperature.at(points).reshape(R.shape)
+        return self.temperature.at(points).reshape(1, *R.shape)
 
     def probe(self, problem: Any, points: Any) -> MidSurfaceProbe:
         return MidSurfaceProbe(problem, points)

@@ -56,13 +56,15 @@ class StepError:
         """
         forms, old = self._forms, past[-1]
         start, clock, end = [h.get() for h in forms.histories], forms.clock, forms.time_at(control)
+        step = end - old.time if self._stresses else 0.0
+        first, found = (self._at(old.x, old.time), self._at(x, end)) if step > 0 else ([], [])
+        forms.clock = clock
         after = self._problem.foretell(old, x, control)
-        if not end > old.time or not self._stresses:
-            return 0.0, 0.0
-        step, first, found = end - old.time, self._at(old.x, old.time), self._at(x, end)
-        for history, memory in zip(forms.histories, after):
-            if history not in self._materials:
+        for history, memory in zip(forms.histories, start):
+            if history in self._materials or not step > 0:
                 history.put(memory)
+        if not step > 0:
+            return 0.0, 0.0
         errors = []
         if self._materials:
             self._advance(share @ np.array([*(state.x for state in past), x]), control, end - step / 2)

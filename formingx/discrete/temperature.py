@@ -28,9 +28,10 @@ class Temperature:
         self.time = self.time_before = 0.0
         self.limits = (-np.inf, np.inf)
 
-    def in_cells(self, cells: np.ndarray, places: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
-        """As that of `GivenTemperature`; values: in place of those now, such as `before`."""
-        return np.clip(self._given.in_cells(cells, places, self.T.x.array if values is None else values), *self.limits)
+    def now_and_before(self, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """As `GivenTemperature.in_cells`, those now and, if there are any, those before: (1 or 2, cells, q)."""
+        values = [self.T.x.array] if self.before is None else [self.T.x.array, self.before]
+        return np.clip(self._given.in_cells(cells, places, np.array(values)), *self.limits)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """Temperatures at reference points, shape (n, 2), of this rank's own choice, shape (n,); collective."""

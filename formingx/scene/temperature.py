@@ -36,11 +36,11 @@ class GivenTemperature:
     def in_cells(self, cells: np.ndarray, places: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
         """Temperatures in some cells (local numbers) at places in the reference cell, shape (q, 2): (cells, q).
 
-        values: in place of those of T, ghosts included.
+        values: in place of those of T, ghosts included, shape (..., n): (..., cells, q).
         """
         space = self.T.function_space
         basis = space.element.basix_element.tabulate(0, places)[0, :, :, 0]
-        return (self.T.x.array if values is None else values)[space.dofmap.list[cells]] @ basis.T
+        return (self.T.x.array if values is None else values)[..., space.dofmap.list[cells]] @ basis.T
 
     def on(self, boundary: str) -> np.ndarray:
         """Temperatures at the nodes of T on a boundary, shape (n,), all ranks; collective."""

@@ -226,7 +226,8 @@ class BorderedNewton:
     """Solves F(x, control) = 0 together with c(x, control) = 0.
 
     `norm(x, control)` measures corrections. The constraint is called as c(x, control, gradient) and returns
-    (c, dc/dcontrol), having put dc/dx into `gradient`. `drag`: forces that are added to F.
+    (c, dc/dcontrol), having put dc/dx into `gradient`. `drag`: forces that are added to F; with them the control stands
+    still (`fixed`), and nothing is solved for along it.
     """
 
     def __init__(self, problem: Equations, tolerances: Tolerances, norm: Callable[[PETSc.Vec, float], float],
@@ -268,7 +269,7 @@ class BorderedNewton:
             self._drag.add_to(matrix)
         good, self._update = self.solver.factorise(rescale), None
         self._modified.made(self.problem.setting if good else None)
-        if good:
+        if good and not self._drag:
             self.problem.control_derivative(x, control, self.F_control, ahead)
         return good
 
@@ -369,13 +370,13 @@ class BorderedNewton:
             raise Failure(f"{where}no convergence in {len(history)} Newton iterations", history)
 
     def _solve(self, x: PETSc.Vec, control: float, chord: bool, rescale: bool) -> bool:
-        """`self.a` = -K^-1 F and, but in a chord iteration, a new K and `self.b` as in `tangent`; False if singular."""
-        if chord:
+        """`self.a` = -K^-1 F; but in a chord iteration with a new K and, without drag, `self.b`; False if singular."""
+        if not chord and not self._factorise(x, control, rescale=rescale):
+            return False
+        if chord or self._drag:
             self.solver.solve(self.F, self.a)
             self.a.scale(-1)
-            return True
-        if not self._factorise(x, control, rescale=rescale):
-            return False
+            return bool(np.isfinite(self.a.norm()))
         both = self.solver.solve_all(np.column_stack([self.F.array_r, self.F_control.array_r]))
         self.a.array_w[:], self.b.array_w[:] = -both[:, 0], -both[:, 1]
         return bool(np.isfinite(self.b.norm()))
