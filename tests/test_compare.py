@@ -153,7 +153,7 @@ GOOD = {"a": [0, 1, 2], "b": [0, 1, 4]}
 
 
 @pytest.mark.parametrize("text, message", [
-    (None, "cannot be read"), ("", "is empty"), ("1,2\n3,4\n5,6\n", "the first line must name the columns"),
+    (None, "is not there"), ("", "is empty"), ("1,2\n3,4\n5,6\n", "the first line must name the columns"),
     ("a,b\n1,2\n", "1 rows of data"), ("a,b\n1,2\n3\n4,5\n", "line 3: 1 cells, but the header names 2"),
     ("a,a\n1,2\n3,4\n", "stands twice"), ("a,b\n1,2\n3,x\n4,5\n", "column 'b': row 2 of the data is empty or not a"),
     ("a,b\n1,2\n3,nan\n4,5\n", "row 2"),

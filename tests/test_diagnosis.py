@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 from conftest import ROOT, drawn, run_json, treloar
+from test_contact import cup
 
 import formingx as fx
 from formingx.solve import diagnose
@@ -34,6 +35,25 @@ def test_target_beyond_a_limit_point():
     error, found = failure(lambda: fx.trace(treloar(), until=fx.pressure(0.6), max_steps=30, progress=False))
     assert found.limit_points == (error.path.limit_points[0].measures["pressure"],)
     assert "the pressure has its maximum, 0.493279, at a limit point that was passed, and the target 0.6" in str(error)
+
+
+def test_a_pressure_in_time_beyond_its_maximum():
+    """The maximum is that of what is driven, and the singular tangent there no bifurcation."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1)), loads=[fx.Pressure("bottom")],
+                     materials=fx.Viscoelastic(fx.NeoHookean(c10=0.2), branches=[(3.6, 1.0)]), model=fx.Membrane(),
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    stage = fx.Stage("blow", drive=scene.loads[0], until=fx.pressure(1.0), duration=0.1)
+    error, found = failure(lambda: fx.Process(scene).run([stage], progress=False, accuracy="draft"))
+    cause, = found.causes
+    assert f"what is driven has its maximum, a limit point, at process time {found.control:.6g}" in cause
+    assert "bifurcation" not in str(error) and "enclosed_volume" in found.advice[0]
+
+
+def test_a_state_that_no_body_can_have_says_itself_what_to_try():
+    """Of a face that sinks into its mould: the penalty; no other cause is sought, nothing else advised."""
+    scene = cup("stick", (10, 1), penalty=1.0)
+    error, _ = failure(lambda: fx.trace(scene, until=fx.pressure(50.0), progress=False))
+    assert "give Contact a penalty of" in str(error) and "Cause" not in str(error) and "Try" not in str(error)
 
 
 def test_too_few_steps():

@@ -88,7 +88,7 @@ def test_a_set_block_keeps_the_exact_stretch(trim):
 
 
 def test_what_is_refused(path):
-    for words, arguments in (("does not change its temperature", {"temperature": 20.0}),
+    for words, arguments in (("no heat=Cooling", {"temperature": 20.0}),
                              ("the part goes from", {"trim": 7.0}), ("must be", {"duration": -1.0})):
         with pytest.raises(fx.InputError, match=words):
             path.released(**arguments)

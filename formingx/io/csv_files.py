@@ -115,6 +115,8 @@ def records(file: Any) -> list[tuple[int, list[str]]]:
     try:
         with open(name, newline="", encoding="utf-8-sig") as stream:
             lines = _without_remarks(list(stream))
+    except FileNotFoundError:
+        raise InputError(f"table {name!r} is not there") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"table {name!r} cannot be read: {error}") from None
     first = re.sub('"[^"]*"', "", lines[0][1]) if lines else ""

@@ -146,8 +146,8 @@ def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration:
     """(how the part cools, or None; how long)."""
     if scene.heat is None:
         if temperature is not None or boundaries is not None:
-            raise InputError("Path.released: temperature: the scene does not change its temperature: give it"
-                             " heat=Cooling(...)")
+            raise InputError("Path.released: temperature: the scene has no heat=Cooling(...) that could change it:"
+                             " leave the temperature out, or give the scene one")
         return None, 0.0 if duration is None else positive("Path.released: duration", duration)
     if (temperature is None) == (boundaries is None):
         raise InputError("Path.released: give the temperature to which the part is cooled, or the boundaries= at which"

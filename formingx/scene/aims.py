@@ -72,7 +72,7 @@ def beyond_all(scene: Scene, quantity: str | None, value: float) -> str | None:
     what, unit = units[quantity]
     if abs(value) <= _MOST * unit:
         return None
-    return f"it is {abs(value) / unit:.2g} times {what}, {unit:.4g}: are the units right?"
+    return f"it is {abs(value) / unit:.2g} times {what}, {unit:.4g} (are the units right?)"
 
 
 def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:

@@ -196,7 +196,7 @@ class Scene:
                 return i
         names = [t.name for t in self.things if t.name]
         raise InputError(f"{who}: {thing!r} is not in the scene; it has {', '.join(map(repr, self.things))}"
-                         + (f", of which some are called {', '.join(map(repr, names))}" if names else ""))
+                         + (f"; by name {', '.join(map(repr, names))}" if names else ""))
 
     def column(self, thing: Any) -> str:
         """Name of the column of what can be driven: "pressure" or "travel", its name in front if there are several."""

@@ -108,8 +108,9 @@ class Diagnosis:
         at = f", at {self.what} {self.aimed:.8g}" if self.aimed is not None else ""
         lines = [f"Step {self.step} failed after {self.what} {self.control:.8g}{at}: {self.reason}." if self.step else
                  f"No equilibrium was found at the start: {self.reason}."]
-        lines += [f"Cause: {cause}." for cause in self.causes] or ["Cause: not clear from the numbers below."]
+        lines += [f"Cause: {cause}." for cause in self.causes]
         if self.residual:
+            lines += [] if self.causes else ["Cause: not clear from the numbers below."]
             parts = ", ".join(f"{k} {v:.3g}" if np.isfinite(v) else f"{k} not finite" for k, v in self.residual.items())
             at = f"; the largest force at {self.worst}" if self.worst else ""
             lines.append(f"Out-of-balance forces, relative to the support forces: {parts}{at}.")
@@ -300,7 +301,10 @@ def _of_elements(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 def _of_limits(facts: dict[str, Any], fixed_control: bool, target: float | None) -> Iterator[tuple[str, str]]:
     """(cause, advice) of a limit point before the target."""
     what, limits = facts["what"], facts.get("limit_points", ())
-    if target is not None and limits and abs(target) > max(map(abs, limits)):
+    if what == "process time" and facts["control"] in limits:
+        yield (f"what is driven has its maximum, a limit point, at process time {facts['control']:.6g}",
+               "a stage in which something goes on growing, such as follow={enclosed_volume: [(time, value), ...]}")
+    elif target is not None and limits and abs(target) > max(map(abs, limits)):
         yield (f"the {what} has its maximum, {max(limits, key=abs):.6g}, at a limit point that was passed, and the"
                f" target {target:.6g} lies above it",
                "a target that goes on growing past a limit point (pole_height, pole_stretch, enclosed_volume)")
@@ -318,7 +322,8 @@ def _of_branches(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield (f"the tangent stiffness became indefinite between {what} {a:.6g} and {b:.6g} without a limit point:"
                f" another path branches off there (a bifurcation, such as buckling)",
                f"a small imperfection in the load or the mesh, or a target before {what} {b:.6g}")
-    if _singular(facts) and not facts.get("turned") and facts.get("limit_ahead") is None:
+    at_limit_point = facts.get("limit_ahead") is not None or facts.get("control") in facts.get("limit_points", ())
+    if _singular(facts) and not facts.get("turned") and not at_limit_point:
         yield ("the tangent stiffness becomes singular, and there is no limit point: its condition number has grown"
                f" from {facts['condition_before']:.1g} to {facts['condition']:.1g} in {_LIMITS.before} states; the"
                f" body buckles here, or a contact point is about to slip off its tool",

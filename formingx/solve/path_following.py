@@ -327,7 +327,7 @@ class Run:
             return [self._jump(old, 0.0)]
         except Failure as failure:
             if not self.problem.setting.rests:              # what is driven was to go on
-                self._give_up(f"the {self._driven} has a limit point here, and {failure.reason}", failure.attempt)
+                self._give_up(f"what is driven has a limit point here, and {failure.reason}", failure.attempt)
             self.record.ended = f"the body snaps at {self.record.describe(old)}, and no equilibrium follows"
             return []
 
@@ -376,7 +376,7 @@ class Run:
         absurd = self.problem.absurd(control)
         if absurd is not None:
             value = self.problem.shown(control)[1]
-            self._give_up(f"the {self._driven} has come to {value:.4g}, and nothing resists it: {absurd}")
+            self._give_up(f"the {self._driven} has come to {value:.4g}, beyond any process: {absurd}")
         self._stop_if(self.aim.stalled())
 
     def _stop_if(self, why: str) -> None:
@@ -419,22 +419,22 @@ class Run:
         except Unusable as unusable:
             if not self.states:
                 raise
-            self._give_up(f"at {record.describe(state)} {unusable}; beyond=True goes on, to look at what follows")
+            self._give_up(f"at {record.describe(state)}: {unusable}; beyond=True goes on, to see what follows", hint="")
         if self.problem.has_kinks:
             self.curve.look_ahead(state)
         self.aim.accept(state)
         record.counts.iterations += self.curve.spent()
         log.info("state %d: %s, %d iterations", record.counts.steps, record.describe(state), len(state.history) - 1)
 
-    def _give_up(self, why: str, attempt: Attempt | None = None, pace: str = "") -> None:
+    def _give_up(self, why: str, attempt: Attempt | None = None, pace: str = "", hint: str = _TRY) -> None:
         self.record.counts.iterations += self.curve.spent()
         found = diagnose(self.curve, self.states, why, attempt, pace,
                          self.aim.until.value if self.aim.of_control and self._aims_at_control else None)
         self.curve.spent()                                  # the diagnosis is not part of the run
-        raise self._error(f"{why}.", found)
+        raise self._error(f"{why}.", found, hint)
 
-    def _error(self, why: str, diagnosis: Diagnosis) -> ConvergenceError:
-        """What happened, what was met, what to try."""
+    def _error(self, why: str, diagnosis: Diagnosis, hint: str) -> ConvergenceError:
+        """What happened, what was met, what to try: the diagnosis' advice, or a hint."""
         record, states, values = self.record, self.states, self.aim.values
         best = int(np.argmin([abs(v - self.aim.until.value) for v in values]))
         limits = "".join(f" A limit point was passed at {record.describe(s)}." for s in states
@@ -443,7 +443,7 @@ class Run:
             f"{f'Stage {record.stage!r}: ' * bool(record.stage)}{self.aim.until} was not reached: {why} The nearest"
             f" value was {values[best]:.6g}, at {record.describe(states[best])}.{limits} The last good state is"
             f" {record.describe(record.last)}; it is kept in the error's `path`."
-            + ("" if diagnosis.advice else _TRY), diagnosis=diagnosis)
+            + ("" if diagnosis.advice else hint), diagnosis=diagnosis)
 
 
 class _Astray(Failure):

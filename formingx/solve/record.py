@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import logging
+import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -16,6 +17,9 @@ from .state import State
 from .stepping import StepControl
 
 log = logging.getLogger("formingx")
+
+_NONE = 1e100
+"""A measure of this size is none: the pole stretch of a wall that is not above 0."""
 
 
 @dataclass
@@ -151,7 +155,7 @@ class Record:
             told()
 
     def describe(self, state: State) -> str:
-        """A state's main numbers in one line."""
+        """A state's main numbers in one line, without those that no body has."""
         return f"stage {state.stage!r}, " * bool(state.stage) + ", ".join(
             f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in self.equations.main_columns
-            if k in state.measures)
+            if abs(state.measures.get(k, math.inf)) < _NONE)

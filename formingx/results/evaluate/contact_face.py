@@ -110,11 +110,12 @@ def contact_of(path: Any, tool: Any, who: str) -> list[Any]:
     contacts = path.problem.contacts
     found = [c for c in contacts if tool is None or tool in (c.contact.name, c.contact.on)
              or tool is c.contact.tool or tool is c.contact]
-    names = ", ".join(repr(c.contact.name or c.contact.on) for c in contacts) or "none"
+    names = ", ".join(repr(c.contact.name or c.contact.on) for c in contacts)
     if not found:
-        raise InputError(f"{who}: tool = {tool!r}: the scene has no such tool; it has {names}")
+        which = "the scene has no tool" if not contacts else f"the scene has no such tool; it has {names}"
+        raise InputError(f"{who}: " + f"tool = {tool!r}: " * (tool is not None) + which)
     if tool is None and len({c.contact.name for c in found}) > 1:
-        raise InputError(f"{who}: which tool? The scene has {names}")
+        raise InputError(f"{who}: the scene has several tools, name one: {names}")
     return found
 
 
