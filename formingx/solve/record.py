@@ -18,9 +18,6 @@ from .stepping import StepControl
 
 log = logging.getLogger("formingx")
 
-_NONE = 1e100
-"""A measure of this size is none: the pole stretch of a wall that is not above 0."""
-
 
 @dataclass
 class Counts:
@@ -155,7 +152,7 @@ class Record:
             told()
 
     def describe(self, state: State) -> str:
-        """A state's main numbers in one line, without those that no body has."""
+        """A state's main numbers in one line, without what no body has (the pole stretch of a wall not above 0)."""
         return f"stage {state.stage!r}, " * bool(state.stage) + ", ".join(
             f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in self.equations.main_columns
-            if abs(state.measures.get(k, math.inf)) < _NONE)
+            if abs(state.measures.get(k, math.inf)) < 1e100)
