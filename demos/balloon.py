@@ -1,4 +1,4 @@
-"""A balloon that relaxes: blown up by a flow, or by a pressure that is held until it snaps.
+"""A balloon that relaxes: blown up at a given air flow, or by a pressure that is held until it snaps.
 
 A thin solid sphere, R0/H0 = 100 (R0 to the middle of the wall), c10 = 0.05, branches (0.3, 0.5 s), (0.4, 5 s); MPa, s.
 Flow: the air drives the volume from V0 to 27 V0, V0 = 4/3 pi R0^3, at q V0 per second, and holds it there. Pressure:

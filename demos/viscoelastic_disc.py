@@ -1,4 +1,4 @@
-"""Treloar's sheet of a material that relaxes, blown up by a flow and held: as a membrane and as a solid.
+"""Treloar's sheet of a material that relaxes, blown up at a given air flow and held: as a membrane and as a solid.
 
 r0/h0 = 100, hinged; c10 = 0.05, branches (0.3, 0.5 s), (0.4, 5 s); MPa, s. The swept volume goes from 0 to V1 r0^3 in
 the time T, evenly: (T, V1) = (0.4 s, 4), (4, 2), (40, 2), and is held for 5, 2 and 2 s. Pressures as p r0/h0. Membrane

@@ -37,6 +37,13 @@ def test_target_beyond_a_limit_point():
     assert "the pressure has its maximum, 0.493279, at a limit point that was passed, and the target 0.6" in str(error)
 
 
+def test_a_limit_point_that_a_path_has_left_behind_is_no_cause():
+    """It rose above the first maximum again."""
+    facts = {"what": "travel", "limit_points": (0.54, 0.51)}
+    assert list(diagnose._of_limits({**facts, "control": 0.53}, False, 0.9))
+    assert not list(diagnose._of_limits({**facts, "control": 0.73}, False, 0.9))
+
+
 def test_a_pressure_in_time_beyond_its_maximum():
     """The maximum is that of what is driven, and the singular tangent there no bifurcation."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1)), loads=[fx.Pressure("bottom")],

@@ -337,7 +337,7 @@ def test_parison_of_programmed_wall():
 
 
 @pytest.mark.parametrize("thickness, words", [
-    ({0: 0.1, 0.9: 0.2}, "must hold R from 0 to 1"), ({0: 0.1}, "must hold R from 0 to 1"),
+    ({0: 0.1, 0.9: 0.2}, "must cover R from 0 to 1"), ({0: 0.1}, "must cover R from 0 to 1"),
     (lambda R: 0.5 - R, r"thickness of 'sheet' at R = 0.5 = 0.0: must be greater than 0"),
     (lambda R: "thick", "must be a number"),
     (lambda R: R.x, "R = 0: the function raised AttributeError: 'float'"),

@@ -421,12 +421,12 @@ def test_moulds_from_files_fill(make, tmp_path):
 
 @pytest.mark.parametrize("make, words", [
     (lambda: trough(friction=0.3), "in space a sheet sticks.*'stick'"),
-    (lambda: trough(friction="none", separates=False), "in space a sheet sticks.*'none', that with separates=True"),
+    (lambda: trough(friction="none", separates=False), "in space a sheet sticks.*'none' without separates=False"),
     (lambda: disc(model=fx.MixedPressure()), "a sheet in space is a Membrane"),
     (lambda: disc(on="rim"), "a pressure on its 'bottom' or its 'top'"),
     (lambda: disc(thickness=None), "needs a thickness"),
-    (lambda: disc(loads=[fx.Spin(1.0)]), "turns about the axis"),
-    (lambda: disc(supports=[*HELD, fx.PinnedNode(0.0, 0.0)]), "boundaries are held, not nodes"),
+    (lambda: disc(loads=[fx.Spin(1.0)]), "spins about the axis"),
+    (lambda: disc(supports=[*HELD, fx.PinnedNode(0.0, 0.0)]), "at its boundaries, not at nodes"),
     (lambda: fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(2, 1)), materials=MATERIALS[0],
                       supports=[fx.Symmetry("axis"), fx.Symmetry("rim", "y")]), "a section has no component 'y'"),
     (lambda: disc(contacts=[fx.Contact("bottom", fx.tools.plane(1.0))]), "a sheet in space those of"),

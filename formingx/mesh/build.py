@@ -294,7 +294,7 @@ def _thickness(who: str, given: Any, coordinate: str) -> Callable[[np.ndarray], 
     def between(x):
         near = 1e-9 * max(np.abs(x).max(), 1e-300)
         if len(ends) < 2 or x.min() < ends[0] - near or x.max() > ends[-1] + near:
-            raise InputError(f"{who} = {given!r}: must hold {coordinate} from {x.min():.6g} to {x.max():.6g}")
+            raise InputError(f"{who} = {given!r}: must cover {coordinate} from {x.min():.6g} to {x.max():.6g}")
         return np.interp(x, ends, values)
     return between
 

@@ -67,17 +67,18 @@ def refuse(scene: Any, heat: Any) -> None:
     """An InputError for what is not proven in space."""
     if scene.model.solid:
         raise InputError(f"Scene: model = {scene.model!r}: a sheet in space is a Membrane(): solids in space are not"
-                         f" there yet")
+                         f" available yet")
     if heat is not None:
-        raise InputError("Scene: heat: in space there is no conduction yet: give a temperature=... that stays")
+        raise InputError("Scene: heat: is not available in space yet: give a temperature=... that stays as it is")
     for load in scene.loads:
         if isinstance(load, Spin):
-            raise InputError(f"Scene: {load!r}: it turns about the axis of a round body: not in space")
+            raise InputError(f"Scene: {load!r}: it spins about the axis of a round body, which a sheet in space has"
+                             " not")
         if isinstance(load, Pressure) and load.on not in ("bottom", "top"):
             raise InputError(f"Scene: {load!r}: a sheet in space takes a pressure on its 'bottom' or its 'top'")
     for support in scene.supports:
         if isinstance(support, PinnedNode):
-            raise InputError(f"Scene: {support!r}: of a sheet in space the boundaries are held, not nodes")
+            raise InputError(f"Scene: {support!r}: a sheet in space is held at its boundaries, not at nodes")
 
 
 def check_contact(scene: Any, contact: Any) -> None:
@@ -87,10 +88,10 @@ def check_contact(scene: Any, contact: Any) -> None:
         raise InputError(f"{contact!r}: a sheet in space touches with its 'bottom' or its 'top'")
     if not contact.sticks and (contact.friction_by_temperature or contact.mu > 0 or not contact.separates):
         raise InputError(f"{contact!r}: in space a sheet sticks where it touches, or slides without friction: must be"
-                         f" 'stick' or 'none', that with separates=True; Coulomb's law is not proven there")
+                         f" 'stick', or 'none' without separates=False; Coulomb friction is not available there")
     if not contact.sticks and not isinstance(tool, Swept):
-        raise InputError(f"{contact!r}: sliding over a tool of flat triangles is not proven, as their edges stop a"
-                         f" sheet: must be 'stick', or one of box, revolved and extruded")
+        raise InputError(f"{contact!r}: sliding over a tool of flat triangles is not available, as their edges stop a"
+                         f" sheet: must be 'stick', or a tool made by box, revolved or extruded")
     if contact.separates and any(material.internal or material.integral for material in scene.materials.values()):
         raise InputError(f"{contact!r}: separates = True: in space a sheet that relaxes is held where it touches, until"
                          f" a stage leaves the tool out (without=[...]): must be 'stick', with separates left out")

@@ -304,7 +304,7 @@ def _of_limits(facts: dict[str, Any], fixed_control: bool, target: float | None)
     if what == "process time" and facts["control"] in limits:
         yield (f"what is driven has its maximum, a limit point, at process time {facts['control']:.6g}",
                "a stage in which something goes on growing, such as follow={enclosed_volume: [(time, value), ...]}")
-    elif target is not None and limits and abs(target) > max(map(abs, limits)):
+    elif target is not None and limits and abs(facts["control"]) <= max(map(abs, limits)) < abs(target):
         yield (f"the {what} has its maximum, {max(limits, key=abs):.6g}, at a limit point that was passed, and the"
                f" target {target:.6g} lies above it",
                "a target that goes on growing past a limit point (pole_height, pole_stretch, enclosed_volume)")
