@@ -149,5 +149,5 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
             raise
         path, ended = error.path, str(error).split(". ")[0]
     if not path["contact_length"].any():
-        raise InputError(f"top_load: floor = {floor!r}: {foot!r} does not come to it within travel = {travel:g}")
+        raise InputError(f"top_load: floor = {floor!r}: {foot!r} does not reach it within travel = {travel:g}")
     return TopLoad(path, path.stability(modes, "all"), -path["travel"], path["support_force"], ended)

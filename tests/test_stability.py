@@ -379,7 +379,7 @@ def test_top_load_of_a_tube():
     ends = {"neck": "top", "foot": "bottom", "material": fx.NeoHookean(c10=1.0)}
     with pytest.raises(InputError, match="must be at least 0"):        # before anything is run
         fx.top_load(mesh, travel=0.8, modes=[-2], **ends)
-    with pytest.raises(InputError, match="'bottom' does not come to it"):
+    with pytest.raises(InputError, match="'bottom' does not reach it"):
         fx.top_load(mesh, travel=0.05, modes=[1], floor=fx.tools.plane(-9.0).reversed(), **ends)
 
 

@@ -184,7 +184,7 @@ class Design:
                     notes.append(str(error).splitlines()[0])
                 share, new = share / 2, None
             if new is None:
-                why = "no shorter step is better" if share < _SEARCH.shortest else why
+                why = "no shorter step brings an improvement" if share < _SEARCH.shortest else why
                 break
             foretold = best.wall + share * (best.derivative("wall")[1] @ step)
             gained = 1 - aim.cost(new) / aim.cost(best)
@@ -251,7 +251,7 @@ class Design:
                 notes.append(str(error).splitlines()[0])
             reach /= 4
             if reach < 1e-4:
-                why = "no shorter step is better"
+                why = "no shorter step brings an improvement"
                 break
         thinnest = best.wall[inside].min()
         return Answer(first, best, taken, notes, inside, why, foretold,

@@ -272,7 +272,8 @@ class Material:
         stress = self.response.derivatives(np.ones((3, n)), sets)[0]
         for g in stress.T[np.ptp(stress, axis=0) > 1e-6 * moduli[1]][:1]:
             raise InputError(f"{self} is not free of stress at rest: dW/dl along r, z and the hoop are {g[0]:.6g},"
-                             f" {g[1]:.6g} and {g[2]:.6g}; what is equal in all of them is taken away, the rest is not")
+                             f" {g[1]:.6g} and {g[2]:.6g}; only a part that is the same in all three, a pressure, is"
+                             " removed")
 
     def check_constants(self, **constants: Any) -> None:
         """Raise an InputError unless these values of the constants are admissible."""

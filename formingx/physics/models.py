@@ -204,12 +204,12 @@ class DisplacementPenalty(Model):
 
     def check(self, scene):
         if scene.expansion:
-            raise InputError(f"Scene: expansion: with model={type(self).__name__}(): its reduced rule knows no field of"
-                             f" temperature; use MixedPressure()")
+            raise InputError(f"Scene: expansion: with model={type(self).__name__}(): it takes no field of temperature;"
+                             f" use MixedPressure()")
         for layer, material in scene.materials.items():
             if material.varies or material.internal:
-                raise InputError(f"Scene: layer {layer!r}: {material} with model={type(self).__name__}(): its reduced"
-                                 f" rule knows no constants that vary and no history; use MixedPressure()")
+                raise InputError(f"Scene: layer {layer!r}: {material} with model={type(self).__name__}(): it takes"
+                                 f" no constants that vary over the body, and no histories; use MixedPressure()")
 
     def terms(self, J, p, modulus, eps):
         """[(energy density, quadrature metadata)] for J = det F and the layer's shear modulus; p is not used."""

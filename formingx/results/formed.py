@@ -104,8 +104,8 @@ def imperfect(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
     mode, amplitude = instance("imperfect: mode", mode, Loss, "a loss that Path.stability found"), finite(
         "imperfect: amplitude", amplitude)
     if mode.number or mode.flipped:
-        raise InputError(f"imperfect: mode: {mode!r}: varies round the body, or its image turns round: no mesh of a"
-                         " section has it; modes of n = 0 can be given")
+        raise InputError(f"imperfect: mode: {mode!r}: varies round the body, or is antisymmetric about a mirror"
+                         " plane: no mesh of the section can have it; give a mode of n = 0")
     grid = gathered(mesh)
     keys, near = (np.round(points / (1e-7 * np.ptp(grid.points))).astype(np.int64) for points in (
         mode.points, grid.points))

@@ -75,7 +75,7 @@ class Loss:
             raise InputError(f"Loss.branch: sense = {sense!r}: must be 1 or -1")
         if self.number or self.flipped or self.limit_point:
             why = "is a limit point, through which the path itself goes on" if self.limit_point else (
-                "varies round the body, or its image turns round: its branch is none of this scene")
+                "varies round the body, or is antisymmetric about a mirror plane: its branch leaves this scene")
             raise InputError(f"Loss.branch: the mode {why}; branches of n = 0 can be followed")
         segment = self.path.segment(self.left)
         curve, problem = segment.curve, segment.problem
@@ -155,7 +155,7 @@ def _shown(loss: Loss) -> str:
     parts = [f"{what} at {loss.driven} {loss.control:.6g}",
              f"between states {states.index(loss.left)} and {states.index(loss.right)}",
              f"largest at R = {R:.4g}, Z = {Z:.4g}", "solved for" if loss.solved else "interpolated"]
-    return ", ".join(parts + [f"its image in {loss.flipped!r} turned round"] * bool(loss.flipped))
+    return ", ".join(parts + [f"antisymmetric about {loss.flipped!r}"] * bool(loss.flipped))
 
 
 class Watch:

@@ -185,7 +185,7 @@ class Modes:
     def _between(self, a: State, b: State, fraction: float) -> State:
         """The state there, solved for; raises `Failure`."""
         if self.problem.has_history:
-            raise Failure("what lies between two states depends on how it is come to", [])
+            raise Failure("with a history the state between two others depends on the steps", [])
         with self.problem.at(a):
             state = self.curve.inside(a, b, fraction)
         self.curve.spent()

@@ -98,4 +98,4 @@ def doubts(first: tuple[int, Resultant] | None) -> list[tuple[str, str]]:
     k, (direction, value, point) = first
     return [("serious", f"The membrane is in compression, first in state {k}: its {direction} resultant is {value:.2g}"
                         f" of shear modulus times thickness at (R, Z) = ({point[0]:.5g}, {point[1]:.5g}): it would"
-                        f" wrinkle there, and has no state: use a solid, MixedPressure(), for one.")]
+                        f" wrinkle there, as it has no bending stiffness: use a solid model, MixedPressure().")]
