@@ -1,5 +1,6 @@
 """Every code block of the pages runs, one after the other, and prints what stands below it; Sphinx builds them all."""
 
+import ast
 import importlib
 import pkgutil
 import re
@@ -53,6 +54,20 @@ def test_notebook(file, tmp_path):
             if kinds <= {"text/plain"}:
                 assert_shows(*(o.get("text") or o["data"]["text/plain"] for o in (a, b)))
     assert shown == 4
+
+
+def test_messages_are_quoted_as_they_are():
+    """Phrases of the tables of errors.md, but those of the first, which are Python's own, are said by the package."""
+    said = ""
+    for file in (ROOT / "formingx").rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            parts = node.values if isinstance(node, ast.JoinedStr) else [node]
+            said += "".join(str(part.value) for part in parts if isinstance(part, ast.Constant)) + "\n"
+    tables = (DOCS / "errors.md").read_text().split("the message says |")[2:]
+    rows = [row for table in tables for row in table.splitlines() if row.startswith("| ")]
+    quoted = [re.sub(r"\(.*?\)", "", row.split(" | ")[0][2:]) for row in rows]
+    parts = {part.strip(" .|`") for one in quoted for part in re.split(r"\.\.\.|, |: |=", one)}
+    assert len(parts) > 80 and not sorted(part for part in parts if part not in said)
 
 
 def test_every_demo_is_in_the_gallery():

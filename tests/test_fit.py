@@ -182,7 +182,7 @@ def test_bad_file(tmp_path, text, words):
 
 
 def test_no_file(tmp_path):
-    with pytest.raises(fx.InputError, match="cannot be read"):
+    with pytest.raises(fx.InputError, match="is not there"):
         fx.fit(fx.NeoHookean, tmp_path / "none.csv")
     with pytest.raises(fx.InputError, match="needs a fourth column"):
         (tmp_path / "t.csv").write_text("uniaxial,1.5,0.2\n")

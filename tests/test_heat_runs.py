@@ -143,7 +143,7 @@ def test_laws_that_are_refused(make, words):
     ({"boundaries": [fx.FixedTemperature("top", temperature=30), fx.HeatFlux("top", flux=1)]}, "does nothing"),
     ({"unit": "F"}, "unit 'F' is not known"),
     ({"start": -274.0}, "absolute zero"),
-    ({"start": "missing.csv"}, "cannot be read"),
+    ({"start": "missing.csv"}, "is not there"),
     ({"start": lambda R, Z: R / 0 * np.nan}, "not a finite number, at"),
     ({"times": [2.0, 1.0]}, "times that grow|several that grow"),
     ({"times": []}, "several that grow"),
