@@ -479,7 +479,8 @@ def test_report_of_a_warm_process(tmp_path, capsys):
     assert "must be LENGTH,STRESS" in capsys.readouterr().err
     for name in ("one", "two"):
         text, data = page(tmp_path / f"{name}.html"), drawn(tmp_path / f"{name}.html")
-        for said in ("0.25 at 40, 0.1 at 100", "temperature, C", "0.025", "contact arriving (", "go down"):
+        for said in ("0.25 at 40, 0.1 at 100", "temperature, C", "0.025", "heat_capacity=", "contact arriving (",
+                     "go down"):
             assert said in text
         assert "lambda" not in text and ("volume of the part" in text) == (name == "one")
         chart = next(chart for chart in data["charts"] if chart["title"] == "Temperature over time")

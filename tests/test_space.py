@@ -133,6 +133,8 @@ def test_a_checkpoint_tells_of_itself_and_knows_its_scene(tmp_path):
         path = fx.trace(scene(tool), until=fx.pressure(0.02), progress=False, checkpoint=folder)
         assert main(["open", str(folder)]) == 0
         text = fx.report([path, folder], tmp_path / "both.html").read_text()
+        assert text.count("its part and pictures are in the report of the path") == 2 and "No warnings" not in text
+        assert "A sheet in space" in text and main(["report", str(folder), "--density", "1"]) == 2    # not left out
         assert "block.stl" in text if number else "revolved" in text
         for other in ({"low": -0.1}, {"thickness": 0.011}):
             with pytest.raises(fx.InputError, match="of another scene"):

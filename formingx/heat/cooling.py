@@ -85,6 +85,11 @@ class Cooling:
         tools = {} if tools is None else instance("Cooling: tools", tools, Mapping, _TOOLS)
         self.tools = {name: ToolHeat.of(name, given) for name, given in tools.items()}
 
+    def __repr__(self) -> str:
+        tools = {name: (tool.conductance, tool.tool) for name, tool in self.tools.items()}
+        more = f", work_to_heat={self.work_to_heat!r}" * (self.work_to_heat is not None)
+        return f"Cooling({self.materials!r}, {self.boundaries!r}, unit={self.unit!r}, tools={tools!r}{more})"
+
     def check(self, scene: Any) -> None:
         """An InputError unless it fits a scene."""
         if scene.temperature is None:

@@ -52,7 +52,8 @@ class PartNumbers(KeyNumbers):
 
     def _rows(self, where: str, more: list[tuple[str, str]]) -> list[tuple[str, str]]:
         """Rows; where: the least wall is; more: those of one kind of part alone."""
-        rows = [("weight", self._said(self.weight, "g"))] if self.weight is not None else []
+        rows = [("weight" + ", lengths taken for cm" * (not self.units.length), self._said(self.weight, "g"))
+                ] if self.weight is not None else []
         rows += [("least wall", f"{self._length(self.least_wall)} at {where}"),
                  ("mean wall", self._length(self.mean_wall)),
                  ("evenness (least over mean wall)", f"{self.evenness:.4g}"),

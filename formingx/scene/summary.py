@@ -29,7 +29,8 @@ def summary(scene: Any) -> dict[str, str]:
             lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if thing.driven else "")
     return lines | {"model": text(scene.model), "kinematics": text(scene.kinematics),
                     "quadrature degree": str(scene.quadrature_degree),
-                    **({} if scene.temperature is None else {"temperature": text(scene.temperature)})}
+                    **({} if scene.temperature is None else {"temperature": text(scene.temperature)}),
+                    **({} if scene.heat is None else {"heat": text(scene.heat)})}
 
 
 def _temperatures(scene: Any) -> list[float]:

@@ -101,8 +101,8 @@ def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndar
     value, line = finite("part: trim", value), wall.r if along == "r" else wall.height
     crossed = np.flatnonzero((line[:-1] < value) & (line[1:] >= value))
     if not len(crossed):
-        raise InputError(f"part: trim = {trim!r}: the part goes from {line.min():.6g} to {line.max():.6g} along"
-                         f" {along}")
+        low, high = without_round_off((line.min(), line.max()), line)
+        raise InputError(f"part: trim = {trim!r}: the part goes from {low:.6g} to {high:.6g} along {along}")
     k = crossed[-1]
     inside[k], inside[k + 1:] = (value - line[k]) / (line[k + 1] - line[k]), 0.0
     return inside
@@ -112,8 +112,9 @@ def _content(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
     """The volume within the inner one of the two faces, as far as strips between nodes belong to the part."""
     found = []
     for face in (wall.profile.bottom, wall.profile.top):
-        slices = _up_to(fine(face)[:-1], fine(face)[1:], axisymmetric)
-        found.append(abs(float((_sums(slices, len(wall.r)) * inside).sum())))
+        slices = _sums(_up_to(fine(face)[:-1], fine(face)[1:], axisymmetric), len(wall.r)) * inside
+        least = 1e-12 * np.abs(face).max() ** (2 + axisymmetric)           # below it is round-off
+        found.append(abs(float(slices.sum())) if abs(slices.sum()) > least else 0.0)
     return min(found)
 
 

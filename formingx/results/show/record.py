@@ -33,7 +33,8 @@ class Record:
     """A run as plain data.
 
     Attributes:
-        summary: {part of the scene: one line}; versions: {program: version}; axisymmetric: else plane strain.
+        summary: {part of the scene: one line}; versions: {program: version}; axisymmetric: else plane strain, or in
+            space.
         kinds: of the states; stages: their names, "" in a run without; measures: {column: shape (n,)}.
         histories: of the n states, rows (residual, correction, work) of Newton's iterations.
         profiles: of the n states, each a `Profile`, or None: of no sheet, or of a state that is not drawn (`frames`).
@@ -70,6 +71,7 @@ class Record:
     verdicts: Sequence[str] = ()
     heat: dict[str, tuple[float, str]] = field(default_factory=dict)
     unit: str = ""
+    space: bool = False
 
     @property
     def control(self) -> str:
@@ -199,7 +201,8 @@ def of_path(path: Any) -> Record:
                       kinds, stages, measures, [list(s.history) for s in states], profiles, vars(path.counts),
                       stepping.get("until"), tooling, [tooling.travels(s.setting, s.control) for s in states],
                       tool_forces(path), shown, dict(wall.layers) if wall else {}, sys.argv[0],
-                      path.doubts(), verdicts=[s.verdict for s in states], **_heat(plain(problem.scene.heat)))
+                      path.doubts(), verdicts=[s.verdict for s in states],
+                      space=problem.scene.kinematics.components == 3, **_heat(plain(problem.scene.heat)))
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:
@@ -216,7 +219,7 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
                   [tooling.travels(s.get("setting", {}), s["control"]) for s in states],
                   {name: measures[column] for name, column in tooling.force_columns.items() if column in measures},
                   _temperatures(states, profiles[-1]), {}, verdicts=[s["verdict"] for s in states],
-                  **ended, **_heat(about["scene"].get("heat")))
+                  space=about["scene"]["kinematics"]["kind"] == "ThreeD", **ended, **_heat(about["scene"].get("heat")))
 
 
 def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:

@@ -12,24 +12,24 @@ const mix = (a, b, f) => a.map((v, k) => v === null || b[k] === null ? v : v + f
 const narrow = () => window.innerWidth < 700;
 const font = {family: "system-ui, Segoe UI, Roboto, sans-serif", size: 13, color: "#1d2530"};
 
-// The place in a run: between states k and k + 1, a fraction f on; stages change at once.
+// The place in a run: between states k and j = k + 1, a fraction f on; stages change at once. A run may be one state.
 function place(run, s) {
   const p = run.progress;
   let k = 0;
   while (k < p.length - 2 && p[k + 1] < s) k++;
-  const gap = p[k + 1] - p[k], same = run.stage[k] === run.stage[k + 1];
-  return {k, f: !same ? 1 : gap > 0 ? Math.min(Math.max((s - p[k]) / gap, 0), 1) : 1};
+  const j = Math.min(k + 1, p.length - 1), gap = p[j] - p[k], same = run.stage[k] === run.stage[j];
+  return {k, j, f: !same ? 1 : gap > 0 ? Math.min(Math.max((s - p[k]) / gap, 0), 1) : 1};
 }
 
 function frame(run, s, field) {
-  const {k, f} = place(run, s), sheet = run.sheet, values = sheet.fields[field];
-  const line = of => [0, 1].map(i => mix(sheet[of][k][i], sheet[of][k + 1][i], f));
-  return {bottom: line("bottom"), top: line("top"), values: mix(values[k], values[k + 1], f),
-    all: Object.fromEntries(Object.entries(sheet.fields).map(([name, v]) => [name, mix(v[k], v[k + 1], f)])),
-    numbers: Object.fromEntries(Object.entries(run.numbers).map(([n, v]) => [n, v[k] + f * (v[k + 1] - v[k])])),
-    travel: run.tools.map(t => t.travel[f < 1 ? k : k + 1] === null ? null
-      : t.travel[k] === null ? t.travel[k + 1] : t.travel[k] + f * ((t.travel[k + 1] ?? t.travel[k]) - t.travel[k])),
-    stage: run.stage[f < 1 ? k : k + 1]};
+  const {k, j, f} = place(run, s), sheet = run.sheet, values = sheet.fields[field];
+  const line = of => [0, 1].map(i => mix(sheet[of][k][i], sheet[of][j][i], f));
+  return {bottom: line("bottom"), top: line("top"), values: mix(values[k], values[j], f),
+    all: Object.fromEntries(Object.entries(sheet.fields).map(([name, v]) => [name, mix(v[k], v[j], f)])),
+    numbers: Object.fromEntries(Object.entries(run.numbers).map(([n, v]) => [n, v[k] + f * (v[j] - v[k])])),
+    travel: run.tools.map(t => t.travel[f < 1 ? k : j] === null ? null
+      : t.travel[k] === null ? t.travel[j] : t.travel[k] + f * ((t.travel[j] ?? t.travel[k]) - t.travel[k])),
+    stage: run.stage[f < 1 ? k : j]};
 }
 
 function limits(run, field) {
@@ -62,7 +62,7 @@ function sectionTraces(run, at, field, range) {
       Object.entries(at.all).map(([name, v]) => `${name}: ${format(v[i])}`).join("<br>")),
     marker: {size: 6, color: dense(at.values), colorscale: field.startsWith("temperature") ? "Portland" : "Viridis", reversescale: field.startsWith("wall"), cmin: range[0],
       cmax: range[1], showscale: n === 0, colorbar: {thickness: 12, len: 0.85, outlinewidth: 0,
-      title: {text: field, side: narrow() ? "top" : "right"}, ...(narrow() ? {orientation: "h", y: -0.42, len: 1} : {})}}}));
+      title: {text: narrow() ? "" : field, side: "right"}, ...(narrow() ? {orientation: "h", yref: "container", y: 0, yanchor: "bottom", len: 1} : {})}}}));
   return traces;
 }
 
@@ -100,12 +100,14 @@ function process(data) {
     height: Math.min(narrow() ? 470 : 520, (narrow() ? 280 : 480) * tall() + (narrow() ? 180 : 110)), xaxis: {title: `r${unit}`, range: box(run)[0], zeroline: false, gridcolor: "#eceff3",
     constrain: "domain"}, yaxis: {title: `z${unit}`, range: box(run)[1], scaleanchor: "x", zeroline: false,
     gridcolor: "#eceff3", constrain: "domain"}, plot_bgcolor: "white"});
-  const scene = () => { const [r, z] = box(run), unit = Math.cbrt((r[1] - r[0]) ** 2 * (z[1] - z[0]));
-    const half = (r[1] - r[0]) / unit / 2, high = 0.9 * (z[1] - z[0]) / unit / 2 + 0.4 * half;     // as they are seen
-    const far = Math.max(half, high) / 0.41 + half / 2;
+  const scene = () => { const [r, z] = box(run), deep = run.axisymmetric ? r : [-r[1], r[1]], height = narrow() ? 340 : 420;
+    const [x, y, up] = [r, deep, z].map(v => v[1] - v[0]), unit = Math.cbrt(x * y * up);
+    const half = (run.axisymmetric ? x : 0.78 * x + 0.63 * y) / unit / 2, high = 0.9 * up / unit / 2 + 0.4 * half;     // as they are seen
+    const wide = Math.min((element("solid").clientWidth || height) / height, 1);
+    const far = Math.max(half / wide, high) / 0.41 + half / 2;
     return {font, margin: {l: 0, r: 0, t: 0, b: 0},
-    height: narrow() ? 340 : 420, scene: {aspectmode: "data", camera: {eye: {x: 0.57 * far, y: -0.71 * far, z: 0.42 * far}},
-    xaxis: {visible: false, range: r}, yaxis: {visible: false, range: r}, zaxis: {visible: false, range: z}}}; };
+    height, scene: {aspectmode: "manual", aspectratio: {x: x / unit, y: y / unit, z: up / unit}, camera: {eye: {x: 0.57 * far, y: -0.71 * far, z: 0.42 * far}},
+    xaxis: {visible: false, range: r}, yaxis: {visible: false, range: deep}, zaxis: {visible: false, range: z}}}; };
   function show(solid) {
     const s = slider.value / 1000, field = colour.value, range = limits(run, field), at = frame(run, s, field);
     Plotly.react("section", sectionTraces(run, at, field, range), layout(), config);
@@ -149,7 +151,7 @@ function charts(data) {
       plot = document.createElement("div");
     caption.textContent = chart.title; figure.append(caption, plot); element("charts").append(figure);
     const axis = (title, zero) => ({title, gridcolor: "#eceff3", zeroline: false, ...(zero ? {rangemode: "tozero"} : {})});
-    Plotly.newPlot(plot, chart.traces, {font, height: 320, margin: {l: 60, r: 10, t: 8, b: 45}, plot_bgcolor: "white",
+    Plotly.newPlot(plot, chart.traces, {font, height: 330, margin: {l: 60, r: 10, t: 28, b: 45}, plot_bgcolor: "white",
       xaxis: axis(chart.x, chart.zero === "x"), yaxis: axis(chart.y, chart.zero === "y"),
       showlegend: chart.traces.length > 1, legend: {orientation: "h", y: -0.25}}, config);
   });

@@ -72,6 +72,9 @@ def write(records: Record | list[Record], file: Any, title: str, failure: Any, c
 
 def _part(record: Record, units: Units, density: float | None, trim: Any) -> Part | None:
     if record.profiles[-1] is None:
+        if density is not None or trim is not None:
+            raise InputError(f"report: {'density' if density is not None else 'trim'}: "
+                             + (_NO_MESH if record.space else "the mesh is no sheet: it has no wall, nor a part"))
         return None
     return part(Wall(record.profiles[-1], record.layers, None), record.axisymmetric, density, trim, (), units)
 
@@ -98,6 +101,8 @@ def _page(records: list[Record], names: list[str], parts: list, title: str, fail
     return page.page(title, body, f"{tail}\n<script>{code}</script>")
 
 
+_NO_MESH = ("a run in space keeps its states without the mesh: its part and pictures are in the report of the path,"
+            " fx.load(folder, scene).report()")
 _PROCESS = """<div id=process><div class=controls><button id=play>Play</button>
 <label>Colour: <select id=colour></select></label>
 <label>Run: <select id=run></select></label></div>
@@ -139,11 +144,18 @@ def _behind(record: Record, units: Units) -> list[str]:
 
 def _warnings(record: Record, lead: str = "") -> str:
     """What a reader should know first: two lines of each, all of it when it is opened."""
+    if record.space:
+        lead = f"<p class=note>{html.escape(lead)}Curves and inputs alone: {_NO_MESH}.</p>"
+        return lead + "".join(_noted(*found) for found in record.findings())
     if not record.findings():
         return (f"<p class=good>{html.escape(lead)}No warnings: the target was met; mass, volume of the elements and"
                 f" penetration are within bounds, and no face crosses another or the axis.</p>")
-    return "".join(f"<details class='note{' bad' if bad == 'serious' else ''}'><summary><b>{bad}</b>:"
-                   f" {html.escape(lead + text)}</summary></details>" for bad, text in record.findings())
+    return "".join(_noted(bad, lead + text) for bad, text in record.findings())
+
+
+def _noted(bad: str, text: str) -> str:
+    return (f"<details class='note{' bad' if bad == 'serious' else ''}'><summary><b>{bad}</b>: {html.escape(text)}"
+            f"</summary></details>")
 
 
 def _made(records: list[Record]) -> list[list[str]]:
@@ -165,7 +177,7 @@ def _cards(record: Record, found: Part | None, units: Units) -> str:
         length = f" {units.length}" if units.length else ""
         cards = [(f"{found.least_wall:.4g}{length}", f"least wall, at r = {found.least_at[0]:.4g}{length}"),
                  (f"{found.evenness:.3g}", "least over mean wall"),
-                 (f"{found.weight:.4g} g", "weight") if found.weight is not None else
+                 (f"{found.weight:.4g} g", found.rows[0][0]) if found.weight is not None else
                  (f"{found.volume:.{4 if found.volume < 1e4 else 6}g} {units.volume}", "volume of the part")]
     cards += [(value, what) for what, value in _peaks(record, units)]
     return "<div class=cards>" + "".join(f"<div class=card><b>{html.escape(value.strip())}</b><span>{html.escape(what)}"
@@ -199,7 +211,8 @@ def _lead(record: Record, units: Units) -> str:
         how += f", {jumps} jump{'s' * (jumps > 1)}, where the body snapped to its next equilibrium"
     said = f"Lengths in {units.length}, stresses in {units.stress}, forces in {units.force}." if units.force else \
         "Units are those of the script."
-    return html.escape(f"{how}. {'Axisymmetric' if record.axisymmetric else 'Plane strain'}. {said}")
+    kind = "A sheet in space" if record.space else "Axisymmetric" if record.axisymmetric else "Plane strain"
+    return html.escape(f"{how}. {kind}. {said}")
 
 
 def _key_numbers(record: Record, units: Units) -> str:
@@ -235,7 +248,8 @@ def _stages(record: Record, units: Units) -> str:
                      for c in columns), *(page.number(f[mine][np.argmax(np.abs(f[mine]))]) for f in
                      record.forces.values()), "" if gap is None else page.number(gap),
                      "" if last is None else page.number(last.wall_ratio.min())])
-    return page.table(["stage", "states", "iterations", *(f"{units.label(c)} at its end" for c in columns), *extra,
+    return page.table(["stage", "states", "iterations of accepted steps",
+                       *(f"{units.label(c)} at its end" for c in columns), *extra,
                        units.label("gap", "largest gap in a corner"), "smallest thickness / original"], rows)
 
 
