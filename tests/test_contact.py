@@ -513,6 +513,27 @@ def _residual(problem, x, control, F):
     return F.array_r.copy()
 
 
+def test_what_slides_beside_what_sticks_is_foretold(monkeypatch):
+    """A plug under friction beside a rough mould, in fewer steps to the same wall; nothing arrives before its step."""
+    mould = fx.tools.cup(radius=38.0, depth=60.0, mouth=1.2, draft=6.0, fillet=5.0, lip=2.0)
+    tool, times, find = fx.tools.male(radius=22.0, height=120.0, base=-120.0, draft=3.0, fillet=6.0), [], Foretold.next
+
+    def told(ahead, k, length):
+        arrival = find(ahead, k, length)
+        times.append(ahead.ends if arrival is None else arrival.time)
+        return arrival
+
+    monkeypatch.setattr(Foretold, "next", told)
+    many, one = (fx.trace(fx.Scene(
+        mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(30, 1)), materials=fx.MooneyRivlin(c10=0.35, c01=0.05),
+        supports=[fx.Symmetry("axis"), fx.Clamped("rim")], contacts=[
+            fx.Contact("top", mould, "stick", separates=False, nodes_per_step=n),
+            fx.Contact("bottom", tool, 0.3, moves=(0, 1), nodes_per_step=n)]),
+        until=fx.travel(44.0), step=fx.StepControl(target=8), progress=False) for n in (None, 1))
+    assert many.counts.steps < 0.7 * one.counts.steps and min(times) >= 0
+    assert many.profile().thickness == pytest.approx(one.profile().thickness, rel=2e-3)
+
+
 @pytest.mark.parametrize("friction", ["none", 0.3])
 def test_what_does_not_stick_is_not_foretold(friction):
     """A smooth ball at Gauss points, more than a face has nodes: steps do not fail (200 of 450 did, foretold)."""

@@ -54,7 +54,7 @@ class StepLimit:
     @property
     def foretells(self) -> bool:
         """True if a step may bring more points where it is told how the body gives way."""
-        return any(c.foretold > c.at_once for c in self._present) and all(
+        return any(c.foretells for c in self._present) and all(
             hasattr(c.face.law, "friction") and hasattr(c.face.law, "without") for c in self._present)
 
     def foretells_from(self, state: Any) -> bool:

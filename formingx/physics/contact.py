@@ -78,7 +78,7 @@ class Contact(Part):
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge); in space so many
             hundredths of all nodes, default 1. What sticks, slides under friction or gives off heat depends on when it
             touched. None: of what sticks up to 5 % of the nodes, foretold one after the other, each held where it
-            arrives; of what slides under friction or gives off heat one.
+            arrives, and so what slides beside it; else of what slides under friction or gives off heat one.
         present_area: the penalty is per area and over the wall as they are at the beginning of a step, not at rest:
             what is drawn or pressed 20 times thinner is held as well as at rest. Without friction. (Then a state
             depends, by its penetration, on the steps on the way to it.)

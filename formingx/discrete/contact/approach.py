@@ -62,9 +62,14 @@ class Approach:
         points = face.comm.allreduce(len(face.rule.points))
         share = max(points // 100, 1) if face.contact.lagged else 1
         self.at_once = (given or 1) * share * (1 if face.law.remembers or conducts else 10)
-        foretells = face.contact.sticks and not given and not face.contact.lagged      # where it sticks depends on it
-        self.foretold = max(self.at_once, round(LIMITS.share * points)) if foretells else self.at_once
+        rubs = face.law.has_friction and not given and not face.contact.lagged
+        self.foretold = max(self.at_once, round(LIMITS.share * points)) if rubs else self.at_once
         self._foreseen = 0                                  # points that the step is going to bring, all ranks
+
+    @property
+    def foretells(self) -> bool:
+        """True if more arrivals than one by one may be foretold for its sake: where it sticks depends on them."""
+        return self.face.contact.sticks and self.foretold > self.at_once
 
     def touches(self, fields: np.ndarray, control: float) -> bool:
         """True if a point touches the tool."""

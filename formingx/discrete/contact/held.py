@@ -71,6 +71,15 @@ class Near(NamedTuple):
     beyond: np.ndarray
 
 
+class Small(NamedTuple):
+    """What m points do, held by nothing: free: dx, flat; by: dx by each force; turn: how forces grow as they turn, by dx,
+    shape (m, 2, 2)."""
+
+    free: np.ndarray
+    by: np.ndarray
+    turn: np.ndarray
+
+
 class Points:
     """Points of faces, those of all ranks, whose columns of the compliance are known.
 
@@ -200,7 +209,7 @@ class Points:
                 return F, F - np.einsum("nij,nj->ni", self._S, dx), status
         return None
 
-    def _agreed(self, small: tuple[np.ndarray, np.ndarray], status: np.ndarray, near: Near, N: np.ndarray,
+    def _agreed(self, small: Small, status: np.ndarray, near: Near, N: np.ndarray,
                 T: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """Rates of forces and positions, and statuses that agree with them; here: points that are at their tools."""
         seen, mu = set(), np.where(self.friction < np.inf, self.friction, 0.0)
@@ -260,21 +269,20 @@ class Points:
         after[first] = other[first]
         return float(times[first]), after
 
-    def _small(self, u: np.ndarray, near: Near, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """dx by u, and by each force, with no stiffness of points but that of forces that turn."""
+    def _small(self, u: np.ndarray, near: Near, force: np.ndarray) -> Small:
+        """By u and by each force, with no stiffness of points but that of forces that turn."""
         N, T = self.parts(force, near)
         n, t = near.normal, near.tangent
         turn = near.curvature[:, None, None] * ((N[:, None] * t - T[:, None] * n)[:, :, None] * t[:, None, :])
         size = len(self._C)
         CK = np.einsum("xni,nij->xnj", self._C.reshape(size, *u.shape), self._S - turn).reshape(size, size)
         found = np.linalg.solve(np.eye(size) - CK, np.column_stack([u.ravel(), self._C]))
-        self._turn = turn
-        return found[:, 0], found[:, 1:]
+        return Small(found[:, 0], found[:, 1:], turn)
 
-    def _solved(self, small: tuple[np.ndarray, np.ndarray], status: np.ndarray, near: Near,
+    def _solved(self, small: Small, status: np.ndarray, near: Near,
                 to: np.ndarray | None = None, slips: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Forces (or, without `to`, their rates) and motions, shape (m, 2); slips: elastic, of those that stick."""
-        free, by = small
+        free, by, turn = small
         size, held = len(free), status != FREE
         sticks = np.flatnonzero(held & (status == STICKS) & (self.friction > 0))
         slides = np.setdiff1d(np.flatnonzero(held), sticks)
@@ -302,4 +310,4 @@ class Points:
             gives[k, k] += slips[sticks]
         size_of = np.linalg.solve(gives, A @ free - a)
         dx = (free - by @ (B @ size_of)).reshape(near.normal.shape)
-        return (B @ size_of).reshape(dx.shape) + np.einsum("nij,nj->ni", self._turn, dx), dx
+        return (B @ size_of).reshape(dx.shape) + np.einsum("nij,nj->ni", turn, dx), dx

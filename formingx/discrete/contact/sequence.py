@@ -296,7 +296,7 @@ class Foretold:
                 gap, rate = float(near.distance[0]) + law.theta, float(near.normal[0] @ w[0])
                 if abs(gap) < _FORETELLING.same_place * law.theta or not rate > 0:
                     break
-                by -= gap / rate
+                by = max(by - gap / rate, self._pieces[-1].begins - time)
                 near = law.nearest(x + by * w)
             told = Arrival(time + by, rank, f, i, (x + by * w)[0], float(face.rule.lengths[i]),
                            bool(np.isinf(np.ravel(law.friction)[0])))
