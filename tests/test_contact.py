@@ -529,7 +529,7 @@ def test_what_slides_beside_what_sticks_is_foretold(monkeypatch):
         supports=[fx.Symmetry("axis"), fx.Clamped("rim")], contacts=[
             fx.Contact("top", mould, "stick", separates=False, nodes_per_step=n),
             fx.Contact("bottom", tool, 0.3, moves=(0, 1), nodes_per_step=n)]),
-        until=fx.travel(44.0), step=fx.StepControl(target=8), progress=False) for n in (None, 1))
+        until=fx.travel(48.0), step=fx.StepControl(target=8), progress=False) for n in (None, 1))
     assert many.counts.steps < 0.7 * one.counts.steps and min(times) >= 0
     assert many.profile().thickness == pytest.approx(one.profile().thickness, rel=2e-3)
 

@@ -72,7 +72,7 @@ class Near(NamedTuple):
 
 
 class Small(NamedTuple):
-    """What m points do, held by nothing: free: dx, flat; by: dx by each force; turn: how forces grow as they turn, by dx,
+    """What m points do, held by nothing: free: dx, flat; by: dx by each force; turn: how forces that turn grow by dx,
     shape (m, 2, 2)."""
 
     free: np.ndarray
