@@ -34,9 +34,12 @@ class LocalContact:
     Attributes:
         most: points that are solved for together; with more, the iteration is left to itself.
         few: points that change for which solutions with the factors at hand cost less than other factors.
-        iterations: at most so many, with `full` corrections at first (which may cycle), then with halved ones where a
-            full one would lead further away, but not more often than `halved` times in a row (which may stall at a
-            kink).
+        iterations: at most so many, with `full` corrections at first (which may cycle), then with those that stop near
+            the foot of the ramp in which contact begins.
+        stays: part of its depth in the ramp at which a point stops that would leave it; least: from this depth, over
+            the width of the ramp, it leaves.
+        behind: depth at which one stops that would come back, over the width; farther: times as deep from one time to
+            the next.
         accuracy: of positions, over the ramp in which contact begins.
     """
 
@@ -44,7 +47,10 @@ class LocalContact:
     few: int = 3
     iterations: int = 40
     full: int = 8
-    halved: int = 4
+    stays: float = 0.1
+    least: float = 1e-9
+    behind: float = 1e-6
+    farther: float = 10.0
     accuracy: float = 1e-4
 
 
@@ -169,26 +175,34 @@ class _Points:
         """How a correction and its step change, own part; None if no consistent state was found."""
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._taken()
-        laws = [c.increment.ahead(i) for c, i in self._some]
-        y, by, least, halved = y0, np.zeros_like(y0), np.inf, 0
+        laws, ramps = [c.increment.ahead(i) for c, i in self._some], [c.increment.in_ramp(i) for c, i in self._some]
+        y, behind = y0, np.full(len(y0) // self._c, _LOCAL.behind)
         accuracy = _LOCAL.accuracy * min(c.increment.ramp for c in self._contacts)
         for k in range(_LOCAL.iterations):
-            f, S = self._law(laws, y - by)
-            more = f - f0 + np.einsum("nij,nj->ni", S - S0, (y - by).reshape(-1, self._c)).ravel()
-            R = y - by - y0 + self._C @ more
-            miss = np.abs(R).max()
-            if miss < accuracy:
+            f, S = self._law(laws, y)
+            more = f - f0 + np.einsum("nij,nj->ni", S - S0, y.reshape(-1, self._c)).ravel()
+            R = y - y0 + self._C @ more
+            if np.abs(R).max() < accuracy:
                 forces = -self._scale * more
                 return self._columns @ forces, float(self._steps @ forces)
-            if k > _LOCAL.full and miss > least and halved < _LOCAL.halved:
-                by, halved = by / 2, halved + 1
-                continue
-            y, least, halved = y - by, miss, 0
-            found = self._within(S - S0, R)
-            if found is None:
+            by = self._within(S - S0, R)
+            if by is None:
                 return None
-            by = found
+            y = y - by if k < _LOCAL.full else self._to_foot(ramps, y, y - by, behind)
         return None
+
+    def _to_foot(self, ramps: list[Any], y: Array, new: Array, behind: Array) -> Array:
+        """Motions `new`, after y, that do not cross the foot of the ramp at once; `behind` grows of those that came in.
+
+        What holds a point that sticks, k s g, falls with the slope s of the ramp from all to nothing next to its foot.
+        There a point is in equilibrium that is pulled along its tool and hardly pressed to it, and a correction from
+        either side leads far to the other.
+        """
+        (was, _), (now, way) = (self._all(self._each(ramps, at), (), (self._c,)) for at in (y, new))
+        leaves, enters = (was > _LOCAL.least) & (now <= 0), (was <= 0) & (now > 0)
+        at = np.where(leaves, _LOCAL.stays * np.minimum(was, 1.0), np.where(enters, np.minimum(now, behind), now))
+        behind[enters] *= _LOCAL.farther
+        return new + ((at - now)[:, None] * way).ravel()
 
     def updated(self, V: Array, step: float, changes: list[Array]) -> Array | None:
         """Solutions V, own rows, shape (n, m), with other stiffnesses per area of own points; None: it is singular."""
@@ -214,21 +228,26 @@ class _Points:
         return np.concatenate([np.zeros(0), *(c.moved(dx, step)[i].ravel() for c, i in self._some)])
 
     def _taken(self) -> tuple[Array, Array]:
-        """Forces and stiffnesses that the iteration has taken."""
-        return self._all([c.increment.taken(i) for c, i in self._some])
+        """Forces, flat, and stiffnesses that the iteration has taken."""
+        return self._forces([c.increment.taken(i) for c, i in self._some])
 
     def _law(self, laws: list[Any], y: Array) -> tuple[Array, Array]:
-        """Forces and stiffnesses of the law, linearised where the points would be."""
-        mine, at, found = y[self._own].reshape(-1, self._c), 0, []
-        for law, (_, i) in zip(laws, self._some):
-            there, at = law(mine[at:at + len(i)]), at + len(i)
-            found.append((there.force, there.stiffness))
-        return self._all(found)
+        """Forces, flat, and stiffnesses of the law, linearised where the points would be."""
+        return self._forces([(there.force, there.stiffness) for there in self._each(laws, y)])
 
-    def _all(self, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-        none = np.zeros((0, self._c)), np.zeros((0, self._c, self._c))      # on a rank without points
-        force, stiffness = (np.concatenate(part) for part in zip(*(parts or [none])))
-        return self._gather(force).ravel(), self._gather(stiffness)
+    def _forces(self, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+        force, stiffness = self._all(parts, (self._c,), (self._c, self._c))
+        return force.ravel(), stiffness
+
+    def _each(self, functions: list[Any], y: Array) -> list[Any]:
+        """What the functions of each contact's points give for motions y."""
+        ends = np.cumsum([len(i) for _, i in self._some])[:-1]
+        return [f(mine) for f, mine in zip(functions, np.split(y[self._own].reshape(-1, self._c), ends))]
+
+    def _all(self, parts: list[tuple[Array, Array]], *shapes: tuple[int, ...]) -> list[Array]:
+        """Those of all contacts and ranks, of pairs with these shapes a point. (A rank may have no points.)"""
+        none = tuple(np.zeros((0, *shape)) for shape in shapes)
+        return [self._gather(np.concatenate(part)) for part in zip(*(parts or [none]))]
 
     def _gather(self, values: Array) -> Array:
         return values if self._comm.size == 1 else np.concatenate(self._comm.allgather(values))

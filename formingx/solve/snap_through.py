@@ -44,10 +44,8 @@ class SnapThrough:
         most, most_moving: largest eta before and after the body has begun to move.
         falls: factor of eta after a solution that took at most `few` iterations; grows, grows_moving: after none was
             found, before and after the body has begun to move.
-        longest_wait: solutions at most for which eta stays after a failure: twice as many from one failure to the next,
-            and half as many again where eta has fallen and a solution was found.
         tolerances: of a viscous solution. (Where contact does not settle soon more viscosity is cheaper than more
-            iterations.)
+            iterations; none is as exact as the state at rest need be.)
         nearest, farthest, share: how far the body is to move in a viscous solution: this share of its way up to there,
             within bounds. again: how many times as far the first may move it, or it is made again with more viscosity.
         solutions, too_far: viscous solutions, and a distance, after which the body counts as never coming to rest.
@@ -65,12 +63,11 @@ class SnapThrough:
     least: float = 1e-9
     most: float = 1e5
     most_moving: float = 1e9
-    falls: float = 0.3
+    falls: float = 0.1
     few: int = 6
     grows: float = 10.0
     grows_moving: float = 3.0
-    longest_wait: int = 8
-    tolerances: Tolerances = Tolerances(1e-8, 1e-6, settling=8)
+    tolerances: Tolerances = Tolerances(1e-6, 1e-4, settling=8)
     nearest: float = 3e-4
     farthest: float = 0.1
     share: float = 0.1
@@ -119,7 +116,7 @@ class _Motion:
         self.at, self.lost, self.solved = old, 0.0, 0
         self.rest, self.near = np.inf, settings.near_rest   # what is out of balance; little enough to look for rest
         self.settles = False
-        self._wait, self._next_wait = 0, 1                  # solutions before eta may fall; after the next failure
+        self._wait = False                                  # eta may not fall after the next solution
 
     def goes_on(self, eta: float) -> bool:
         """True while neither eta nor the body has left its bounds."""
@@ -154,16 +151,12 @@ class _Motion:
         if limit:
             limit.prepare(Way(x, self.control, by, 0.0, 1.0))
         self.solved += 1
-        if self._wait or len(history) - 1 > settings.few:
-            self._wait = max(self._wait - 1, 0)
-            return max(1.0, far)
-        self._next_wait = max(self._next_wait // 2, 1)
-        return max(settings.falls, far)
+        stays, self._wait = self._wait or len(history) - 1 > settings.few, False
+        return max(1.0 if stays else settings.falls, far)
 
     def _hold_back(self, grows: float = 0.0) -> float:
         """No solution, or one too far off: the factor by which eta grows; it does not fall right after the next one."""
-        self._wait = self._next_wait
-        self._next_wait = min(2 * self._next_wait, self._settings.longest_wait)
+        self._wait = True
         return grows or (self._settings.grows_moving if self.solved else self._settings.grows)
 
     def end(self) -> State | None:

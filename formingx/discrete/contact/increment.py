@@ -82,11 +82,25 @@ class Increment:
 
     def ahead(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Tractions]:
         """`foretold` of m of the points: what gives their tractions if they move on, shape (m, c)."""
-        assert self._before is not None
         touch = self._touch and Touch(*(part[points] for part in self._touch))
-        before = Motion(*(part[points] for part in self._before))
-        law, x = self._law.part(points), self._now[0][points]
-        return lambda by: law.tractions(x, touch, None, before.to(x + by))
+        law, x, there = self._law.part(points), self._now[0][points], self._foreseen(points)
+        return lambda by: law.tractions(x, touch, None, there(by))
+
+    def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """What gives how deep m points are in the ramp of the law if they move on, shape (m, c): over its width, shape
+        (m,), and the way through it, shape (m, c), length, 0 without friction."""
+        width, there = 2 * self._law.theta, self._foreseen(points)
+
+        def found(by: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            motion = there(by)
+            return motion.distance / width + 0.5, width * self._law.has_friction * motion.normal
+        return found
+
+    def _foreseen(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Motion]:
+        """What gives the motion of points, to first order, if they move on."""
+        assert self._before is not None
+        before, x = Motion(*(part[points] for part in self._before)), self._now[0][points]
+        return lambda by: before.to(x + by)
 
     def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
         """Which way points (a mask, shape (n,)) are going to slide."""
