@@ -96,6 +96,10 @@ class Increment(Protocol):
     def ahead(self, points: Array | slice) -> Callable[[Array], Tractions]:
         """`foretold` of some of the points."""
 
+    def in_ramp(self, points: Array) -> Callable[[Array], tuple[Array, Array]]:
+        """What gives how deep some points are in that ramp if they move on, over its width, shape (m,); the way through
+        it, shape (m, 2), length, 0 without friction."""
+
     def expect(self, points: Array, sense: Array) -> None:
         """The next iteration takes this sense of sliding for the points in a mask, shape (n,)."""
 

@@ -246,8 +246,8 @@ class _Points:
 
     def _all(self, parts: list[tuple[Array, Array]], *shapes: tuple[int, ...]) -> list[Array]:
         """Those of all contacts and ranks, of pairs with these shapes a point. (A rank may have no points.)"""
-        none = tuple(np.zeros((0, *shape)) for shape in shapes)
-        return [self._gather(np.concatenate(part)) for part in zip(*(parts or [none]))]
+        found = zip(*parts) if parts else ([np.zeros((0, *shape))] for shape in shapes)
+        return [self._gather(np.concatenate(part)) for part in found]
 
     def _gather(self, values: Array) -> Array:
         return values if self._comm.size == 1 else np.concatenate(self._comm.allgather(values))
