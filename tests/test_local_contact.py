@@ -1,0 +1,69 @@
+"""The local problem of a few contact points: a point at the foot of the ramp of its law, between stick and free."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy import optimize
+
+from formingx import tools
+from formingx.discrete.contact.increment import Increment
+from formingx.physics.contact import Law
+from formingx.solve import local_contact
+
+THETA, K = 1e-3, 1e4
+"""Half-width of the ramp, and the penalty."""
+
+
+class Face:
+    """One point on a tool whose face is z = 0, the solid above."""
+
+    def __init__(self, slip):
+        law = Law(tools.Tool([(0.0, 0.0), (9.0, 0.0)]), np.full(1, np.inf), np.full(1, K), THETA, 1e-3)
+        here = np.array([[4.0, -0.5 * THETA]])
+        touch = law.start(here - [[slip, 0.0]])
+        self.points, self.scale = here, np.ones(1)
+        self.increment = Increment(law, touch, here)
+        self.increment.tractions(here)
+        self.increment.linearise(here)
+
+    def add(self, values, forces):
+        values += forces.ravel()
+
+    def moved(self, dx, step):
+        return dx.reshape(-1, 2)
+
+
+@pytest.mark.parametrize("coupling", [0.5, 0.6, 0.9])
+@pytest.mark.parametrize("inside", [3e-4, 1e-3, 3e-3])
+def test_a_point_that_is_pulled_along_its_tool_and_hardly_pressed_to_it(inside, coupling):
+    """A body with a compliance C that would end so far inside without contact, while what holds the point along the
+    tool pulls it out: the state, a root of one equation for its depth, is at the foot of the ramp."""
+    C = np.array([[1.0, coupling], [coupling, 1.0]])
+    face = Face(slip=0.3)
+    problem = SimpleNamespace(comm=MPI.COMM_SELF, present=[face], held=np.zeros(0, dtype=int),
+                              x=PETSc.Vec().createSeq(2))
+    points = local_contact._Points(problem, [face], [np.array([0])], SimpleNamespace(solve_all=lambda E: C @ E),
+                                   lambda V: np.zeros(V.shape[1]))
+    f0, S0 = points._taken()
+    law, free = face.increment.ahead(np.array([0])), np.array([0.1, -0.5 * THETA + inside])
+
+    def forces(y):
+        there = law(y.reshape(1, 2))
+        return there.force.ravel() + there.stiffness[0] @ y
+    def along(depth):
+        """Motion with a depth, in equilibrium along the tool, where forces are linear."""
+        a, b = ((free - C @ forces(np.array([r, depth])))[0] - r for r in (0.0, 1.0))
+        return np.array([a / (a - b), depth])
+    depth = optimize.brentq(lambda z: z - (free - C @ forces(along(z)))[1], -0.6 * THETA, 1.0, xtol=1e-16, rtol=1e-15)
+    assert depth == pytest.approx(-0.5 * THETA, abs=1e-3 * THETA)
+    dx = PETSc.Vec().createSeq(2)
+    y0 = np.linalg.solve(np.eye(2) + C @ S0[0], free - C @ f0)       # where the law as it was linearised leads
+    dx.array_w[:] = y0
+    points._C = np.linalg.solve(np.eye(2) + C @ S0[0], C)
+    points._columns = points._C
+    found = points.solve(dx, 0.0)
+    assert found is not None
+    assert y0 + found[0] == pytest.approx(along(depth), abs=1e-3 * THETA)
