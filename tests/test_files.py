@@ -648,3 +648,8 @@ def test_folders_without_a_run(tmp_path, capsys, words, there):
         assert main([*command, str(folder)]) == 2
     out, err = capsys.readouterr()
     assert err.count(words) == 4 and ("waiting" in out) == (not there)
+
+
+def test_a_stage_of_a_run_without_stages(inflated):
+    with pytest.raises(fx.InputError, match="the run has no stages"):
+        inflated.state(stage="hold")

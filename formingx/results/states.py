@@ -139,7 +139,11 @@ class States:
             ConvergenceError: see `at`.
         """
         if stage is not None:
-            known("Path.state: stage", stage, list(dict.fromkeys(state.stage for state in self.states)))
+            stages = list(dict.fromkeys(state.stage for state in self.states))
+            if stages == [""]:
+                raise InputError(f"Path.state: stage {stage!r}: the run has no stages; its states by number are"
+                                 f" Path.states[k]")
+            known("Path.state: stage", stage, stages)
         there = [state for state in self.states if stage in (None, state.stage)]
         if time is None:
             return there[-1]
