@@ -45,7 +45,7 @@ class SnapThrough:
         falls: factor of eta after a solution that took at most `few` iterations; grows, grows_moving: after none was
             found, before and after the body has begun to move.
         tolerances: of a viscous solution. (Where contact does not settle soon more viscosity is cheaper than more
-            iterations; none is as exact as the state at rest need be.)
+            iterations. Not of looser ones: where the tangent is nearly singular the body seems to rest too soon.)
         nearest, farthest, share: how far the body is to move in a viscous solution: this share of its way up to there,
             within bounds. again: how many times as far the first may move it, or it is made again with more viscosity.
         solutions, too_far: viscous solutions, and a distance, after which the body counts as never coming to rest.
@@ -67,7 +67,7 @@ class SnapThrough:
     few: int = 6
     grows: float = 10.0
     grows_moving: float = 3.0
-    tolerances: Tolerances = Tolerances(1e-6, 1e-4, settling=8)
+    tolerances: Tolerances = Tolerances(1e-8, 1e-6, settling=8)
     nearest: float = 3e-4
     farthest: float = 0.1
     share: float = 0.1
