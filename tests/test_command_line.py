@@ -56,7 +56,7 @@ def test_compare(tmp_path, capsys):
 @pytest.mark.parametrize("words, message", [
     (["demo"], "demo: needs a NAME; known: "),
     (["demo", "nothing"], "demo 'nothing' is not known; known: "),
-    (["compare", "absent.csv", "absent.csv"], "'absent.csv' cannot be read"),
+    (["compare", "absent.csv", "absent.csv"], "'absent.csv' is not there"),
     (["compare", "OURS", "OURS", "--columns", "pressure", "travel"], "column 'travel' is not known; known: 'pressure'"),
     (["compare", "OURS", "OURS", "--units", "pressure"], "--units 'pressure': must be COLUMN=UNIT"),
     (["compare", "OURS", "OURS", "--units", "pressure=psi"], "does not state the unit of column 'pressure'"),
