@@ -158,7 +158,7 @@ class _Points:
 
     def __init__(self, problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array],
                  solver: DirectSolver, border: Border):
-        self._comm, self._contacts = problem.comm, contacts
+        self._comm, self._contacts, self._chosen = problem.comm, contacts, chosen
         self._c = contacts[0].points.shape[1]               # components
         self._some = [(c, i) for c, i in zip(contacts, chosen) if len(i)]
         counts = self._comm.allgather(self._c * sum(map(len, chosen)))
@@ -224,8 +224,8 @@ class _Points:
         return found if np.isfinite(found).all() else None
 
     def _moved(self, dx: Array, step: float) -> Array:
-        """Own points' part of a correction, seen from their tools, flat."""
-        return np.concatenate([np.zeros(0), *(c.moved(dx, step)[i].ravel() for c, i in self._some)])
+        """Own points' part of a correction, seen from their tools, flat (collective, also without points)."""
+        return np.concatenate([c.moved(dx, step)[i].ravel() for c, i in zip(self._contacts, self._chosen)])
 
     def _taken(self) -> tuple[Array, Array]:
         """Forces, flat, and stiffnesses that the iteration has taken."""
