@@ -397,7 +397,7 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
     except (ConvergenceError, InputError) as error:
         error.path = path = so_far()
         if path is not None and isinstance(error, ConvergenceError):       # on all ranks
-            _end(path, str(error))
+            _end(path, str(error), path.doubts() if path.record.on_end else [])
         raise
     except KeyboardInterrupt:
         path = so_far()
@@ -407,18 +407,23 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
         how = (f"checkpoint={str(checkpoint)!r} holds it: the same script goes on with resume=True" if checkpoint else
                "it is lost; with checkpoint='folder', resume=True the same script would go on from there")
         raise Interrupted(f"interrupted {stands}; {how}", path) from None
-    for bad, text in doubts(paths[0]):
+    found = paths[0].doubts()
+    for bad, text in [*_of_volume(paths[0]), *found]:
         if bad == "serious" and paths[0].problem.comm.rank == 0:
             log.warning("%s", text)
-    _end(paths[0], "")
+    _end(paths[0], "", found)
 
 
-def _end(path: Path, failure: str) -> None:
-    """Tell those who keep the run how it ended."""
+def _end(path: Path, failure: str, found: list[tuple[str, str]]) -> None:
+    """Tell those who keep the run how it ended, and what is to be doubted."""
     for told in path.record.on_end:
-        told(failure)
+        told(failure, found)
 
 
 def doubts(path: Path) -> list[tuple[str, str]]:
     """(how bad, what) of all that a run says when it ends; collective."""
-    return [*volume.doubts(path.last.measures["volume_error"], "the last state"), *path.doubts()]
+    return [*_of_volume(path), *path.doubts()]
+
+
+def _of_volume(path: Path) -> list[tuple[str, str]]:
+    return volume.doubts(path.last.measures["volume_error"], "the last state")

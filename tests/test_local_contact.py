@@ -42,28 +42,27 @@ def test_a_point_that_is_pulled_along_its_tool_and_hardly_pressed_to_it(inside, 
     """A body with a compliance C that would end so far inside without contact, while what holds the point along the
     tool pulls it out: the state, a root of one equation for its depth, is at the foot of the ramp."""
     C = np.array([[1.0, coupling], [coupling, 1.0]])
-    face = Face(slip=0.3)
+    face, free = Face(slip=0.3), np.array([0.1, -0.5 * THETA + inside])
+    f0, S0 = (values[0] for values in face.increment.taken(np.array([0])))
+    tangent = np.eye(2) + C @ S0                            # that of the body with the law as it was linearised
     problem = SimpleNamespace(comm=MPI.COMM_SELF, present=[face], held=np.zeros(0, dtype=int),
                               x=PETSc.Vec().createSeq(2))
-    points = local_contact._Points(problem, [face], [np.array([0])], SimpleNamespace(solve_all=lambda E: C @ E),
-                                   lambda V: np.zeros(V.shape[1]))
-    f0, S0 = points._taken()
-    law, free = face.increment.ahead(np.array([0])), np.array([0.1, -0.5 * THETA + inside])
+    solver = SimpleNamespace(solve_all=lambda E: np.linalg.solve(tangent, C @ E))
+    law = face.increment.ahead(np.array([0]))
 
-    def forces(y):
-        there = law(y.reshape(1, 2))
-        return there.force.ravel() + there.stiffness[0] @ y
     def along(depth):
         """Motion with a depth, in equilibrium along the tool, where forces are linear."""
         a, b = ((free - C @ forces(np.array([r, depth])))[0] - r for r in (0.0, 1.0))
         return np.array([a / (a - b), depth])
+
+    def forces(y):
+        there = law(y.reshape(1, 2))
+        return there.force.ravel() + there.stiffness[0] @ y
     depth = optimize.brentq(lambda z: z - (free - C @ forces(along(z)))[1], -0.6 * THETA, 1.0, xtol=1e-16, rtol=1e-15)
     assert depth == pytest.approx(-0.5 * THETA, abs=1e-3 * THETA)
     dx = PETSc.Vec().createSeq(2)
-    y0 = np.linalg.solve(np.eye(2) + C @ S0[0], free - C @ f0)       # where the law as it was linearised leads
-    dx.array_w[:] = y0
-    points._C = np.linalg.solve(np.eye(2) + C @ S0[0], C)
-    points._columns = points._C
+    dx.array_w[:] = np.linalg.solve(tangent, free - C @ f0)
+    points = local_contact._Points(problem, [face], [np.array([0])], solver, lambda V: np.zeros(V.shape[1]))
     found = points.solve(dx, 0.0)
     assert found is not None
-    assert y0 + found[0] == pytest.approx(along(depth), abs=1e-3 * THETA)
+    assert dx.array_r + found[0] == pytest.approx(along(depth), abs=1e-3 * THETA)

@@ -63,14 +63,14 @@ class Answer:
                 for name, x, a, b, h in zip(p.names, v, p.low, p.high, near) if x <= a + h or x >= b - h]
 
     def without_effect(self) -> list[str]:
-        """Parameters whose whole range, foretold by the derivatives, changes the wall by less than its scatter."""
+        """Parameters whose whole range, predicted by the derivatives, changes the wall by less than its scatter."""
         by = self.before.derivative("wall")[1][self.inside] * self.before.parameters.size
         mean = self.before.wall[self.inside].mean()
         return [name for name, d in zip(self.before.parameters.names, abs(by).max(0) / mean) if d < _SCATTER]
 
     def attainable(self) -> float:
         """The unevenness to which these parameters could bring the wall within their bounds, whatever the volume, as
-        the derivatives of the best run foretell."""
+        the derivatives of the best run predict."""
         from scipy.optimize import lsq_linear
         p, v, (wall, by) = self.best.parameters, self.best.vector, self.best.derivative("wall")
         wall, by, mean = wall[self.inside], by[self.inside] * p.size, wall[self.inside].mean()

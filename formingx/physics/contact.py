@@ -77,7 +77,7 @@ class Contact(Part):
             leaves the tool out, or, with True, until it pulls (of materials that do not relax).
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge); in space so many
             hundredths of all nodes, default 1. What sticks, slides under friction or gives off heat depends on when it
-            touched. None: of what sticks up to 5 % of the nodes, foretold one after the other, each held where it
+            touched. None: of what sticks up to 5 % of the nodes, predicted one after the other, each held where it
             arrives, and so what slides beside it; else of what slides under friction or gives off heat one.
         present_area: the penalty is per area and over the wall as they are at the beginning of a step, not at rest:
             what is drawn or pressed 20 times thinner is held as well as at rest. Without friction. (Then a state
@@ -251,16 +251,16 @@ class Law(NormalLaw):
         super().__init__(tool, k, theta, shift)
         self.shear_limit = shear_limit or (lambda pressure, mu: (mu * pressure, mu))
         self.elastic_slip, self.pulls = elastic_slip, pulls
-        self._rub(mu)
+        self._set_friction(mu)
         self._slid: tuple[Nearest, Touch, tuple] | None = None      # of what is near, and remembered: the slip
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
         """The same law with other coefficients of friction."""
         law = self._with()
-        law._rub(mu)
+        law._set_friction(mu)
         return law
 
-    def _rub(self, mu: np.ndarray | float) -> None:
+    def _set_friction(self, mu: np.ndarray | float) -> None:
         self.mu, self._slides = mu, bool(np.all(np.isfinite(mu)))
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
         self.remembers = self.has_friction or self.pulls

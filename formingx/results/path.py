@@ -41,12 +41,14 @@ class Path(States):
 
     def doubts(self) -> list[tuple[str, str]]:
         """(how bad: "serious" or "minor"; what) a run says when it ends, but for `volume_error`; collective."""
-        from .space import show
         found = volume.doubts_of_point(self.problem.furthest_volume_ratio(self.last))
         for history in self.problem.histories:
             found += getattr(history, "doubts", lambda states: [])(self.segments[-1].states)
-        found += show.doubts(self, self.wall()) if self._in_space else self._view(
-            self.segments[-1]).verdict.doubts(self.last)
+        if self._in_space:
+            from .space import show
+            found += show.doubts(self, self.wall())
+        else:
+            found += self._view(self.segments[-1]).verdict.doubts(self.last)
         found += edges.doubts(edges.coarsest(self, self.last)) + tension.doubts(tension.first_compression(self))
         return found + snaps.doubts(snaps.largest(self))
 
@@ -76,7 +78,7 @@ class Path(States):
         from .files.checkpoint import Checkpoint
         kept = Checkpoint(folder, self)
         kept.write()
-        kept.end()
+        kept.end("", self.doubts())
 
     def to_vtx(self, folder: Any, states: Any = None) -> None:
         """Write fields of states (default: the last) for ParaView, a time step each: `formingx.results.files.fields`.

@@ -59,7 +59,8 @@ class Record:
         ended: why the run ended before its targets, as a result and not as an error; "" if it did not.
         on_state: functions called with every accepted state, while the problem stands there (they fill `measures`).
         on_step: functions called whenever a step is complete.
-        on_end: functions called when the run ends, with the words of what failed, or "".
+        on_end: functions called when the run ends, with the words of what failed, or "", and those of what is to be
+            doubted, [(how bad, what)].
         judge: says of a state whose measures are known why it is none that a body can have, "" if it is one.
         beyond: keep such states, too.
     """
@@ -69,7 +70,7 @@ class Record:
         self.counts, self.stage, self.ended = Counts(), "", ""
         self.on_state: list[Callable[[State], None]] = []
         self.on_step: list[Callable[[], None]] = []
-        self.on_end: list[Callable[[str], None]] = []
+        self.on_end: list[Callable[[str, list[tuple[str, str]]], None]] = []
         self.judge: Callable[[State], str] = lambda state: ""
         self.beyond = False
 

@@ -62,8 +62,8 @@ class Approach:
         points = face.comm.allreduce(len(face.rule.points))
         share = max(points // 100, 1) if face.contact.lagged else 1
         self.at_once = (given or 1) * share * (1 if face.law.remembers or conducts else 10)
-        rubs = face.law.has_friction and not given and not face.contact.lagged
-        self.foretold = max(self.at_once, round(LIMITS.share * points)) if rubs else self.at_once
+        several = face.law.has_friction and not given and not face.contact.lagged
+        self.foretold = max(self.at_once, round(LIMITS.share * points)) if several else self.at_once
         self._foreseen = 0                                  # points that the step is going to bring, all ranks
 
     @property

@@ -82,9 +82,9 @@ class Checkpoint:
                 self._there = number + 1
                 done((self._there - first) / (len(path) - first))
 
-    def end(self, failure: str = "") -> None:
-        """Write that the run has ended, what failed, and what is to be said of it (`Path.doubts`); collective."""
-        about = {"failure": failure, "doubts": self._path.doubts()}
+    def end(self, failure: str, doubts: list[tuple[str, str]]) -> None:
+        """Write that the run has ended, what failed, or "", and what is to be said of it (`Path.doubts`)."""
+        about = {"failure": failure, "doubts": doubts}
         files.on_root(self._comm, lambda: _plainly(
             lambda: files.replace(self.folder / _END, lambda stream: json.dump(about, stream, indent=1)),
             self.folder, f"{_END} could not be written; its states are kept"))
