@@ -98,7 +98,7 @@ class Increment(Protocol):
 
     def in_ramp(self, points: Array) -> Callable[[Array], tuple[Array, Array]]:
         """What gives how deep some points are in that ramp if they move on, over its width, shape (m,); the way through
-        it, shape (m, 2), length, 0 without friction."""
+        it, shape (m, 2), length, 0 where no friction grows in it."""
 
     def expect(self, points: Array, sense: Array) -> None:
         """The next iteration takes this sense of sliding for the points in a mask, shape (n,)."""

@@ -88,12 +88,14 @@ class Increment:
 
     def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
         """What gives how deep m points are in the ramp of the law if they move on, shape (m, c): over its width, shape
-        (m,), and the way through it, shape (m, c), length, 0 without friction."""
+        (m,), and the way through it, shape (m, c), length, 0 where no friction grows in it: without any, or where the
+        body may pull at the tool."""
         width, there = 2 * self._law.theta, self._foreseen(points)
+        grows = self._law.has_friction and not self._law.pulls
 
         def found(by: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             motion = there(by)
-            return motion.distance / width + 0.5, width * self._law.has_friction * motion.normal
+            return motion.distance / width + 0.5, width * grows * motion.normal
         return found
 
     def _foreseen(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Motion]:
