@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,6 +35,10 @@ class Path(States):
     """
 
     pilot: Path | None = None
+
+    if TYPE_CHECKING:
+        def __getattr__(self, name: str) -> Any:
+            """Let type checkers accept the methods that extensions add (`formingx.results.extend`)."""
 
     def __repr__(self) -> str:
         return f"Path({len(self.states)} states{f', to {self.last!r}' if self.states else ''})"
