@@ -305,6 +305,27 @@ def inflate(mesh, ratio):
                     step=fx.StepControl(largest=0.03))
 
 
+def test_branch_points_are_those_that_a_run_warns_of(caplog):
+    """Half a sphere under outer pressure: three modes n = 0 are lost between 1 and 1.4 times Zoelly's pressure."""
+    h, mu = 0.05, 1.0
+    mesh = fx.mesh.sphere(inner_radius=1 - h / 2, thickness=h, elements=(24, 1))
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=mu / 2), loads=[fx.Pressure("outer")],
+                     supports=[fx.Symmetry("axis"), fx.Symmetry("equator", "z")])
+    zoelly = 4 * mu * h**2                                   # 2 E (h/R)^2 / sqrt(3 (1 - nu^2))
+    step = fx.StepControl(length=2e-3, largest=2e-3)
+    path = fx.trace(scene, until=fx.pressure(1.2 * zoelly), through=[fx.pressure(1.08 * zoelly)], step=step,
+                    progress=False)
+    path = fx.trace(scene, start=path, until=fx.pressure(1.4 * zoelly), step=step, progress=False)
+    said = [record.getMessage() for record in caplog.records if "another path branches off" in record.getMessage()]
+    found = path.branch_points
+    assert len(found) == 3 and len(said) == 3
+    for (before, behind), words in zip(found, said):
+        assert f"between {path.describe(before)} and {path.describe(behind)}" in words
+        assert 1.0 < before.measures["pressure"] / zoelly < behind.measures["pressure"] / zoelly < 1.4
+    back = fx.trace(scene, start=path, until=fx.pole_height(0.0), step=step, progress=False)
+    assert len(back.branch_points) == 6 and len(back.states) > len(path.states)
+
+
 def test_imperfections_knock_down(caplog):
     """A tube that bulges from the start bears less, by the power 2/3 of its imperfection (Koiter, 1945)."""
     mesh = fx.mesh.disc(radius=1.0, inner_radius=0.8, thickness=np.pi, elements=(2, 10))

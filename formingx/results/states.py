@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from collections.abc import Mapping
 from dataclasses import replace
@@ -22,6 +23,9 @@ from ..solve.stepping import StepControl
 from .evaluate.profile import Profiles
 from .evaluate.stress import Stresses
 from .evaluate.verdict import Verdict
+
+_WRITTEN = 5e-6
+"""Largest difference of a number from the same one written with six digits, over the number."""
 
 
 class _View:
@@ -98,8 +102,8 @@ class States:
         """Neighbours between which another path branches off: the tangent's determinant changes its sign without
         limit point.
 
-        Modes n = 0 alone, and an odd number of them; `Path.stability` sees all. Two factorisations a stretch between
-        limit points; none with a history.
+        Those of which the run warns, from the determinants that its states carry. Modes n = 0 alone, and an odd number
+        of them between two states; `Path.stability` sees all. None with a history.
         """
         return [pair for segment in self.segments for pair in branch_points(segment.curve, segment.states)]
 
@@ -158,6 +162,8 @@ class States:
     def at(self, target: Target, after: State | None = None) -> State:
         """The first state of the path that meets the target: solved for, not interpolated; the path stays as it is.
 
+        A value just beyond the path's last state, as one written with six digits may lie, is solved for there.
+
         Args:
             target: for example `pressure(0.4)`.
             after: look only beyond this state of the path, for example beyond a limit point.
@@ -170,6 +176,7 @@ class States:
             raise InputError("Path.at: after: must be a state of this path")
         values: list[float] = []
         refused: list[InputError] = []
+        piece: tuple[Segment, State, State, Bound] | None = None
         started = after is None
         for segment in self.segments:
             for left, right in zip(segment.states, segment.states[1:]):
@@ -190,10 +197,17 @@ class States:
                     if (a - target.value) * (b - target.value) < 0:
                         return self._between(segment, left, right, target, bound)
                     values += ends
+                    piece = segment, left, right, bound
+        if piece is not None and piece[2] is self.last and 0 < (target.value - b) * np.sign(b - a) < _WRITTEN * abs(b):
+            segment, left, right, bound = piece
+            with segment.problem.at(left), contextlib.suppress(ConvergenceError):
+                found = self._between(segment, left, right, target, bound)
+                if segment.curve.distance(right, found) < segment.curve.distance(left, right):
+                    return found
         if refused and not values:
             raise refused[0]
-        raise InputError(f"the path does not pass {target}: " + (
-            f"its values lie between {min(values):.6g} and {max(values):.6g}" if values else "it has one state there"))
+        raise InputError(f"the path does not pass {target.name.replace('_', ' ')} = {target.value:.9g}: " + (
+            f"its values lie between {min(values):.9g} and {max(values):.9g}" if values else "it has one state there"))
 
     def _between(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
         """The state between two neighbours that meets a target; the problem stands at the first."""

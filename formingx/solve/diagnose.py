@@ -164,11 +164,15 @@ def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attemp
 
 
 def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
-    """Neighbours between which the determinant of the tangent changes its sign without a limit point; collective.
+    """Return the neighbours between which the determinant of the tangent changes its sign without a limit point.
 
-    An even number of changes between two limit points is not seen. With a history no other path begins: none.
+    The signs are those that the states carry (`State.orientation`). States at fixed control carry none: two
+    factorisations for each stretch between limit points, which miss an even number of changes. With a history no other
+    path begins: none. Collective.
     """
     problem = curve.problem
+    if any(state.orientation for state in states):
+        return _turns(curve, states)
     usable = [s for s in states[1 if problem.slack_at_rest else 0:] if s.kind != "limit point"]
     if len(usable) < 2 or problem.has_history:
         return []
@@ -178,11 +182,30 @@ def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, St
     return found
 
 
-def warn_of_branch(record: Any, old: State) -> None:
-    """Say so where another path branches off within the step from a state to the last: no extra cost."""
-    new, usual = record.last, ["step", "target", *["start"] * (not record.equations.slack_at_rest)]
-    if old.orientation * new.orientation < 0 and old.kind in usual and new.kind in usual:
-        log.warning(ANOTHER_PATH, record.describe(old), record.describe(new))
+def warn_of_branches(record: Any, step: Sequence[State]) -> None:
+    """Warn where another path branches off within a step: the state that it began with and those that it added."""
+    for before, behind in _turns(record.curve, step):
+        log.warning(ANOTHER_PATH, record.describe(before), record.describe(behind))
+
+
+def _turns(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
+    """Return neighbours whose orientations differ, limit points left out: there the sign is that of round-off.
+
+    Not across a jump or the start of a stage. Where a run went back from a state, its orientation turns with it.
+    """
+    found = []
+    last: State | None = None
+    for state in states:
+        if state.kind == "limit point":
+            continue
+        first = state.kind in ("start", "jump") or last is not None and last.setting != state.setting
+        if last is not None and not first and last.orientation * state.orientation:
+            sense = 1 if curve.progress(last, state) > 0 else -1
+            if sense * last.orientation * state.orientation < 0:
+                found.append((last, state))
+        smooth = state.kind in ("step", "target") or state.kind == "start" and not curve.problem.slack_at_rest
+        last = state if smooth else None
+    return found
 
 
 def _signs(curve: Curve, solver: DirectSolver) -> Callable[[State], int]:
@@ -214,7 +237,9 @@ def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
         facts["condition"] = condition(problem.matrix, solver)
     if len(usable) > _LIMITS.before and sign(usable[-1 - _LIMITS.before]):
         facts["condition_before"] = condition(problem.matrix, solver)
-    if len(usable) > 1 and not problem.has_history:
+    if any(state.orientation for state in states):
+        turned = _turns(curve, states)
+    elif len(usable) > 1 and not problem.has_history:
         # one sign per stretch between limit points: there it cannot change unless another branch starts
         turned = _changes(states, usable, sign)
     facts["turned"] = tuple((problem.shown(a.control)[1], problem.shown(b.control)[1]) for a, b in turned)

@@ -20,7 +20,7 @@ from ..errors import ConvergenceError
 from ..measures.targets import Amplitude, Target
 from . import predictor
 from .arc_length import Predictor
-from .diagnose import Diagnosis, diagnose, warn_of_branch
+from .diagnose import Diagnosis, diagnose, warn_of_branches
 from .equations import Array, Attempt, Measure
 from .newton import Failure, fixed, tangents
 from .progress import Aim, Progress
@@ -105,8 +105,8 @@ class Run:
                 if max_steps is not None and record.counts.steps - before >= max_steps:
                     self._give_up(f"max_steps = {max_steps} were used up before it", pace=self.aim.pace(max_steps))
                 self._check_progress()
-                old = self.states[-1]
-                for state in self._next(old):
+                states = self.states
+                for state in self._next(states[-1]):
                     self._accept(state)
                     self._stop_if(self.aim.jumped_past(state))
                     if state.kind == "limit point" and self._at_fold == "stop":
@@ -116,7 +116,7 @@ class Run:
                     if not self.aim.is_open() and state.met is self.aim.until:
                         break
                 self._complete_step()
-                warn_of_branch(record, old)
+                warn_of_branches(record, self.states[len(states) - 1:])
                 if record.ended:
                     break
                 self._stop_if(self.aim.turned_back())
