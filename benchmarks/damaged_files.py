@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 import formingx as fx
-from formingx.calibration.measured import read_tests
+from formingx.extensions.fits.measured import read_tests
 from formingx.io import csv_files
 from formingx.scene.fields import values_at
 

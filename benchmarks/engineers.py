@@ -187,9 +187,9 @@ class Clock:
 
 def measured(name, finest):
     """The row of one run, in this process."""
-    from formingx.discrete.contact.approach import Approach
-    from formingx.discrete.contact.face import FaceContact
-    from formingx.discrete.problem import Problem
+    from formingx.contact.approach import Approach
+    from formingx.contact.face import FaceContact
+    from formingx.problem.problem import Problem
     from formingx.solve.linear import DirectSolver
     from formingx.solve.local_contact import LocalSolve
     from formingx.solve.path_following import Run

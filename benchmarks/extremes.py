@@ -16,8 +16,8 @@ from common import COMM, say  # noqa: E402
 from scipy.sparse import csr_matrix  # noqa: E402
 
 import formingx as fx  # noqa: E402
-from formingx.discrete.problem import Problem  # noqa: E402
 from formingx.exact.inflation import membrane_inflation, membrane_limit_point  # noqa: E402
+from formingx.problem.problem import Problem  # noqa: E402
 from formingx.results import files  # noqa: E402
 from formingx.solve.arc_length import Curve  # noqa: E402
 from formingx.solve.newton import Failure  # noqa: E402

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
 from common import COMM, say  # noqa: E402
 
 import formingx as fx  # noqa: E402
-from formingx.discrete.problem import Problem  # noqa: E402
+from formingx.problem.problem import Problem  # noqa: E402
 from formingx.results import files  # noqa: E402
 from formingx.solve.arc_length import Curve  # noqa: E402
 from formingx.solve.linear import DirectSolver  # noqa: E402

@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
 import plugs  # noqa: E402
 
 import formingx as fx  # noqa: E402
-from formingx.discrete.elements import body  # noqa: E402
+from formingx.forms.elements import body  # noqa: E402
 
 RADIUS, TRAVEL = 10.0, 3.0                                   # cm; over the plug's radius
 LAWS = ("frictionless", 0.1, 0.3, 1.0, 3.0, 10.0, "stick", "held")

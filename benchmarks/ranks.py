@@ -15,7 +15,7 @@ from common import COMM, say  # noqa: E402
 from limit import clocked  # noqa: E402
 
 import formingx as fx  # noqa: E402
-from formingx.discrete.problem import Problem  # noqa: E402
+from formingx.problem.problem import Problem  # noqa: E402
 from formingx.results import files  # noqa: E402
 from formingx.solve.linear import DirectSolver  # noqa: E402
 

@@ -8,7 +8,7 @@ from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, block, draw_grids, force, press, where
 
 import formingx as fx
-from formingx.discrete.contact import resultants
+from formingx.contact import resultants
 from formingx.results import files
 from formingx.results.show import plots
 

@@ -10,7 +10,7 @@ from common import parser, say, summarise
 from moulding import at_pressures, cost, filled_at, first_touch, first_touch_at, name_of, write
 
 import formingx as fx
-from formingx.discrete.contact import resultants
+from formingx.contact import resultants
 from formingx.results import files
 
 RADIUS, THICKNESS = 10.0, 0.3

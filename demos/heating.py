@@ -10,7 +10,7 @@ from slab import SHEET, at_times, draw, print_errors, same_slab, slab
 
 import formingx as fx
 from formingx.exact import heat as reference
-from formingx.heat.boundaries import STEFAN_BOLTZMANN
+from formingx.extensions.heat.boundaries import STEFAN_BOLTZMANN
 from formingx.results import files
 
 THICKNESS, START = 3e-3, 25.0

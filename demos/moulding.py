@@ -4,7 +4,7 @@ import numpy as np
 from common import COMM, save, say
 
 import formingx as fx
-from formingx.discrete.contact import resultants
+from formingx.contact import resultants
 from formingx.results import files
 from formingx.results.evaluate.profile import distance_to_line
 from formingx.results.show import plots

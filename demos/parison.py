@@ -10,7 +10,7 @@ from common import parser, say, summarise
 from moulding import cost, filled_at, first_touch, first_touch_at, name_of, write
 
 import formingx as fx
-from formingx.discrete.contact import resultants
+from formingx.contact import resultants
 from formingx.results import files
 
 RADIUS, WALL, LENGTH, PRESSURE = 1.1, 0.3, 10.6, 200.0

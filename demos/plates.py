@@ -8,7 +8,7 @@ import numpy as np
 from common import save
 
 import formingx as fx
-from formingx.discrete.probes import probe
+from formingx.forms.probes import probe
 from formingx.results.show import plots
 
 RADIUS, HALF_HEIGHT = 1.32, 1.25                             # cm

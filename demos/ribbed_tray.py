@@ -10,8 +10,8 @@ import numpy as np
 from common import COMM, parser, say, summarise
 
 import formingx as fx
+from formingx.extensions.space.solid_tool import write_stl
 from formingx.results import files
-from formingx.tools.solid import write_stl
 
 HALF, CORNER, DEPTH, DRAFT = np.array([75.0, 45.0]), 20.0, 35.0, np.radians(10.0)
 SHEET, THICKNESS, DENSITY = (170.0, 110.0), 1.5, 1.05

@@ -131,7 +131,7 @@ def switched(ratio, kB, fine):
         now = _radial(path, loss.state, ratio)
         ends[sense] = fx.trace(path.problem.scene, start=branch, progress=False,
                                until=fx.displacement(1.15 * now, at=(ratio, here), component="r"))
-    from formingx.discrete.probes import probe
+    from formingx.forms.probes import probe
     target = fx.pressure(float(ends[1].last.measures["pressure"]))
     moved = []
     for sense, one in ends.items():
@@ -211,7 +211,7 @@ def main():
 
 def _radial(path, state, ratio):
     """Radial displacement of the inner face at its lower end."""
-    from formingx.discrete.probes import probe
+    from formingx.forms.probes import probe
     with path.problem.at(state) as problem:
         return float(probe(problem, [(ratio, 0.0)]).displacement(problem.x)[0, 0])
 

@@ -13,23 +13,30 @@ The examples of all classes and functions begin with these lines (mm and MPa):
 import sys as _sys
 
 from . import _calls, _interrupts, mesh, tools
-from .calibration.data import treloar1944
-from .calibration.fit import Fit, fit
-from .calibration.fit_in_time import TimedTest
-from .design.design import Design
-from .design.parameters import along
-from .doctor.doctor import doctor
+from .checks.doctor import doctor
 from .errors import ConvergenceError, InputError, Interrupted
-from .heat.boundaries import Absorption, Convection, FixedTemperature, HeatFlux, Radiation, ThermalProperties
-from .heat.contact import ConductingTool, ContactWithTool
-from .heat.cooling import Cooling
-from .heat.result import HeatRun
-from .heat.run import heat
+from .extensions.compare.compare import Comparison, compare
+from .extensions.compare.compare_nodes import NodalComparison, compare_nodes, write_nodes
+from .extensions.design.design import Design
+from .extensions.design.parameters import along
+from .extensions.fits.data import treloar1944
+from .extensions.fits.fit import Fit, fit
+from .extensions.fits.fit_in_time import TimedTest
+from .extensions.heat.boundaries import Absorption, Convection, FixedTemperature, HeatFlux, Radiation, ThermalProperties
+from .extensions.heat.contact import ConductingTool, ContactWithTool
+from .extensions.heat.cooling import Cooling
+from .extensions.heat.expansion import ThermalExpansion
+from .extensions.heat.result import HeatRun
+from .extensions.heat.run import heat
+from .extensions.kbkz.damping import PSM, Damping, DoubleWagner, LuoTanner, Wagner
+from .extensions.kbkz.kbkz import KBKZ
+from .extensions.release.formed import imperfect
+from .extensions.remeshing.remeshing import Remesh
+from .extensions.stability.instability import unstable
+from .extensions.stability.top_load import TopLoad, top_load
+from .extensions.study.study import Study, StudyRun, study
 from .materials.constants import entropic, of_temperature
-from .materials.damping import PSM, Damping, DoubleWagner, LuoTanner, Wagner
-from .materials.expansion import ThermalExpansion
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
-from .materials.kbkz import KBKZ
 from .materials.material import Material
 from .materials.published import Published, published
 from .materials.sets import Sets
@@ -50,24 +57,17 @@ from .physics.kinematics import Axisymmetric, PlaneStrain, ThreeD
 from .physics.loads import Gravity, Load, Pressure, Spin
 from .physics.models import DisplacementPenalty, Membrane, MixedPressure
 from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Support, Symmetry
-from .remeshing import Remesh
-from .results.compare import Comparison, compare
-from .results.compare_nodes import NodalComparison, compare_nodes, write_nodes
 from .results.evaluate.profile import Profile
 from .results.evaluate.stress import Stress, StressField
-from .results.formed import imperfect
 from .results.path import Path
 from .results.show.report import report
-from .results.stability import unstable
 from .runs import Process, load, solve, trace
 from .scene.scene import Scene
 from .solve.newton import Tolerances
 from .solve.stage import Stage
 from .solve.state import State
 from .solve.stepping import StepControl
-from .study import Study, StudyRun, study
 from .tools import Tool
-from .top_load import TopLoad, top_load
 from .units import Units
 from .values.course import course
 from .values.table import table

@@ -135,7 +135,7 @@ def _demo(words: list[str]) -> None:
 
 
 def _doctor(options: argparse.Namespace) -> None:
-    from .doctor.scripts import look_over
+    from .checks.scripts import look_over
     _say(str(look_over(options.script, options.arguments)))
 
 

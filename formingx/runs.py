@@ -10,19 +10,19 @@ import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-from . import remeshing
-from .discrete.problem import Problem
 from .errors import ConvergenceError, InputError, Interrupted, count, finite, instance, known, several
+from .extensions.adapt.adapted import adapted, of_columns
+from .extensions.remeshing import remeshing
+from .extensions.remeshing.remeshing import Remesh
+from .extensions.space.sheet import Sheet
+from .extensions.stability.instability import Unstable
 from .measures.columns import Measure
 from .measures.targets import Amplitude, Target
-from .mesh.adapted import adapted, of_columns
-from .mesh.sheet import Sheet
 from .physics.contact import Contact
-from .remeshing import Remesh
+from .problem.problem import Problem
 from .results.evaluate import volume
 from .results.files.checkpoint import Checkpoint, holds_states, read
 from .results.path import Path
-from .results.stability import Unstable
 from .scene import aims, clearance
 from .scene.scene import Scene
 from .solve.arc_length import Curve

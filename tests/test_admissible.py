@@ -8,9 +8,9 @@ from conftest import run_json, treloar
 from dolfinx import fem
 
 import formingx as fx
-from formingx.discrete import elements
-from formingx.discrete.admissible import Admissible
-from formingx.discrete.problem import Problem
+from formingx.forms import elements
+from formingx.forms.admissible import Admissible
+from formingx.problem.problem import Problem
 
 HELD = {"loads": [fx.Pressure("bottom")], "materials": fx.NeoHookean(c10=1.0)}
 
@@ -125,9 +125,9 @@ RANKS = """
 import json
 import numpy as np
 import formingx as fx
-from formingx.discrete import elements
-from formingx.discrete.admissible import Admissible
-from formingx.discrete.problem import Problem
+from formingx.forms import elements
+from formingx.forms.admissible import Admissible
+from formingx.problem.problem import Problem
 mesh = fx.mesh.disc(radius=1.0, thickness=0.2, elements=(8, 1))
 scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
                  supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], model=fx.MixedPressure(space="P1"))

@@ -7,10 +7,10 @@ from test_admissible import displaced
 from test_contact import cup
 
 import formingx as fx
-from formingx.discrete.contact import resultants
-from formingx.discrete.probes import probe
-from formingx.discrete.problem import Problem
+from formingx.contact import resultants
+from formingx.forms.probes import probe
 from formingx.io import csv_files
+from formingx.problem.problem import Problem
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,8 @@ from test_contact import cup, form
 from test_cooling import press, pressed
 
 import formingx as fx
-from formingx.discrete.carry import Carrier, carry, fitted_shapes
-from formingx.discrete.problem import Problem
+from formingx.forms.carry import Carrier, carry, fitted_shapes
+from formingx.problem.problem import Problem
 
 
 def test_quadratics_are_exact_and_other_functions_converge_with_order_three():

@@ -8,13 +8,13 @@ import pytest
 from mpi4py import MPI
 
 import formingx as fx
-from formingx.discrete.contact.held import FREE, STICKS, Near, Points
-from formingx.discrete.contact.increment import Increment
-from formingx.discrete.contact.sequence import Foretold
-from formingx.discrete.problem import Problem
-from formingx.discrete.step_limit import Way
+from formingx.contact.increment import Increment
+from formingx.contact.step_limit import Way
+from formingx.extensions.contact_events.event_sequence import Foretold
+from formingx.extensions.contact_events.reduced_contact import FREE, STICKS, Near, Points
 from formingx.physics.contact import Law
 from formingx.physics.contact_law import NormalLaw, Touch
+from formingx.problem.problem import Problem
 
 tools = fx.tools
 THETA, K, SLIP = 0.02, 300.0, 3e-3

@@ -7,7 +7,7 @@ from test_contact import cup
 from test_derivatives import difference, random_state, residual
 
 import formingx as fx
-from formingx.discrete.problem import Problem
+from formingx.problem.problem import Problem
 from formingx.results.files.fields import Fields
 
 

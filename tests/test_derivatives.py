@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import formingx as fx
-from formingx.discrete.problem import Problem
-from formingx.discrete.viscosity import Viscosity
+from formingx.forms.viscosity import Viscosity
+from formingx.problem.problem import Problem
 from formingx.solve.snap_through import ViscousDrag
 
 pytestmark = pytest.mark.quick

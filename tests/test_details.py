@@ -12,9 +12,9 @@ from test_ledger import RELAXES, sheet
 
 import formingx as fx
 from formingx import Stage, tools
-from formingx.discrete.problem import Problem
-from formingx.discrete.step_limit import Way
+from formingx.contact.step_limit import Way
 from formingx.measures.targets import Amplitude
+from formingx.problem.problem import Problem
 from formingx.results.evaluate.part import _strips
 from formingx.solve import path_following, predictor, snap_through
 from formingx.solve.arc_length import Curve

@@ -144,7 +144,7 @@ def test_condition_number():
     """The estimate against NumPy's 1-norm condition number of the same matrix, and the sign of its determinant."""
     from scipy.sparse import csr_matrix
 
-    from formingx.discrete.problem import Problem
+    from formingx.problem.problem import Problem
     from formingx.solve.linear import DirectSolver, condition
     problem = Problem(treloar(elements=(4, 1)))
     x = problem.x.duplicate()
@@ -160,7 +160,7 @@ def test_condition_number():
 @pytest.mark.parametrize("able", [True, False], ids=["kept", "MUMPS cannot"])
 def test_solutions_with_a_scaling_that_is_kept(able, monkeypatch):
     """Of another tangent, to round-off; a MUMPS that cannot keep one makes another."""
-    from formingx.discrete.problem import Problem
+    from formingx.problem.problem import Problem
     from formingx.solve import linear
     problem = Problem(treloar(elements=(4, 1)))
     x, found = problem.x.duplicate(), problem.x.duplicate()

@@ -10,7 +10,7 @@ from conftest import ROOT, treloar
 from scipy.optimize import brentq
 
 import formingx as fx
-from formingx.doctor.scripts import look_over
+from formingx.checks.scripts import look_over
 from formingx.materials.inflation import Inflated, first_peak
 
 CUP = {"radius": 1.25, "depth": 0.4, "mouth": 0.082}

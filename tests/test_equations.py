@@ -8,7 +8,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import formingx as fx
-from formingx.discrete.schedule import Setting
+from formingx.forms.schedule import Setting
 from formingx.measures.targets import Target
 from formingx.solve.arc_length import Curve
 from formingx.solve.equations import Equations

@@ -25,7 +25,7 @@ from test_contact import cup
 import formingx as fx
 from formingx import _compat
 from formingx.__main__ import main
-from formingx.discrete.tooling import Tooling
+from formingx.contact.tooling import Tooling
 from formingx.results.files import checkpoint
 from formingx.results.files.description import describe
 from formingx.results.files.fields import Fields

@@ -7,8 +7,8 @@ from dolfinx import fem
 
 import formingx as fx
 from formingx.exact import heat as reference
-from formingx.heat import stepping
-from formingx.heat.conduction import Conduction
+from formingx.extensions.heat import stepping
+from formingx.extensions.heat.conduction import Conduction
 
 D = 3e-3
 SHEET = fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=1800.0)

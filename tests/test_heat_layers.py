@@ -10,8 +10,8 @@ from dolfinx import fem
 
 import formingx as fx
 from formingx.exact import heat as reference
-from formingx.heat import run as running
-from formingx.heat.layers import layered
+from formingx.extensions.heat import run as running
+from formingx.extensions.heat.layers import layered
 from formingx.mesh.grid import gathered
 
 SHEET = fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=1800.0)

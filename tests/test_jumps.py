@@ -9,7 +9,7 @@ from scipy import integrate, optimize
 
 import formingx as fx
 from formingx import tools
-from formingx.discrete.contact.face import FaceContact
+from formingx.contact.face import FaceContact
 from formingx.results.evaluate import snaps
 from formingx.results.show import plots
 from formingx.solve.path_following import PathFollowing, Run

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from test_derivatives import difference, random_state, residual
 
 import formingx as fx
-from formingx.materials.past import Integral
+from formingx.extensions.kbkz.integral import Integral
 
 SPECTRUM = [(0.10, 0.01), (0.06, 0.1), (0.03, 1.0), (0.012, 10.0)]
 DAMPINGS = {"none": None, "psm": fx.PSM(alpha=10.0, beta=0.05), "wagner": fx.Wagner(alpha=0.1, beta=0.15),

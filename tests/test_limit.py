@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from conftest import ROOT, run
 
-from formingx.discrete.material_history import MaterialHistory
+from formingx.forms.material_history import MaterialHistory
 from formingx.solve.newton import BorderedNewton
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
@@ -18,7 +18,7 @@ import limit  # noqa: E402
 def test_importing_loads_nothing_that_only_some_scripts_use():
     code = "import sys, formingx; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
-    assert "formingx.heat" in loaded
+    assert "formingx.extensions.heat" in loaded
     assert {"gmsh", "matplotlib", "plotly", "pyvista", "scipy", "tqdm"}.isdisjoint(loaded)
 
 

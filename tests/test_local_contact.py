@@ -9,7 +9,7 @@ from petsc4py import PETSc
 from scipy import optimize
 
 from formingx import tools
-from formingx.discrete.contact.increment import Increment
+from formingx.contact.increment import Increment
 from formingx.physics.contact import Law
 from formingx.solve import local_contact
 

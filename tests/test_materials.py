@@ -12,9 +12,9 @@ from scipy.optimize import brentq
 from ufl.algorithms import expand_derivatives, expand_indices
 
 import formingx as fx
-from formingx.discrete.problem import Problem
 from formingx.materials.homogeneous import MODES, _Program
 from formingx.physics import kinematics
+from formingx.problem.problem import Problem
 
 
 def of_invariants(W1, W2=lambda I1: 0.0):

@@ -7,8 +7,8 @@ from scipy.interpolate import CubicSpline
 from test_derivatives import assert_derivatives, difference, random_state
 
 import formingx as fx
-from formingx.discrete.problem import Problem
 from formingx.exact.inflation import membrane_inflation, membrane_limit_point
+from formingx.problem.problem import Problem
 from formingx.results.evaluate.tension import Tension
 
 MATERIALS = [

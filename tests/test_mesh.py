@@ -8,7 +8,7 @@ from conftest import ROOT, run_json, treloar
 
 import formingx as fx
 from formingx import _compat
-from formingx.discrete.solid import Solid
+from formingx.forms.solid import Solid
 
 pytestmark = pytest.mark.quick
 

@@ -5,7 +5,7 @@ import pytest
 
 import formingx as fx
 from formingx import tools
-from formingx.discrete.step_limit import Way
+from formingx.contact.step_limit import Way
 
 
 def ball(radius, *, elements=12, friction="none", gap=0.0, **more):

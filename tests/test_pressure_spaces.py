@@ -10,8 +10,8 @@ from test_derivatives import assert_derivatives, random_state, scene
 
 import formingx as fx
 from formingx import _compat
-from formingx.discrete.probes import probe
-from formingx.discrete.problem import Problem
+from formingx.forms.probes import probe
+from formingx.problem.problem import Problem
 
 SPACES = ["P0", "P1", "P1dg"]
 TUBE_MODULUS = 2.0

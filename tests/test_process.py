@@ -8,9 +8,9 @@ from conftest import run_json
 from test_contact import support_force
 
 import formingx as fx
-from formingx.discrete.formulation import Formulation
-from formingx.discrete.problem import Problem
-from formingx.discrete.schedule import Setting
+from formingx.forms.formulation import Formulation
+from formingx.forms.schedule import Setting
+from formingx.problem.problem import Problem
 from formingx.results.show.plots import main_columns
 from formingx.solve.state import State
 

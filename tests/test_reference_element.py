@@ -7,8 +7,8 @@ from reference.body import Body, follow, read
 
 import formingx as fx
 from formingx import _compat
-from formingx.discrete.problem import Problem
 from formingx.physics.kinematics import sum_of_powers
+from formingx.problem.problem import Problem
 
 
 def as_printed(F, m1, a1, m2, a2):

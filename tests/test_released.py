@@ -10,9 +10,9 @@ from dolfinx import fem
 from test_sets import BASE, air, balance, block, draw
 
 import formingx as fx
-from formingx.discrete.carry import take_fields
-from formingx.discrete.problem import Problem
-from formingx.mesh.part import part_along
+from formingx.extensions.release.part import part_along
+from formingx.forms.carry import take_fields
+from formingx.problem.problem import Problem
 
 
 def blown(material, **more):

@@ -24,7 +24,7 @@ def pressed(friction, travel, **options):
 
 def test_a_homogeneous_block_does_not_feel_it(monkeypatch):
     """Without friction F_old is the same everywhere: the force goes on, as do volume, energy and columns."""
-    from formingx import remeshing
+    from formingx.extensions.remeshing import remeshing
     monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.kind == "target")
     path = fx.trace(block("none"), until=fx.travel(0.6), through=[fx.travel(0.5)], progress=False,
                     remesh=fx.Remesh(size=0.3))
@@ -46,7 +46,7 @@ def test_a_homogeneous_block_does_not_feel_it(monkeypatch):
 def test_stages_go_on_where_they_were(monkeypatch):
     """A mesh made at the end of a stage, one within a stage that has no time, one on the way back: no stage runs twice,
     time stands."""
-    from formingx import remeshing
+    from formingx.extensions.remeshing import remeshing
 
     def worn(record, state, remesh):
         travel = state.measures["travel"]
@@ -82,7 +82,7 @@ def test_a_stuck_block_goes_on():
 
 def test_nodes_are_not_foretold(monkeypatch):
     """They arrive one a step, on all meshes."""
-    from formingx.discrete.contact import approach
+    from formingx.contact import approach
     monkeypatch.setattr(approach, "LIMITS", approach.StepLimits(share=0.5))
     assert pressed("stick", 0.1).problem.limit.foretells
     path = pressed("stick", 0.5, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)))
@@ -91,7 +91,7 @@ def test_nodes_are_not_foretold(monkeypatch):
 
 def test_a_mesh_without_a_state_ends_no_path(monkeypatch):
     """The path of a run that fails at once on its new mesh ends before that."""
-    from formingx import remeshing
+    from formingx.extensions.remeshing import remeshing
 
     def fails(record, state, remesh, look=remeshing._look):
         if state.kind == "remesh":
@@ -105,7 +105,7 @@ def test_a_mesh_without_a_state_ends_no_path(monkeypatch):
 
 def test_the_old_mesh_is_kept_while_no_new_one_has_a_state(monkeypatch):
     """The next state is tried: the run goes on."""
-    from formingx import remeshing
+    from formingx.extensions.remeshing import remeshing
     failed = []
 
     def fails(path, remesh, tolerances, best=remeshing._best):
@@ -131,7 +131,7 @@ def test_a_session_of_gmsh_that_is_open_stays_as_it_is():
     """A mesh does not depend on what a script has set in gmsh, and leaves it alone."""
     import gmsh
 
-    from formingx.mesh.remeshed import remeshed
+    from formingx.extensions.remeshing.remeshed import remeshed
     corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
     ends = np.roll(corners, -1, axis=0)
     edges = np.stack([corners, ends, (corners + ends) / 2], axis=1)
@@ -248,7 +248,7 @@ def axial_stress(path, state):
     """The integral of the stress along Z over the body: minus the force of a plate times its height."""
     import basix
 
-    from formingx.discrete.carry import in_own_cells
+    from formingx.forms.carry import in_own_cells
     problem = path.segment(state).problem
     forms = problem.forms
     places, weights = map(np.asarray, basix.make_quadrature(basix.CellType.triangle, problem.scene.quadrature_degree))
@@ -260,7 +260,7 @@ def axial_stress(path, state):
 
 def twice(monkeypatch, **after):
     """The mesh is made again once in each of these stages, after these times."""
-    from formingx import remeshing
+    from formingx.extensions.remeshing import remeshing
     monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.time > after.get(state.stage, 1e9)
                         and state.setting["mesh"] == list(after).index(state.stage))
 
@@ -304,7 +304,7 @@ def test_what_a_material_remembers_goes_on(monkeypatch, tmp_path, material):
 
 def test_supports_hold_from_where_they_are(monkeypatch):
     """One that is driven goes on; a hinge holds the mean of its face."""
-    from formingx import remeshing
+    from formingx.extensions.remeshing import remeshing
     monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.kind == "target")
 
     def both(scene, targets, size):
@@ -372,7 +372,7 @@ def test_a_relaxing_block_under_a_ball(monkeypatch, material):
 
 
 def forms_of(n):
-    from formingx.discrete.problem import Problem
+    from formingx.problem.problem import Problem
     mesh = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(n, n))
     return Problem(fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
                             supports=[fx.Symmetry("axis"), fx.Clamped("rim")])).forms
@@ -382,8 +382,8 @@ def test_a_deformation_is_carried_to_other_elements():
     """F of r -> r s(z), with det F = 1: of third order, up to the faces, however it turns."""
     import ufl
 
-    from formingx.discrete.carry import in_own_cells
-    from formingx.discrete.preformed import Preformed
+    from formingx.extensions.remeshing.preformed import Preformed
+    from formingx.forms.carry import in_own_cells
     places = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0], [1 / 3, 1 / 3]])
 
     def deformation(r, z):
@@ -407,7 +407,7 @@ def test_a_deformation_is_carried_to_other_elements():
 
 def remeshed_at(monkeypatch, travel, n):
     """The path of a stuck block of n x n elements, remeshed once in between by as large ones, and its state then."""
-    from formingx import remeshing
+    from formingx.extensions.remeshing import remeshing
     monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.kind == "target")
     path = fx.trace(block("stick", elements=(n, n)), until=fx.travel(travel + 0.01), through=[fx.travel(travel)],
                     progress=False, remesh=fx.Remesh(size=1.3 / n, corner=1.3 / n))

@@ -5,7 +5,7 @@ import pytest
 from test_temperature import SHEET
 
 import formingx as fx
-from formingx.discrete.problem import Problem
+from formingx.problem.problem import Problem
 
 C10, HOT = 1.0, 150.0
 SHRINKS = fx.ThermalExpansion(linear=7e-4, stress_free=HOT)

@@ -12,10 +12,10 @@ from test_derivatives import assert_derivatives, difference, random_state
 
 import formingx as fx
 from formingx.__main__ import main
-from formingx.discrete.problem import Problem
+from formingx.extensions.space.part import _beyond
+from formingx.extensions.space.solid_tool import write_stl
+from formingx.problem.problem import Problem
 from formingx.results.files.fields import Fields
-from formingx.results.space.part import _beyond
-from formingx.tools.solid import write_stl
 
 MATERIALS = [fx.NeoHookean(c10=2.0), fx.MooneyRivlin(c10=1.5, c01=0.4), fx.Ogden(mu=(1.4, -0.3), alpha=(2.5, -2.0)),
              fx.Viscoelastic(fx.NeoHookean(c10=0.5), [(1.0, 1.0)])]

@@ -7,9 +7,9 @@ from conftest import run_json, treloar
 
 import formingx as fx
 import formingx.exact.stability as exact
-from formingx.discrete.problem import Problem
-from formingx.discrete.second_variation import SecondVariation
 from formingx.errors import InputError
+from formingx.extensions.stability.second_variation import SecondVariation
+from formingx.problem.problem import Problem
 
 
 def sparse(matrix):

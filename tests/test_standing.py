@@ -5,7 +5,7 @@ import pytest
 from test_process import air, end, plug, plugged, run
 
 import formingx as fx
-from formingx.discrete.contact import resultants
+from formingx.contact import resultants
 
 STAGES = [plug("down", 1.6), air("press", 0.02), plug("up", 1.0)]
 

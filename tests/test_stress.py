@@ -8,8 +8,8 @@ from conftest import run_json, treloar
 from test_closed_forms import cylinder, tube
 
 import formingx as fx
-from formingx.discrete.problem import Problem
 from formingx.exact.inflation import thick_sphere_limit_point, thick_wall
+from formingx.problem.problem import Problem
 
 STRETCH = 1.7
 MATERIALS = [

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import formingx as fx
-from formingx.discrete.problem import Problem
+from formingx.problem.problem import Problem
 
 HOT = {130.0: 2.0, 150.0: 0.6, 170.0: 0.2}
 

@@ -12,10 +12,10 @@ from scipy.optimize import brentq
 from test_derivatives import difference, random_state, residual
 
 import formingx as fx
-from formingx.discrete.problem import Problem
-from formingx.discrete.schedule import Setting
+from formingx.forms.schedule import Setting
 from formingx.materials.material import Material
 from formingx.physics.supports import MeanHeld
+from formingx.problem.problem import Problem
 from formingx.results.files.arrays import pack, unpack
 
 SYMMETRY = fx.Symmetry("axis")

@@ -7,8 +7,8 @@ import pytest
 from conftest import treloar
 
 import formingx as fx
-from formingx.discrete.probes import Probe
 from formingx.exact.inflation import membrane_limit_point
+from formingx.forms.probes import Probe
 from formingx.solve.arc_length import Curve
 from formingx.solve.newton import fixed
 

@@ -5,7 +5,7 @@ import pytest
 from test_temperature import SHEET
 
 import formingx as fx
-from formingx.discrete.tooling import Tooling
+from formingx.contact.tooling import Tooling
 from formingx.results.files.description import describe
 
 RISING = fx.table({20.0: 0.1, 150.0: 0.4})

@@ -2,9 +2,9 @@
 
 from typing import NamedTuple
 
-from .damping import PSM
+from ..extensions.kbkz.damping import PSM
+from ..extensions.kbkz.kbkz import KBKZ
 from .hyperelastic import MooneyRivlin, NeoHookean
-from .kbkz import KBKZ
 from .material import Material
 
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..discrete.contact import resultants
-from ..discrete.tooling import Tooling
+from ..contact import resultants
+from ..contact.tooling import Tooling
 from ..errors import InputError
 from ..physics.loads import Gravity
 from .forces import resisting

@@ -6,7 +6,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from ..discrete.contact import resultants
+from ..contact import resultants
 from ..errors import InputError, finite, known
 from .targets import Bound, Target
 

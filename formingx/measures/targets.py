@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import ufl
 
-from ..discrete.probes import probe
 from ..errors import InputError, finite, known, pair, positive
+from ..forms.probes import probe
 from ..mesh.nodes import of_space
 
 _GAUSS = (0.5 - 12**-0.5, 0.5 + 12**-0.5)

@@ -1,8 +1,8 @@
 """Meshes of six-node triangles: discs, spheres, parisons, and meshes read from files; sheets in space."""
 
-from .adapted import adapted
+from ..extensions.adapt.adapted import adapted
+from ..extensions.space.sheet import circle, rectangle, sheet
 from .build import ACCURACY, disc, from_lines, parison, sphere
 from .files import read, write
 from .grid import Grid, to_grid
 from .mesh import MPI, Mesh
-from .sheet import circle, rectangle, sheet

@@ -31,13 +31,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, count, instance, non_negative, pair, positive, triple
+from ..extensions.space.lagged_stick import LaggedSlide, LaggedStick
+from ..extensions.space.solid_tool import SolidTool
 from ..tools.shapes import Nearest, Tool
-from ..tools.solid import SolidTool
 from ..tools.tool import PlaneTool
 from ..values.table import Table
 from ..values.temperature import FunctionOfTemperature
 from .contact_law import ContactLaw, Motion, NormalLaw, Touch, Tractions, outer
-from .lagged_stick import LaggedSlide, LaggedStick
 from .part import Part
 
 _STICKS = 100.0

@@ -37,7 +37,7 @@ class Load(Part):
         """The virtual work of the load at a value, which may be a UFL expression: a UFL form, linear in `body.du`.
 
         Args:
-            body: a `formingx.discrete.formulation.LoadedBody`: u, du, X, F, kinematics, `integral`, `face`.
+            body: a `formingx.forms.formulation.LoadedBody`: u, du, X, F, kinematics, `integral`, `face`.
         """
         raise NotImplementedError
 

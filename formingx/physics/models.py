@@ -64,7 +64,7 @@ class Membrane(Model):
 
     Args:
         wrinkles: in space: the part of the stiffness, up to 1, that is left where the membrane wrinkles (tension-field
-            theory, see `formingx.discrete.surface`), 0.01 for one; None: all of it.
+            theory, see `formingx.extensions.space.surface`), 0.01 for one; None: all of it.
 
     >>> thin = fx.Scene(mesh=sheet, materials=scene.materials, supports=scene.supports, loads=scene.loads,
     ...                 model=fx.Membrane())

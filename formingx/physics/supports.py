@@ -58,7 +58,7 @@ class Support(Part):
         Its derivative by the displacement are the forces on the body. In a stage without the support it is not there.
 
         Args:
-            body: a `formingx.discrete.loaded_body.LoadedBody`: u, X, F, `face`, `integral`.
+            body: a `formingx.forms.loaded_body.LoadedBody`: u, X, F, `face`, `integral`.
         """
         return None
 

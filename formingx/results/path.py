@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..discrete.earlier_meshes import followed
 from ..errors import InputError, as_points, count
+from ..extensions.remeshing.earlier_meshes import followed
 from ..figures import Axes
 from ..solve.state import State
 from ..units import NONE, Units
@@ -49,7 +49,7 @@ class Path(States):
         for history in self.problem.histories:
             found += getattr(history, "doubts", lambda states: [])(self.segments[-1].states)
         if self._in_space:
-            from .space import show
+            from ..extensions.space import show
             found += show.doubts(self, self.wall())
         else:
             found += self._view(self.segments[-1]).verdict.doubts(self.last)
@@ -131,7 +131,7 @@ class Path(States):
             OSError: the file cannot be written.
         """
         if self._in_space:
-            from .space import show
+            from ..extensions.space import show
             return show.report(self, file, title, failure, units or NONE, density, trim)
         from .show import report
         return report.write(report.of_path(self), file, title, failure, self.problem.comm, units or NONE, density, trim)
@@ -153,7 +153,7 @@ class Path(States):
         squares of that size (length) that were printed on the flat sheet.
         """
         if self._in_space:
-            from .space import show
+            from ..extensions.space import show
             show.view(self, state or self.last, file, grid)
             return Picture(file)
         from .show import views
@@ -168,7 +168,7 @@ class Path(States):
         An InputError for a membrane, and for a load that does not say how it changes with a mode.
         """
         self._section_only("stability")
-        from .stability import Watch
+        from ..extensions.stability.instability import Watch
         self._watch = self._watch or Watch(self)
         return self._watch.look(modes, states)
 
@@ -178,7 +178,7 @@ class Path(States):
         A solid or a membrane; an InputError in plane strain, in space, and for a mesh that is no sheet.
         """
         self._section_only("hoop_resultants", "use path.wall().wrinkled")
-        from .evaluate.hoop import hoop_resultants
+        from ..extensions.stability.hoop import hoop_resultants
         state = state or self.last
         return hoop_resultants(self, self.segment(state).problem, state)
 
@@ -189,18 +189,18 @@ class Path(States):
         rank. (With the stresses that it has a body is let go by `released`.)
         """
         self._section_only("formed", "use to_stl, or shell_model")
-        from .formed import formed
+        from ..extensions.release.formed import formed
         return formed(self.segment(state).problem, state or self.last, size)
 
     def column_factors(self, share: float | None, error: float | None) -> np.ndarray:
         """Wanted over present length of the mesh's columns, shape (n,), by which `formingx.mesh.adapted` goes."""
         self._section_only("column_factors", "use fx.mesh.adapted")
-        from .evaluate.column_factors import column_factors
+        from ..extensions.adapt.column_factors import column_factors
         return column_factors(self, share, error)
 
     def wanted_sizes(self, share: float | None, error: float | None) -> tuple[np.ndarray, np.ndarray]:
         """Nodes of a flat sheet in space, (n, 2), and sizes of triangles there, (n,), by `formingx.mesh.adapted`."""
-        from .space.sizes import wanted_sizes
+        from ..extensions.adapt.sizes import wanted_sizes
         return wanted_sizes(self, share, error)
 
     def wall(self, state: State | None = None) -> Any:
@@ -209,7 +209,7 @@ class Path(States):
         A `Wall`, from the axis to the rim; in space a `WallInSpace`, triangle by triangle.
         """
         if self._in_space:
-            from .space.wall import wall_of
+            from ..extensions.space.wall import wall_of
             return wall_of(self, state or self.last)
         from .evaluate.wall import Walls
         self._walls = self._walls or Walls(self)
@@ -232,7 +232,7 @@ class Path(States):
             InputError: the mesh is no sheet, or the part does not reach the trim or a height.
         """
         if self._in_space:
-            from .space.part import part as part_in_space
+            from ..extensions.space.part import part as part_in_space
             return part_in_space(self.wall(state), density, trim, heights, units or NONE)
         from .evaluate.part import part
         axisymmetric = self.problem.scene.kinematics.axisymmetric
@@ -258,7 +258,7 @@ class Path(States):
             ConvergenceError: no state of the free part was found; it carries the path so far.
         """
         self._section_only("released")
-        from .released import released
+        from ..extensions.release.released import released
         state = state or self.last
         make = lambda record: Path(record, True)                           # noqa: E731
         return released(self, self.segment(state).problem, make, state, temperature, trim, boundaries, duration,
@@ -275,7 +275,7 @@ class Path(States):
         """
         from .evaluate.contact_face import contact_of
         if self._in_space:
-            from .space.part import filling as filling_in_space
+            from ..extensions.space.part import filling as filling_in_space
             return filling_in_space(self, contact_of(self, tool, "filling")[0])
         if len(self.segments) > 1:
             raise InputError("filling: is not available for a remeshed run as a whole: take that of one mesh,"
@@ -349,7 +349,7 @@ class Path(States):
         """Write a part in space as shells, each with its wall, for a structural code (.inp; rank 0 writes)."""
         if not self._in_space:
             raise InputError("shell_model: is for a sheet in space; of a section use to_stl, or formed()")
-        from .space.show import shell_model
+        from ..extensions.space.show import shell_model
         shell_model(self, file, state)
 
     def _section_only(self, what: str, instead: str = "") -> None:
@@ -364,7 +364,7 @@ class Path(States):
     def _solid(self, state: State | None) -> Any:
         """Points, triangles and wall ratios of the part as a solid."""
         if self._in_space:
-            from .space.show import solid as solid_in_space
+            from ..extensions.space.show import solid as solid_in_space
             return solid_in_space(self, state or self.last)
         from .files.solid import coloured
         return coloured(self.profile(state), self.problem.scene.kinematics.axisymmetric)

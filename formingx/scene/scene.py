@@ -11,8 +11,9 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError, count, known, several, together
+from ..extensions.heat.expansion import ThermalExpansion
+from ..extensions.space import scene_checks as space
 from ..materials.constants import Sample
-from ..materials.expansion import ThermalExpansion
 from ..materials.hyperelastic import Material
 from ..mesh.mesh import Mesh
 from ..mesh.nodes import of_mesh
@@ -23,7 +24,7 @@ from ..physics.models import Membrane, MixedPressure, Model
 from ..physics.part import Part
 from ..physics.supports import Held, Support
 from ..ranks import gathered
-from . import space, tool_width
+from . import tool_width
 from .sampling import sample
 from .summary import summary
 from .temperature import GivenTemperature

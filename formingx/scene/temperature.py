@@ -20,7 +20,7 @@ class GivenTemperature:
 
     Attributes:
         given: as it was given.
-        T: the DOLFINx `Function` (P2), never changed: what changes is `formingx.discrete.temperature.Temperature`.
+        T: the DOLFINx `Function` (P2), never changed: what changes is `Temperature`.
 
     Raises:
         InputError: it is not given all over the body.

@@ -9,10 +9,10 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..errors import ConvergenceError
+from ..extensions.contact_events.response import Response
 from ..measures.targets import Target
 from .equations import Array, Attempt, Constraint, Equations, Measure
 from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
-from .response import Response
 from .state import State
 
 Predictor: TypeAlias = Callable[[float], Array | None]

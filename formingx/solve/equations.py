@@ -27,8 +27,8 @@ import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..discrete.schedule import Setting
-from ..discrete.step_limit import StepLimit
+from ..contact.step_limit import StepLimit
+from ..forms.schedule import Setting
 
 Array: TypeAlias = npt.NDArray[Any]
 

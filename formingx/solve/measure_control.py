@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..discrete.step_limit import Way
+from ..contact.step_limit import Way
 from ..measures.targets import Target, is_met, process_time
 from . import predictor
 from .equations import Array, Measure

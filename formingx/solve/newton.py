@@ -10,8 +10,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from petsc4py import PETSc
 
-from ..discrete.schedule import Setting
 from ..errors import count, positive
+from ..forms.schedule import Setting
 from .equations import Array, Attempt, Constraint, Equations, Residual, Standing
 from .linear import DirectSolver
 from .local_contact import LocalSolve, Update, woodbury

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..discrete.step_limit import Way
+from ..contact.step_limit import Way
 from ..errors import ConvergenceError
 from ..measures.targets import Amplitude, Target
 from . import predictor

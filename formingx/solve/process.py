@@ -14,8 +14,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ..discrete.schedule import Setting
 from ..errors import ConvergenceError, InputError
+from ..forms.schedule import Setting
 from ..measures.targets import Amplitude, Target, changed, process_time
 from .arc_length import Curve
 from .diagnose import diagnose

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from petsc4py import PETSc
 
-from ..discrete.step_limit import StepLimit, Way
+from ..contact.step_limit import StepLimit, Way
 from .arc_length import Curve
 from .equations import Array, Equations, Viscosity
 from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative

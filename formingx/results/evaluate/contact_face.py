@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...discrete.contact import resultants
-from ...discrete.tooling import Tooling
+from ...contact import resultants
+from ...contact.tooling import Tooling
 from ...errors import InputError
 from ...mesh.nodes import of_facets
 from ...ranks import gathered

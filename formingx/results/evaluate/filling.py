@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...discrete.probes import probe
 from ...errors import InputError, non_negative
+from ...forms.probes import probe
 from ...tools.shapes import Arc, Tool
 from ..files.sheet import Sheet
 from .profile import distance_to_line, fine
@@ -74,7 +74,7 @@ class Filling(Sheet):
 
 def filling(path: Any, contact: Any) -> Filling:
     """See `Path.filling`; contact: the `FaceContact`."""
-    from ...discrete.tooling import Tooling
+    from ...contact.tooling import Tooling
     tooling = Tooling.of_problem(path.problem)
     number = path.problem.contacts.index(contact)
     corners = corners_of(contact.contact.tool)

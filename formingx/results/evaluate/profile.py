@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...discrete.probes import Probe, probe
 from ...errors import InputError, finite
+from ...forms.probes import Probe, probe
 
 FACES = (("bottom", "top"), ("inner", "outer"))
 """Names of the two faces of a sheet or of a wall."""

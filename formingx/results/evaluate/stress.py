@@ -29,8 +29,8 @@ from numpy.typing import ArrayLike
 from petsc4py import PETSc
 
 from ... import _compat
-from ...discrete.earlier_meshes import followed
 from ...errors import InputError, as_points, known, pair
+from ...extensions.remeshing.earlier_meshes import followed
 from ...mesh.locate import Place, locate
 from ...mesh.nodes import COORDINATES, of_cells, own_cells
 from ...physics.kinematics import BLOCK

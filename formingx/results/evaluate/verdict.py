@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...discrete.contact import resultants
-from ...discrete.outline import Outline, along
+from ...contact import resultants
+from ...forms.outline import Outline, along
 from ...scene.tool_width import CUT
 from ...solve.state import State
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ... import _compat
-from ...discrete.probes import probe
 from ...errors import InputError, finite
+from ...forms.probes import probe
 from ...mesh.nodes import of_cells, of_facets
 from ...ranks import gathered
 from ..files.sheet import Sheet

@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from ...discrete.contact import resultants
-from ...discrete.step_limit import Way
-from ...discrete.tooling import Tooling
+from ...contact import resultants
+from ...contact.step_limit import Way
+from ...contact.tooling import Tooling
 from ...errors import InputError
 from ...solve.newton import Failure
 

@@ -29,10 +29,11 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ... import _compat
-from ...discrete.problem import Problem
-from ...discrete.schedule import Setting
 from ...errors import InputError, instance, place
+from ...extensions.remeshing import files as remade
+from ...forms.schedule import Setting
 from ...measures.targets import Target
+from ...problem.problem import Problem
 from ...scene.scene import Scene
 from ...scene.summary import summary
 from ...solve.arc_length import Curve
@@ -40,7 +41,6 @@ from ...solve.newton import Iteration, Tolerances
 from ...solve.record import Counts, Record, Segment
 from ...solve.state import State
 from .. import files
-from . import remade
 from .arrays import pack, unpack
 from .description import describe, differences
 from .progress import progress

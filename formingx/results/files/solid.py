@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...tools.solid import volume, write_stl
+from ...extensions.space.solid_tool import volume, write_stl
 from ..evaluate.profile import fine
 from . import tabular
 

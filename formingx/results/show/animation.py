@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ... import figures
-from ...discrete.tooling import Tooling
+from ...contact.tooling import Tooling
 from ...errors import InputError, count, positive
 from ...units import NONE, Units
 from .. import files

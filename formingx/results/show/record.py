@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ...discrete.earlier_meshes import followed
-from ...discrete.tooling import Tooling
+from ...contact.tooling import Tooling
 from ...errors import InputError
+from ...extensions.remeshing.earlier_meshes import followed
 from .. import files
 from ..evaluate import volume
 from ..evaluate.contact_face import ContactFace, ContactTable, tool_forces

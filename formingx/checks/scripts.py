@@ -1,0 +1,85 @@
+"""A script looked over before it runs: executed up to its first run, whose scene and targets `doctor` looks at."""
+
+import os
+import runpy
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import formingx
+
+from ..errors import InputError, place
+from ..extensions.design import design as designs
+from ..extensions.study.study import design
+from ..runs import Process
+from .doctor import Report, doctor
+
+
+class _Looked(BaseException):
+    """Raised in place of the first run; no Exception, so that a script does not catch it."""
+
+    def __init__(self, report: Report):
+        super().__init__()
+        self.report = report
+
+
+def look_over(script: Any, arguments: Sequence[str] = ()) -> Report:
+    """What `doctor` says of the first scene that a script runs, by whichever way; nothing is solved.
+
+    Args:
+        script: a Python file; what it does before its first run is done, also heating (`heat`).
+        arguments: its command line.
+
+    Raises:
+        InputError: there is no such file, it is no Python, runs no scene, or the scene or a target is refused.
+    """
+    file = place("doctor: script", script)
+    if not file.is_file():
+        raise InputError(f"doctor: script {str(file)!r} is not there")
+    _check_python(file)
+    before = sys.argv, sys.path[:]
+    sys.argv, sys.path[:0] = [os.fspath(file), *arguments], [os.fspath(file.parent)]
+    try:
+        with _no_runs():
+            runpy.run_path(os.fspath(file), run_name="__main__")
+    except _Looked as found:
+        return found.report
+    finally:
+        sys.argv, sys.path[:] = before
+    raise InputError(f"doctor: {str(file)!r} runs no scene in this process: there is nothing to look over")
+
+
+def _check_python(file: Path) -> None:
+    try:
+        compile(file.read_bytes(), os.fspath(file), "exec")
+    except (SyntaxError, ValueError, OverflowError, MemoryError, RecursionError) as error:
+        where = f", line {error.lineno}" if isinstance(error, SyntaxError) and error.lineno else ""
+        words = error.msg if isinstance(error, SyntaxError) else str(error) or type(error).__name__
+        raise InputError(f"doctor: script {str(file)!r} is no Python: {words}{where}") from None
+
+
+@contextmanager
+def _no_runs() -> Iterator[None]:
+    """`trace`, `solve`, `Process.run` and the like look their scene over instead of running it."""
+    def trace(scene, *, until, through=(), **_):
+        raise _Looked(doctor(scene, targets=[*through, until]))
+
+    def solve(scene, **_):
+        raise _Looked(doctor(scene))
+
+    def study(build, variables, *_, **__):
+        build(**design(variables)[0])
+
+    def run(process, stages, **_):
+        raise _Looked(doctor(process.scene, stages=stages))
+    others: list[Any] = [(formingx, trace), (designs, trace), (formingx, solve), (formingx, study), (Process, run)]
+    kept = [getattr(owner, other.__name__) for owner, other in others]
+    try:
+        for owner, other in others:
+            setattr(owner, other.__name__, other)
+        yield
+    finally:
+        for (owner, other), original in zip(others, kept):
+            setattr(owner, other.__name__, original)

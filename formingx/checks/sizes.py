@@ -1,0 +1,320 @@
+"""What `doctor` says of pressures, blow ratios and ways of tools: sizes against what the body is and bears."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..extensions.kbkz import rupture
+from ..materials.inflation import Inflated, Peak, first_peak
+from ..measures.targets import Target
+from ..mesh.triangles import Triangles
+from ..physics.contact import Contact
+from ..scene.scene import Scene
+from ..solve.stage import Stage
+from ..tools.shapes import Tool
+from ..units import Units
+
+Found = Iterator[tuple[str, str]]
+
+_PRESSED = 100.0           # of the shear modulus: more presses no wall further into any corner
+_SLIGHT = 1e-4             # of shear modulus x thickness / length: as good as no pressure
+_BEYOND = 1.1              # of the largest pressure of a cap, which is 3 % below that of a disc
+_LEFT = 0.8                # of a tube's largest pressure, at the mould: see tests/test_doctor.py
+_BLOWN = 8.0               # blow ratio that no bottle has
+_DEEP = 0.5                # of the opening: a wall beyond it that high is a mould's, not a grip's
+_WIDER = 4.0               # times wider than the other: of a sheet and its mould one is in another unit
+_SHARP = 10.0              # degrees that a profile turns at a corner
+_LOOKS = 400               # places of a tool on its way
+_STIFFENS = "a material that stiffens (Gent, ArrudaBoyce, Yeoh, Ogden with an exponent above 2) does"
+
+
+class Aim(NamedTuple):
+    """A pressure or a travel that a run goes to: of what (None: that is not known), the value, its name."""
+
+    thing: Any
+    quantity: str
+    value: float
+    text: str
+
+
+class Body(Triangles):
+    """The body that is looked over, and what it is to be brought to.
+
+    Attributes:
+        moduli: {layer: shear modulus}; natural: a pressure of its size, shear modulus x thickness / length, stress.
+        aims: pressures and travels that the run goes to; targets: all that it aims at.
+    """
+
+    def __init__(self, scene: Scene, targets: Sequence[Target], stages: Sequence[Stage], units: Units):
+        super().__init__(scene.mesh)
+        self.scene, self._units = scene, units
+        self.moduli = {name: scene.shear_modulus(name) for name in scene.materials}
+        self.natural = max(self.moduli.values()) * self.thickness / self.length
+        self.aims = [aim for target in targets for aim in self._aim(target, scene.driven)]
+        self.goals = bool(targets or stages)
+        self.targets = [*targets, *(t for stage in stages for t in (*stage.through, stage.until, stage.highest) if t)]
+        for stage in stages:
+            drive = None if stage.drive is None else scene.things[scene.number(stage.who, stage.drive)]
+            for target in (*stage.through, stage.until):
+                self.aims += [] if target is None else self._aim(target, drive)
+            for thing, table in stage.tables:
+                of = scene.things[scene.number(stage.who, thing)]
+                most = float(table[np.argmax(np.abs(table[:, 1])), 1])
+                self.aims.append(Aim(of, str(of.quantity), most, f"the table of {thing!r} in {stage.who}"))
+
+    def say(self, value: float, kind: str) -> str:
+        """A number in words, with its unit: of a "pressure", a "travel" (a length) or a "force"."""
+        unit = self._units.of(kind)
+        return f"{value:.4g}" + (f" {unit}" if unit else "")
+
+    def _aim(self, target: Target, drive: Any) -> list[Aim]:
+        name, _, quantity = str(target.name).rpartition("_")
+        if quantity not in ("pressure", "travel"):
+            return []
+        things = [t for t in self.scene.things if t.driven and t.quantity == quantity]
+        of = next((t for t in things if name and t.name == name), drive if not name and drive in things else None)
+        return [Aim(of, quantity, target.value, str(target))]
+
+    def pressures(self) -> list[tuple[str, float]]:
+        """(what, value) of all pressures that act or are aimed at."""
+        fixed = [(repr(load), load.value) for load in self.scene.loads
+                 if load.quantity == "pressure" and not load.driven]
+        return [*fixed, *((aim.text, aim.value) for aim in self.aims if aim.quantity == "pressure")]
+
+    @cached_property
+    def pushed(self) -> list[Pushed]:
+        """Faces that a pressure pushes at tools that stay, and free ones that a pressure blows up."""
+        found = []
+        for load in (load for load in self.scene.loads if load.quantity == "pressure"):
+            try:
+                line = self.scene.mesh.line_of(load.on)
+            except InputError:                               # not one line: a section that is no sheet
+                continue
+            tools = [c for c in self.scene.contacts if c.moves is None and c.on != load.on]
+            found.append(Pushed(self, load, line, tools))
+        return found
+
+
+class Pushed:
+    """The face of a sheet that a pressure pushes.
+
+    Attributes:
+        tools: contacts with tools that stay on its other face. tall: a tube, not a disc.
+        radius: of the tube's middle, or the reach of the disc, length.
+    """
+
+    def __init__(self, body: Body, load: Any, line: np.ndarray, tools: list[Contact]):
+        self.load, self.tools, self._body = load, tools, body
+        self.length = float(np.hypot(*np.diff(line, axis=0).T).sum())
+        high, wide = float(np.ptp(line[:, 1])), float(line[:, 0].max())
+        self.round = body.scene.kinematics.axisymmetric
+        self.tall, self.flat = high > 2 * wide, high < 0.05 * wide
+        self.radius = float(np.median(line[:, 0])) + body.thickness / 2 if self.tall else wide
+        self._line = line
+
+    @cached_property
+    def ways(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points of the other face, and where each meets a tool straight on (or infinity), shape (n, 2) each."""
+        points = np.unique(np.vstack([self._body.scene.mesh.nodes_of(c.on) for c in self.tools]), axis=0)
+        through = points - self._line[np.argmin(np.hypot(*(points[:, None] - self._line).transpose(2, 0, 1)), axis=1)]
+        size = np.hypot(*through.T)
+        points, way = points[size > 0], through[size > 0] / size[size > 0, None]     # faces may share their ends
+        far = 100 * self._body.length
+        gone = np.min([_free_way(c.tool, points, way, far) for c in self.tools], axis=0)[:, None]
+        return points, np.where(np.isfinite(gone), points + np.where(np.isfinite(gone), gone, 0.0) * way, np.inf)
+
+    def peak(self) -> Peak | None:
+        """Where the free sheet bears most; None: there is no such place, or it is not known."""
+        materials = self._body.scene.materials
+        if not self.round or not (self.tall or self.flat) or any(m.varies for m in materials.values()):
+            return None
+        blown = Inflated(self._layers(), self.radius)
+        return first_peak(blown.tube if self.tall else blown.disc)
+
+    def left(self, blow_ratio: float) -> tuple[float, Peak] | None:
+        """The least pressure of the free tube behind its peak, up to a blow ratio, over that at the peak; the peak."""
+        peak = self.peak()
+        if peak is None or peak.stretch >= blow_ratio:
+            return None
+        behind = Inflated(self._layers(), self.radius).tube(np.linspace(peak.stretch, blow_ratio, 200))
+        return float(behind.min()) / peak.pressure, peak
+
+    def _layers(self) -> list[tuple[Any, float]]:
+        body = self._body
+        return [(material, float(body.area[body.layer == name].sum()) / self.length)
+                for name, material in body.scene.materials.items()]
+
+
+def _free_way(tool: Tool, points: np.ndarray, way: np.ndarray, far: float) -> np.ndarray:
+    """How far points, shape (n, 2), go along unit vectors before they come into a tool; infinity beyond `far`."""
+    gone = np.zeros(len(points))
+    for _ in range(1000):                                    # as far at a time as no tool can be nearer
+        free = -tool.signed_distance(points + gone[:, None] * way)
+        if not np.any((free > 1e-6 * far / 100) & (gone < far)):
+            break
+        gone = np.minimum(gone + np.maximum(free, 0.0), far)
+    return np.where(gone < far, gone, np.inf)
+
+
+def _pressures(body: Body) -> Found:
+    """Pressures that no sheet of this stiffness feels, or that none bears: free, or in a mould."""
+    stiff = max(body.moduli.values())
+    for name, value in body.pressures():
+        if 0 < abs(value) < _SLIGHT * body.natural:
+            yield name, (f"it is {abs(value) / body.natural:.2g} times shear modulus x thickness / length ="
+                         f" {body.say(body.natural, 'pressure')} (shear modulus {body.say(stiff, 'stress')}), and moves"
+                         f" nothing: are the units of stress the same (Pa, kPa, MPa)?")
+        free = not body.scene.contacts and abs(value) > 1e3 * body.natural
+        if free or abs(value) > _PRESSED * stiff:
+            size, what, enough = (stiff, "shear modulus", "some ten times that fill a corner as small as the wall")
+            if free:
+                size, what, enough = body.natural, "shear modulus x thickness / length", "a free sheet bears about that"
+            yield name, (f"it is {abs(value) / size:.2g} times {what} = {body.say(size, 'pressure')}: {enough}: are the"
+                         f" units of stress the same (Pa, kPa, MPa)?")
+
+
+def _bears(body: Body) -> Found:
+    """A free sheet of an energy that does not stiffen has a largest pressure: no state lies above it."""
+    for pushed in body.pushed:
+        if body.scene.contacts or (peak := pushed.peak()) is None:
+            continue
+        for name, value in body.pressures():
+            if _BEYOND * peak.pressure < abs(value) <= 1e3 * body.natural:
+                yield name, (f"a free {'tube' if pushed.tall else 'sheet'} of {_names(body)} bears at most about"
+                             f" {body.say(peak.pressure, 'pressure')} (at a stretch of {peak.stretch:.3g}). Give a pole"
+                             f" height, a pole stretch or a volume as the target: these grow past that maximum;"
+                             f" {_STIFFENS} bear more")
+
+
+def _blow_ratio(body: Body) -> Found:
+    """A tube whose pressure falls far behind its peak bulges at one place; what is blown first is thin in the end."""
+    for pushed in body.pushed:
+        if not (pushed.tools and pushed.tall and pushed.round):
+            continue
+        points, ends = pushed.ways
+        outer = points[:, 0].max()
+        beside = np.isfinite(ends[:, 0]) & (points[:, 0] > 0.95 * outer)     # not its round end
+        ratio = float(ends[beside, 0].max(initial=outer) / outer)
+        if ratio > _BLOWN:
+            yield repr(pushed.tools[0]), (f"the parison of radius {body.say(pushed.radius, 'travel')} is blown up"
+                                          f" {ratio:.3g}-fold in this mould: are the units of length the same (mm and"
+                                          f" cm)?")
+        elif (found := pushed.left(ratio)) is not None and found[0] < _LEFT:
+            yield "materials", (f"a tube of {_names(body)} has its largest pressure,"
+                                f" {body.say(found[1].pressure, 'pressure')}, at a blow ratio of"
+                                f" {found[1].stretch:.3g}, and only {100 * found[0]:.0f} % of it on the way to this"
+                                f" mould's ratio of {ratio:.3g}: it bulges at one place, snaps, and may find no"
+                                f" equilibrium before the mould. Use a larger parison; {_STIFFENS} not bulge")
+
+
+def _closing(body: Body) -> Found:
+    """A mould that leaves a way straight past it holds only what the sheet bears alone."""
+    for pushed in body.pushed:
+        if not pushed.tools:
+            continue
+        points, ends = pushed.ways
+        open_at = points[~np.isfinite(ends[:, 0])]
+        peak = pushed.peak()
+        if not len(open_at) or len(open_at) == len(points):  # closed; or a tool beside what is blown up
+            continue
+        tool = pushed.tools[0].tool
+        wall = float((tool.surface()[0] - open_at.mean(0)).dot(_across(pushed, open_at)).max())
+        aims = [aim for aim in body.pressures() if peak is not None and abs(aim[1]) > _BEYOND * peak.pressure]
+        deep = not body.goals and wall > _DEEP * np.ptp(points, axis=0).max()
+        if aims or deep:
+            why = f"{aims[0][0]} is more than the {body.say(peak.pressure, 'pressure')} that the sheet bears alone" \
+                if aims and peak else "a sheet bears little alone"
+            yield repr(pushed.tools[0]), (f"the mould is open: straight ahead of (R, Z) = ({open_at[0, 0]:.4g},"
+                                          f" {open_at[0, 1]:.4g}) it has no surface, and {why}: the body would be"
+                                          f" blown past its end. Give the profile a floor to R = 0, or a pole height"
+                                          f" or a volume as the target")
+
+
+def _across(pushed: Pushed, points: np.ndarray) -> np.ndarray:
+    """The direction in which the pressure pushes points, on the mean."""
+    away = points.mean(0) - pushed._line.mean(0)
+    return np.array([0.0, np.sign(away[1])]) if not pushed.tall else np.array([1.0, 0.0])
+
+
+def _mould_sizes(body: Body) -> Found:
+    """A sheet beside a mould that stays, many times wider or narrower than what it is to be formed into."""
+    for contact in body.scene.contacts:
+        if contact.tool.components == 3:
+            continue
+        face, outline = body.scene.mesh.nodes_of(contact.on), contact.tool.surface()[0]
+        wide, reach = float(np.abs(face[:, 0]).max()), np.abs(outline[:, 0])
+        if contact.moves is not None or np.ptp(face[:, 1]) > 0.1 * wide:
+            continue
+        bottom, flange = outline[[np.argmin(reach), np.argmax(reach)], 1] - face[:, 1].mean()
+        gap = float(-contact.tool.signed_distance(face).max())
+        narrow = reach.max() < wide / _WIDER
+        if abs(bottom) > abs(flange) and (narrow or reach.max() > _WIDER * wide and wide < gap < 20 * wide):
+            what = "reaches to" if narrow else f"is {body.say(gap, 'travel')} away, and reaches to"
+            yield repr(contact), (f"the mould {what} R = {body.say(float(reach.max()), 'travel')}, the sheet to"
+                                  f" {body.say(wide, 'travel')}: are the units of length the same (mm and cm)?")
+
+
+def _ways(body: Body) -> Found:
+    """A tool that moves away from its face, or past it."""
+    for i, tool in enumerate(body.scene.things):
+        if not isinstance(tool, Contact) or tool.moves is None or not (tool.separates or tool.tool.components == 3):
+            continue
+        if body.scene.together(i)[0] != i:
+            continue
+        meets = [c for c in (body.scene.things[k] for k in body.scene.together(i)) if isinstance(c, Contact)]
+        aims = [aim.value for aim in body.aims if aim.thing is tool]
+        if any(value < 0 for value in aims):                 # it is taken back, or pulls
+            continue
+        others = bool(body.scene.loads) or len(body.scene.drivable) > 1
+        size = float(max(body.scene.extent))
+        faces = [(c.tool, body.scene.mesh.nodes_of(c.on)) for c in meets]
+        start = _gap(faces, tool.moves, 0.0)
+        far = max([*aims, 0.0]) or 3 * size + 2 * max(start, 0.0)
+        gaps = np.array([_gap(faces, tool.moves, travel) for travel in np.linspace(0, far, _LOOKS)])
+        near = 0.5 * min(body.edge.min(), body.thickness)
+        if gaps.min() <= near and (start > near or gaps[1] <= gaps[0]) or not far > 0:
+            continue
+        if gaps[1] > gaps[0] and gaps[-1] > gaps[0] and (start <= near or not others or not aims):
+            yield repr(tool), (f"it moves away from the body: over a travel of {body.say(far, 'travel')} its gap to"
+                               f" {tool.on!r} grows from {body.say(max(0.0, start), 'travel')} to"
+                               f" {body.say(gaps[-1], 'travel')}: must it be moves ="
+                               f" ({', '.join(f'{0 - m:g}' for m in tool.moves)})?")
+        elif not others and gaps.min() > near:
+            yield repr(tool), (f"it touches nothing on its way: over a travel of {body.say(far, 'travel')} it comes no"
+                               f" nearer to {tool.on!r} than {body.say(gaps.min(), 'travel')}: place it nearer (moved),"
+                               f" turn its way, or let it travel farther")
+
+
+def _gap(faces: list[tuple[Tool, np.ndarray]], moves: Any, travel: float) -> float:
+    return min(float(-tool.signed_distance(nodes - travel * np.array(moves)).max()) for tool, nodes in faces)
+
+
+def _sharp_edges(body: Body) -> Found:
+    """Under a sharp edge the force depends on where nodes lie, whatever the mesh: see tests/test_doctor.py."""
+    for contact in body.scene.contacts:
+        facets = (len(body.scene.mesh.nodes_of(contact.on)) - 1) // 2
+        rows = len(body.edge) / max(2 * facets, 1)
+        if contact.moves is None or contact.sticks or rows < 1.5:
+            continue
+        pieces = contact.tool.pieces
+        for a, b in zip(pieces, pieces[1:] + (pieces[:1] if contact.tool.closed else ())):
+            turn = np.degrees((b.angles[0] - a.angles[1] + np.pi) % (2 * np.pi) - np.pi)
+            if turn > _SHARP:                                # the solid is to the left: convex
+                yield repr(contact), (f"its edge at (R, Z) = ({a.ends[1][0]:.4g}, {a.ends[1][1]:.4g}) is sharp: forces"
+                                      f" there are off by 1 to 3 %, depending on where nodes lie, and more elements"
+                                      f" through the thickness ({rows:.2g} here) do not help: give it a fillet that"
+                                      f" spans some elements along the sheet")
+                break
+
+
+def _names(body: Body) -> str:
+    return ", ".join(dict.fromkeys(str(m) for m in body.scene.materials.values()))
+
+
+CHECKS: Sequence[Callable[[Body], Found]] = (_pressures, _bears, _blow_ratio, _closing, _mould_sizes, _ways,
+                                                 _sharp_edges, rupture.check)

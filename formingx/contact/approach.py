@@ -1,0 +1,177 @@
+"""How the points of a face come to their tool in a step: where they arrive, and whether the step was too long."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from ..extensions.contact_events.event_sequence import arrivals
+from ..ranks import gathered
+from .face import FaceContact
+
+
+@dataclass(frozen=True)
+class StepLimits:
+    """What of contact limits a step.
+
+    Attributes:
+        as_good: part of a step within which a point is as good as in touch.
+        beyond: how far a step goes that is to end at an arrival, over the length to there.
+        near: distances, over thickness, at which a point is as good as in touch.
+        share: of the points of a face, that a step may bring if they are foretold one after the other.
+        at_end: part of a step from which on what arrives, and will stick, has no friction until the next.
+        slides: how far a point may slide so, over the length of face that is its own.
+        nearer: part of its distance from the tool that a point may move in a step of lagged contact, beside its length
+            of face.
+        cut_off: how deep the way of a point in a step may lead through a tool, over the length of face that is its own.
+        places: at most, at which that way is looked at.
+        shortest: lengths of steps (dimensionless) that are never too long for what comes into contact.
+    """
+
+    as_good: float = 0.02
+    beyond: float = 1.001
+    near: float = 1e-3
+    share: float = 0.05
+    at_end: float = 0.95
+    slides: float = 2e-3
+    nearer: float = 0.7
+    cut_off: float = 0.5
+    places: int = 4000
+    shortest: float = 1e-4
+
+
+LIMITS = StepLimits()
+
+
+class Approach:
+    """The step ahead of one contact. For each step: `reach`, `prepare`; of the state that it came to the others.
+
+    Args:
+        face: the contact.
+        conducts: heat flows through what touches, from the end of the step on.
+
+    Attributes:
+        at_once, foretold: so many points a step may bring into contact, along the tangent and one foretold after the
+            other. (Where it does not matter when they come, the convergence of contact limits steps.)
+    """
+
+    def __init__(self, face: FaceContact, conducts: bool):
+        self.face, self._comm, given = face, face.comm, face.contact.nodes_per_step
+        points = face.comm.allreduce(len(face.rule.points))
+        share = max(points // 100, 1) if face.contact.lagged else 1
+        self.at_once = (given or 1) * share * (1 if face.law.remembers or conducts else 10)
+        several = face.law.has_friction and not given and not face.contact.lagged
+        self.foretold = max(self.at_once, round(LIMITS.share * points)) if several else self.at_once
+        self._foreseen = 0                                  # points that the step is going to bring, all ranks
+
+    @property
+    def foretells(self) -> bool:
+        """True if more arrivals than one by one may be foretold for its sake: where it sticks depends on them."""
+        return self.face.contact.sticks and self.foretold > self.at_once
+
+    def touches(self, fields: np.ndarray, control: float) -> bool:
+        """True if a point touches the tool."""
+        return bool(self._comm.allreduce(bool(self.face.touching(fields, control).any()), MPI.LOR))
+
+    def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
+        """How long a step along a tangent may be: to the first touch, or until enough new points touch.
+
+        A step that would bring a whole region into contact at once would decide by its own length where it sticks.
+        """
+        face = self.face
+        start, velocity = face.positions(fields, control), face.moved(direction, slope)
+        free = ~face.law.touching(start, face.touch)
+        if face.contact.lagged:                             # a tangent of a long step foretells no arrivals
+            most = LIMITS.nearer * np.maximum(-face.law.distance(start), 0.0) + face.rule.lengths
+            speed = np.linalg.norm(velocity, axis=1)
+            most = np.divide(most, speed, out=np.full(len(speed), length), where=free & (speed > 0))
+            length = self._comm.allreduce(float(most.min(initial=length)), MPI.MIN)
+        times = arrivals(face.law, start, velocity, free, length)
+        ahead = (times > LIMITS.as_good * length) & (times < length)
+        times = np.sort(gathered(self._comm, times[ahead]))
+        touching = self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM)
+        allowed = self.at_once if touching > 1 else 1
+        return min(LIMITS.beyond * times[allowed - 1], length) if len(times) >= allowed else length
+
+    def along(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
+              length: float) -> tuple[np.ndarray, np.ndarray]:
+        """Along a tangent: arc length at which points arrive, or `length`; where they are then, shapes (n,), (n, c)."""
+        face = self.face
+        start, velocity = face.positions(fields, control), face.moved(direction, slope)
+        free = ~face.law.touching(start, face.touch) & (face.rule.area > 0)
+        times = arrivals(face.law, start, velocity, free, length)
+        return times, start + times[:, None] * velocity
+
+    def prepare(self, times: np.ndarray, places: np.ndarray, guessed: np.ndarray | None, length: float,
+                ends: bool) -> None:
+        """A step of this length is about to be taken: points arrive at times (arc length, `length`: not), at places.
+
+        guessed: which begin where their forces want them, shape (n,); None: none.
+        ends: it is to end where a point touches that sticks (see `touches_by`), which has no friction before.
+        """
+        face = self.face
+        self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
+        if not face.contact.lagged:                         # that asks for no place of arrival
+            at_end = ends & face.contact.sticks & (times >= LIMITS.at_end * length)
+            face.expect_arrivals(np.where(at_end[:, None], np.nan, places), guessed)
+
+    def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+        """More than twice the new points that a step is meant, or foreseen, to bring into contact.
+
+        Of lagged contact: one that is further inside its tool than twice the length of face that is its own.
+        """
+        face, theta = self.face, self.face.law.theta
+        if face.touch is None:
+            return False
+        a, b = (face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control)))
+        if face.contact.lagged:
+            deep = np.where(face.law.touching(a, face.touch), 0.0, b - 2 * face.rule.lengths)
+            return bool(self._comm.allreduce(float(deep.max(initial=0.0)), MPI.MAX) > 0)
+        found = int(np.sum((a <= -theta - LIMITS.near * face.thickness) & (b > -theta)))
+        return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self.at_once, self._foreseen) + 2)
+
+    def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+        """True if a point's straight way from one state to another, seen from the tool, leads through the tool."""
+        return self.cuts(self.face.positions(old, old_control), self.face.positions(new, control))
+
+    def cuts(self, a: np.ndarray, b: np.ndarray) -> bool:
+        """True if a straight way from positions a to b leads deeper than both ends by `StepLimits.cut_off`.
+
+        So much a point may cut off an edge that it slides over.
+        """
+        law, lengths = self.face.law, self.face.rule.lengths
+        way, most = np.linalg.norm(b - a, axis=1), LIMITS.cut_off * lengths
+        ends = np.maximum(np.maximum(law.distance(a), law.distance(b)), 0.0)
+        between = (law.distance(a) + law.distance(b) + way) / 2            # no place of the way is deeper
+        far = np.flatnonzero((between > ends + most) & (lengths > 0))
+        found = False
+        if len(far):
+            parts = int(min(np.ceil((way / most)[far].max() * 2), LIMITS.places)) + 1
+            places = a[far] + np.linspace(0, 1, parts)[:, None, None] * (b - a)[far]
+            found = bool(np.any(law.part(far).distance(places).max(0) > (ends + most)[far]))
+        return bool(self._comm.allreduce(found, MPI.LOR))
+
+    def touches_by(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
+        """Part of a step by which the first of the points touched whose slip the step got wrong; 1 if there is none.
+
+        Since it touched its pressure has grown, and it has slid, as it does at the end, along (direction, slope). One
+        that sticks slid too far without friction; under Coulomb's law it slides the other way than it came.
+        """
+        face, law, touch = self.face, self.face.law, self.face.touch
+        if touch is None or not law.has_friction:
+            return 1.0
+        end, velocity = face.positions(new, control), face.moved(direction, slope)
+        near = law.nearest(end)
+        F, grows = law.ramp(near.distance)
+        rate = np.maximum(grows * np.einsum("ni,ni->n", near.normal, velocity), 0.0)
+        since = np.minimum(np.divide(F, rate, out=np.full(len(F), length), where=rate > 0), length)
+        slid = since * np.einsum("ni,ni->n", near.tangent, velocity)
+        if face.contact.sticks:
+            wrong = np.isnan(touch.arrival[:, 0]) & (np.abs(slid) > LIMITS.slides * face.rule.lengths)
+        else:
+            counted = np.einsum("ni,ni->n", near.tangent, end - touch.arrival)
+            wrong = (slid * counted < 0) & (np.minimum(np.abs(slid), np.abs(counted)) > law.elastic_slip)
+        late = (touch.distance <= -law.theta) & (F > 0) & wrong
+        return float(self._comm.allreduce(1 - float(since[late].max(initial=0.0)) / length, MPI.MIN))

@@ -1,0 +1,324 @@
+"""Contact of one face as forces at points of it, and what they remember (a `History`). No form is compiled per tool."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..forms.carry import Carrier
+from ..forms.history import Start
+from ..physics.contact import Contact
+from ..physics.contact_law import Touch, Tractions
+from .increment import Increment
+from .rule import Gauss, Lobatto, Rule, Vertices
+
+_SAME_STIFFNESS = 1e-3
+"""Of the stiffness of a point: what it may differ by to count as the same in the tangent ahead."""
+
+
+class Memory(NamedTuple):
+    """What the points of a face remember of the last accepted state.
+
+    touch: of the law of friction; arrived: which points came into contact in the step that ended there, shape (n,).
+    penalty: over that at rest, which the state was found with, shape (n,) (`Contact.present_area`).
+    """
+
+    touch: Touch
+    arrived: np.ndarray
+    penalty: np.ndarray
+
+
+class FaceContact:
+    """Residual, tangent and history of one contact, at the n points of its face that are this rank's.
+
+    Args:
+        solid: the scene's `Solid`; contact: the `Contact`; assemble: makes the owned part of a linear form.
+
+    Attributes:
+        rule: where the points are (`Rule`); points: their reference positions, shape (n, components), length.
+        law: at the points; thickness: of the body behind the face, length.
+        increment: the `Increment` that goes on.
+        present: it takes part in the stage.
+        shift: what distances count less by, shape (n,), length, or None.
+        unbalanced: of the own forces, what the body does not bear at its nodes, shape (components,), stress length^2:
+            round-off of positions, given by the perturbed runs of a design sensitivity.
+    """
+
+    def __init__(self, solid: Any, contact: Contact, assemble: Any):
+        self.contact, self.comm, self._solid, self._length = contact, solid.comm, solid, solid.length
+        in_space = contact.tool.components == 3
+        self.rule: Rule = (Vertices(solid, assemble) if in_space else
+                           Lobatto(solid, contact.on, assemble) if contact.points == "nodes" else
+                           Gauss(solid, contact.on, int(contact.points)))
+        self.points, self.thickness = self.rule.points, solid.thickness(contact.on)
+        self._warm = solid.temperature.nodes(self.rule.nodes) if contact.friction_by_temperature else None
+        self._penalty = np.ones(len(self.points))
+        self.unbalanced = np.zeros(self.points.shape[1])
+        self.shift: np.ndarray | None = None
+        self.law = self._law(1.0)
+        self._scale = solid.length / (solid.stress * solid.volume) * self.rule.area
+        self._way = solid.length * contact.way
+        self.enter(0.0, float(contact.driven), True)
+        self._in_tangent = np.zeros((*self.points.shape, self.points.shape[1]))  # stiffness in the tangent last made
+        self._guessed: np.ndarray | None = None
+        self._memory: Memory | None = None
+        self.start()
+
+    def enter(self, base: float, rate: float, present: bool) -> None:
+        """Take a stage: the travel is base + rate * control (`Setting`), if the contact takes part."""
+        self._base, self._rate, self.present = base, rate, present
+
+    def shift_distances(self, by: np.ndarray) -> None:
+        """Distances count less from now on, shape (n,), length: of a mesh that is made on the way."""
+        self.shift = by
+        self.law = self._law(self._penalty)
+
+    def _temperatures(self) -> np.ndarray | None:
+        """Of the body at the points now, shape (n,); None where friction does not depend on them."""
+        return None if self._warm is None else self.rule.at_points(self._solid.temperature.at_nodes(self._warm))
+
+    def take_temperature(self) -> None:
+        """The temperature has changed: friction follows it.
+
+        Raises:
+            InputError: friction has no value at a temperature.
+        """
+        if self._warm is not None:
+            self.law = self.law.with_friction(self.contact.friction_at(self._temperatures()))
+            self.increment = Increment(self.law, self.touch)
+
+    def displacement(self, values: np.ndarray) -> np.ndarray:
+        """See `Rule`."""
+        return self.rule.displacement(values)
+
+    def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Points seen from the tool, shape (n, components), length; `fields`: owned unknowns."""
+        return self.points + self._length * self.displacement(fields) - self.travelled(control)
+
+    def travelled(self, control: float) -> np.ndarray:
+        """How far the tool has moved, shape (components,), length."""
+        return (self._base + self._rate * control) * self._way
+
+    def moved(self, dx: np.ndarray, step: float) -> np.ndarray:
+        """Change of `positions` by one of the unknowns (own part) and of the control, length."""
+        return self._length * self.displacement(dx) - self._rate * step * self._way
+
+    def tractions(self, fields: np.ndarray, control: float) -> Tractions:
+        """What the law gives at a state."""
+        return self.increment.tractions(self.positions(fields, control))
+
+    def touching(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Which points touch, or are held, shape (n,)."""
+        return self.law.touching(self.positions(fields, control), self.touch)
+
+    @property
+    def area(self) -> np.ndarray:
+        """That forces act on, shape (n,). (Lagged: none of points that have just arrived: they are held from now.)"""
+        if self._memory is None or not self.contact.lagged:
+            return self.rule.area
+        return np.where(self._memory.arrived, 0.0, self.rule.area)
+
+    # equations
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Of the forces in F by tractions, shape (n,)."""
+        return self._scale
+
+    @property
+    def stiffness_in_tangent(self) -> np.ndarray:
+        """Of the forces in F by positions, as in the tangent last made, shape (n, components, components), 1/length."""
+        return self._scale[:, None, None] * self._in_tangent
+
+    def add(self, values: np.ndarray, forces: np.ndarray) -> None:
+        """Add forces in F at the points, shape (n, components), to the owned residual."""
+        self.rule.add(values, forces)
+
+    def begin(self, old: np.ndarray | None, control: float = 0.0) -> None:
+        """Newton's method begins ahead of a state (owned unknowns; None: of none); collective."""
+        if self.contact.present_area and old is not None:   # of a sheet: the wall is thinner by as much as it is wider
+            self._harden(np.maximum(self.rule.area_ratio(old), 1.0) ** 2)
+        start = None if old is None else self.positions(old, control)
+        self.increment, self._guessed = Increment(self.law, self.touch, start, self._guessed), None
+
+    def leave_out(self, points: np.ndarray) -> None:
+        """Some points (a mask, shape (n,)) touch nothing, until another increment begins."""
+        law: Any = self.law                                  # see `ContactLaw`
+        self.increment = Increment(law.without(points), self.touch)
+
+    def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
+        """Add the forces to the owned residual."""
+        self.add(values, self._scale[:, None] * self.tractions(fields, control).force)
+
+    def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
+        """Make the tangent at a state the one that an iteration wants, and the residual (`values`) fit to it."""
+        self.add(values, self._scale[:, None] * self.increment.linearise(self.positions(fields, control)))
+
+    def tangent(self, fields: np.ndarray, control: float, ahead: bool = False) -> np.ndarray:
+        """`stiffness` for the tangent of the problem; `ahead`: as in it."""
+        self._in_tangent = self._stiffness(fields, control, ahead)
+        return self._of_unknowns(self._in_tangent)
+
+    def stiffness(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Derivative of the forces by the unknowns of each point (`Rule.dofs`), shape (n, m, m)."""
+        return self._of_unknowns(self._stiffness(fields, control, False))
+
+    def stiffness_round(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """As `stiffness`, of forces round the axis by motions there, shape (n, m/2, m/2), see the law."""
+        radius = np.full(len(self.points), np.inf)
+        if self._solid.scene.kinematics.axisymmetric:
+            radius = self.points[:, 0] + self._length * self.displacement(fields)[:, 0]
+        both = np.zeros_like(self._in_tangent)
+        both[:, 0, 0] = self.law.stiffness_round(self.positions(fields, control), self.touch, radius)
+        return self._of_unknowns(both)[:, ::2, ::2]
+
+    def change_ahead(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Stiffness ahead of an accepted state, less that in the tangent last made, (n, c, c), stress/length.
+
+        0 where they differ by less than `_SAME_STIFFNESS` of it.
+        """
+        change = self._stiffness(fields, control, True) - self._in_tangent
+        least = _SAME_STIFFNESS * np.abs(self._in_tangent).max((1, 2), keepdims=True)
+        return np.where(np.abs(change).max((1, 2), keepdims=True) > least, change, 0.0)
+
+    def add_control_derivative(self, values: np.ndarray, fields: np.ndarray, control: float,
+                               ahead: bool = False) -> None:
+        """Add the derivative of the forces by the control: the tool moves; `ahead`: as in `tangent`."""
+        if self._rate:
+            stiffness = self._stiffness(fields, control, ahead)
+            self.add(values, -self._scale[:, None] * (stiffness @ (self._rate * self._way)))
+
+    def _stiffness(self, fields: np.ndarray, control: float, ahead: bool) -> np.ndarray:
+        """Derivative of the tractions by the positions, shape (n, components, components), stress/length."""
+        if ahead:
+            arrived = self._memory.arrived if self._memory else np.zeros(len(self.points), dtype=bool)
+            return self.law.stiffness_ahead(self.positions(fields, control), self.touch, arrived)
+        return self.tractions(fields, control).stiffness
+
+    def _of_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
+        return self.rule.between_unknowns((self._scale * self._length)[:, None, None] * stiffness)
+
+    @property
+    def _penalty_at_rest(self) -> float:
+        """Of the contact, stress/length."""
+        return self.contact.penalty * self._solid.stress / self.thickness
+
+    def _law(self, penalty: np.ndarray | float) -> Any:
+        law: Any = self.contact.law(self._penalty_at_rest * penalty, self.thickness, self.points,
+                                    self._temperatures())
+        if self.shift is not None:
+            law.shift = self.shift
+        return law
+
+    def _harden(self, penalty: np.ndarray) -> None:
+        """The penalty is so many times that at rest, shape (n,)."""
+        if not np.array_equal(penalty, self._penalty):
+            self._penalty, self.law = penalty, self._law(penalty)
+
+    # history
+
+    @property
+    def remembers(self) -> bool:
+        """True if forces depend on what points remember."""
+        return self.law.remembers or self.contact.present_area
+
+    @property
+    def touch(self) -> Touch | None:
+        """What the law of friction remembers; None without friction."""
+        return self._memory and self._memory.touch
+
+    def start(self) -> None:
+        """See `History`: nothing has touched the tool yet, the body being at rest."""
+        self._start_at(self.points)
+
+    def come_in(self, fields: np.ndarray, control: float) -> None:
+        """The tool comes in: nothing has touched it yet."""
+        self._start_at(self.positions(fields, control))
+
+    def _start_at(self, x: np.ndarray) -> None:
+        self._take(Memory(self.law.start(x), np.zeros(len(x), dtype=bool), np.ones(len(x))) if self.remembers else None)
+
+    def expect_arrivals(self, arrival: np.ndarray, guessed: np.ndarray | None = None) -> None:
+        """Where points will be when they touch in the step ahead (`Touch.arrival`).
+
+        guessed: which are going to be guessed where their forces want them, shape (n,).
+        """
+        self._guessed = guessed
+        if self._memory is not None:
+            self._take(self._memory._replace(touch=self._memory.touch._replace(arrival=arrival)))
+
+    def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
+        """See `History`. (A tool that is away remembers nothing new.)"""
+        if self._memory is None or not self.present:
+            return
+        old, theta = self._memory.touch, self.law.theta
+        touch = self.law.tractions(self.positions(x, control), old).touch
+        penalty = self._penalty if self.contact.present_area else self._memory.penalty
+        arrived = (old.distance <= -theta) & (touch.distance > -theta)
+        if self.contact.lagged:                             # where another stage begins nothing has moved
+            moved = np.abs(touch.arrival - old.arrival).max(1, initial=0.0)
+            arrived |= self._memory.arrived & (moved < 1e-12 * self._length)
+        self._take(Memory(touch, arrived, penalty))
+
+    def let_go(self, fields: np.ndarray, control: float) -> bool:
+        """Let go of points that pull at a tool in space at a state; False if there are none; collective."""
+        if self._memory is None or not (self.contact.lagged and self.contact.separates):
+            return False
+        touch, x = self._memory.touch, self.positions(fields, control)
+        free = self.law.pulling(x, touch) & ~self._memory.arrived
+        found = bool(self.comm.allreduce(int(free.sum())))
+        if found:
+            self._take(self._memory._replace(touch=touch._replace(
+                position=np.where(free[:, None], x, touch.position),
+                distance=np.where(free, -2 * self.law.theta, touch.distance))))
+        return found
+
+    def get(self) -> Memory | None:
+        """See `History`; None without friction."""
+        return self._memory
+
+    def put(self, memory: Memory | None) -> None:
+        """See `History`."""
+        if memory is not self._memory:
+            self._take(memory)
+
+    def _take(self, memory: Memory | None) -> None:
+        self._memory = memory
+        if self.contact.present_area and memory is not None:
+            self._harden(memory.penalty)
+        self.increment = Increment(self.law, self.touch)
+
+    def save(self, memory: Memory) -> dict[str, np.ndarray]:
+        """See `History`: point by point with its reference position."""
+        parts = self.comm.allgather((self.points, *memory.touch, memory.arrived, memory.penalty))
+        names = ("points", *memory.touch._fields, "arrived", "penalty")
+        return {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True))}
+
+    def load(self, data: dict[str, Any]) -> Memory:
+        """See `History`; an InputError if a point of the face is not in the data."""
+        from scipy.spatial import cKDTree
+        away, rows = cKDTree(np.array(data["points"]).reshape(-1, self.points.shape[1])).query(self.points)
+        if np.any(away > 1e-9 * self._length):
+            raise InputError("checkpoint: a contact point of the scene is not in it: it belongs to another mesh")
+        like = self.law.start(self.points)
+        touch = Touch(*(np.array(data[name], dtype=float)[rows].reshape(getattr(like, name).shape)
+                        for name in Touch._fields))
+        penalty = np.array(data["penalty"], dtype=float)[rows] if "penalty" in data else np.ones(len(rows))
+        return Memory(touch, np.array(data["arrived"], dtype=bool)[rows], penalty)
+
+    def carry(self, source: FaceContact, memory: Memory | None, x: np.ndarray, control: float,
+              there: Callable[[np.ndarray], np.ndarray]) -> Memory | None:
+        """See `History`: where its nearest point touched a point touches, and slipped as that did."""
+        if memory is None:
+            return None
+        carrier, touch, theta = Carrier(self.comm, there(source.points), self.points), memory.touch, self.law.theta
+        distance, arrived, penalty = (carrier.all(values)[carrier.nearest] for values in
+                                      (touch.distance, memory.arrived, memory.penalty))
+        touched, position = distance > -source.law.theta, self.positions(x, control)
+        free = np.minimum(self.law.distance(position), -(1 + 1e-9) * theta)
+        slip = np.where(touched, carrier.fitted(touch.slip), 0.0)
+        return Memory(Touch(position, np.where(touched, distance * theta / source.law.theta, free), slip, position),
+                      arrived, penalty)

@@ -1,0 +1,114 @@
+"""One increment of a contact: its tractions, as Newton's method linearises them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..physics.contact_law import ContactLaw, Motion, Touch, Tractions
+
+
+class Increment:
+    """Tractions at n points from what they remember of the last accepted state, until the next one is accepted.
+
+    It is begun for each run of Newton's method ahead of a state, or to look at one. In each iteration
+
+        tractions(x)     for the residual, at the positions x of the points seen from the tool, shape (n, components);
+        linearise(x)     at the same positions: the tangent of the iteration is that of `tractions(x)` from now on;
+
+    and then it is asked: `active`, `arrivals`, `taken`, `foretold`, and `expect` says what the next iteration is to
+    take. Whoever accepts the state begins another increment.
+
+    Args:
+        law: of the contact; touch: what the points remember; None without friction.
+        start: positions of the points at the state ahead of which Newton's method begins; None: of none.
+        guessed: which begin where their forces want them, so that the law is linearised there at first, shape (n,).
+    """
+
+    def __init__(self, law: ContactLaw, touch: Touch | None, start: np.ndarray | None = None,
+                 guessed: np.ndarray | None = None):
+        self._law, self._touch = law, touch
+        self._touched = None if start is None else law.touching(start, touch)
+        self._before: Motion | None = None if start is None else law.motion(start, touch)   # at the last iteration
+        self._guessed = guessed
+        self._sense: np.ndarray | None = None                                               # of sliding there
+        self._last: tuple[np.ndarray, Tractions] | None = None
+
+    def tractions(self, x: np.ndarray) -> Tractions:
+        """What the law gives at positions x, computed once for them; after `linearise` at them, linearised."""
+        if self._last is None or not np.array_equal(x, self._last[0]):
+            self._last = x, self._law.tractions(x, self._touch)
+        return self._last[1]
+
+    def linearise(self, x: np.ndarray) -> np.ndarray:
+        """Linearise the law where the last iteration foretold; by how much its forces at x change, shape of x."""
+        plain = found = self.tractions(x)
+        now = self._law.motion(x, self._touch)
+        if self._before is not None:
+            expected = self._before.to(x)
+            if self._guessed is not None:
+                expected = Motion(*(np.where(self._guessed if a.ndim == 1 else self._guessed[:, None], b, a)
+                                    for a, b in zip(expected, now)))
+            found = self._law.tractions(x, self._touch, self._sense, expected)
+            self._last = x, found
+        self._sense, self._before, self._guessed = found.sense, now, None
+        return found.force - plain.force
+
+    @property
+    def active(self) -> np.ndarray:
+        """`Tractions.active` of those last computed, shape (n,)."""
+        return self._now[1].active
+
+    @property
+    def arrivals(self) -> np.ndarray:
+        """Which points touch at the positions last looked at that did not where Newton's method began, shape (n,)."""
+        if self._touched is None:
+            return np.zeros(len(self._now[0]), dtype=bool)
+        return self._law.touching(self._now[0], self._touch) & ~self._touched
+
+    @property
+    def ramp(self) -> float:
+        """Half-width of the ramp in which contact begins, length."""
+        return self._law.theta
+
+    def taken(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forces and stiffnesses per area that `linearise` has taken, of m points: (m, c), (m, c, c)."""
+        return self._now[1].force[points], self._now[1].stiffness[points]
+
+    def foretold(self, by: np.ndarray) -> Tractions:
+        """The law, linearised where points come to if they move on by so much, shape (n, c), length."""
+        return self.ahead(slice(None))(by)
+
+    def ahead(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Tractions]:
+        """`foretold` of m of the points: what gives their tractions if they move on, shape (m, c)."""
+        touch = self._touch and Touch(*(part[points] for part in self._touch))
+        law, x, there = self._law.part(points), self._now[0][points], self._foreseen(points)
+        return lambda by: law.tractions(x, touch, None, there(by))
+
+    def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """What gives how deep m points are in the ramp of the law if they move on, shape (m, c): over its width, shape
+        (m,), and the way through it, shape (m, c), length, 0 where no friction grows in it: without any, or where the
+        body may pull at the tool."""
+        width, there = 2 * self._law.theta, self._foreseen(points)
+        grows = self._law.has_friction and not self._law.pulls
+
+        def found(by: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            motion = there(by)
+            return motion.distance / width + 0.5, width * grows * motion.normal
+        return found
+
+    def _foreseen(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Motion]:
+        """What gives the motion of points, to first order, if they move on."""
+        assert self._before is not None
+        before, x = Motion(*(part[points] for part in self._before)), self._now[0][points]
+        return lambda by: before.to(x + by)
+
+    def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
+        """Which way points (a mask, shape (n,)) are going to slide."""
+        self._sense = np.where(points, sense, 0.0 if self._sense is None else self._sense)
+
+    @property
+    def _now(self) -> tuple[np.ndarray, Tractions]:
+        assert self._last is not None, "call `tractions` first"
+        return self._last

@@ -1,0 +1,252 @@
+"""Where the contact of a face acts, and how those points move with the unknowns: a rule on its facets.
+
+Gauss-Lobatto's points are the nodes of six-node triangles; at Gauss points a face lets go more smoothly.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from dolfinx import fem, la
+
+from ..forms.outline import ends_first
+from ..ranks import gathered
+
+
+class Rule:
+    """The n points of a face that are this rank's.
+
+    Attributes:
+        dofs: local numbers of the unknowns that move each point, component by component of each of its nodes, (n, m).
+        points: reference positions, shape (n, components), length; nodes: of the nodes of each, shape (n, components),
+            where a point is a node, or (n, nodes, components).
+        lengths, lumped: reference length and area that belong to each point, shape (n,) (lumped: 0 on the axis).
+        area: that forces act on: `lumped`, but see `Lobatto`, shape (n,).
+    """
+
+    dofs: np.ndarray
+    points: np.ndarray
+    nodes: np.ndarray
+    lengths: np.ndarray
+    lumped: np.ndarray
+    area: np.ndarray
+
+    @property
+    def extent(self) -> np.ndarray:
+        """Of the face that belongs to each point, as `contact_length` counts it, shape (n,); in space an area."""
+        return self.lengths
+
+    def displacement(self, values: np.ndarray) -> np.ndarray:
+        """Of the points, shape (n, components), for owned unknowns, in their units; collective."""
+        raise NotImplementedError
+
+    def add(self, values: np.ndarray, forces: np.ndarray) -> None:
+        """Add forces at the points, shape (n, components), to the owned residual; collective."""
+        raise NotImplementedError
+
+    def between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
+        """Stiffness of the points, shape (n, components, components), as that of their `dofs`, shape (n, m, m)."""
+        raise NotImplementedError
+
+    def at_points(self, values: np.ndarray) -> np.ndarray:
+        """Values at the points, shape (n,), of those at `nodes`."""
+        raise NotImplementedError
+
+    def area_ratio(self, fields: np.ndarray) -> np.ndarray:
+        """Deformed over reference area at the points, shape (n,); `fields`: owned unknowns; collective."""
+        raise NotImplementedError
+
+
+class Lobatto(Rule):
+    """The nodes of the face. `lumped`, exact for what is cubic along a facet, gives the node on the axis no area."""
+
+    def __init__(self, solid: Any, on: str, assemble: Any):
+        kinematics, vectors, numbers = solid.scene.kinematics, *_displacements(solid)
+        self._brought = solid.scene.preformed
+        nodes = np.sort(fem.locate_dofs_topological(vectors, 1, solid.scene.mesh.facets_of(on)))
+        own = numbers[nodes, 0] < solid.space.dofmap.index_map.size_local
+        self.dofs = numbers[nodes[own]]
+        self.points = self.nodes = vectors.tabulate_dof_coordinates()[nodes[own], :kinematics.components].copy()
+        self.lengths = assemble(solid.compile(solid.length_row(on)))[self.dofs[:, 0]]
+        self.lumped = self.lengths * kinematics.weight(self.points.T)
+        self.area = self.lumped.copy()
+        self._spread_to_axis(kinematics, solid.comm)
+        self._comm, self._length, self._weight = solid.comm, solid.length, kinematics.weight
+        self._vectors, self._X = vectors, vectors.tabulate_dof_coordinates()[:, :kinematics.components]
+        self._facets = _own_facets(solid.scene.mesh, on)
+
+    def displacement(self, values: np.ndarray) -> np.ndarray:
+        return values[self.dofs]
+
+    def add(self, values: np.ndarray, forces: np.ndarray) -> None:
+        values[self.dofs] += forces
+
+    def between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
+        return stiffness
+
+    def at_points(self, values: np.ndarray) -> np.ndarray:
+        return values
+
+    def area_ratio(self, fields: np.ndarray) -> np.ndarray:
+        """The mean of what the edges on both sides of a node say; on the axis the stretch is the same both ways."""
+        now = gathered(self._comm, self.points + self._length * self.displacement(fields))
+        rest, edges = gathered(self._comm, self.points), self.edges
+        ratio = np.linalg.norm(_along(now[edges]), axis=-1) / np.linalg.norm(_along(rest[edges]), axis=-1)
+        weight, wider = (np.broadcast_to(np.transpose(self._weight(x[edges].T)), ratio.shape) for x in (rest, now))
+        ratio *= np.divide(wider, weight, out=ratio.copy(), where=weight > 1e-9 * weight.max())
+        count = np.maximum(np.bincount(edges.ravel(), minlength=len(rest)), 1)
+        first = sum(self._comm.allgather(len(self.points))[:self._comm.rank])
+        return (np.bincount(edges.ravel(), ratio.ravel(), len(rest)) / count)[first:][:len(self.points)]
+
+    @property
+    def extent(self) -> np.ndarray:
+        """As it was on the body's first mesh."""
+        return self._first_lengths
+
+    @cached_property
+    def _first_lengths(self) -> np.ndarray:
+        """The mean of what the edges on both sides of a node say."""
+        if self._brought is None:
+            return self.lengths
+        first, (a, b, _) = self._brought.first_places(self.points), self.edges.T
+        ratio = np.linalg.norm(first[b] - first[a], axis=1) / np.linalg.norm(self.points[b] - self.points[a], axis=1)
+        ends, count = np.repeat(ratio, 3), np.bincount(self.edges.ravel(), minlength=len(first))
+        return self.lengths * np.bincount(self.edges.ravel(), ends, len(first)) / np.maximum(count, 1)
+
+    @property
+    def has_area(self) -> np.ndarray:
+        """Which points have a `lumped` area: all but a node on the axis, shape (n,)."""
+        return self.lumped > 1e-9 * self.lumped.max()
+
+    @cached_property
+    def edges(self) -> np.ndarray:
+        """Two ends and the middle of each edge of the face, all ranks', as rows of all ranks' points, shape (m, 3)."""
+        from scipy.spatial import cKDTree
+        X = gathered(self._comm, self._X[_nodes_of(self._facets, self._vectors, self._X)])
+        found = cKDTree(gathered(self._comm, self.points)).query(X.reshape(-1, X.shape[2]))[1]
+        return np.asarray(found).reshape(-1, 3)
+
+    def _spread_to_axis(self, kinematics: Any, comm: Any) -> None:
+        """Give the node on the axis some area of its facet's, so that something holds it.
+
+        (1/24, -2/24, 1/24) of L times the weight at L: integrals of what is linear along the facet stay exact.
+        """
+        nodes = gathered(comm, np.column_stack([self.points, self.lengths, self.lumped]))
+        for axis in nodes[without_area(nodes[:, -1], nodes[:, -2])]:
+            length, at = 6 * axis[-2], axis[:-2].copy()                 # of its facet, on which Gauss-Lobatto gives 1/6
+            away = np.linalg.norm(self.points - at, axis=1) / length
+            at[0] += length
+            whole = kinematics.weight(at) * length / 24
+            for place, share in ((0.0, 1), (0.5, -2), (1.0, 1)):
+                self.area[np.abs(away - place) < 0.1] += share * whole
+
+
+class Vertices(Lobatto):
+    """The nodes of a sheet in space, each with its third of the triangles around it; `lengths`: the root of that."""
+
+    def __init__(self, surface: Any, assemble: Any):
+        vectors, numbers = _displacements(surface)
+        own = np.flatnonzero(numbers[:, 0] < surface.space.dofmap.index_map.size_local)
+        self.dofs = numbers[own]
+        self.points = self.nodes = vectors.tabulate_dof_coordinates()[own].copy()
+        self.area = self.lumped = assemble(surface.compile(surface.area_row()))[self.dofs[:, 0]]
+        self.lengths = np.sqrt(self.area)
+
+    @property
+    def extent(self) -> np.ndarray:
+        return self.area
+
+
+class Gauss(Rule):
+    """`count` Gauss points of each facet of a cell that this rank owns. Nodes of such a facet may be ghosts.
+
+    Attributes:
+        shapes: shape functions of the three nodes at the points, shape (n, 3).
+    """
+
+    def __init__(self, solid: Any, on: str, count: int):
+        self._kinematics, vectors, numbers = solid.scene.kinematics, *_displacements(solid)
+        self._length, components = solid.length, self._kinematics.components
+        X = vectors.tabulate_dof_coordinates()[:, :components]
+        self._unknowns = la.vector(solid.space.dofmap.index_map, 1)
+        nodes = _nodes_of(_own_facets(solid.scene.mesh, on), vectors, X)
+        at, weights = np.polynomial.legendre.leggauss(count)
+        s, q = (1 + at) / 2, len(at)
+        shapes = np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)])
+        slopes = np.column_stack([4 * s - 3, 4 * s - 1, 4 - 8 * s])
+        self.dofs = np.repeat(numbers[nodes].reshape(-1, 3 * components), q, axis=0)
+        self.shapes, self._slopes = (np.tile(values, (len(nodes), 1)) for values in (shapes, slopes))
+        self.nodes = np.repeat(X[nodes], q, axis=0)
+        self.points = np.einsum("qa,fai->fqi", shapes, X[nodes]).reshape(-1, components)
+        self._along = np.einsum("qa,fai->fqi", slopes, X[nodes]).reshape(-1, components)
+        self.lengths = np.linalg.norm(self._along, axis=1) * np.tile(weights / 2, len(nodes))
+        self.area = self.lumped = self.lengths * self._kinematics.weight(self.points.T)
+
+    def displacement(self, values: np.ndarray) -> np.ndarray:
+        return np.einsum("na,nai->ni", self.shapes, self._at_nodes(values))
+
+    def add(self, values: np.ndarray, forces: np.ndarray) -> None:
+        unknowns, n = self._unknowns, self._owned
+        unknowns.array[:] = 0
+        np.add.at(unknowns.array, self.dofs, np.einsum("na,ni->nai", self.shapes, forces).reshape(self.dofs.shape))
+        unknowns.scatter_reverse(la.InsertMode.add)
+        values[:n] += unknowns.array[:n]
+
+    def between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
+        blocks = np.einsum("na,nb,nij->naibj", self.shapes, self.shapes, stiffness)
+        return blocks.reshape(len(blocks), *[3 * stiffness.shape[-1]] * 2)
+
+    def at_points(self, values: np.ndarray) -> np.ndarray:
+        """A face that is as hot all over stays so to the last bit."""
+        return values[:, 0] + np.einsum("na,na->n", self.shapes[:, 1:], values[:, 1:] - values[:, :1])
+
+    def area_ratio(self, fields: np.ndarray) -> np.ndarray:
+        along = self._along + self._length * np.einsum("na,nai->ni", self._slopes, self._at_nodes(fields))
+        weight, now = self._kinematics.weight, self.points + self._length * self.displacement(fields)
+        grown = np.linalg.norm(along, axis=1) / np.linalg.norm(self._along, axis=1)
+        return grown * weight(now.T) / weight(self.points.T)
+
+    def _at_nodes(self, values: np.ndarray) -> np.ndarray:
+        """Of the three nodes of each point, shape (n, 3, components), from owned unknowns."""
+        unknowns, n = self._unknowns, self._owned
+        unknowns.array[:n] = values[:n]
+        unknowns.scatter_forward()
+        return unknowns.array[self.dofs].reshape(len(self.dofs), 3, -1)
+
+    @property
+    def _owned(self) -> int:
+        return self._unknowns.index_map.size_local
+
+
+def _along(edges: np.ndarray) -> np.ndarray:
+    """dx/ds at the two ends and the middle of edges, shape (m, 3, components)."""
+    a, b, m = edges.transpose(1, 0, 2)
+    return np.stack([4 * m - 3 * a - b, a - 4 * m + 3 * b, b - a], axis=1)
+
+
+def without_area(lumped: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Which nodes of a face are on the axis, of all ranks, shape (n,)."""
+    return (lumped < 1e-9 * lumped.max()) & (lengths > 0)
+
+
+def _displacements(solid: Any) -> tuple[Any, np.ndarray]:
+    """(space of the displacement, local numbers of each node's unknowns, shape (nodes, components))."""
+    vectors, numbers = solid.space.sub(0).collapse()
+    return vectors, np.asarray(numbers, dtype=np.int32).reshape(-1, solid.scene.kinematics.components)
+
+
+def _nodes_of(facets: np.ndarray, vectors: Any, X: np.ndarray) -> np.ndarray:
+    """Two ends and the middle of each facet, local numbers of nodes at X, shape (facets, 3)."""
+    found = [ends_first(fem.locate_dofs_topological(vectors, 1, np.array([f], dtype=np.int32), remote=False), X)
+             for f in facets]
+    return np.array(found, dtype=np.int32).reshape(-1, 3)
+
+
+def _own_facets(mesh: Any, on: str) -> np.ndarray:
+    """Local numbers of the facets of a boundary whose cells this rank owns: each facet is one rank's."""
+    topology, facets = mesh.domain.topology, mesh.facets_of(on)
+    topology.create_connectivity(1, 2)
+    cells = np.array([topology.connectivity(1, 2).links(f)[0] for f in facets], dtype=np.int64)
+    return facets[cells < topology.index_map(2).size_local]

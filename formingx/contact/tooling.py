@@ -1,0 +1,96 @@
+"""The tools of a scene and where they stand in its states: for pictures and tables."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..extensions.space.solid_tool import SolidTool, Swept
+from ..forms.schedule import Setting
+from ..physics.contact import Contact
+from ..tools.shapes import Arc, Line, Tool
+
+
+class Tooling(NamedTuple):
+    """All contacts of a scene.
+
+    contacts: in the order of the scene; before: how many of its things come before them (`Scene.things`); length: that
+    of a problem's forms, which makes amplitudes of travels.
+    """
+
+    contacts: list[Contact]
+    before: int
+    length: float
+
+    @classmethod
+    def of_problem(cls, problem: Any) -> Tooling:
+        """Those of a `Problem`."""
+        scene = problem.scene
+        return cls(scene.contacts, len(scene.loads) + len(scene.supports), problem.forms.length)
+
+    @classmethod
+    def of_description(cls, scene: dict[str, Any]) -> Tooling:
+        """Those of a scene as plain data (`description.describe`)."""
+        return cls([_contact(dict(data)) for data in scene["contacts"]], len(scene["loads"]) + len(scene["supports"]),
+                   scene["mesh"]["length"])
+
+    @property
+    def names(self) -> list[str]:
+        """Of the tool of each contact; one without a name is "tool 1" and so on, by its (first) contact."""
+        first: dict[Any, int] = {}
+        alike = [k if c.moves is None else c.moves for k, c in enumerate(self.contacts)]   # what moves alike is one
+        return [c.name or f"tool {first.setdefault(alike[k], k) + 1}" for k, c in enumerate(self.contacts)]
+
+    @property
+    def force_columns(self) -> dict[str, str]:
+        """{tool: the column of its force}: "tool_force" of the only one, else "plug_force" of one named "plug"."""
+        names = list(dict.fromkeys(self.names))
+        return {name: "tool_force" if len(names) == 1 else f"{name}_force".replace(" ", "_") for name in names}
+
+    def travels(self, setting: dict[str, Any], control: float) -> list[float | None]:
+        """How far each has come (length) in a state of this setting and control; None: it takes no part."""
+        if not setting:
+            return [0.0] * len(self.contacts)
+        there = Setting(**setting)
+        return [None if i in there.off else self.length * there.amplitude(i, control)
+                for i in range(self.before, self.before + len(self.contacts))]
+
+    def placed(self, travels: list[float | None]) -> list[tuple[Tool, np.ndarray]]:
+        """(tool, its shift (r, z)) of those that take part."""
+        return [(contact.tool, travel * contact.way)
+                for contact, travel in zip(self.contacts, travels, strict=True) if travel is not None]
+
+
+class _OfFile(SolidTool):
+    """A tool from a file, of which a checkpoint holds the name alone."""
+
+    def __init__(self, name: str):
+        self.name = name
+
+    def __repr__(self) -> str:
+        return f"solid({self.name!r})"
+
+
+def _tool(shape: dict[str, Any]) -> Tool | SolidTool:
+    if "pieces" in shape:
+        pieces: list[Line | Arc] = []
+        for piece in shape["pieces"]:
+            values: list[Any] = [np.array(v) if isinstance(v, list) else v for v in piece]
+            pieces.append((Line if len(values) == 2 else Arc)(*values))
+        return Tool.of_pieces(pieces, shape["closed"])
+    if "profile" not in shape:
+        return _OfFile(shape["name"])
+    profile = _tool(shape["profile"])
+    assert isinstance(profile, Tool)
+    return Swept(profile, shape["kind"], tuple(shape["half"]), shape["corner"], shape["along"])
+
+
+def _contact(data: dict[str, Any]) -> Contact:
+    moves = data["moves"] and tuple(data["moves"])
+    names = ("penalty", "ramp", "elastic_slip", "separates", "nodes_per_step", "points", "name")
+    more = {name: data[name] for name in names if name in data}
+    words = isinstance(data["friction"], str) and data["friction"] not in ("stick", "none")
+    found = Contact(data["on"], _tool(data["tool"]), "stick" if words else data["friction"], moves=moves, **more)
+    found.friction = data["friction"]                       # a function of the temperature can only be told
+    return found

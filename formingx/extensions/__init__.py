@@ -1,0 +1,1 @@
+"""Extensions of the core; each folder can be taken out."""

@@ -1,0 +1,1 @@
+"""Meshes adapted to a pilot run."""

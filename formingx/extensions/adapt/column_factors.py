@@ -1,0 +1,120 @@
+"""How long the columns of a mesh should be, over how long they are, by what the states of a run say."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ...errors import positive
+from ...forms.outline import Outline, along
+
+_STATES = 12
+"""States whose stresses are looked at: those, evenly, of all."""
+
+_NEAR = 0.25
+"""Gap over the radius of a fillet within which the face counts as lying on it: that of a chord of 80 degrees."""
+
+_PARTS = 16
+"""Straight pieces of an edge of the face."""
+
+_MOST = 1.0
+"""Turn of a column that is believed, radians: a larger one is of an element that does not resolve it, or is crushed."""
+
+_ORDER = 2
+"""Of the error of stresses."""
+
+
+def column_factors(path: Any, share: float | None, error: float | None) -> np.ndarray:
+    """Wanted over present length of the n columns, the least of all states, shape (n,); inf: none is asked for.
+
+    share, error: see `formingx.mesh.adapted`.
+    """
+    share, error = (value if value is None else positive(f"column_factors: {name}", value)
+                    for name, value in (("share", share), ("error", error)))
+    columns = path.problem.scene.mesh.columns
+    middles = columns.place((columns.ends[1:] + columns.ends[:-1]) / 2)
+    factors = np.full(len(columns.ends) - 1, np.inf)
+    if share is not None and path.problem.scene.model.solid:
+        factors = np.minimum(factors, _in_bends(path, share, middles))
+    if error is not None:
+        factors = np.minimum(factors, _by_stress(path, error, middles))
+    return factors
+
+
+def _column_of(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
+    """Numbers of the columns whose middle lines, shape (rows, n, 2), are nearest to points."""
+    n = middles.shape[1]
+    return cKDTree(middles.reshape(-1, middles.shape[-1])).query(points)[1] % n
+
+
+def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
+    """A column turns by at most `share`, as its middle line does, or as a fillet would on which it lies."""
+    found = np.full(middles.shape[1], np.inf)
+    problem = path.problem
+    columns, outline = problem.scene.mesh.columns, Outline(problem.forms)
+    faces = [outline.of(contact.contact.on) for contact in problem.contacts]
+    column = _column_of(outline.rest[:, 2], middles[[0, -1]])
+    begin = columns.place(columns.ends[:-1])[[0, -1]]
+    sides = []                                               # edges of a face column by column, and which run back
+    for name, first in zip(columns.faces, begin):
+        edges = np.flatnonzero(outline.of(name))
+        edges = edges[np.unique(column[edges], return_index=True)[1]]               # a ghost is there twice
+        a, b = (np.linalg.norm(outline.rest[edges, k] - first, axis=1) for k in (0, 1))
+        sides.append((edges, a > b))
+    for state in path.states:
+        with problem.at(state):
+            edges = outline.edges()
+        found = np.minimum(found, share / np.maximum(_turns(edges, sides), 1e-300))
+        points = along(edges, _PARTS)
+        length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(1)
+        with problem.at(state):
+            for contact, face in zip(problem.contacts, faces):
+                if not contact.present:
+                    continue
+                at = points[face] - contact.travelled(state.control)
+                near = contact.contact.tool.nearest(at.reshape(-1, at.shape[-1]))
+                bend = np.abs(near.curvature)
+                radius = np.divide(1, bend, out=np.zeros(len(bend)), where=bend > 0) + np.sign(
+                    near.curvature) * near.distance
+                lies = (radius > 0) & (-near.distance < _NEAR * radius)
+                least = np.where(lies, radius, np.inf).reshape(-1, _PARTS + 1).min(1)
+                np.minimum.at(found, column[face], share * least / length[face])
+    return found
+
+
+def _turns(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """By how much each column turns, half of the kinks at its ends included, radians, shape (n,)."""
+    way = np.zeros(edges.shape[-1])                          # directions at both ends, of both faces together
+    for numbers, back in sides:
+        a, b, m = edges[numbers].transpose(1, 0, 2)
+        first, last = 4 * m - 3 * a - b, 3 * b - 4 * m + a
+        tangents = np.where(back[:, None, None], -np.stack([last, first], 1), np.stack([first, last], 1))
+        way = way + tangents / np.linalg.norm(b - a, axis=1)[:, None, None]
+    angle = np.unwrap(np.arctan2(way[..., 1], way[..., 0]).ravel())
+    turn = np.abs(np.diff(angle))
+    inside, kinks = turn[::2], np.concatenate([[0.0], turn[1::2], [0.0]])
+    return np.minimum(inside + (kinks[1:] + kinks[:-1]) / 2, _MOST)
+
+
+def _by_stress(path: Any, error: float, middles: np.ndarray) -> np.ndarray:
+    """Columns that share an error of the stress, per length, as meshes of fewest elements do.
+
+    With errors C(s) h^p, p the order: h ~ C^(-2/(2 p + 1)), so that the integral of (C h^p)^2 is what is allowed.
+    """
+    n = middles.shape[1]
+    length = np.linalg.norm(np.diff(path.problem.scene.mesh.columns.place(
+        path.problem.scene.mesh.columns.ends)[[0, -1]], axis=1), axis=2).mean(0)
+    found = np.full(n, np.inf)
+    states = [state for state in path.states if state.kind != "start"]
+    for state in {id(s): s for s in (states[k] for k in np.linspace(0, len(states) - 1, _STATES).astype(int))}.values():
+        of = path.stress(state).error()
+        squares = np.bincount(_column_of(of.points, middles), of.cells**2, n)
+        allowed = (error * np.linalg.norm(of.stress)) ** 2
+        q = 2 * _ORDER + 1
+        density = (squares / length**q) ** (1 / q)           # C^(2/q)
+        with np.errstate(divide="ignore"):
+            h = (allowed / max((density * length).sum(), 1e-300)) ** (1 / (q - 1)) / density
+        found = np.minimum(found, h / length)
+    return found

@@ -1,0 +1,64 @@
+"""How large the triangles of a sheet in space should be, by what the states of a run say."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...mesh.nodes import COORDINATES
+from ..space.wall import wall_of
+
+_FINEST = 0.25
+"""Wanted over present size, at the least: what a mesh does not resolve it shows, but not how fine it is."""
+
+_GROWTH = 0.25
+"""By how much sizes grow with the distance along the sheet."""
+
+
+def wanted_sizes(path: Any, share: float | None, error: float | None) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes (x, y) of the flat sheet, shape (n, 2), and the size of triangles there, shape (n,), length.
+
+    From triangle to triangle the surface is to turn by at most `share` (radians), and its wall to change by at most the
+    part `error`, in all states; both fall with the size. None: it does not count.
+    """
+    factor: np.ndarray = np.ones(0)
+    for state in path.states:
+        wall = wall_of(path, state)
+        if not len(factor):
+            pairs, factor = _neighbours(wall.triangles), np.ones(len(wall.triangles))
+        a, b, c = (wall.now[wall.triangles[:, k]] for k in range(3))
+        normal = np.cross(b - a, c - a)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        turn = np.arccos(np.clip(np.einsum("ij,ij->i", *normal[pairs.T]), -1, 1))
+        change = np.abs(np.diff(np.log(wall.ratio[pairs]), axis=1)[:, 0])
+        for allowed, found in ((share, turn), (error, change)):
+            if allowed is not None:
+                part = np.maximum(allowed / np.maximum(found, allowed), _FINEST)
+                for of_pair in pairs.T:
+                    np.minimum.at(factor, of_pair, part)
+    strictest = np.ones(len(wall.rest))
+    np.minimum.at(strictest, wall.triangles.ravel(), np.repeat(factor, 3))
+    size = wall.to_nodes(np.sqrt(wall.area_at_rest / (np.sqrt(3) / 4)))         # equilateral ones
+    return wall.rest[:, :COORDINATES], _graded(wall.rest, wall.triangles, size * strictest)
+
+
+def _neighbours(triangles: np.ndarray) -> np.ndarray:
+    """Numbers of triangles that have an edge in common, shape (k, 2)."""
+    edges = np.sort(np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
+    of = np.tile(np.arange(len(triangles)), 3)
+    order = np.lexsort(edges.T)
+    same = (edges[order[1:]] == edges[order[:-1]]).all(1)
+    return np.column_stack([of[order[:-1]][same], of[order[1:]][same]])
+
+
+def _graded(points: np.ndarray, triangles: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Sizes at nodes that grow no faster than `_GROWTH` along edges."""
+    a, b = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]).T
+    reach = _GROWTH * np.linalg.norm(points[a] - points[b], axis=1)
+    while True:
+        before = size.copy()
+        np.minimum.at(size, a, before[b] + reach)
+        np.minimum.at(size, b, before[a] + reach)
+        if np.array_equal(size, before):
+            return size

@@ -1,0 +1,152 @@
+"""Displacements node by node: written for other solvers, and compared with theirs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ... import mesh as meshes
+from ...errors import InputError, known
+from ...forms.probes import probe
+from ...io import csv_files
+from ...mesh import text as grid
+from ...results import files
+from ...results.show import plots
+
+_COMPONENTS = ("u_r", "u_z")
+
+
+@dataclass(frozen=True)
+class NodalComparison:
+    """What `compare_nodes` found; `str` of it is a report.
+
+    Attributes:
+        nodes: their numbers, shape (n,). points: reference (R, Z), shape (n, 2), our unit of length.
+        ours, theirs: displacements (u_r, u_z), shape (n, 2), our unit of length.
+        largest: our largest displacement: the scale of the differences.
+    """
+
+    nodes: np.ndarray
+    points: np.ndarray
+    ours: np.ndarray
+    theirs: np.ndarray
+    largest: float
+
+    @property
+    def difference(self) -> np.ndarray:
+        """Length of theirs minus ours at each node, shape (n,)."""
+        return np.hypot(*(self.theirs - self.ours).T)
+
+    @property
+    def maximum(self) -> float:
+        """The largest difference."""
+        return float(self.difference.max())
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the difference over the nodes."""
+        return float(np.sqrt(np.mean(self.difference**2)))
+
+    def __str__(self) -> str:
+        k = int(np.argmax(self.difference))
+        (R, Z), (a, b), (c, d) = self.points[k], self.ours[k], self.theirs[k]
+        size = self.largest or 1.0
+        return (f"{len(self.nodes)} nodes; our largest displacement is {self.largest:.6g}\n"
+                f"largest difference {self.maximum:.5g} ({100 * self.maximum / size:.2g} %), at node {self.nodes[k]},"
+                f" (R, Z) = ({R:.6g}, {Z:.6g}): ours ({a:.8g}, {b:.8g}), theirs ({c:.8g}, {d:.8g})\n"
+                f"root mean square {self.rms:.5g} ({100 * self.rms / size:.2g} %)")
+
+    __repr__ = __str__
+
+    def plot(self) -> Any:
+        """The deformed nodes of both; returns the figure."""
+        figure, axes = plots.figure()
+        for u, style, label in ((self.ours, {"marker": "o", "fillstyle": "none"}, "ours"),
+                                (self.theirs, {"marker": "x", "color": "k"}, "theirs")):
+            axes.plot(*(self.points + u).T, linestyle="none", markersize=5, label=label, **style)
+        axes.set(xlabel="r", ylabel="z", title=f"largest difference {self.maximum:.3g}")
+        axes.set_aspect("equal")
+        axes.legend(frameon=False)
+        return figure
+
+
+def write_nodes(path: Any, file: Any, *, state: Any = None, mesh: str | os.PathLike | None = None) -> None:
+    """Write node, R, Z, u_r, u_z of every node of a state as CSV, in the user's unit of length (rank 0 writes).
+
+    Args:
+        state: of the path; default: the last.
+        mesh: a text mesh file (`formingx.mesh.Grid`) whose nodes and numbers are taken; default: those of the run's own
+            mesh as `mesh.write` numbers them (one rank only).
+
+    Raises:
+        InputError: the mesh file cannot be read, or a node of it lies outside the run's mesh.
+
+    >>> fx.write_nodes(path, "nodes.csv")
+    >>> open("nodes.csv").readline().strip()
+    'node,R,Z,u_r,u_z'
+    """
+    plain = meshes.to_grid(path.problem.scene.mesh) if mesh is None else grid.read(mesh)
+    u = _displacements(path, state, plain.points)
+    rows = [[int(n), *X, *v] for n, X, v in zip(plain.numbers, plain.points.tolist(), u.tolist())]
+    files.write_rows(file, ["node", "R", "Z", *_COMPONENTS], rows, path.problem.comm)
+
+
+def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.PathLike | None = None,
+                  columns: Mapping[str, str] | None = None,
+                  units: Mapping[str, float | str] | None = None) -> NodalComparison:
+    """Compare a state with another program's nodal displacements, at its nodes, wherever in our mesh they lie.
+
+    Args:
+        theirs: a CSV file or {column: values} with u_r, u_z and either R, Z or, with `mesh`, node.
+        state: of the path; default: the last. To compare at a pressure: `path.at(formingx.pressure(...))`.
+        mesh: a text mesh file (`formingx.mesh.Grid`) that gives the coordinates of the numbered nodes, in our unit.
+        columns: {our name: their name} for columns that are called otherwise.
+        units: as for `compare`, by our column names: R, Z, u_r, u_z.
+
+    Raises:
+        InputError: a file that cannot be read, a column, unit or node that is not known, or a node outside our mesh.
+
+    >>> fx.write_nodes(path, "nodes.csv")                                   # or what another program wrote
+    >>> found = fx.compare_nodes(path, "nodes.csv")
+    >>> len(found.nodes), float(abs(found.ours - found.theirs).max()) < 1e-12
+    (51, True)
+    """
+    table = (csv_files.from_arrays("compare_nodes: theirs", theirs) if isinstance(theirs, Mapping)
+             else csv_files.read(theirs))
+    names, units = dict(columns or {}), dict(units or {})
+    for name in (*names, *units):
+        known("compare_nodes: column", name, ("node", "R", "Z", *_COMPONENTS))
+
+    def take(name: str) -> np.ndarray:
+        return table.take(names.get(name, name), units.get(name))
+    def take_nodes() -> np.ndarray:
+        numbers = take("node")
+        if np.any(numbers != np.round(numbers)):
+            raise InputError(f"{table.name}: column {names.get('node', 'node')!r}: node numbers must be whole numbers")
+        return numbers.astype(int)
+    if mesh is None:
+        points = np.column_stack([take("R"), take("Z")])
+        numbered = names.get("node", "node") in table.columns
+        nodes = take_nodes() if numbered else np.arange(1, len(points) + 1)
+    else:
+        plain = grid.read(mesh)
+        nodes = take_nodes()
+        at = {int(n): k for k, n in enumerate(plain.numbers)}
+        for node in nodes.tolist():
+            if node not in at:
+                raise InputError(f"{table.name}: node {node} is not in the mesh file {os.fspath(mesh)!r}")
+        points = plain.points[[at[int(n)] for n in nodes]]
+    ours = _displacements(path, state, points)
+    return NodalComparison(nodes, points, ours, np.column_stack([take(c) for c in _COMPONENTS]),
+                           float(np.hypot(*ours.T).max()))
+
+
+def _displacements(path: Any, state: Any, points: np.ndarray) -> np.ndarray:
+    """u at reference points in a state (default: the last), shape (n, 2)."""
+    problem, state = path.problem, state or path.last
+    with problem.at(state):
+        return probe(problem, points).displacement(problem.x)

@@ -1,0 +1,1 @@
+"""Contact events: closures of gaps predicted within one step."""

@@ -1,0 +1,419 @@
+"""Points that a step brings to their tools, one after the other: each is held as it arrives, and turns the path.
+
+Along the tangent of a state, by a unit of arc length, points move by w0. A point that has arrived is held by what its
+law of friction says, and so are those that slid before: each sticks, slides against mu N, or lets go, which the
+compliance of the body at these points tells (`held`). From one change to the next the path goes straight, and where a
+point arrives an iteration with the same factors brings it back to equilibrium: the path is curved, and where a point
+sticks depends on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+
+from .reduced_contact import FREE, STICKS, Points, Response
+
+
+@dataclass(frozen=True)
+class Foretelling:
+    """How far, and how exactly, arrivals are foretold.
+
+    Attributes:
+        iterations: at most so many for an arrival.
+        to_tools: iterations, of the contact alone, that bring points to their tools.
+        changes: at most so many points let go or begin to slide from one arrival to the next.
+        taken_over: points that slid before are held by forces of their own, if they are not more than these.
+        same_place: by how much an iteration may still move an arrival that sticks, over the length of face that
+            is its own.
+        about_there: the same of one that may slide.
+        far: squares of positions beyond all bounds, length^2.
+        soon: part of a step within which two points arrive together.
+        earlier: at most so many points turn out to have arrived before the one that is looked at.
+        late: part of the way to an arrival by which an iteration may move it: beyond, where it is is not known.
+    """
+
+    iterations: int = 8
+    to_tools: int = 4
+    changes: int = 100
+    taken_over: int = 80
+    same_place: float = 1e-3
+    about_there: float = 1e-2
+    far: float = 1e30
+    soon: float = 0.02
+    earlier: int = 3
+    late: float = 1.0
+
+
+_FORETELLING = Foretelling()
+
+
+class Arrival(NamedTuple):
+    """A point of a face that meets the ramp of its tool; the same on all ranks.
+
+    time: arc length; place: then, shape (2,). length: of face that is its own. sticks: whatever pulls at it.
+    """
+
+    time: float
+    rank: int
+    face: int
+    point: int
+    place: np.ndarray
+    length: float
+    sticks: bool
+
+    @property
+    def who(self) -> tuple[int, int, int]:
+        """The point."""
+        return self.rank, self.face, self.point
+
+
+class _Piece(NamedTuple):
+    """A straight piece of the path, from an arc length on.
+
+    at, speed: positions and velocities of points, by face. Of the m points that are known: status; place: where they
+    stick; force, rate: on them, and by arc length; extra, growth: of it, what the factors do not know, all but the
+    first of shape (m, 2). off: what (x, control) is there off the tangent by more than these.
+    """
+
+    begins: float
+    at: list[np.ndarray]
+    speed: list[np.ndarray]
+    status: np.ndarray
+    place: np.ndarray
+    force: np.ndarray
+    rate: np.ndarray
+    extra: np.ndarray
+    growth: np.ndarray
+    off: tuple[np.ndarray, float]
+
+    def after(self, time: float) -> _Piece:
+        """What is left of it from a time on, or it, and what was before that, on a straight line."""
+        by = time - self.begins
+        return self._replace(begins=time, at=[x + by * w for x, w in zip(self.at, self.speed)],
+                             force=self.force + by * self.rate, extra=self.extra + by * self.growth)
+
+    def of(self, m: int) -> _Piece:
+        """It, when m points are known."""
+        more = m - len(self.status)
+        if not more:
+            return self
+        none = np.zeros((more, self.force.shape[1]))
+        grown = {name: np.concatenate([getattr(self, name), none])
+                 for name in ("place", "force", "rate", "extra", "growth")}
+        return self._replace(status=np.append(self.status, np.full(more, FREE)), **grown)
+
+
+class Foretold:
+    """The arrivals ahead of a state, in order, and the path bent by them.
+
+    Args:
+        faces: in contact (`FaceContact`), those that take part; n: owned unknowns of the fields.
+        x, control: the state, own part; direction, slope: of them by arc length.
+        response: of the body; batch: points for which that is asked at a time.
+
+    Attributes:
+        touching: how many points of each face touch.
+        ends: arc length beyond which nothing is foretold; stops: no path goes on there.
+    """
+
+    def __init__(self, faces: Sequence[Any], n: int, x: np.ndarray, control: float, direction: np.ndarray, slope: float,
+                 response: Response, batch: int):
+        self._faces, self._response, self._comm, self._batch = faces, response, faces[0].comm, batch
+        self._n, self._way = n, (x, control, direction, slope)
+        start = [face.positions(x[:n], control) for face in faces]
+        self._along = [face.moved(direction[:n], slope) for face in faces]
+        self._free = [~face.law.touching(at, face.touch) & (face.rule.area > 0) for face, at in zip(faces, start)]
+        self.touching = [int(self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM))
+                         for face, free in zip(faces, self._free)]
+        self._arrivals: list[Arrival] = []
+        self._points = Points(faces, n, len(x), response)
+        none = np.zeros((0, start[0].shape[1]))
+        self._pieces = [_Piece(0.0, start, self._along, np.zeros(0, dtype=int), none, none, none, none, none,
+                               (np.zeros(len(x)), 0.0))]
+        self._end: _Piece | None = None                     # of the last piece, in equilibrium
+        self._taken = 0                                     # arrivals that are held
+        self.ends, self.stops = np.inf, False
+        if not self._take_over():
+            self._pieces, self.ends = self._pieces[:1], 0.0
+
+    def next(self, k: int, length: float) -> Arrival | None:
+        """The arrival number k (from 0) within a length, or None; those before it are held."""
+        while len(self._arrivals) <= k:
+            if self.ends < np.inf:
+                return None
+            if self._taken < len(self._arrivals) and not self._hold(length):
+                self.ends = self._arrivals[-1].time
+                return None
+            if not self._find(length):
+                return None
+            if not self._settle(length):
+                self.ends = self._arrivals[-1].time
+        return self._arrivals[k] if self._arrivals[k].time < length else None
+
+    def places(self, length: float) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
+        """Of each face: arc length at which own points arrive, `length` if they do not; where they are then; which
+        are where their forces want them at the end."""
+        piece = self._piece(length)
+        times, at = [np.full(len(x), length) for x in piece.at], piece.after(length).at
+        for arrival in self._arrivals:
+            if arrival.time < length and arrival.rank == self._comm.rank:
+                times[arrival.face][arrival.point] = arrival.time
+                at[arrival.face][arrival.point] = arrival.place
+        sure = [np.zeros(len(x), dtype=bool) for x in at]
+        self._points.spread(piece.of(len(self._points.who)).status != FREE, sure)
+        return times, at, sure
+
+    def at(self, length: float) -> list[np.ndarray]:
+        """Positions of own points of each face at an arc length, straight from the last change."""
+        return self._piece(length).after(length).at
+
+    def bend(self, length: float) -> tuple[np.ndarray, float] | None:
+        """What is added to (x, control) at a length along the tangent; None: nothing."""
+        piece, m = self._piece(length), len(self._points.who)
+        if self._end is not None and piece.begins < self._end.begins <= length:
+            piece = self._end                               # in equilibrium there
+        piece = piece.of(m).after(length)
+        if not len(piece.status):
+            return None
+        for _ in range(_FORETELLING.to_tools):
+            piece = self._held(piece)
+        if not np.isfinite(piece.extra).all():
+            return None
+        return (piece.off[0] - self._points.columns @ piece.extra.ravel(),
+                piece.off[1] - float(self._points.steps @ piece.extra.ravel()))
+
+    def _held(self, piece: _Piece, moved: Sequence[np.ndarray] = ()) -> _Piece:
+        """Where a piece begins with its points brought to where they stick and to their tools; moved: first, by face.
+
+        (Tools are curved: it takes a few such iterations.)
+        """
+        points, near = self._points, self._points.near(piece.at, piece.force)
+        u = points.at(moved) if moved else np.zeros_like(piece.force)
+        force, more = points.held(u, piece.status, near, piece.force,
+                                  points.back(piece.at, piece.place, near))
+        at = [x - points.moved_by(more, f) for f, x in enumerate(piece.at)]
+        return piece._replace(at=[x + m for x, m in zip(at, moved)] if moved else at, force=force,
+                              extra=piece.extra + more)
+
+    def _piece(self, length: float) -> _Piece:
+        """The last piece of the path that begins before a length."""
+        return next(piece for piece in self._pieces[::-1] if piece.begins < length or not piece.begins)
+
+    def _take_over(self) -> bool:
+        """Hold points that touched, and may slide, by forces of their own; False: that cannot be told."""
+        x, control = self._way[:2]
+        slide = [~free & (face.rule.area > 0) & (face.law.friction < np.inf)
+                 for face, free in zip(self._faces, self._free)]
+        number = self._comm.allreduce(sum(int(np.sum(s)) for s in slide), MPI.SUM)
+        if not 0 < number <= _FORETELLING.taken_over:
+            return True
+        if not self._points.learn([np.flatnonzero(s) for s in slide], touched=True):
+            return False
+        found = [face.tractions(x[: self._n], control) for face in self._faces]
+        force = self._points.at([face.scale[:, None] * t.force for face, t in zip(self._faces, found)])
+        status = self._points.at([t.sense for t in found]).astype(int)
+        status[self._points.friction == 0] = 1
+        slip = self._points.at([np.zeros(len(face.points)) if face.touch is None else face.touch.slip
+                                for face in self._faces])
+        piece = self._pieces[0].of(len(status))
+        place = self._points.at(piece.at) - slip[:, None] * self._points.near(piece.at, force).tangent
+        return self._turn(piece._replace(status=status, force=force, place=place), status) and bool(self._pieces.pop(0))
+
+    def _turn(self, piece: _Piece, status: np.ndarray) -> bool:
+        """The piece of path that goes on from where one begins, with other statuses; False: it cannot be told."""
+        points, near = self._points, self._points.near(piece.at, piece.force)
+        found = points.rates(points.at(self._along), status, near, piece.force)
+        if found is None:
+            return False
+        rate, growth, status = found
+        stuck = (status == STICKS) & (np.abs(piece.status) == 1)
+        slip = (piece.status * points.elastic_slip)[:, None] * near.tangent
+        piece = piece._replace(
+            place=np.where(stuck[:, None], self._points.at(piece.at) - slip, piece.place), status=status, rate=rate,
+            growth=growth, force=np.where((status == FREE)[:, None], 0.0, piece.force),
+            speed=[w - points.moved_by(growth, f) for f, w in enumerate(self._along)])
+        points.spread(status == FREE, self._free)
+        self._pieces.append(piece)
+        return True
+
+    def _hold(self, length: float) -> bool:
+        """Hold the arrival that is not held yet: the next piece of the path; False: it cannot be told."""
+        last, arrival, end = self._pieces[-1], self._arrivals[-1], self._end
+        if end is None or arrival.who not in self._points.who and not self._learn(length):
+            return False
+        self._taken += 1
+        end, k = end.of(len(self._points.who)), self._points.who.index(arrival.who)
+        status, place = end.status.copy(), end.place.copy()
+        slips = self._points.at(last.speed)[k] @ self._points.near(end.at, end.force).tangent[k]
+        status[k] = STICKS if self._points.friction[k] == np.inf else -1 if slips < 0 else 1
+        place[k] = arrival.place
+        return self._turn(end._replace(status=status, place=place), status)
+
+    def _find(self, length: float) -> bool:
+        """The next arrival within a length, on the last piece or off its end."""
+        for _ in range(_FORETELLING.changes):
+            last = self._pieces[-1]
+            if last.begins >= length:
+                return False
+            times = [arrivals(face.law, x, w, free, length - last.begins)
+                     for face, x, w, free in zip(self._faces, last.at, last.speed, self._free)]
+            first = min(self._comm.allgather(min((float(t.min(initial=np.inf)) for t in times), default=np.inf)))
+            after, status = self._points.change(last.status, self._points.near(last.at, last.force), last.force,
+                                                last.rate)
+            if not after < min(first, length - last.begins):
+                break
+            if not self._turn(last.after(last.begins + after), status):
+                self.ends, self.stops = last.begins + after, True
+                return False
+        if self._first([last.begins + t for t in times], length, last):
+            return True
+        self._end = self._moved(length, last)
+        return self._end is not None and self._first(self._back(self._end, last), length, last)
+
+    def _first(self, times: list[np.ndarray], length: float, at: _Piece) -> bool:
+        """Take up the first of arrivals at times, if it is within a length; at: a piece of path there."""
+        best = min(((float(t.min()), self._comm.rank, f, int(np.argmin(t))) for f, t in enumerate(times) if len(t)),
+                   default=(length, 0, 0, 0))
+        time, rank, f, i = min(self._comm.allgather(best))
+        if not time < length:
+            return False
+        self._arrivals.append(self._meets(rank, f, i, time, at.after(time).at))
+        return True
+
+    def _meets(self, rank: int, f: int, i: int, time: float, at: list[np.ndarray]) -> Arrival:
+        """The arrival of a point near a time, when points are `at` their places."""
+        told = None
+        if rank == self._comm.rank:
+            face, x, w = self._faces[f], at[f][[i]], self._pieces[-1].speed[f][[i]]
+            law, by = face.law.part([i]), 0.0
+            near = law.nearest(x)
+            for _ in range(3):
+                gap, rate = float(near.distance[0]) + law.theta, float(near.normal[0] @ w[0])
+                if abs(gap) < _FORETELLING.same_place * law.theta or not rate > 0:
+                    break
+                by = max(by - gap / rate, self._pieces[-1].begins - time)
+                near = law.nearest(x + by * w)
+            told = Arrival(time + by, rank, f, i, (x + by * w)[0], float(face.rule.lengths[i]),
+                           bool(np.isinf(np.ravel(law.friction)[0])))
+        return self._comm.bcast(told, root=rank)
+
+    def _settle(self, length: float) -> bool:
+        """Bring the path back to equilibrium where the last point found arrives, and that with it; False: it fails."""
+        last, arrival = self._pieces[-1], self._arrivals[-1]
+        self._end = end = last.after(arrival.time)
+        if arrival.time - last.begins < _FORETELLING.soon * length:
+            return True
+        tried: list[tuple[_Piece, _Piece]] = []
+        for _ in range(_FORETELLING.iterations * _FORETELLING.earlier):
+            if len(tried) == _FORETELLING.iterations:
+                return False
+            arrival, moved = self._arrivals[-1], self._moved(arrival.time, end)
+            if moved is None:
+                return False
+            found = self._meets(*arrival.who, arrival.time, moved.at)
+            tried.append((end, moved.after(found.time)))
+            mixed = self._mixed(tried)
+            if mixed is None:
+                return False
+            end = mixed
+            found = self._meets(*arrival.who, end.begins, end.at)
+            if not (found.time > last.begins and abs(found.time - arrival.time) < _FORETELLING.late * arrival.time):
+                return False
+            self._arrivals[-1], self._end = found, (end := end.after(found.time))
+            near = (_FORETELLING.same_place if found.sticks else _FORETELLING.about_there) * found.length
+            if np.linalg.norm(found.place - arrival.place) < near:
+                times = self._back(end, last, found)
+                if not self._first(times, found.time, end):
+                    return True
+                self._arrivals.pop(-2)                      # another one has arrived before
+                tried = []
+        return False
+
+    def _back(self, end: _Piece, last: _Piece, but: Arrival | None = None) -> list[np.ndarray]:
+        """When points that are inside their tools at an end of the last piece of path came there, else its time."""
+        times = [np.full(len(free), end.begins) for free in self._free]
+        for f, (t, face, x, w, free) in enumerate(zip(times, self._faces, end.at, last.speed, self._free)):
+            near = face.law.nearest(x)
+            inside, rate = free & (near.distance > -face.law.theta), np.einsum("ni,ni->n", near.normal, w)
+            if but and (but.rank, but.face) == (self._comm.rank, f):
+                inside[but.point] = False
+            back = np.divide(near.distance + face.law.theta, rate, out=np.zeros(len(x)), where=inside & (rate > 0))
+            left = end.begins - last.begins
+            t[inside] = last.begins + np.clip(left - back, 1e-3 * left, 0.999 * left)[inside]
+        return times
+
+    def _mixed(self, tried: list[tuple[_Piece, _Piece]]) -> _Piece | None:
+        """What iterations, (before, after) each, lead to: their mean that is nearest to a fixed point (Anderson 1965).
+
+        None: they lead beyond all bounds.
+
+        (Factors of another state alone make them go to and fro.)
+        """
+        by = np.array([np.concatenate([(b - a).ravel() for a, b in zip(before.at, after.at)])
+                       for before, after in tried])
+        gram = self._comm.allreduce(by @ by.T)
+        if not gram.trace() < _FORETELLING.far:
+            return None
+        ahead = gram[-1, -1] - gram[-1, :-1] - gram[:-1, -1, None] + gram[:-1, :-1]
+        right = gram[-1, -1] - gram[:-1, -1]
+        share = np.linalg.lstsq(ahead, right, rcond=1e-10)[0]
+        weights, after = np.append(share, 1 - share.sum()), [piece for _, piece in tried]
+
+        def mean(values: list) -> Any:
+            return sum(w * v for w, v in zip(weights, values))
+        return after[-1]._replace(
+            begins=float(mean([p.begins for p in after])), at=[mean(list(at)) for at in zip(*(p.at for p in after))],
+            force=mean([p.force for p in after]), extra=mean([p.extra for p in after]),
+            off=(mean([p.off[0] for p in after]), float(mean([p.off[1] for p in after]))))
+
+    def _moved(self, time: float, piece: _Piece) -> _Piece | None:
+        """A piece of path, from a time on, moved by an iteration towards equilibrium there; None: no factors."""
+        piece, points = piece.of(len(self._points.who)).after(time), self._points
+        x, control, direction, slope = self._way
+        forces = [np.full(at.shape, np.nan) for at in piece.at]
+        for given, free in zip(forces, self._free):
+            given[free] = 0.0                               # what has not arrived yet touches nothing
+        points.spread(piece.force, forces)
+        by = self._response.to_rest(
+            x + time * direction + piece.off[0] - points.columns @ piece.extra.ravel(),
+            control + time * slope + piece.off[1] - float(points.steps @ piece.extra.ravel()), forces)
+        if by is None:
+            return None
+        moved = [face.moved(by[0][: self._n], by[1]) for face in self._faces]
+        piece = self._held(piece, moved)
+        if not np.isfinite(piece.extra).all():
+            return None
+        return piece._replace(off=(piece.off[0] + by[0], piece.off[1] + by[1]))
+
+    def _learn(self, length: float) -> bool:
+        """Columns of the arrival that is to be held and of those that come next as it looks; False: no factors."""
+        last, arrival, chosen = self._pieces[-1], self._arrivals[-1], []
+        left = length - last.begins
+        for f, face in enumerate(self._faces):
+            times = arrivals(face.law, last.at[f], last.speed[f], self._free[f], left)
+            times[[i for rank, g, i in self._points.who if (rank, g) == (self._comm.rank, f)]] = left
+            if (arrival.rank, arrival.face) == (self._comm.rank, f):
+                times[arrival.point] = -1.0
+            first = np.argsort(times, kind="stable")[: self._batch]
+            chosen.append(np.sort(first[times[first] < left]))
+        return self._points.learn(chosen)
+
+
+def arrivals(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> np.ndarray:
+    """Arc length at which free points (a mask) that go straight meet the ramp, `length` if not before, shape (n,)."""
+    at, times = length * np.linspace(0, 1, 17), np.full(len(start), length)
+    ways = 1.01 * length * np.linalg.norm(velocity, axis=1)             # none comes nearer by more
+    near = np.flatnonzero(free & (law.distance(start) + ways > -law.theta))
+    if len(near):
+        gap = -law.theta - law.part(near).distance(start[near] + at[:, None, None] * velocity[near])    # shape (17, m)
+        hit = np.flatnonzero((gap[1:] <= 0).any(0))
+        k = np.argmax(gap[1:, hit] <= 0, axis=0)
+        before, now = np.maximum(gap[k, hit], 0.0), gap[k + 1, hit]
+        share = np.divide(before, before - now, out=np.zeros(len(hit)), where=before > 0)
+        times[near[hit]] = at[k] + (at[k + 1] - at[k]) * share
+    return times

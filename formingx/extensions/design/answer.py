@@ -1,0 +1,125 @@
+"""What a search came to: before and after, and how sure it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from .run import DesignRun
+
+_SCATTER = 6e-5
+"""Of the wall, relative: by so much it may differ as runs take other steps."""
+
+
+def unevenness(wall: np.ndarray) -> float:
+    """Standard deviation over mean."""
+    return float(wall.std() / wall.mean())
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A design that was searched for; print it.
+
+    Attributes:
+        before, best: the first and the best `DesignRun`; runs: all that were taken, in order; failed: why others made
+            no path, in words; inside: which places of the wall counted, shape (k,); why: the search ended; foretold:
+            the wall that the run before the best foretold for it, shape (k,), length; lack: a volume or a least wall
+            that was asked for and not reached, in words, or "".
+    """
+
+    before: DesignRun
+    best: DesignRun
+    runs: list[DesignRun]
+    failed: list[str]
+    inside: np.ndarray
+    why: str
+    foretold: np.ndarray
+    lack: str = ""
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """Of the parameters, by name."""
+        return self.best.values
+
+    @property
+    def paths(self) -> int:
+        """Runs that were taken, those that failed too."""
+        return len(self.runs) + len(self.failed)
+
+    @property
+    def cv(self) -> tuple[float, float]:
+        """Standard deviation over mean of the wall, before and after."""
+        return unevenness(self.before.wall[self.inside]), unevenness(self.best.wall[self.inside])
+
+    def at_bounds(self) -> list[str]:
+        """The parameters that stand at a bound."""
+        p, v = self.best.parameters, self.best.vector
+        near = 1e-6 * p.size
+        return [f"{name} at its {'lowest' if x <= a + h else 'highest'}, {x:.6g}"
+                for name, x, a, b, h in zip(p.names, v, p.low, p.high, near) if x <= a + h or x >= b - h]
+
+    def without_effect(self) -> list[str]:
+        """Parameters whose whole range, predicted by the derivatives, changes the wall by less than its scatter."""
+        by = self.before.derivative("wall")[1][self.inside] * self.before.parameters.size
+        mean = self.before.wall[self.inside].mean()
+        return [name for name, d in zip(self.before.parameters.names, abs(by).max(0) / mean) if d < _SCATTER]
+
+    def attainable(self) -> float:
+        """The unevenness to which these parameters could bring the wall within their bounds, whatever the volume, as
+        the derivatives of the best run predict."""
+        from scipy.optimize import lsq_linear
+        p, v, (wall, by) = self.best.parameters, self.best.vector, self.best.derivative("wall")
+        wall, by, mean = wall[self.inside], by[self.inside] * p.size, wall[self.inside].mean()
+        found = lsq_linear((by - np.outer(wall / mean, by.mean(0))) / mean, 1 - wall / mean,
+                           bounds=((p.low - v) / p.size - 1e-12, (p.high - v) / p.size + 1e-12))
+        return float(np.sqrt(2 * found.cost / len(wall)))
+
+    def __str__(self) -> str:
+        (a, b), before, after = self.cv, self.before.wall[self.inside], self.best.wall[self.inside]
+        off = abs(self.foretold - self.best.wall)[self.inside].max() / after.mean()
+        lines = [f"{self.paths} runs" + f", of which {len(self.failed)} failed" * bool(self.failed) + f"; {self.why}",
+                 f"{'':24}{'before':>12}{'after':>12}",
+                 f"{'unevenness (std/mean)':24}{a:12.4f}{b:12.4f}",
+                 f"{'least wall':24}{before.min():12.5g}{after.min():12.5g}",
+                 f"{'mean wall':24}{before.mean():12.5g}{after.mean():12.5g}",
+                 f"{'volume':24}{self.before.volume:12.5g}{self.best.volume:12.5g}"]
+        p = self.best.parameters
+        lines += [f"{name:24}{x:12.5g}{y:12.5g}" for name, x, y in zip(p.names, self.before.vector, self.best.vector)]
+        lines += [f"the run before predicted the wall to {100 * off:.2g} %"]
+        lines += [f"bounds: {', '.join(met)}" for met in [self.at_bounds()] if met]
+        lines += [f"no effect: {', '.join(none)}" for none in [self.without_effect()] if none]
+        lines += [f"the best run: {text}" for kind, text in self.best.path.doubts() if kind == "serious"]
+        return "\n".join([*lines, *[self.lack] * bool(self.lack), *(f"failed: {text}" for text in self.failed)])
+
+    __repr__ = __str__
+
+    def plot_wall(self, axes: Any = None) -> Any:
+        """Draw the wall before and after over the reference length; returns the matplotlib axes."""
+        if axes is None:
+            from ...figures import figure
+            axes = figure(width=7)[1]
+        for run, label, colour in ((self.before, "before", "0.6"), (self.best, "after", "C0")):
+            axes.plot(run.profile.reference_length, run.wall, color=colour, label=label)
+        axes.set_xlabel("reference length")
+        axes.set_ylabel("wall")
+        axes.set_ylim(bottom=0)
+        axes.legend()
+        return axes
+
+    def report(self, file: Any = "design.html", title: str = "", *,
+               deviations: Mapping[str, float] | None = None) -> FilePath:
+        """Write one HTML file: what was found, how sure it is, walls before and after, the pattern, and which parameter
+        changes the wall where (rank 0 writes); returns where it is.
+
+        deviations: {parameter: its standard deviation}, as of constants that were fitted: the wall is drawn with its
+            `spread`.
+
+        Raises:
+            InputError: the best run has no derivative. OSError: the file cannot be written.
+        """
+        from .report import of_answer
+        return of_answer(self, file, title, deviations)

@@ -1,0 +1,273 @@
+"""Neighbours carried along a run, state by state, to its last.
+
+Without a history the last state depends on its own equations alone (and on where stages before it ended). With one, a
+neighbour remembers its own states. Where a node sticks depends on when it touches, which moves with the parameter: so
+where the run's node arrived, the neighbour's is moved along the run's velocity onto its own tool, whatever the step
+did. (With the steps held as they were, derivatives would be wrong by up to a factor of three.) Where a node arrives at
+the end of a step, which turns the path, the neighbour is looked at where its own does; at a target where it meets its
+own; else in the plane normal to the path of the run: it is all one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...forms.schedule import Setting
+from ...measures.targets import Target
+from ...results.path import Path
+from ...solve.newton import Failure, fixed
+from ...solve.process import driving, end_of, next_knot, straight
+from ...solve.stage import Plan, plan
+from ...solve.state import State
+from .neighbours import Neighbour, settle
+
+
+def carry(path: Path, end: Any, neighbours: Sequence[Neighbour]) -> None:
+    """Solve for all neighbours beside the last state of a run.
+
+    end: the `Target` of a run with one control, or the stages of a process.
+
+    Raises:
+        Failure: the run has no derivative, in words.
+    """
+    _Carrier(path, end, neighbours).run()
+
+
+class _Carrier:
+    def __init__(self, path: Path, end: Any, neighbours: Sequence[Neighbour]):
+        if len(path.segments) > 1:
+            raise Failure("the body was remeshed", [])
+        if path.ended:
+            raise Failure(path.ended, [])
+        if any(face.contact.lagged for face in path.problem.contacts):
+            raise Failure("there is no derivative of contact in space yet", [])
+        self.path, self.neighbours = path, neighbours
+        self.problem, self.curve = path.problem, path.record.curve
+        self._single = isinstance(end, Target)
+        self._plans = [] if self._single else [plan(self.problem.scene, stage) for stage in end]
+        self._end = end
+        self._until: dict[tuple[int, int], tuple[Any, list[Any]]] = {}
+        for one in neighbours:
+            one.plans = [] if self._single else [plan(one.problem.scene, stage) for stage in one.end]
+            if [_kind(p) for p in one.plans] != [_kind(p) for p in self._plans]:
+                raise Failure(f"parameter {one.name} changes what the stages drive or how they end", [])
+
+    def run(self) -> None:
+        """From the first state to the last."""
+        states = self.path.states
+        history = self.problem.has_history
+        if history and any(state.kind == "jump" for state in states):
+            jump = next(state for state in states if state.kind == "jump")
+            raise Failure(f"the body snaps at {self.path.describe(jump)}, where the result does not depend smoothly on"
+                          " parameters", [])
+        if history and any(p.in_flow for p in self._plans):
+            raise Failure("there is none yet for a stage that follows or holds a measure (follow={measure: ...},"
+                          " hold=...) in a scene with friction, relaxation or heat", [])
+        before: State | None = None
+        for k, state in enumerate(states):
+            last = k == len(states) - 1 or states[k + 1].setting != state.setting
+            begins = before is None or state.setting != before.setting
+            if begins and not self._single:
+                self._enter(Setting(**state.setting))
+            if before is None:
+                self._begin(state)
+            elif state.kind == "start":
+                self._beside = state
+            elif last or history:
+                self._settle(state, before, last)
+            if history:
+                for one in self.neighbours:
+                    one.problem.advance(one.x, one.control)
+                self._put_on_tools(state)
+            before = state
+        if states[-1].met is None:
+            raise Failure("it did not reach its target", [])
+
+    def _begin(self, state: State) -> None:
+        """The first state: the body at rest, or in equilibrium with what acts on it."""
+        for one in self.neighbours:
+            one.x, one.control = state.x.copy(), state.control
+        self._late: list[np.ndarray] = []
+        self._beside = state
+        if np.any(state.x):
+            with self.problem.at(replace(state, memory=state.before)):
+                constraint = fixed(state.control)
+                settle(self.curve, state, self.neighbours, constraint, [constraint] * len(self.neighbours))
+
+    def _enter(self, setting: Setting) -> None:
+        """The setting of a stage, of each neighbour from where it stands."""
+        for one in self.neighbours:
+            problem, p = one.problem, one.plans[setting.stage]
+            now = problem.setting
+            standing = one.x is not None
+            amplitudes = [0.0] * len(now.base) if not standing else [
+                *now.standing(one.control)[:-1], problem.time_at(one.control)]
+            x = one.x if standing else np.zeros(problem.x.getLocalSize())
+            if standing:
+                for number in set(now.off) - set(setting.off):
+                    problem.bring_in(number, x, one.control)
+            if setting.piece == 0:
+                base, rate, control = amplitudes, [0.0] * len(amplitudes), 0.0
+            elif p.by_time:
+                time = now.base[-1] + now.rate[-1] * one.control if standing else 0.0
+                then = next_knot(p.tables, time, end_of(p.stage, p.tables, time))
+                base, rate = straight(amplitudes, problem.scales, p.tables, time, then)
+                one.then, control = then, 0.0
+            else:
+                base, rate, control = driving(amplitudes, problem.scales, p.numbers, p.stage, clocked=not p.in_flow)
+            problem.enter(replace(setting, base=base, rate=rate), x, control)
+            one.control = control
+
+    def _settle(self, state: State, before: State, last: bool) -> None:
+        """The neighbours beside a state that was solved for."""
+        with self.problem.at(replace(state, memory=state.before)):
+            self._late = []
+            for number, face in enumerate(self.problem.contacts):
+                self._late.append(self._arrivals(number, face, state, before))
+            self._leave_out(state)
+            for one in self.neighbours:                      # they go on as the run did
+                one.x = state.x + (one.x - self._beside.x)
+                one.control = state.control + (one.control - self._beside.control)
+            equation, equations = self._equations(state, last)
+            left_over = settle(self.curve, state, self.neighbours, equation, equations)
+            for one in self.neighbours if state is self.path.last else []:
+                one.balance(left_over)
+            self._beside = state
+            b = self.curve.newton.b.array_r
+            self._velocity = [face.moved(b, 1.0) for face in self.problem.contacts]
+
+    def _leave_out(self, state: State) -> None:
+        """What the run's points have not touched before the end of the step, the neighbours' do not either."""
+        n = self.problem.n_owned
+        for face, late, *others in zip(self.problem.contacts, self._late,
+                                       *(one.problem.contacts for one in self.neighbours)):
+            if face.present:
+                face.leave_out(late)
+                free = ~face.law.touching(face.positions(state.x[:n], state.control), face.touch)
+                for mine in others:
+                    mine.leave_out(free | late)
+
+    def _arrivals(self, number: int, face: Any, state: State, before: State) -> np.ndarray:
+        """Put the neighbours' points that arrive in a step where they do; which arrived at its end, shape (n,)."""
+        touch, law, n = face.touch, face.law, self.problem.n_owned
+        none = np.zeros(len(face.points), dtype=bool)
+        if touch is None or not law.has_friction or not face.present:
+            return none
+        distance = law.distance(face.positions(state.x[:n], state.control))
+        arrived = (touch.distance <= -law.theta) & (distance > -law.theta)
+        late = arrived & (np.isnan(touch.arrival[:, 0]) | (not face.contact.sticks) & (distance < law.theta))
+        velocity = face.moved(before.direction, before.slope)
+        start = face.positions(before.x[:n], before.control)
+        early = np.flatnonzero(arrived & ~late)
+        if len(early):
+            gap = law.part(early).distance(touch.arrival[early])
+        for one in self.neighbours:
+            mine, arrival = one.problem.contacts[number], touch.arrival.copy()
+            if len(early):
+                there = mine.positions(one.x[:n], one.control)[early] + touch.arrival[early] - start[early]
+                arrival[early] = _onto(mine.law.part(early), there, velocity[early], gap)
+            mine.expect_arrivals(arrival)
+        return late
+
+    def _put_on_tools(self, state: State) -> None:
+        """Neighbours' points touch where the run's do; those that arrived at the end of the step are where its velocity
+        brings them to their tools."""
+        n = self.problem.n_owned
+        for number, face in enumerate(self.problem.contacts):
+            if not face.law.remembers or not face.present:
+                continue
+            run = state.memory[self.problem.histories.index(face)]
+            free = run.touch.distance <= -face.law.theta
+            late = np.flatnonzero(self._late[number] if self._late else 0 * free)
+            free[late] = True
+            for one in self.neighbours:
+                mine = one.problem.contacts[number]
+                memory = mine.get()
+                assert memory is not None
+                touch = memory.touch._replace(distance=run.touch.distance,
+                                              slip=np.where(free, run.touch.slip, memory.touch.slip))
+                if len(late):
+                    touch = touch._replace(position=touch.position.copy())
+                    touch.position[late] = _onto(
+                        mine.law.part(late), mine.positions(one.x[:n], one.control)[late], self._velocity[number][late],
+                        run.touch.distance[late])
+                mine.put(memory._replace(touch=touch, arrived=run.arrived))
+        for one in self.neighbours:
+            one.memory = one.problem.memory
+        self._late = []
+
+    def _equations(self, state: State, last: bool) -> tuple[Any, list[Any]]:
+        """The constraint of the run's state, and those of the neighbours; None: the plane normal to the path."""
+        setting = self.problem.setting
+        if not last:
+            timed = setting.rate[-1] and self.problem.relaxes
+            hold = fixed(state.control)
+            return (hold, [hold] * len(self.neighbours)) if timed else self._gaps()
+        if setting.piece == 0 and not self._single:          # what has changed has done so
+            return fixed(1.0), [fixed(1.0)] * len(self.neighbours)
+        key = (setting.stage, setting.piece)
+        p = None if self._single else self._plans[setting.stage]
+        if p is not None and p.by_time and not p.stage.waits:
+            return fixed(state.control), [fixed((one.then - one.problem.setting.base[-1])
+                                                / one.problem.setting.rate[-1]) for one in self.neighbours]
+        if p is not None and p.in_flow:
+            raise Failure("there is none yet for a stage that follows or holds a measure", [])
+        if key not in self._until:
+            targets = [(self.problem, self._end if p is None else p.stage.until),
+                       *((one.problem, one.end if p is None else one.plans[setting.stage].stage.until)
+                         for one in self.neighbours)]
+            mine, *others = (target.bind(problem).equation(target.value) for problem, target in targets)
+            self._until[key] = mine, others
+        target = self._end if p is None else p.stage.until
+        if state.met is None or state.met[:2] != target[:2]:
+            raise Failure(f"it did not reach its target {target}", [])
+        return self._until[key]
+
+    def _gaps(self) -> tuple[Any, list[Any]]:
+        """The gap of a point that arrives at the end of the step, which turns the path; None: there is none."""
+        for number, late in enumerate(self._late):
+            face = self.problem.contacts[number]
+            size = np.where(late, abs(face.rule.area), 0.0)
+            most = self.problem.comm.allgather(float(size.max(initial=0.0)))
+            if max(most) > 0:
+                mine = int(np.argmax(size)) if int(np.argmax(most)) == self.problem.comm.rank else None
+                return _gap(self.problem, face, mine, True), [
+                    _gap(one.problem, one.problem.contacts[number], mine, False) for one in self.neighbours]
+        return None, []
+
+
+def _gap(problem: Any, face: Any, point: int | None, sloped: bool) -> Any:
+    """The distance of a point of a face from its tool, as a constraint, `sloped`: with its gradient; the point's number
+    on the rank that has it, else None."""
+    mine = np.array([] if point is None else [point], dtype=int)
+    law = face.law.part(mine)
+
+    def c(x: Any, control: float, gradient: Any) -> tuple[float, float]:
+        near = law.nearest(face.positions(x.array_r[: problem.n_owned], control)[mine])
+        found, rate = float(near.distance.sum()), 0.0
+        if sloped:
+            forces, values = np.zeros_like(face.points), np.zeros(problem.n_owned)
+            forces[mine] = near.normal
+            rate = float((near.normal * face.moved(np.zeros(len(x.array_r)), 1.0)[mine]).sum())
+            face.add(values, problem.forms.length * forces)
+            problem.fill(gradient, values)
+        return (found, rate) if problem.comm.size == 1 else tuple(problem.comm.allreduce(np.array([found, rate])))
+    return c
+
+
+def _kind(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[int]]:
+    """What a stage drives, its tables and their lengths, what it leaves out."""
+    return p.numbers, [(i, len(table)) for i, table in p.tables], p.off
+
+
+def _onto(law: Any, x: np.ndarray, velocity: np.ndarray, gap: np.ndarray) -> np.ndarray:
+    """Points x moved along a velocity to where their distance from a tool is `gap`; they are near it. Shape (n, 2)."""
+    near = law.nearest(x)
+    rate = np.einsum("ni,ni->n", near.normal, velocity)
+    sure = abs(rate) > 1e-3 * np.linalg.norm(velocity, axis=1)
+    by = np.divide(gap - near.distance, rate, out=np.zeros(len(x)), where=sure)
+    return x + by[:, None] * velocity

@@ -1,0 +1,313 @@
+"""The search for what should be made: an even or a wanted wall, the least weight, by exact derivatives of runs."""
+
+from __future__ import annotations
+
+import copy
+import inspect
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import ConvergenceError, InputError, count, finite, instance, pair, positive
+from ...measures.targets import Target
+from ...runs import Process, trace
+from ...scene.scene import Scene
+from ...solve.newton import Tolerances
+from ...solve.stage import Stage
+from ...solve.stepping import StepControl
+from .answer import Answer
+from .parameters import Parameters
+from .run import DesignRun
+
+log = logging.getLogger("formingx")
+
+
+@dataclass(frozen=True)
+class Search:
+    """How searches weigh what they look for, and when they end.
+
+    Attributes:
+        held: weight of the volume that is held, relative, beside relative walls.
+        spare: part by which a volume that is to be kept is aimed lower, so that round-off does not exceed it.
+        kept: a volume or a least wall that is missed by more than this part is said.
+        damped: Levenberg's damping over the largest singular value of the sensitivities: less effect counts as none.
+        worth: the search ends after two runs that lower the sum of squares by less than this part of it.
+        shortest: a step is halved, where it is no better, down to this part of it.
+    """
+
+    held: float = 1e2
+    spare: float = 1e-6
+    kept: float = 5e-3
+    damped: float = 1e-6
+    worth: float = 0.02
+    shortest: float = 1 / 64
+
+
+_SEARCH = Search()
+
+
+class Design:
+    """What may be changed in a run, and the search for the best of it.
+
+    Args:
+        build: a function of the parameters, by name, that returns (scene, target) or (scene, stages), as `trace` or
+            `Process.run` want them. It is called beside a design, too, for derivatives: it must give the same mesh but
+            for the places of its nodes. A contact of it that leaves `nodes_per_step` open takes one a step: so their
+            arrivals have exact derivatives.
+        parameters: {name: (start, low, high), a number to start from, or `along(...)`: a profile, which `build` gets as
+            a function of a length from 0 to 1}.
+        step, tolerances, max_steps: of the runs, see `trace`.
+
+    Raises:
+        InputError: an argument that is not allowed.
+
+    >>> def build(thickness):
+    ...     return fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=thickness, elements=(8, 1)),
+    ...                     materials=fx.NeoHookean(c10=0.4), loads=[fx.Pressure("bottom")],
+    ...                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")]), fx.pole_height(4.0)
+    >>> effects = fx.Design(build, {"thickness": (0.5, 0.1, 1.0)}).run().sensitivities("pressure")
+    >>> effects.names, round(float(effects.by[0, 0]), 3)
+    (['thickness'], 0.046)
+    """
+
+    def __init__(self, build: Callable[..., Any], parameters: Mapping[str, Any], *, step: StepControl | None = None,
+                 tolerances: Tolerances | None = None, max_steps: int | None = None):
+        if not callable(build):
+            raise InputError(f"Design: build = {build!r}: must be a function of the parameters that returns a scene and"
+                             f" its target or stages")
+        self._build, self.parameters = build, Parameters(parameters)
+        try:
+            inspect.signature(build).bind(**dict.fromkeys(parameters))
+        except TypeError as error:
+            raise InputError(f"Design: parameters {', '.join(map(repr, parameters))}: build{inspect.signature(build)}"
+                             f" cannot be called with these: {error}") from None
+        self._step, self._tolerances, self._most = step, tolerances, max_steps
+        self.paths = 0                                       # taken so far
+
+    def run(self, values: Mapping[str, Any] | None = None) -> DesignRun:
+        """Run it with some values, the other parameters at their start.
+
+        Raises:
+            InputError: what `build` returns is no scene with an end, or the scene is not allowed.
+            ConvergenceError: see `trace`.
+        """
+        return self._run(self.parameters.vector(values or {}))
+
+    def _make(self, vector: np.ndarray) -> tuple[Any, Any]:
+        made = self._build(**self.parameters.values(vector))
+        if not isinstance(made, tuple) or len(made) != 2 or not isinstance(made[0], Scene):
+            raise InputError("Design: build must return (scene, target) or (scene, stages)")
+        scene, end = made
+        if not isinstance(end, Target):
+            end = list(end) if isinstance(end, Sequence) else end
+            if not isinstance(end, list) or not end or not all(isinstance(stage, Stage) for stage in end):
+                raise InputError(f"Design: build returns the end {made[1]!r}: must be a target, such as pressure(1), or"
+                                 f" stages")
+        return scene, end
+
+    def _run(self, vector: np.ndarray) -> DesignRun:
+        scene, end = self._make(vector)
+        scene = copy.copy(scene)                             # what the script made is left as it is
+        scene.one_by_one = True
+        self.paths += 1
+        options: dict[str, Any] = {"step": self._step, "tolerances": self._tolerances, "max_steps": self._most,
+                                   "progress": False}
+        path = trace(scene, until=end, **options) if isinstance(end, Target) else Process(scene).run(end, **options)
+        return DesignRun(self._make, self.parameters, vector, path, end, self._tolerances)
+
+    def fit(self, *, wall: Any = None, even: bool = False, within: tuple[float, float] | None = None,
+            volume: str | float | None = "kept", runs: int = 10, good: float = 1e-4,
+            start: Mapping[str, Any] | DesignRun | None = None) -> Answer:
+        """Search for a wall: Gauss and Newton's method with bounds, each step tried by a run of its own.
+
+        Args:
+            wall: the wanted thickness, length: a number, or a function of the reference length; or
+            even: True: as even as can be; least standard deviation over mean.
+            within: reference lengths (of the middle line, from the axis) that count; default all.
+            volume: "kept": the body's at rest stays that of the start; a number: it is that, length^3; None: free.
+            runs: at most so many.
+            good: relative change of the wall, in the mean square, that is foretold and not worth another run.
+            start: values to start from, by name, or a run of this design.
+
+        Raises:
+            InputError: nothing to fit, or nothing has an effect.
+            ConvergenceError: the first run.
+        """
+        if (wall is None) == (not instance("fit: even", even, bool, "True or False")):
+            raise InputError("fit: nothing to fit: give it wall=..., a wanted thickness, or even=True")
+        most, good = count("fit: runs", runs), positive("fit: good", good)
+        if isinstance(volume, str) and volume != "kept" or isinstance(volume, bool):
+            raise InputError(f"fit: volume = {volume!r}: must be 'kept', a number or None")
+        first = start if isinstance(start, DesignRun) else self._run(self.parameters.vector(start or {}))
+        held = None if volume is None else (
+            first.volume * (1 - _SEARCH.spare) if volume == "kept" else positive("fit: volume", volume))
+        aim = _Aim(first, wall, within, held)
+        return self._search(first, aim, most, good)
+
+    def _search(self, first: DesignRun, aim: _Aim, most: int, good: float) -> Answer:
+        """Gauss-Newton steps from the best run so far, halved where a run is worse or fails."""
+        from scipy.optimize import lsq_linear
+        low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
+        best, taken, foretold, before = first, [first], first.wall, 1.0
+        notes: list[str] = []
+        why = f"runs = {most} were used up"
+        while len(taken) + len(notes) < most:
+            try:
+                left, by = aim.residual(best)
+            except InputError as error:
+                if best is first:
+                    raise
+                why = str(error)
+                break
+            if not np.any(np.abs(by * size) > 1e-9):
+                raise InputError("fit: no parameter has an effect on what is fitted")
+            held = _SEARCH.damped * np.linalg.norm(by * size, 2) * np.eye(len(size))     # what has no effect stays
+            step = lsq_linear(np.vstack([by * size, held]), np.append(-left, 0 * size), tol=1e-12,
+                              bounds=((low - best.vector) / size, (high - best.vector) / size)).x * size
+            gain = np.sqrt(np.mean((by @ step) ** 2))
+            better = 1 - np.sum((left + by @ step) ** 2) / np.sum(left**2)
+            if gain < good or better < _SEARCH.worth:
+                why = f"the next step would change the wall by {gain:.1e}" if gain < good else (
+                    f"the next step, within the bounds, would be {100 * max(better, 0.0):.1f} % better")
+                break
+            share, new = 1.0, None
+            while share >= _SEARCH.shortest and len(taken) + len(notes) < most:
+                try:
+                    new = self._run(np.clip(best.vector + share * step, low, high))
+                    taken.append(new)
+                    if aim.cost(new) < aim.cost(best):
+                        break
+                except (InputError, ConvergenceError) as error:
+                    notes.append(str(error).splitlines()[0])
+                share, new = share / 2, None
+            if new is None:
+                why = "no shorter step brings an improvement" if share < _SEARCH.shortest else why
+                break
+            foretold = best.wall + share * (best.derivative("wall")[1] @ step)
+            gained = 1 - aim.cost(new) / aim.cost(best)
+            best = new
+            if max(gained, before) < _SEARCH.worth:     # a first step may lead beyond, to what is hardly better
+                why = f"the last run was {100 * gained:.1f} % better"
+                break
+            before = gained
+            log.info("design: run %d, cost %.3g", len(taken), aim.cost(best))
+        return Answer(first, best, taken, notes, aim.inside, why, foretold, _lack("volume", aim.held, best.volume))
+
+    def least_weight(self, least_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
+        """Search for the least volume of the body with a wall nowhere less than so much (successive linear programs).
+
+        Each iteration minimises the volume along its derivative with the wall as its derivatives foretell it, within a
+        range that shrinks where a run is worse (Palacios-Gomez, Lasdon and Engquist 1982): the wall at every node is a
+        bound, and its least value, which has kinks, is not differentiated.
+
+        Args:
+            least_wall: length; within: reference lengths that count; runs: at most so many.
+
+        Raises:
+            InputError, ConvergenceError: as `fit`.
+        """
+        from scipy.optimize import linprog
+        least, most = positive("least_weight: least_wall", least_wall), count("least_weight: runs", runs)
+        low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
+        first = self._run(self.parameters.start.copy())
+        inside = _inside(first, within)
+        unit = min(least, first.wall[inside].min())
+        best, taken, foretold, reach, why = first, [first], first.wall, 0.25, f"runs = {most} were used up"
+        notes: list[str] = []
+
+        def cost(run: DesignRun) -> float:
+            return run.volume / first.volume + 10 * max(least - run.wall[inside].min(), 0.0) / unit
+        while len(taken) + len(notes) < most:
+            try:
+                wall, by = best.derivative("wall")
+            except InputError as error:
+                if best is first:
+                    raise
+                why = str(error)
+                break
+            grows = best.derivative("volume")[1][0] / first.volume
+            n = len(size)
+            # the wall's lack is one more unknown: there is a solution at any rate
+            rows = np.column_stack([-by[inside] * size, -np.full(inside.sum(), unit)])
+            room = [(max((a - v) / s, -reach), min((b - v) / s, reach))
+                    for a, b, v, s in zip(low, high, best.vector, size)]
+            found = linprog(np.append(grows * size, 10.0), A_ub=rows, b_ub=wall[inside] - least,
+                            bounds=[*room, (0, None)])
+            step = found.x[:n] * size
+            gain = cost(best) - (best.volume / first.volume + found.fun)
+            if gain < 1e-5:
+                why = f"the next step would save {max(gain, 0.0):.1e} of the volume"
+                break
+            try:
+                new = self._run(np.clip(best.vector + step, low, high))
+                taken.append(new)
+                if cost(new) < cost(best):
+                    foretold, best, reach = wall + by @ step, new, min(2 * reach, 1.0)
+                    continue
+            except (InputError, ConvergenceError) as error:
+                notes.append(str(error).splitlines()[0])
+            reach /= 4
+            if reach < 1e-4:
+                why = "no shorter step brings an improvement"
+                break
+        thinnest = best.wall[inside].min()
+        return Answer(first, best, taken, notes, inside, why, foretold,
+                      _lack("least wall", least, min(thinnest, least)))
+
+
+def _lack(what: str, wanted: float | None, found: float) -> str:
+    """What was asked for and not reached, in words, or ""."""
+    if wanted is None or abs(found / wanted - 1) < _SEARCH.kept:
+        return ""
+    return f"the {what} that was asked for, {wanted:.5g}, was not reached: {found:.5g}"
+
+
+class _Aim:
+    """A wanted wall as least squares: relative deviations, and that of the volume where it is held."""
+
+    def __init__(self, run: DesignRun, wall: Any, within: tuple[float, float] | None, held: float | None):
+        self.inside, self.held = _inside(run, within), held
+        self._even = wall is None
+        if not self._even:
+            s = run.profile.reference_length[self.inside]
+            given = wall(s) if callable(wall) else np.full(len(s), finite("fit: wall", wall))
+            self._wanted = np.asarray(given, dtype=float)
+            if self._wanted.shape != s.shape or not np.all(self._wanted > 0):
+                raise InputError("fit: wall: must be greater than 0 at all reference lengths")
+
+    def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
+        """Shape (m,), and its derivatives, (m, n)."""
+        by = run.derivative("wall")[1][self.inside]
+        wall = run.wall[self.inside]
+        wanted = wall.mean() if self._even else self._wanted
+        left = wall / wanted - 1
+        slopes = by / np.reshape(wanted, (-1, 1))
+        if self._even:
+            slopes -= np.outer(wall / wanted**2, by.mean(0))
+        if self.held is not None:
+            grows = run.derivative("volume")[1][0] / self.held
+            weight = _SEARCH.held * np.sqrt(len(left))
+            left = np.append(left, weight * (run.volume / self.held - 1))
+            slopes = np.vstack([slopes, weight * grows])
+        return left, slopes
+
+    def cost(self, run: DesignRun) -> float:
+        """Mean square of the relative deviations, and of the volume's."""
+        wall = run.wall[self.inside]
+        left = np.mean((wall / (wall.mean() if self._even else self._wanted) - 1) ** 2)
+        return float(left + (0.0 if self.held is None else (run.volume / self.held - 1) ** 2))
+
+
+def _inside(run: DesignRun, within: tuple[float, float] | None) -> np.ndarray:
+    s = run.profile.reference_length
+    if within is None:
+        return np.ones(len(s), dtype=bool)
+    low, high = pair("within", within)
+    inside = (s >= low) & (s <= high)
+    if inside.sum() < 2:
+        raise InputError(f"within = {within!r}: has fewer than two places of the sheet, whose reference length goes"
+                         f" from 0 to {s[-1]:.6g}")
+    return inside

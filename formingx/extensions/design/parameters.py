@@ -1,0 +1,161 @@
+"""The numbers that a design may change, and profiles of them along the body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError, count, finite, instance, several
+
+
+class Knots:
+    """A profile over a length from 0 to 1: called with places it gives values; `values` are those of its knots.
+
+    The knots are equidistant; between them it is linear, or a cubic spline (`smooth`).
+    """
+
+    def __init__(self, values: Any, smooth: bool = False):
+        self.values, self.smooth = np.array(values, dtype=float), smooth
+        self.places = np.linspace(0.0, 1.0, len(self.values))
+
+    def __call__(self, s: Any) -> Any:
+        s = np.clip(s, 0.0, 1.0)
+        return self._spline(s) if self.smooth else np.interp(s, self.places, self.values)
+
+    @cached_property
+    def _spline(self) -> Any:
+        from scipy.interpolate import CubicSpline
+        return CubicSpline(self.places, self.values)
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, k: Any) -> Any:
+        return self.values[k]
+
+    def __repr__(self) -> str:
+        return f"Knots({np.array2string(self.values, precision=4, threshold=20)})"
+
+
+@dataclass(frozen=True)
+class Along:
+    """See `along`. start: at the knots, shape (k,); profile: False if it is one number."""
+
+    start: np.ndarray
+    low: float
+    high: float
+    smooth: bool = False
+    profile: bool = True
+
+
+def along(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, smooth: bool = False) -> Along:
+    """A parameter of a design that is a profile of so many equidistant knots: of thickness, temperature, a constant.
+
+    The function that makes the scene gets it as a function of a length from 0 to 1, see `Knots`.
+
+    Args:
+        knots: at least 2, with `smooth` 4.
+        start: a number, or one for each knot.
+        low, high: bounds of every knot.
+        smooth: a cubic spline through the knots, not straight lines.
+
+    Raises:
+        InputError: an argument that is not allowed.
+
+    >>> fx.along(3, start=2.0, low=1.0).start.tolist()
+    [2.0, 2.0, 2.0]
+    """
+    least = 4 if instance("along: smooth", smooth, bool, "True or False") else 2
+    if count("along: knots", knots) < least:
+        raise InputError(f"along: knots = {knots}: must be at least {least}")
+    values = [start] * knots if np.ndim(start) == 0 else several("along: start", start, "numbers")
+    if len(values) != knots:
+        raise InputError(f"along: start has {len(values)} numbers: must be one for each of {knots} knots")
+    at = np.array([finite("along: start", v) for v in values])
+    _check_bounds("along", at, low, high)
+    return Along(at, float(low), float(high), smooth)
+
+
+class Parameters:
+    """Those of a design, one after the other in a vector of n numbers.
+
+    Args:
+        given: {name: (start, low, high), a number, or what `along` returned}.
+
+    Attributes:
+        names: of the numbers, such as "travel" or "wall[3]"; start, low, high: shape (n,); size: what counts as one of
+            each: by how much a bounded one may change, else its start, else 1, shape (n,).
+    """
+
+    def __init__(self, given: Mapping[str, Any]):
+        if not isinstance(given, Mapping) or not given:
+            raise InputError("Design: parameters: must be {name: (start, low, high) or fx.along(...)}, at least one")
+        self._given: dict[str, Along] = {}
+        self.names: list[str] = []
+        for name, one in given.items():
+            if not isinstance(name, str):
+                raise InputError(f"Design: parameter {name!r}: must be a name")
+            self._given[name] = one = one if isinstance(one, Along) else _number(name, one)
+            self.names += [f"{name}[{k}]" for k in range(len(one.start))] if one.profile else [name]
+        all_of = list(self._given.values())
+        self.start = np.concatenate([one.start for one in all_of])
+        self.low = np.concatenate([np.full(len(one.start), one.low) for one in all_of])
+        self.high = np.concatenate([np.full(len(one.start), one.high) for one in all_of])
+        width = self.high - self.low
+        self.size = np.where(np.isfinite(width) & (width > 0), width, np.where(self.start != 0, abs(self.start), 1.0))
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def profiles(self) -> dict[str, tuple[float, float]]:
+        """Bounds of those that are profiles, by name."""
+        return {name: (one.low, one.high) for name, one in self._given.items() if one.profile}
+
+    def values(self, vector: np.ndarray) -> dict[str, Any]:
+        """What the user's function is called with."""
+        parts = np.split(vector, np.cumsum([len(one.start) for one in self._given.values()])[:-1])
+        return {name: Knots(part, one.smooth) if one.profile else float(part[0])
+                for (name, one), part in zip(self._given.items(), parts)}
+
+    def vector(self, values: Mapping[str, Any]) -> np.ndarray:
+        """The numbers of some parameters, the others at their start, shape (n,)."""
+        found, first = self.start.copy(), 0
+        for name in values:
+            if name not in self._given:
+                raise InputError(f"Design: parameter {name!r} is not known; known: {', '.join(self._given)}")
+        for name, one in self._given.items():
+            n = len(one.start)
+            if name in values:
+                given = values[name]
+                given = given.values if isinstance(given, Knots) else np.atleast_1d(given)
+                if given.shape not in ((n,), (1,)):
+                    raise InputError(f"Design: {name} = {values[name]!r}: must be {n} number{'s' * (n > 1)}")
+                given = [finite(f"Design: {name}", one) for one in given.tolist()]
+                found[first: first + n] = given
+            first += n
+        return found
+
+
+def _number(name: str, given: Any) -> Along:
+    parts: Sequence[Any] = (given, -np.inf, np.inf) if np.ndim(given) == 0 else tuple(given)
+    if len(parts) != 3:
+        raise InputError(f"Design: {name} = {given!r}: must be a number, (start, low, high) or fx.along(...)")
+    start = np.array([finite(f"Design: {name}: start", parts[0])])
+    _check_bounds(f"Design: {name}", start, parts[1], parts[2])
+    return Along(start, float(parts[1]), float(parts[2]), profile=False)
+
+
+def _check_bounds(who: str, start: np.ndarray, low: Any, high: Any) -> None:
+    try:
+        low, high = float(low), float(high)
+    except (TypeError, ValueError):
+        raise InputError(f"{who}: low = {low!r}, high = {high!r}: must be numbers") from None
+    if not low < high:
+        raise InputError(f"{who}: low = {low:g}, high = {high:g}: the first must be below the second")
+    if not np.all((start >= low) & (start <= high)):
+        raise InputError(f"{who}: start = {start if len(start) > 1 else start[0]}: must be from {low:g} to {high:g}")

@@ -1,0 +1,164 @@
+"""One HTML file of a run of a design, or of what a search came to: walls, pattern, derivatives."""
+
+import datetime
+import html
+from collections.abc import Mapping
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from ...contact.tooling import Tooling
+from ...figures import figure, tools
+from ...results import files
+from ...results.show import page, plots
+
+
+def of_answer(answer: Any, file: Any, title: str, deviations: Mapping[str, float] | None) -> FilePath:
+    """See `Answer.report`."""
+    before, best, (a, b) = answer.before, answer.best, answer.cv
+    effects, spread = best.sensitivities("wall"), best.spread(deviations) if deviations else None
+    attainable, met, none = answer.attainable(), answer.at_bounds(), answer.without_effect()
+    walls = [run.wall[answer.inside] for run in (before, best)]
+    off = abs(answer.foretold - best.wall)[answer.inside].max() / walls[1].mean()
+    cards = [(f"{a:.3g} → {b:.3g}", "unevenness, standard deviation over mean of the wall"),
+             (f"{walls[0].min():.4g} → {walls[1].min():.4g}", "least wall"),
+             (f"{before.volume:.4g} → {best.volume:.4g}", "volume of the body at rest"),
+             (str(answer.paths), "runs were taken")]
+    said = [("bad", text) for text in [answer.lack, *(text for kind, text in best.path.doubts() if kind == "serious")]]
+    said += [("", f"A run failed: {text}") for text in answer.failed]
+    said += [("", f"At bounds: {', '.join(met)}.")] * bool(met)
+    said += [("", f"Without effect on the wall: {', '.join(none)}.")] * bool(none)
+    how = [f"Why it ended: {answer.why}.",
+           f"The run before the best predicted its wall to {100 * off:.2g} %.",
+           f"By the derivatives of the best run, these parameters could bring the unevenness to {attainable:.3g},"
+           f" whatever the volume; it is {b:.3g}."]
+    rows = [[str(k), *(page.number(v) for v in (one.wall[answer.inside].std() / one.wall[answer.inside].mean(),
+             one.wall[answer.inside].min(), one.wall[answer.inside].mean(), one.volume))]
+            for k, one in enumerate(answer.runs, 1)]
+    runs = page.table(["run", "unevenness", "least wall", "mean wall", "volume"], rows)
+
+    def pictures() -> list[str]:
+        return [_sections([before, best], ["before", "after"]), _walls(answer, spread, deviations),
+                _patterns(before, best), _heat_map(effects)]
+    tail = ["<h2>Runs of the search</h2>", runs]
+    return _write(file, title or "Report of a design", how, cards, said, pictures, _effects(best, effects, before),
+                  tail, best.path.problem.comm)
+
+
+def of_run(run: Any, file: Any, title: str, deviations: Mapping[str, float] | None) -> FilePath:
+    """See `DesignRun.report`."""
+    effects, spread = run.sensitivities("wall"), run.spread(deviations) if deviations else None
+    wall = run.wall
+    cards = [(f"{wall.std() / wall.mean():.3g}", "unevenness, standard deviation over mean of the wall"),
+             (f"{wall.min():.4g}", "least wall"), (f"{run.volume:.4g}", "volume of the body at rest")]
+    said = [("bad", text) for kind, text in run.path.doubts() if kind == "serious"]
+
+    def pictures() -> list[str]:
+        drawing, axes = figure(1, width=9, height=4)
+        _line(axes, run, "C0", "wall", spread, deviations)
+        return [_sections([run], ["the part"]), page.figure(drawing, "Wall over the reference length."),
+                _heat_map(effects)]
+    return _write(file, title or "Report of a run", ["One run and what changes it."], cards, said, pictures,
+                  _effects(run, effects), [], run.path.problem.comm)
+
+
+def _write(file: Any, title: str, how: list[str], cards: list, said: list, pictures: Any, table: str, tail: list[str],
+           comm: Any) -> FilePath:
+    def make() -> None:
+        body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{html.escape(' '.join(how))}</p>"]
+        body += [f"<div class='note{' bad' * (kind == 'bad')}'>{page.lines(text)}</div>" for kind, text in said if text]
+        body.append("<div class=cards>" + "".join(
+            f"<div class=card><b>{html.escape(value)}</b><span>{html.escape(what)}</span></div>"
+            for value, what in cards) + "</div>")
+        body += [*pictures(), "<h2>Parameters and their effects</h2>", table, *tail, "<h2>Made with</h2>", page.table(
+            ["", ""], [["date", datetime.datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z")],
+                       *([k, str(v)] for k, v in files.versions().items())])]
+        files.replace(file, lambda stream: stream.write(page.page(title, body)))
+    files.on_root(comm, make)
+    return FilePath(file)
+
+
+def _sections(runs: list[Any], names: list[str]) -> str:
+    """The parts side by side, coloured by their wall."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    shapes = [run.profile for run in runs]
+    low, high = plots.span(shapes)
+    colours = Normalize(min(s.wall_thickness.min() for s in shapes), max(s.wall_thickness.max() for s in shapes))
+    wide = float(np.clip(5 * (high - low)[0] / (high - low)[1], 3.0, 9.0))
+    drawing, axes = figure(len(runs), width=wide, height=max(5 * wide / 9, 3.2) if wide == 9 else 5.4)
+    for one, run, shape, name in zip(np.atleast_1d(axes), runs, shapes, names):
+        tooling, last = Tooling.of_problem(run.path.problem), run.path.last
+        tools(one, tooling.placed(tooling.travels(last.setting, last.control)), low, high)
+        plots.section(one, shape, (1, 1), colormaps["viridis_r"](colours(shape.wall_thickness)))
+        one.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="r", ylabel="z", title=name)
+    bar = drawing.colorbar(ScalarMappable(colours, "viridis_r"), ax=axes, shrink=0.8, label="wall")
+    bar.outline.set_visible(False)
+    return "<h2>The part</h2>" + page.figure(drawing, "Sections, coloured by the wall.")
+
+
+def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations: Any) -> None:
+    s = run.profile.reference_length
+    axes.plot(s, run.wall, color=colour, label=label)
+    if spread is not None:
+        said = ", ".join(f"{name} ± {size:g}" for name, size in deviations.items())
+        axes.fill_between(s, run.wall - spread, run.wall + spread, color=colour, alpha=0.2, linewidth=0,
+                          label=f"± standard deviation, of {said}")
+    axes.set(xlabel="reference length", ylabel="wall", ylim=(0, None))
+    axes.legend()
+
+
+def _walls(answer: Any, spread: Any, deviations: Any) -> str:
+    drawing, axes = figure(1, width=9, height=4)
+    s = answer.best.profile.reference_length
+    axes.plot(s, answer.before.wall, color="0.6", label="before")
+    axes.plot(s, answer.foretold, "--", color="C1", linewidth=1, label="predicted by the run before the best")
+    if not np.all(answer.inside):
+        axes.axvspan(*s[answer.inside][[0, -1]], color="0.96", zorder=0, label="what counts")
+    _line(axes, answer.best, "C0", "after", spread, deviations)
+    return "<h2>The wall</h2>" + page.figure(drawing, "Wall over the reference length, before and after.")
+
+
+def _patterns(before: Any, best: Any) -> str:
+    """Every profile over its knots."""
+    found = best.parameters.profiles
+    if not found:
+        return ""
+    drawing, axes = figure(len(found), width=9 if len(found) == 1 else 5.5, height=3.6)
+    for one, (name, (low, high)) in zip(np.atleast_1d(axes), found.items()):
+        s = np.linspace(0, 1, 201)
+        for run, colour, label in ((before, "0.6", "before"), (best, "C0", "after")):
+            profile = run.values[name]
+            one.plot(s, profile(s), color=colour, label=label)
+            one.plot(profile.places, profile.values, "o", color=colour, markersize=4)
+        for bound in (low, high):
+            if np.isfinite(bound):
+                one.axhline(bound, color="0.5", linestyle=":", linewidth=1)
+        one.set(xlabel="part of the length", ylabel=name)
+        one.legend()
+    return "<h2>The pattern</h2>" + page.figure(drawing, "Profiles and their knots, before and after; dotted: bounds.")
+
+
+def _heat_map(effects: Any) -> str:
+    drawing, axes = figure(1, width=9, height=float(np.clip(1.6 + 0.28 * len(effects.names), 2.6, 9)))
+    effects.plot(axes)
+    return "<h2>What changes the wall, and where</h2>" + page.figure(
+        drawing, "Change of the wall that the derivatives predict where a parameter changes by a tenth of its range.")
+
+
+def _effects(run: Any, effects: Any, before: Any = None) -> str:
+    """A row for every parameter."""
+    p, tenth = run.parameters, effects.by * effects.sizes / 10
+    thin, grows = int(np.argmin(effects.value)), run.derivative("volume")[1][0] * p.size / 10
+    head = ["", *(["before", "after"] if before else ["value"]), "least", "most", "mean wall", "least wall",
+            "largest change", "volume"]
+    most = tenth[abs(tenth).argmax(0), np.arange(len(p))]
+    rows = [[name, *([page.number(before.vector[k])] if before else []),
+             *(page.number(v) for v in (run.vector[k], p.low[k], p.high[k])),
+             *(f"{v:.3g}" for v in (tenth[:, k].mean(), tenth[thin, k], most[k], grows[k]))]
+            for k, name in enumerate(p.names)]
+    return page.table(head, rows) + ("<p class=lead>Changes that a tenth of the range of a parameter makes, to first"
+                                     " order: of the mean and of the least wall, the largest anywhere, of the volume."
+                                     "</p>")

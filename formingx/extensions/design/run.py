@@ -1,0 +1,225 @@
+"""One run of a design, and the derivatives of what it came to by all parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from ...errors import InputError, non_negative
+from ...results.evaluate.profile import Profile, Profiles
+from ...results.path import Path
+from ...solve.arc_length import Curve
+from ...solve.newton import Failure, Tolerances
+from ...solve.record import Record
+from .carry import carry
+from .neighbours import Apart, Neighbour
+from .parameters import Parameters
+
+_SMOOTH = 1e-5
+"""Change of a parameter, over its size, to the neighbours of a scene without contact, one above and one below."""
+
+_CLOSER = (1e-8, 1e-9, 1e-10)
+"""With contact, which acts within a thin ramp, to one neighbour: one change after the other until all are found. (So
+near, a difference to one side leaves nothing out.)"""
+
+
+@dataclass(frozen=True)
+class Effects:
+    """Derivatives of one measure: of shape (m,) by n parameters.
+
+    names: of the parameters; sizes: their ranges (else their starts), shape (n,); places: what the rows are at (a
+    length, or nothing); value: shape (m,); by: (m, n).
+    """
+
+    measure: str
+    names: list[str]
+    sizes: np.ndarray
+    places: np.ndarray
+    value: np.ndarray
+    by: np.ndarray
+
+    def __str__(self) -> str:
+        rows = np.unique(np.linspace(0, len(self.value) - 1, min(len(self.value), 12)).round().astype(int))
+        lines = ["".join([f"{'at':>10}{self.measure[:10]:>12}", *(f"{name[:11]:>12}" for name in self.names)])]
+        lines += ["".join([f"{self.places[k]:10.4g}{self.value[k]:12.5g}", *(f"{d:12.4g}" for d in self.by[k])])
+                  for k in rows]
+        return "\n".join(lines)
+
+    __repr__ = __str__
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw a heat map: by how much the measure changes, to first order, where a parameter goes over a tenth of its
+        range; returns the matplotlib axes."""
+        from ...figures import figure
+        axes = axes if axes is not None else figure()[1]
+        tenth, n = (self.by * self.sizes / 10).T, len(self.names)
+        most, places = abs(tenth).max() or 1.0, self.places if len(self.places) > 1 else np.array([0.0, 1.0])
+        edges = np.concatenate([places[:1], (places[1:] + places[:-1]) / 2, places[-1:]])
+        drawn = axes.pcolormesh(edges, np.arange(n + 1) - 0.5, tenth if len(self.places) > 1 else tenth.repeat(2, 1),
+                                cmap="RdBu_r", vmin=-most, vmax=most)
+        axes.set(yticks=range(n), yticklabels=self.names, xlabel="reference length" if self.measure == "wall" else "")
+        axes.invert_yaxis()
+        axes.grid(False)
+        axes.figure.colorbar(drawn, ax=axes, label=f"change of the {self.measure}").outline.set_visible(False)
+        return axes
+
+
+class DesignRun:
+    """A run of what the user's function makes of some values.
+
+    Attributes:
+        vector: the numbers of the parameters, shape (n,); values: the same by name; parameters: what they are
+            (`Parameters`); path: the `Path`.
+    """
+
+    def __init__(self, make: Callable[[np.ndarray], tuple[Any, Any]], parameters: Parameters, vector: np.ndarray,
+                 path: Path, end: Any, tolerances: Tolerances | None):
+        self._make, self.parameters, self.vector, self.path, self._end = make, parameters, vector, path, end
+        self._tolerances = tolerances or Tolerances()
+        self.values = parameters.values(vector)
+
+    @cached_property
+    def profile(self) -> Profile:
+        """Of the last state."""
+        return self.path.profile()
+
+    @cached_property
+    def _profiles(self) -> Profiles:
+        return Profiles(self.path.problem)
+
+    @property
+    def wall(self) -> np.ndarray:
+        """Thickness of the last state at the nodes of the bottom face, shape (k,), length."""
+        return self.profile.thickness
+
+    @property
+    def volume(self) -> float:
+        """Of the whole body at rest."""
+        return float(self.path.problem.forms.volume)
+
+    @cached_property
+    def _neighbours(self) -> list[tuple[list[Neighbour], float]]:
+        """For each parameter neighbours, solved for to the last state: one above, or one above and one below; how far
+        the first is from the last, or from the run."""
+        contact, reason = bool(self.path.problem.contacts), ""
+        for size in _CLOSER if contact else (_SMOOTH,):
+            made = []
+            for k, step in enumerate(size * self.parameters.size):
+                ways = (-1.0 if self.vector[k] + step > self.parameters.high[k] else 1.0,) if contact else (1.0, -1.0)
+                made.append(([self._beside(k, way * step) for way in ways], ways[0] * step * len(ways)))
+            try:
+                carry(self.path, self._end, [one for beside, _ in made for one in beside])
+            except Apart as failure:
+                reason = failure.reason
+            except Failure as failure:
+                reason = failure.reason
+                break
+            else:
+                return made
+        raise InputError(f"Design: this run has no derivative: {reason}")
+
+    def _beside(self, k: int, step: float) -> Neighbour:
+        """A neighbour, one parameter changed; not solved for."""
+        moved, name = self.vector.copy(), self.parameters.names[k]
+        moved[k] += step
+        try:
+            return Neighbour(*self._make(moved), self.path.problem, name)
+        except InputError as error:
+            raise InputError(f"Design: no derivative by {name}: next to its value {self.vector[k]:.6g} build(...)"
+                             f" fails: {error}") from None
+
+    def derivative(self, measure: Any) -> tuple[np.ndarray, np.ndarray]:
+        """A measure of the last state, shape (m,), and its derivatives by the parameters, shape (m, n).
+
+        Args:
+            measure: "wall" (thickness at the nodes of the bottom face), "volume" (of the body at rest), a column of the
+                path, or a function of a path that looks at its last state.
+
+        Raises:
+            InputError: the run has no derivative, or the measure looks at more than the last state.
+        """
+        here, by = self._here(measure), []
+        for beside, apart in self._neighbours:
+            first, *other = (np.atleast_1d(self._at(one, measure)) for one in beside)
+            by.append((first - (other[0] if other else here)) / apart)
+        return here, np.stack(by, axis=-1)
+
+    def sensitivities(self, measure: Any = "wall") -> Effects:
+        """`derivative` as a table, of the wall over the reference length."""
+        value, by = self.derivative(measure)
+        places = self.profile.reference_length if measure == "wall" else np.arange(float(len(value)))
+        name = measure if isinstance(measure, str) else getattr(measure, "__name__", "measure")
+        return Effects(name, self.parameters.names, self.parameters.size, places, value, by)
+
+    def spread(self, deviations: Mapping[str, float], measure: Any = "wall") -> np.ndarray:
+        """Standard deviation of a measure, to first order, where parameters scatter independently, shape (m,).
+
+        deviations: {parameter: its standard deviation}; of a profile that of every knot.
+        """
+        by = self.derivative(measure)[1]
+        sizes = np.zeros(len(self.parameters))
+        for name, size in deviations.items():
+            mine = [k for k, one in enumerate(self.parameters.names) if one == name or one.startswith(f"{name}[")]
+            if not mine:
+                raise InputError(f"spread: parameter {name!r} is not known; known: {', '.join(self.values)}")
+            sizes[mine] = non_negative(f"spread: {name}", size)
+        return np.sqrt((by**2) @ sizes**2)
+
+    def report(self, file: Any = "design.html", title: str = "", *,
+               deviations: Mapping[str, float] | None = None) -> FilePath:
+        """Write one HTML file: the part, its wall, and what changes it (rank 0 writes); returns where it is.
+
+        deviations: {parameter: its standard deviation}, as of constants that were fitted: the wall is drawn with its
+            `spread`.
+
+        Raises:
+            InputError: the run has no derivative. OSError: the file cannot be written.
+        """
+        from .report import of_run
+        return of_run(self, file, title, deviations)
+
+    def _here(self, measure: Any) -> np.ndarray:
+        if isinstance(measure, str):
+            if measure in ("wall", "volume"):
+                return np.atleast_1d(getattr(self, measure))
+            return self.path[measure][-1:]
+        found = measure(self.path) if callable(measure) else None
+        try:
+            whole = np.atleast_1d(np.asarray(found, dtype=float))
+        except (TypeError, ValueError):
+            whole = np.array(np.nan)
+        if not np.all(np.isfinite(whole)):
+            raise InputError(f"Design: measure {measure!r} is {found!r}: must be 'wall', 'volume', a column of the"
+                             f" path, or a function of it that gives finite numbers")
+        short = _of_one(self.path.last, Record(self.path.problem, self.path.record.curve))
+        if not np.allclose(whole, measure(short), rtol=1e-9, atol=0):
+            raise InputError("Design: a measure must be one of the last state alone: this function of the path looks at"
+                             " earlier states too, whose derivatives are not kept")
+        return whole
+
+    def _at(self, one: Neighbour, measure: Any) -> Any:
+        if measure == "volume":
+            return one.problem.forms.volume
+        state = one.state(self.path.last)
+        if measure == "wall":
+            mine, its = (problem.scene.mesh.domain.geometry.x for problem in (self.path.problem, one.problem))
+            same = self.path.problem.comm.allreduce(np.array_equal(mine, its), MPI.LAND)
+            return (self._profiles if same else Profiles(one.problem)).of(state).thickness
+        if one.path is None:
+            one.path = _of_one(state, Record(one.problem, Curve(one.problem, self._tolerances)))
+        return one.path[measure] if isinstance(measure, str) else np.asarray(measure(one.path), dtype=float)
+
+
+def _of_one(state: Any, record: Record) -> Path:
+    """A path of one state."""
+    path = Path(record)
+    record.segments[-1].states.append(state)
+    for told in record.on_state:
+        told(state)
+    return path

@@ -1,0 +1,54 @@
+"""Data and fitted material in one picture."""
+
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...figures import figure
+
+
+def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -> Any:
+    """See `Fit.plot`."""
+    held = [] if isinstance(data, dict) else [np.ptp(test.stretches) == 0 for test in data]
+    count = 1 + (any(held) and not all(held))
+    if axes is None:
+        axes = figure(count)[1]
+    panels = np.ravel(axes)
+    if len(panels) != count:
+        raise InputError(f"Fit.plot: axes: {len(panels)} given: these tests need {count}, one for relaxation tests"
+                         f" (held stretch), one for the others")
+    if isinstance(data, dict):
+        _stretched(material, data, panels[0])
+    else:
+        _timed(material, data, held, panels)
+    label = "nominal stress" + f" ({unit})" * bool(unit)
+    for i, panel in enumerate(panels):
+        in_time = any(held) and i == 0
+        panel.set(xlabel=f"time ({unit_of_time})" if in_time else "stretch", ylabel=label)
+        panel.legend()
+    return axes
+
+
+def _stretched(material: Any, data: dict, panel: Any) -> None:
+    for mode, (l, P) in data.items():
+        points, = panel.plot(l, P, "o", ms=4, label=mode.replace("_", " "))
+        fine = np.linspace(min(1, np.min(l)), np.max(l), 200)
+        panel.plot(fine, material.stress(mode, fine), color=points.get_color())
+
+
+def _timed(material: Any, tests: Any, held: list[bool], panels: Any) -> None:
+    """Tests that are held on the first panel, against a logarithmic time; the others on the last."""
+    for i, (test, still) in enumerate(zip(tests, held), 1):
+        panel = panels[0] if still else panels[-1]
+        t, l = np.asarray(test.times, float), np.asarray(test.stretches, float)
+        x, label = (t - t[0], f"stretch {l[0]:g}") if still else (l, _rate(t, l))
+        points, = panel.plot(x, test.stress, "o", ms=4, label=f"{i} {test.mode.replace('_', ' ')}, {label}")
+        panel.plot(x, material.stress(test.mode, l, times=t, between=test.between), color=points.get_color())
+        if still:
+            panel.set_xscale("log")
+
+
+def _rate(times: np.ndarray, stretches: np.ndarray) -> str:
+    """The mean Hencky rate, for a legend."""
+    return f"rate {abs(np.log(stretches[-1] / stretches[0])) / (times[-1] - times[0]):.3g}"

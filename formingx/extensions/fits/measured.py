@@ -1,0 +1,88 @@
+"""Tests from a file: columns test, stretch, stress, and time if there is any."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import InputError, known
+from ...io.csv_files import name_and_unit, records
+from ...io.numerals import is_number
+from ...materials.homogeneous import MODES
+from ...units import STRESSES
+
+_NAMES = {"test": "test", "mode": "test", "stretch": "stretch", "stress": "stress", "nominal stress": "stress",
+          "engineering stress": "stress", "time": "time"}
+_ORDER = ("test", "stretch", "stress", "time")
+_UNITS = {"stress": tuple(STRESSES), "time": ("s", "ms", "min", "h")}
+
+
+def read_tests(file: Path) -> list[tuple[str, np.ndarray]]:
+    """[(test, columns)] of a CSV file, each test of rows that follow one another; see `fit`.
+
+    Columns is (stretch, stress), or (stretch, stress, time), shape (2 or 3, n); stresses left empty are not numbers.
+
+    Raises:
+        InputError: a file that cannot be read, has no rows, a header without these columns or with another unit, or a
+            row that is not of this form.
+    """
+    who = f"fit: data: {file}"
+    try:
+        rows = records(file)
+    except InputError as error:
+        raise InputError(f"fit: data: {error}") from None
+    head = rows[0][1] if rows and rows[0][1][0] not in MODES and not any(map(is_number, rows[0][1])) else None
+    body = rows if head is None else rows[1:]
+    if not body:
+        raise InputError(f"{who}: has no rows of test, stretch, stress")
+    width = len(body[0][1]) if head is None else len(head)
+    columns = list(range(width)) if head is None else _columns(who, head)
+    points = [(_mode(f"{who}, line {n}", row, width, columns), _numbers(f"{who}, line {n}", row, columns))
+              for n, row in body]
+    numbered = zip(_counted(points), points)
+    return [(group[0][1][0], np.array([numbers for _, (_, numbers) in group]).T)
+            for group in (list(found) for _, found in itertools.groupby(numbered, key=lambda x: x[0]))]
+
+
+def _columns(who: str, head: list[str]) -> list[int]:
+    """Where test, stretch, stress, and time if there is any, are, by their names in the first line."""
+    found: dict[str, int] = {}
+    for k, cell in enumerate(head):
+        words, unit = name_and_unit(cell)
+        name = _NAMES.get(" ".join(words.lower().replace("_", " ").split()), "")
+        if name in found:
+            raise InputError(f"{who}: the first line names two columns {name!r}")
+        if name and unit is not None and unit not in _UNITS.get(name, ()):
+            raise InputError(f"{who}: column {name!r} is in {unit!r}: must be"
+                             f" {'in one of ' + ', '.join(_UNITS[name]) if name in _UNITS else 'without a unit'}")
+        found |= {name: k} if name else {}
+    missing = [name for name in _ORDER[:3] if name not in found]
+    if missing:
+        raise InputError(f"{who}: the first line names the columns {', '.join(map(repr, head))}: no {missing[0]!r};"
+                         f" must be test, stretch (length over first length), stress (nominal), and time if any")
+    return [found[name] for name in _ORDER if name in found]
+
+
+def _mode(where: str, row: list[str], width: int, columns: list[int]) -> str:
+    if len(row) != width or len(columns) not in (3, 4):
+        raise InputError(f"{where}: has {len(row)} columns: must be test, stretch, stress or test, stretch, stress,"
+                         f" time, the same in all lines")
+    known(f"{where}: test", row[columns[0]], MODES)
+    return row[columns[0]]
+
+
+def _numbers(where: str, row: list[str], columns: list[int]) -> list[float]:
+    cells = [row[k] for k in columns[1:]]
+    for i, cell in enumerate(cells):
+        if not is_number(cell) and not (cell == "" and i == 1 and len(cells) == 3):
+            raise InputError(f"{where}: {cell!r}: must be a number")
+    return [float(cell or "nan") for cell in cells]
+
+
+def _counted(points: list[tuple[str, list[float]]]) -> list[int]:
+    """A number for each point, higher by one where the test changes or time begins again."""
+    found, n = [], 0
+    for (mode, row), (before, last) in zip(points, [points[0], *points]):
+        n += mode != before or len(row) == 3 and row[2] < last[2]
+        found.append(n)
+    return found

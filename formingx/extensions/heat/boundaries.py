@@ -1,0 +1,186 @@
+"""What a body is made of for heat, and what its faces and its inside receive: one law each.
+
+A flux is heat into the body per area of the deformed face and time. All numbers are in one consistent set of units, the
+mesh's unit of length among them. What is said to be "a number or a table over R" may be a `formingx.table` of the
+reference radius.
+"""
+
+from typing import Any
+
+from ...errors import InputError, finite, non_negative, positive
+from ...values.table import Table
+
+STEFAN_BOLTZMANN = 5.670374419e-8
+"""W/(m2 K4)."""
+
+
+class ThermalProperties:
+    """What heat needs to know of a material.
+
+    Args:
+        conductivity: k, heat per time, length and degree.
+        density: of the reference body, mass per volume.
+        heat_capacity: per mass and degree. (In SI: W/(m K), kg/m3, J/(kg K).)
+
+    Raises:
+        InputError: a number that is not above 0.
+
+    >>> fx.ThermalProperties(conductivity=0.2e-3, density=1e-3, heat_capacity=2.0)      # W/(mm K), g/mm3, J/(g K)
+    ThermalProperties(conductivity=0.0002, density=0.001, heat_capacity=2.0)
+    """
+
+    def __init__(self, *, conductivity: float, density: float, heat_capacity: float):
+        self.conductivity = positive("ThermalProperties: conductivity", conductivity)
+        self.density = positive("ThermalProperties: density", density)
+        self.heat_capacity = positive("ThermalProperties: heat_capacity", heat_capacity)
+
+    @property
+    def diffusivity(self) -> float:
+        """k/(density heat_capacity), length^2/time."""
+        return self.conductivity / (self.density * self.heat_capacity)
+
+    def __repr__(self) -> str:
+        return (f"ThermalProperties(conductivity={self.conductivity!r}, density={self.density!r},"
+                f" heat_capacity={self.heat_capacity!r})")
+
+
+class _Boundary:
+    """A law of a face. parameters: {name: number or Table over R}; temperatures: names of those that are some."""
+
+    parameters: dict[str, float | Table]
+    temperatures: tuple[str, ...] = ()
+    quadrature_degree = 5
+
+    def __init__(self, on: str, **parameters: Any):
+        self.on = on
+        who = f"{type(self).__name__}({on!r})"
+        self.parameters = {name: value if isinstance(value, Table) else finite(f"{who}: {name}", value)
+                           for name, value in parameters.items()}
+
+    def _between(self, name: str, low: float, high: float = float("inf")) -> None:
+        value = self.parameters[name]
+        for number in value.y if isinstance(value, Table) else [value]:
+            if not low <= number <= high:
+                allowed = f"at least {low:g}" if high == float("inf") else f"from {low:g} to {high:g}"
+                raise InputError(f"{type(self).__name__}({self.on!r}): {name} = {float(number)!r}: must be {allowed}")
+
+    def check(self, mesh: Any, absolute_zero: float) -> None:
+        """An InputError unless temperatures are above absolute zero and tables cover the boundary."""
+        for name, value in self.parameters.items():
+            if name in self.temperatures:
+                self._between(name, absolute_zero)
+            if isinstance(value, Table):
+                value.check(mesh.nodes_of(self.on)[:, 0], f"R on {self.on!r}")
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.on!r}, {', '.join(f'{k}={v!r}' for k, v in self.parameters.items())})"
+
+
+class Convection(_Boundary):
+    """Air along a face: flux h (air - T).
+
+    Args:
+        on: name of the boundary.
+        h: heat transfer coefficient, heat per time, area and degree; air: temperature; numbers or tables over R.
+
+    >>> fx.Convection("top", h=2e-5, air=fx.table({0.0: 25.0, 10.0: 20.0}))              # W/(mm2 K); by R
+    Convection('top', h=2e-05, air=table({0: 25, 10: 20}))
+    """
+
+    temperatures = ("air",)
+
+    def __init__(self, on: str, *, h: float | Table, air: float | Table):
+        super().__init__(on, h=h, air=air)
+        self._between("h", 0.0)
+
+    def flux(self, T, absolute_zero, h, air):
+        """Heat into the face, UFL."""
+        return h * (air - T)
+
+
+class Radiation(_Boundary):
+    """A grey face before a black heater: flux view_factor emissivity sigma (heater^4 - T^4), from absolute zero.
+
+    Args:
+        on: name of the boundary.
+        emissivity, view_factor: from 0 to 1; heater: temperature; numbers or tables over R.
+        stefan_boltzmann: sigma in the units of the run: 5.670374419e-8 in W/(m2 K4), 5.670374419e-14 in W/(mm2 K4).
+
+    >>> fx.Radiation("top", emissivity=0.9, heater=600.0, stefan_boltzmann=5.67e-14)      # W/(mm2 K4)
+    Radiation('top', emissivity=0.9, heater=600.0, view_factor=1.0, stefan_boltzmann=5.67e-14)
+    """
+
+    temperatures = ("heater",)
+    quadrature_degree = 9                          # T^4 on P2 edges
+
+    def __init__(self, on: str, *, emissivity: float | Table, heater: float | Table, view_factor: float | Table = 1.0,
+                 stefan_boltzmann: float = STEFAN_BOLTZMANN):
+        super().__init__(on, emissivity=emissivity, heater=heater, view_factor=view_factor,
+                         stefan_boltzmann=positive(f"Radiation({on!r}): stefan_boltzmann", stefan_boltzmann))
+        self._between("emissivity", 0.0, 1.0)
+        self._between("view_factor", 0.0, 1.0)
+
+    def flux(self, T, absolute_zero, emissivity, heater, view_factor, stefan_boltzmann):
+        """Heat into the face, UFL."""
+        kelvin = (heater - absolute_zero, T - absolute_zero)
+        return view_factor * emissivity * stefan_boltzmann * (kelvin[0] ** 4 - kelvin[1] ** 4)
+
+
+class HeatFlux(_Boundary):
+    """A given flux into a face.
+
+    Args:
+        on: name of the boundary.
+        flux: heat per time and area, number or table over R; negative takes heat out.
+
+    >>> fx.HeatFlux("top", flux=1e-3)
+    HeatFlux('top', flux=0.001)
+    """
+
+    def __init__(self, on: str, *, flux: float | Table):
+        super().__init__(on, flux=flux)
+
+    def flux(self, T, absolute_zero, flux):
+        """Heat into the face, UFL."""
+        return flux
+
+
+class FixedTemperature(_Boundary):
+    """A face held at a temperature from the start on.
+
+    Args:
+        on: name of the boundary.
+        temperature: number or table over R.
+
+    >>> fx.FixedTemperature("rim", temperature=80.0)
+    FixedTemperature('rim', temperature=80.0)
+    """
+
+    temperatures = ("temperature",)
+
+    def __init__(self, on: str, *, temperature: float | Table):
+        super().__init__(on, temperature=temperature)
+
+
+class Absorption:
+    """Radiation that goes through a face and is absorbed in the depth x below it (Beer and Lambert's law).
+
+    Heat per deformed volume and time: flux coefficient exp(-coefficient x), x the distance to the deformed face. What
+    comes out at the other face is lost.
+
+    Args:
+        on: name of the boundary that it comes in through; for both sides, give two.
+        flux: what enters, heat per time and area.
+        coefficient: 1/length, above 0.
+
+    >>> fx.Absorption("top", flux=2e-3, coefficient=1.5)                           # W/mm2, 1/mm
+    Absorption('top', flux=0.002, coefficient=1.5)
+    """
+
+    def __init__(self, on: str, *, flux: float, coefficient: float):
+        self.on = on
+        self.flux = non_negative(f"Absorption({on!r}): flux", flux)
+        self.coefficient = positive(f"Absorption({on!r}): coefficient", coefficient)
+
+    def __repr__(self) -> str:
+        return f"Absorption({self.on!r}, flux={self.flux!r}, coefficient={self.coefficient!r})"

@@ -1,0 +1,373 @@
+"""Conduction in a body: M dT/dt = R(T), on quadratic triangles, in the body as it is deformed.
+
+Per reference volume, with F, J of a displacement and q the heat into the deformed face, by Nanson's formula:
+
+    density heat_capacity dT/dt = Div(k J F^-1 F^-T Grad T) + J source,    k J F^-1 F^-T Grad T . N = q |J F^-T N|
+
+A body without displacement has no F in its forms. All forms are divided by the heat capacity of the whole body, so M
+sums up to 1 and R is in degrees per time.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import ufl
+from dolfinx import fem, la
+from dolfinx.fem import petsc as fem_petsc
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ... import _compat
+from ...errors import ConvergenceError
+from ...mesh import Mesh
+from ...mesh.nodes import of_space
+from ...physics import kinematics as kin
+from ...ranks import gathered
+from ...results.evaluate.profile import distance_to_line
+from ...solve.linear import DirectSolver
+from ...values.table import Table
+from .boundaries import Absorption, FixedTemperature, ThermalProperties
+from .contact import ContactWithTool, Touch
+
+_MOST_ITERATIONS = 20      # of Newton's method, of radiation and of constants by temperature
+
+
+class Stage(NamedTuple):
+    """Where an implicit stage came to: changes of T and of the lines of each touch, and the rates there.
+
+    changes, rates: [of T, owned part, shape (n,), then of each touch, shape (its nodes, m)]; rates are those of heat,
+    M dT/dt. heats: rate of heat through each boundary and source, of the whole body.
+    """
+
+    changes: list[np.ndarray]
+    rates: list[np.ndarray]
+    heats: np.ndarray
+
+
+class Conduction:
+    """The equations, in a stage of a time step.
+
+    Attributes:
+        mesh, comm: where. space: P2 (or of `degree`). T: the `Function` that the forms see. points: of its
+            nodes, (R, Z), owned part.
+        capacity: of the whole body, heat per degree; volume: of the reference body.
+        touches: [`Touch`], one for each ContactWithTool; who changes a conductance in it calls `update`.
+        power: heat that is given at the nodes per time, over `capacity`, owned part, shape (n,), or 0.
+        names: of what gives heat: boundaries and sources, in the order of `Stage.heats`.
+    """
+
+    def __init__(self, mesh: Mesh, materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any],
+                 kinematics: Any, absolute_zero: float, displacement: Any = None, degree: int = 2):
+        self.mesh, self.comm, self._degree = mesh, mesh.comm, degree
+        self._kinematics, self._u, self._zero = kinematics, displacement, absolute_zero
+        domain = mesh.domain
+        self.space = fem.functionspace(domain, ("Lagrange", degree))
+        self.T, self._change, self._held_at = (fem.Function(self.space) for _ in range(3))
+        self._n = self.space.dofmap.index_map.size_local
+        self.points = of_space(self.space)[: self._n]
+        self._X, self._v = ufl.SpatialCoordinate(domain), ufl.TestFunction(self.space)
+        self._dx = ufl.Measure("dx", domain, subdomain_data=mesh.cells,
+                               metadata={"quadrature_degree": 2 * degree + 2})
+        self._scale, self._c = self.constant(1.0), self.constant(1.0)
+        self.power: Any = 0.0
+        self._buffer = la.vector(self.space.dofmap.index_map, 1)
+        self._factored_for: float | None = None
+        self._displaced: Any = None
+        self._deform()
+        one = self.constant(1.0)
+        self.volume = self._integral(one * self._weight * self._dx)
+        self.capacity = self._integral(self._stored(materials, one, one))
+        self._scale.value = 1 / self.capacity
+        self.touches = [self._touch(b) for b in boundaries if isinstance(b, ContactWithTool)]
+        self._fix([b for b in boundaries if isinstance(b, FixedTemperature)])
+        self._laws = [b for b in boundaries if hasattr(b, "flux") and not isinstance(b, Absorption)]
+        self._sources = [(b, fem.Function(self.space)) for b in boundaries if isinstance(b, Absorption)]
+        given = [*self._laws, *(source for source, _ in self._sources),
+                 *(b for b in boundaries if isinstance(b, ContactWithTool)), *(b for b, _ in self._fixed)]
+        self.names = [f"{type(b).__name__}({b.on!r})" for b in given]
+        self._compile(materials)
+        self.update()
+
+    def constant(self, value: float) -> fem.Constant:
+        """A number in a form that can be changed without compiling it again."""
+        return fem.Constant(self.mesh.domain, PETSc.ScalarType(value))
+
+    def start(self) -> list[np.ndarray]:
+        """The state that `T` and the tools have now, faces that are held at theirs: [T, owned part, *lines]."""
+        return [self.held(self.T.x.array[: self._n]), *(touch.start() for touch in self.touches)]
+
+    def held(self, T: np.ndarray) -> np.ndarray:
+        """A temperature, owned part, with the faces that are held at theirs."""
+        return np.where(self._held, self._held_at.x.array[: self._n], T)
+
+    def update(self) -> None:
+        """The displacement or what touches has changed: take up where faces are and how large they are."""
+        self._factored_for = None
+        for touch, area in zip(self.touches, self._areas):
+            touch.area = self._assemble(area)[touch.dofs]
+        for source, depth in self._sources:
+            depth.x.array[: self._n] = distance_to_line(self._moved(self.points, self.displacements()),
+                                                        self._face_line(source.on))
+            depth.x.scatter_forward()
+
+    def rates(self, state: list[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
+        """(rates, heats) at a state, as in `Stage`."""
+        R = self._body_rate(state[0])
+        found, through = [R], []
+        for touch, lines in zip(self.touches, state[1:], strict=True):
+            q, rate = touch.rates(lines, state[0][touch.dofs])
+            R[touch.dofs] += touch.area * q
+            through.append(touch.area @ q)
+            found.append(rate)
+        return found, self._heats(through)
+
+    def stage(self, state: list[np.ndarray], known: list[np.ndarray], c: float, guess: np.ndarray) -> Stage:
+        """Solve M change = known + c rates(state + change) for all; guess: of the change of T, shape (n,).
+
+        Raises:
+            ConvergenceError: Newton's method found no solution.
+        """
+        T = state[0]
+        answers = [touch.answer(lines, k, c) for touch, lines, k in zip(self.touches, state[1:], known[1:])]
+        change = np.where(self._held, 0.0, guess)
+        for iteration in range(_MOST_ITERATIONS):
+            R = self._body_rate(T + change)
+            for touch, answer in zip(self.touches, answers):
+                at = (T + change)[touch.dofs]
+                R[touch.dofs] += touch.area * answer.g * (answer.free - at)
+            left = known[0] + c * R - self._mass(change)
+            self._factorise(c, answers, afresh=iteration % 4 == 3)        # a tangent serves the next ones too
+            correction = self._solve(left)
+            change += correction
+            size, off = self._largest(change), self._largest(correction)
+            if off <= max(1e-11 * size, 1e-15 * self._largest(T + change)):
+                return self._finish(T, change, known, c, answers)
+            if not np.isfinite(off):
+                break
+        raise ConvergenceError("heat: Newton's method did not converge in a step")
+
+    def difference(self, known: list[np.ndarray], c: float) -> float:
+        """Largest change, of body and tools, that heat `known` makes in an implicit step: (M - c R') change = known.
+
+        With the tangent of the last `stage` if that had the same c, else with that at the T last set.
+        """
+        answers = [touch.answer(0 * k, k, c, absolute=False) for touch, k in zip(self.touches, known[1:])]
+        self._factorise(c, answers, afresh=False)
+        left = known[0].copy()
+        for touch, answer in zip(self.touches, answers):
+            left[touch.dofs] += c * touch.area * answer.g * answer.free
+        change = self._solve(left)
+        sizes = [self._largest(change)]
+        for touch, answer, k in zip(self.touches, answers, known[1:]):
+            sizes.append(self._largest(touch.finish(answer, k, change[touch.dofs], c)[1]))
+        return max(sizes)
+
+    def slope(self, rate: np.ndarray) -> np.ndarray:
+        """dT/dt, owned part, of rates of heat M dT/dt; 0 where the temperature is held."""
+        self._factorise(0.0, [], afresh=True)
+        return self._solve(rate)
+
+    def stored(self, change: np.ndarray) -> float:
+        """Heat that a change of T, owned part, stores in the whole body."""
+        return self.capacity * self._sum(self._mass(change))
+
+    def held_by(self, missing: np.ndarray) -> np.ndarray:
+        """Heat that each held face gave, of what is missing at the nodes (degrees of the whole body), owned part."""
+        return self.capacity * np.array([self._sum(missing[dofs]) for _, dofs in self._fixed])
+
+    def mass(self, change: np.ndarray) -> np.ndarray:
+        """M times a change of T, owned part."""
+        return self._mass(change)
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        for thing in (self._solver, self._matrix, self._rhs, self._out):
+            thing.destroy()
+
+    def _finish(self, T: np.ndarray, change: np.ndarray, known: list[np.ndarray], c: float,
+                answers: list[Any]) -> Stage:
+        R = self._body_rate(T + change)
+        changes, rates, through = [change], [R], []
+        for touch, answer, k in zip(self.touches, answers, known[1:]):
+            q, moved, rate = touch.finish(answer, k, (T + change)[touch.dofs], c)
+            R[touch.dofs] += touch.area * q
+            through.append(touch.area @ q)
+            changes.append(moved)
+            rates.append(rate)
+        return Stage(changes, rates, self._heats(through))
+
+    def _heats(self, through_touches: list[float]) -> np.ndarray:
+        """Rates of heat at the T last set, in the order of `names` but for held faces (see `held_by`)."""
+        local = [fem.assemble_scalar(form) for form in self._scalars] + through_touches
+        return self.capacity * self.comm.allreduce(np.array(local, dtype=float), MPI.SUM)
+
+    def _deform(self) -> None:
+        """`_weight`, `_area` (of a deformed face per reference length), `_carry` (Grad T to grad T), `_J`."""
+        kinematics, u, X = self._kinematics, self._u, self._X
+        self._weight, self._J, self._carry = kinematics.weight(X), self.constant(1.0), None
+        self._area = self._weight
+        if u is not None:
+            F = kinematics.deformation_gradient(u, X)
+            self._J = kin.volume_ratio(F)
+            self._carry = ufl.inv(ufl.as_matrix([[F[0, 0], F[0, 1]], [F[1, 0], F[1, 1]]])).T
+            area = kinematics.area_vector(u, X, ufl.FacetNormal(self.mesh.domain))
+            self._area = ufl.sqrt(ufl.inner(area, area))
+
+    def _gradient(self, f: Any) -> Any:
+        return ufl.grad(f) if self._carry is None else self._carry * ufl.grad(f)
+
+    def _layers(self, materials: Mapping[str, ThermalProperties]) -> list[tuple[Any, Any]]:
+        """[(properties, measure)]: layers of one object are one body."""
+        groups: dict[int, tuple[Any, list[int]]] = {}
+        for name, tag in self.mesh.layers.items():
+            groups.setdefault(id(materials[name]), (materials[name], []))[1].append(tag)
+        everywhere = len(groups) == 1
+        return [(m, self._dx if everywhere else self._dx(tuple(tags))) for m, tags in groups.values()]
+
+    def _stored(self, materials: Mapping[str, ThermalProperties], T: Any, v: Any) -> Any:
+        return sum(self._scale * self.constant(m.density * m.heat_capacity) * T * v * self._weight * dx
+                   for m, dx in self._layers(materials))
+
+    def _compile(self, materials: Mapping[str, ThermalProperties]) -> None:
+        T, v, J = self.T, self._v, self._J
+        R = -sum(self._scale * self.constant(m.conductivity) * J * self._weight
+                 * ufl.inner(self._gradient(T), self._gradient(v)) * dx for m, dx in self._layers(materials))
+        scalars = []
+        for law in self._laws:
+            ds = self._ds(law.on, {"quadrature_degree": law.quadrature_degree})
+            flux = law.flux(T, self.constant(self._zero), **{k: self._number(p) for k, p in law.parameters.items()})
+            R += self._scale * flux * self._area * v * ds
+            scalars.append(self._scale * flux * self._area * ds)
+        for source, depth in self._sources:
+            kappa = self.constant(source.coefficient)
+            heat = self.constant(source.flux) * kappa * ufl.exp(-kappa * depth) * J * self._weight * self._scale
+            R += heat * v * self._dx
+            scalars.append(heat * self._dx)
+        tangent = self._stored(materials, ufl.TrialFunction(self.space), v) - self._c * ufl.derivative(R, T)
+        self._rate_form, self._mass_form = self._form(R), self._form(self._stored(materials, self._change, v))
+        self._scalars = [self._form(s) for s in scalars]
+        gll = {"quadrature_rule": "GLL", "quadrature_degree": 2 * self._degree - 1}    # points at the nodes
+        self._areas = [self._form(self._scale * self._area * v * self._ds(touch.on, gll)) for touch in self.touches]
+        self._tangent = self._form(tangent)
+        self._matrix = fem_petsc.create_matrix(self._tangent)
+        self._rhs, self._out = self._matrix.createVecRight(), self._matrix.createVecRight()
+        self._solver = DirectSolver(self._matrix, symmetric=False)
+
+    def _number(self, value: float | Table) -> Any:
+        return value(self._X[0]) if isinstance(value, Table) else self.constant(value)
+
+    def _ds(self, boundary: str, metadata: dict) -> ufl.Measure:
+        ds = ufl.Measure("ds", self.mesh.domain, subdomain_data=self.mesh.facets)
+        return ds(self.mesh.boundaries[boundary], metadata=metadata)
+
+    def _dofs(self, boundary: str) -> np.ndarray:
+        """Local dofs of a boundary, ghosts included."""
+        return fem.locate_dofs_topological(self.space, 1, self.mesh.facets_of(boundary))
+
+    def _fix(self, fixed: list[FixedTemperature]) -> None:
+        self._held = np.zeros(self._n, dtype=bool)
+        self._fixed, self._bcs, taken = [], [], self._held.copy()
+        for boundary in fixed:
+            dofs = self._dofs(boundary.on)
+            R = self.space.tabulate_dof_coordinates()[dofs, 0]
+            value = boundary.parameters["temperature"]
+            self._held_at.x.array[dofs] = value(R) if isinstance(value, Table) else value
+            self._bcs.append(fem.dirichletbc(self._held_at, dofs))
+            own = dofs[dofs < self._n]
+            self._fixed.append((boundary, own[~taken[own]]))
+            taken[own] = self._held[own] = True
+
+    def _touch(self, contact: ContactWithTool) -> Touch:
+        dofs = self._dofs(contact.on)
+        own = dofs[dofs < self._n]
+        return Touch(contact, own, self.points[own])
+
+    def displacements(self) -> Any:
+        """Displacements of the owned nodes, shape (n, 2), or None."""
+        if self._u is None:
+            return None
+        if self._displaced is None:
+            space = fem.functionspace(self.mesh.domain, ("Lagrange", self._degree, (2,)))
+            self._displaced = fem.Function(space), _compat.compile_expression(
+                self._u, _compat.interpolation_points(space))
+        u, expression = self._displaced
+        u.interpolate(expression)
+        return u.x.array.reshape(-1, self.points.shape[1])[: self._n]
+
+    @staticmethod
+    def _moved(points: np.ndarray, u: Any) -> np.ndarray:
+        return points if u is None else points + u
+
+    def _face_line(self, boundary: str) -> np.ndarray:
+        """The deformed nodes of a boundary one after the other, shape (k, 2), all ranks."""
+        line = self.mesh.line_of(boundary)
+        u = self.displacements()
+        if u is None:
+            return line
+        from scipy.spatial import cKDTree
+        dofs = self._dofs(boundary)
+        own = dofs[dofs < self._n]
+        X, u = (gathered(self.comm, a) for a in (self.points[own], u[own]))
+        return line + u[cKDTree(X).query(line)[1]]
+
+    def source(self, make: Any) -> Any:
+        """A compiled form for `assembled`: make(v) is an integral (UFL) of heat per time, times v."""
+        return self._form(make(self._scale * self._v))
+
+    def assembled(self, form: Any) -> np.ndarray:
+        """What such a form gives now, as `power`."""
+        return self._assemble(form)
+
+    def _form(self, form: Any) -> Any:
+        return _compat.compile_form(form)
+
+    def _integral(self, form: Any) -> float:
+        return float(self.comm.allreduce(fem.assemble_scalar(self._form(form)), MPI.SUM))
+
+    def _assemble(self, form: Any) -> np.ndarray:
+        array = self._buffer.array
+        array[:] = 0
+        fem.assemble_vector(array, form)
+        self._buffer.scatter_reverse(la.InsertMode.add)
+        return array[: self._n].copy()
+
+    def _body_rate(self, T: np.ndarray) -> np.ndarray:
+        """R(T) without what touches, owned part; leaves T in `T`."""
+        self.T.x.array[: self._n] = T
+        self.T.x.scatter_forward()
+        return self._assemble(self._rate_form) + self.power
+
+    def _mass(self, change: np.ndarray) -> np.ndarray:
+        self._change.x.array[: self._n] = change
+        self._change.x.scatter_forward()
+        return self._assemble(self._mass_form)
+
+    def _factorise(self, c: float, answers: list[Any], afresh: bool) -> None:
+        """The tangent M - c R' at the T last set, what touches included; one with the same c, unless `afresh`."""
+        if self._factored_for == c and not afresh:
+            return
+        self._factored_for = c
+        self._c.value = c
+        self._matrix.zeroEntries()
+        _compat.assemble_matrix(self._matrix, self._tangent, self._bcs)
+        self._matrix.assemble()
+        if self.touches:
+            extra = np.zeros(self._n)
+            for touch, answer in zip(self.touches, answers):
+                extra[touch.dofs] += c * touch.area * answer.g
+            self._rhs.array_w[:] = np.where(self._held, 0.0, extra)
+            self._matrix.setDiagonal(self._rhs, PETSc.InsertMode.ADD_VALUES)
+        if not self._solver.factorise():
+            raise ConvergenceError("heat: the matrix of a step is singular")
+
+    def _solve(self, left: np.ndarray) -> np.ndarray:
+        self._rhs.array_w[:] = np.where(self._held, 0.0, left)
+        self._solver.solve(self._rhs, self._out)
+        return self._out.array_r.copy()
+
+    def _largest(self, values: np.ndarray) -> float:
+        return float(self.comm.allreduce(np.abs(values).max(initial=0.0), MPI.MAX))
+
+    def _sum(self, values: np.ndarray) -> float:
+        return float(self.comm.allreduce(values.sum(), MPI.SUM))

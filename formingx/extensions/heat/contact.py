@@ -1,0 +1,182 @@
+"""A face that touches a tool: heat through a contact conductance, into a tool that is as hot as told, or conducts.
+
+At each node of the face q = conductance (tool - T) flows into the body. A conducting tool has a line of its own below
+each node, one-dimensional, into its depth y: C w_t = k w_yy, -k w_y = -q at its face, w = back at its end. In an
+implicit stage T + c dT/dt = known the line answers linearly, w_face = free - z q, with one z for all lines; so q =
+g (free - T), g = conductance/(1 + z conductance), and the line is out of the equations of the body.
+"""
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...errors import InputError, count, finite, non_negative, positive
+
+
+class ConductingTool:
+    """A tool wall that conducts into its depth, in one dimension, below each point that touches.
+
+    Args:
+        thickness: length. conductivity: heat per time, length and degree.
+        heat_capacity: per volume and degree (density times that per mass).
+        back: temperature that its far side is held at.
+        start: its temperature at first; default `back`.
+        elements: through its thickness, quadratic ones.
+        finest: size of the one at the face over the thickness; sizes grow geometrically from there.
+
+    Raises:
+        InputError: a number that is not allowed.
+
+    >>> fx.ConductingTool(thickness=20.0, conductivity=0.05, heat_capacity=3.6e-3, back=40.0)      # steel: mm, W
+    ConductingTool(thickness=20.0, conductivity=0.05, heat_capacity=0.0036, back=40.0)
+    """
+
+    def __init__(self, *, thickness: float, conductivity: float, heat_capacity: float, back: float,
+                 start: float | None = None, elements: int = 40, finest: float = 1e-4):
+        self.thickness = positive("ConductingTool: thickness", thickness)
+        self.conductivity = positive("ConductingTool: conductivity", conductivity)
+        self.heat_capacity = positive("ConductingTool: heat_capacity", heat_capacity)
+        self.back = finite("ConductingTool: back", back)
+        self.start = self.back if start is None else finite("ConductingTool: start", start)
+        self.elements = count("ConductingTool: elements", elements)
+        self.finest = positive("ConductingTool: finest", finest)
+        if self.elements * self.finest > 1:
+            raise InputError(f"ConductingTool: finest = {finest!r}: must be at most 1/elements = {1 / self.elements:g}")
+
+    @property
+    def depths(self) -> np.ndarray:
+        """Depths of the nodes, shape (2 elements + 1,), length: from the face to the back."""
+        from scipy.optimize import brentq
+        n, small = self.elements, self.finest
+        ratio = 1.0
+        if n * small < 1 - 1e-9:                               # small (1 + ratio + ... + ratio^(n - 1)) = 1
+            ratio = brentq(lambda r: small * (r**n - 1) / (r - 1) - 1, 1 + 1e-12, (2 / small) ** (1 / max(n - 1, 1)))
+        ends = np.concatenate([[0.0], np.cumsum(ratio ** np.arange(n))])
+        return np.interp(np.arange(2 * n + 1) / 2, np.arange(n + 1), self.thickness * ends / ends[-1])
+
+    def matrices(self) -> tuple[np.ndarray, np.ndarray]:
+        """(capacity, conductivity) of a line per area, for the temperatures above `back` of all nodes but the last."""
+        y = self.depths
+        M, K = np.zeros((2, len(y), len(y)))
+        for e in range(0, len(y) - 1, 2):
+            h, at = y[e + 2] - y[e], np.ix_(range(e, e + 3), range(e, e + 3))
+            M[at] += self.heat_capacity * h / 30 * np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]])
+            K[at] += self.conductivity / (3 * h) * np.array([[7, -8, 1], [-8, 16, -8], [1, -8, 7]])
+        return M[:-1, :-1], K[:-1, :-1]
+
+    def __repr__(self) -> str:
+        return (f"ConductingTool(thickness={self.thickness!r}, conductivity={self.conductivity!r},"
+                f" heat_capacity={self.heat_capacity!r}, back={self.back!r})")
+
+
+class ContactWithTool:
+    """A face that touches a tool all over, from the start on.
+
+    Args:
+        on: name of the boundary.
+        conductance: of the contact, heat per time, area and degree.
+        tool: a temperature, or a `ConductingTool`.
+
+    >>> fx.ContactWithTool("bottom", conductance=1e-3, tool=40.0)
+    ContactWithTool('bottom', conductance=0.001, tool=40.0)
+    """
+
+    temperatures = ("tool",)
+
+    def __init__(self, on: str, *, conductance: float, tool: float | ConductingTool):
+        self.on = on
+        self.conductance = non_negative(f"ContactWithTool({on!r}): conductance", conductance)
+        self.tool = tool if isinstance(tool, ConductingTool) else finite(f"ContactWithTool({on!r}): tool", tool)
+
+    def check(self, mesh: Any, absolute_zero: float) -> None:
+        """An InputError unless the tool is above absolute zero."""
+        tool = self.tool
+        for value in (tool.back, tool.start) if isinstance(tool, ConductingTool) else (tool,):
+            if value < absolute_zero:
+                raise InputError(f"{self!r}: temperature = {value!r}: must be at least {absolute_zero:g}")
+
+    def __repr__(self) -> str:
+        return f"ContactWithTool({self.on!r}, conductance={self.conductance!r}, tool={self.tool!r})"
+
+
+class Answer(NamedTuple):
+    """How lines answer in a stage: q = g (free - T); their change is `change` - q `column`.
+
+    free, g: shape (n,); change: shape (n, m); column: shape (m,).
+    """
+
+    free: np.ndarray
+    g: np.ndarray
+    change: np.ndarray
+    column: np.ndarray
+
+
+class Touch:
+    """The n nodes of this rank where a face touches a tool, and the lines below them.
+
+    Lines hold temperatures above the tool's back at m nodes, shape (n, m), the face first; m = 0 for a tool that is as
+    hot as told.
+
+    Attributes:
+        dofs: of the nodes, local, shape (n,). points: (R, Z) of them, shape (n, 2), length.
+        area: of the deformed face that belongs to each, shape (n,).
+        conductance: at each, shape (n,): 0 where it does not touch.
+        back: temperature of the tool's back, or of a tool that is as hot as told. depths: of a line, back included.
+    """
+
+    def __init__(self, contact: ContactWithTool, dofs: np.ndarray, points: np.ndarray):
+        self.on, self.dofs, self.points = contact.on, dofs, points
+        self.area = np.zeros(len(dofs))
+        self.conductance = np.full(len(dofs), contact.conductance)
+        tool = contact.tool
+        if isinstance(tool, ConductingTool):
+            self.back, self._above, self.depths = tool.back, tool.start - tool.back, tool.depths
+            self._M, self._K = tool.matrices()
+        else:
+            self.back, self._above, self.depths = tool, 0.0, np.zeros(0)
+            self._M, self._K = np.zeros((2, 0, 0))
+        self._factor = lru_cache(maxsize=4)(self._factorise)
+
+    @property
+    def conducts(self) -> bool:
+        """True if there are lines."""
+        return len(self._M) > 0
+
+    def start(self) -> np.ndarray:
+        """The lines at first, shape (n, m)."""
+        return np.full((len(self.dofs), len(self._M)), self._above)
+
+    def face(self, lines: np.ndarray) -> np.ndarray:
+        """Temperature of the tool's face at the nodes, shape (n,)."""
+        return self.back + lines[:, 0] if self.conducts else np.full(len(self.dofs), self.back)
+
+    def rates(self, lines: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(q, heat per time and area into the nodes of the lines) for body temperatures T, shape (n,)."""
+        q = self.conductance * (self.face(lines) - T)
+        rate = -lines @ self._K
+        rate[:, :1] -= q[:, None]
+        return q, rate
+
+    def answer(self, lines: np.ndarray, known: np.ndarray, c: float, absolute: bool = True) -> Answer:
+        """For a stage M w' = known + c rate(lines + w'), known: shape (n, m).
+
+        `absolute` = False: lines count from 0, not from the tool's back (for differences of temperatures).
+        """
+        back = self.back if absolute else 0.0
+        if not self.conducts:
+            return Answer(np.full(len(self.dofs), back), self.conductance, lines, np.zeros(0))
+        inverse, column = self._factor(c)
+        change = (known - c * lines @ self._K) @ inverse
+        return Answer(back + lines[:, 0] + change[:, 0], self.conductance / (1 + self.conductance * column[0]),
+                      change, column)
+
+    def finish(self, answer: Answer, known: np.ndarray, T: np.ndarray, c: float) -> tuple[Any, Any, Any]:
+        """(q, change of the lines, their rate) at the end of a stage, for body temperatures T, shape (n,)."""
+        q = answer.g * (answer.free - T)
+        change = answer.change - np.outer(q, answer.column)
+        return q, change, (change @ self._M - known) / c
+
+    def _factorise(self, c: float) -> tuple[np.ndarray, np.ndarray]:
+        inverse = np.linalg.inv(self._M + c * self._K)
+        return inverse, c * inverse[:, 0]

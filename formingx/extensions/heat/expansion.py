@@ -1,0 +1,65 @@
+"""Thermal expansion: how large a material is without stress, by its temperature."""
+
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError, finite
+from ...materials.constants import varying
+from ...values.temperature import FunctionOfTemperature
+
+
+class ThermalExpansion:
+    """The volume ratio J_T(T) at which a material has no stress, alike in all directions.
+
+    F = J_T^(1/3) F_e: the energy and the constraint are those of F_e, so det F = J_T where the volume is kept, and the
+    isochoric part is that of F (Lu and Pister, Int. J. Solids Struct. 11 (1975) 927).
+
+    Args:
+        linear: coefficient a of linear expansion, 1/degree: J_T = [1 + a (T - stress_free)]^3.
+        specific_volume: in place of it, v(T) in any unit, a `table` or what `of_temperature` returns:
+            J_T = v(T)/v(stress_free).
+        stress_free: the temperature at which the mesh as it is has no stress.
+
+    Raises:
+        InputError: neither of the two, or both; a volume that is not above 0.
+
+    >>> float(fx.ThermalExpansion(linear=1e-4, stress_free=120.0).stretch(20.0).round(6))
+    0.99
+    """
+
+    def __init__(self, *, linear: float | None = None, specific_volume: Any = None, stress_free: float):
+        if (linear is None) == (specific_volume is None):
+            raise InputError("ThermalExpansion: give linear=..., a number, or specific_volume=..., by temperature")
+        self.stress_free = finite("ThermalExpansion: stress_free", stress_free)
+        self.linear = None if linear is None else finite("ThermalExpansion: linear", linear)
+        self.specific_volume: Any = varying(specific_volume)
+        if linear is None and not isinstance(self.specific_volume, FunctionOfTemperature):
+            raise InputError(f"ThermalExpansion: specific_volume = {specific_volume!r}: must be table({{T: v, ...}}) or"
+                             f" of_temperature(f)")
+        self.stretch(np.array([self.stress_free]))
+
+    def volume_ratio(self, temperature: Any) -> np.ndarray:
+        """J_T at temperatures, of their shape."""
+        return self.stretch(temperature) ** 3
+
+    def stretch(self, temperature: Any) -> np.ndarray:
+        """J_T^(1/3) at temperatures, of their shape.
+
+        Raises:
+            InputError: the volume is not above 0, or not known there.
+        """
+        T = np.asarray(temperature, dtype=float)
+        if self.linear is not None:
+            found = 1 + self.linear * (T - self.stress_free)
+        else:
+            found = np.cbrt(self.specific_volume(T) / self.specific_volume(np.array([self.stress_free]))[0])
+        wrong = ~(found > 0)
+        if np.any(wrong):
+            raise InputError(f"{self!r}: the stress-free stretch is {found[wrong].flat[0]:.6g} at a temperature of"
+                             f" {T[wrong].flat[0]:.6g}: must be above 0")
+        return found
+
+    def __repr__(self) -> str:
+        law = f"linear={self.linear!r}" if self.linear is not None else f"specific_volume={self.specific_volume!r}"
+        return f"ThermalExpansion({law}, stress_free={self.stress_free!r})"

@@ -1,0 +1,42 @@
+"""How a body without stress is stretched by its temperature."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import basix
+import basix.ufl
+from dolfinx import fem
+
+from ...forms.followed import Followed
+
+
+class FreeStretch:
+    """J_T^(1/3) at the quadrature points of the energy; 1 in layers that do not expand.
+
+    Args:
+        forms: the `Formulation`; expansion: {layer: `ThermalExpansion`}.
+
+    Attributes:
+        stretch: UFL.
+    """
+
+    def __init__(self, forms: Any, expansion: dict[str, Any]):
+        cell, degree = forms.domain.basix_cell(), forms.scene.quadrature_degree
+        element = basix.ufl.quadrature_element(cell, scheme="default", degree=degree)
+        stretch = fem.Function(fem.functionspace(forms.domain, element), name="free stretch")
+        stretch.x.array[:] = 1.0
+        self._cells = [forms.cells_of([name]) for name in expansion]
+        self._there = partial(forms.temperature.now_and_before, places=basix.make_quadrature(cell, degree)[0])
+        self._followed = Followed(forms, stretch, [(cells, law.stretch) for cells, law in
+                                                   zip(self._cells, expansion.values())], map(self._there, self._cells))
+        self.stretch = self._followed.at(forms.time)
+
+    def take_temperature(self) -> None:
+        """See `Followed.take`."""
+        self._followed.take(map(self._there, self._cells))
+
+    def elastic(self, F: Any) -> Any:
+        """The elastic part of a deformation gradient F, shape (3, 3)."""
+        return F / self.stretch

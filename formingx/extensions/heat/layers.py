@@ -1,0 +1,201 @@
+"""Elements for heat: where heat passes a face, those of a body are cut into layers that are thin enough for it.
+
+Heat has gone sqrt(a t) deep by a time t (a: diffusivity), and elements must be smaller than that there. A layer at a
+depth y below such a face is a given part of max(that depth at the first time of interest, y/3) thick, so that later
+profiles, which are deeper, are met as well. Edges are cut, those that neighbours share for both; triangles are cut
+into rows between the cuts of their edges, in the shape of the element that they are part of.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...mesh import Mesh
+from ...mesh.grid import Grid, gathered, to_mesh
+
+_PART = 0.3
+"""Thickness of a layer over the depth that heat has gone: errors are then some 1e-5 of the span of temperatures."""
+_REACH = 7.0
+"""How many times the depth at the last time heat is felt: 1 - erf(7/2) is 7e-7."""
+_SPARE = 0.2
+"""By how much of a layer more one may be thicker than that."""
+_SAMPLES = (1 - np.cos(np.pi * np.linspace(0.0, 1.0, 2001))) / 2
+
+
+def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callable | None = None) -> Mesh:
+    """The mesh, its elements cut into layers below faces; the mesh itself where they are thin enough, or too curved.
+
+    Collective.
+
+    Args:
+        depths: {boundary: depths that heat from there has gone at the first and the last time of interest}, lengths.
+        moved: where points of the body, shape (n, 2), are in the deformed body, in which depths are; None: at rest.
+    """
+    grid = gathered(mesh)
+    cuts = _cuts(grid, depths, moved(grid.points) if moved else grid.points)
+    try:
+        return to_mesh(lambda: _cut(grid, cuts), mesh.comm, "the mesh, cut into layers for heat") if cuts else mesh
+    except InputError:           # an element is so curved that straight rows do not fit in it: a quarter of its height
+        return mesh
+
+
+def graded(mesh: Mesh, faces: Sequence[str], part: float, depth: float) -> list[float]:
+    """Relative sizes of layers from the bottom up, each 1.26 times the next one towards the faces (of "bottom", "top"),
+    where they are `part` as thick as elements are now, and of the depth that heat has gone; collective."""
+    grid = gathered(mesh)
+    triangles = np.concatenate([rows[:, :3] for rows in grid.layers.values()])
+    double = np.abs(np.linalg.det(grid.points[triangles[:, 1:]] - grid.points[triangles[:, :1]]))
+    thinnest, longest = _PART * depth, 0.0
+    for face in faces:
+        ends = grid.boundaries[face][:, :2]
+        length = np.hypot(*(grid.points[ends[:, 1]] - grid.points[ends[:, 0]]).T)
+        below = [np.flatnonzero(np.isin(triangles, edge).sum(1) == 2)[0] for edge in ends]
+        thinnest = min(thinnest, part * float(np.median(double[below] / length)))
+        longest = max(longest, float(length.sum()))
+    n = int(np.ceil(3 * np.log2((2 ** (1 / 3) - 1) * double.sum() / 2 / longest / len(faces) / thinnest + 1)))
+    sizes = [2 ** (k / 3) for k in range(n)]
+    return sizes + sizes[::-1] if len(faces) > 1 else sizes if "bottom" in faces else sizes[::-1]
+
+
+def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
+          points: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
+    """{ends of an edge, that of smaller (R, Z) first: where it is cut, from 0 to 1}, of edges that are cut.
+
+    points: where nodes are, for depths, shape (n, 2).
+    """
+    if not depths:
+        return {}
+    below = np.array([_depth(points, grid.boundaries[name][:, :2]) for name in depths])
+    first, last = (np.array(values)[:, None] for values in zip(*depths.values()))
+    edges = np.unique(np.concatenate([_ordered(grid.points, rows[:, [i, j]]) for rows in grid.layers.values()
+                                      for i, j in ((0, 1), (1, 2), (2, 0))]), axis=0)
+    ends = below[:, edges]                                   # shape (faces, edges, 2)
+    across, nearest = np.abs(np.diff(ends)[..., 0]), ends.min(2)
+    at_most = (across / (_PART * np.maximum(first, nearest / 3)) * (nearest < _REACH * last)).sum(0)
+    found = {}
+    for k in np.flatnonzero(at_most > 1 + _SPARE):
+        y = ends[:, k, :1] * (1 - _SAMPLES) + ends[:, k, 1:] * _SAMPLES
+        size = np.where(y < _REACH * last, _PART * np.maximum(first, y / 3), np.inf)
+        density = np.where(size == size.min(0), across[:, k, None] / size, 0.0).max(0)
+        layers = np.concatenate([[0.0], np.cumsum(np.diff(_SAMPLES) * (density[1:] + density[:-1]) / 2)])
+        n = int(np.ceil(layers[-1] - _SPARE))
+        if n > 1:
+            found[tuple(edges[k].tolist())] = np.interp(np.arange(1, n) / n * layers[-1], layers, _SAMPLES)
+    return found
+
+
+def _depth(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Distance of points from the edges of a boundary, shape (n,), length."""
+    away = np.full(len(points), np.inf)
+    for a, b in points[edges]:
+        along = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+        away = np.minimum(away, np.hypot(*(points - a - along[:, None] * (b - a)).T))
+    return away
+
+
+def _ordered(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Edges, shape (n, 2), each from its end of smaller R (of smaller Z), however nodes are numbered."""
+    a, b = points[edges[:, 0]], points[edges[:, 1]]
+    swap = (a[:, 0] > b[:, 0]) | (a[:, 0] == b[:, 0]) & (a[:, 1] > b[:, 1])
+    return np.where(swap[:, None], edges[:, ::-1], edges)
+
+
+class _Nodes:
+    """Nodes of the cut mesh: the old ones, and new ones on edges and inside triangles."""
+
+    def __init__(self, grid: Grid, cuts: dict[tuple[int, int], np.ndarray]):
+        self._old, self._cuts = grid.points, cuts
+        self.points: list[Any] = [*grid.points]
+        self._on: dict[tuple[int, int], list[int]] = {}
+        self._middles: dict[tuple[int, int], int] = {}
+
+    def along(self, a: int, b: int, curve: np.ndarray) -> tuple[list[int], np.ndarray]:
+        """(nodes, places from 0 to 1) of an edge from a to b that runs along a `curve`: ends and middle, or ends."""
+        forward = bool(_ordered(self._old, np.array([[a, b]]))[0, 0] == a)
+        key = (a, b) if forward else (b, a)
+        places = np.concatenate([[0.0], self._cuts.get(key, np.zeros(0)), [1.0]])
+        if key not in self._on:
+            shape = curve if forward else curve[[1, 0, *range(2, len(curve))]]
+            self._on[key] = [key[0], *(self._new(p) for p in _on_curve(shape, places[1:-1])), key[1]]
+        nodes = self._on[key]
+        return (nodes, places) if forward else (nodes[::-1], 1 - places[::-1])
+
+    def middle(self, a: int, b: int, point: np.ndarray | None = None) -> int:
+        """The node in the middle of an edge; `point`: where, for the first that asks."""
+        key = min(a, b), max(a, b)
+        if key not in self._middles:
+            self._middles[key] = self._new(point)
+        return self._middles[key]
+
+    def keep(self, a: int, b: int, middle: int) -> None:
+        """The middle of an edge that is not cut stays."""
+        self._middles[min(a, b), max(a, b)] = middle
+
+    def _new(self, point: Any) -> int:
+        self.points.append(point)
+        return len(self.points) - 1
+
+
+def _on_curve(curve: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Points of a straight edge (two nodes) or of a quadratic one (ends, then middle), shape (n, 2)."""
+    s = np.asarray(s, dtype=float)[:, None]
+    if len(curve) == 2:
+        return (1 - s) * curve[0] + s * curve[1]
+    return (1 - s) * (1 - 2 * s) * curve[0] + s * (2 * s - 1) * curve[1] + 4 * s * (1 - s) * curve[2]
+
+
+def _in_element(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """The point of a triangle, 3 or 6 nodes, at area coordinates x, shape (3,)."""
+    if len(nodes) == 3:
+        return x @ nodes
+    return (x * (2 * x - 1)) @ nodes[:3] + 4 * np.array([x[0] * x[1], x[1] * x[2], x[2] * x[0]]) @ nodes[3:]
+
+
+def _cut(grid: Grid, cuts: dict[tuple[int, int], np.ndarray]) -> Grid:
+    nodes = _Nodes(grid, cuts)
+    quadratic = next(iter(grid.layers.values())).shape[1] == 6
+    layers, boundaries = {}, {}
+    for name, triangles in grid.layers.items():
+        layers[name] = np.array([new for row in _rows(triangles) for new in _parts(grid, nodes, row, quadratic)])
+    for name, edges in grid.boundaries.items():
+        found = []
+        for row in _rows(edges):
+            line, _ = nodes.along(row[0], row[1], grid.points[row])
+            found += [[a, b, nodes.middle(a, b)] if quadratic else [a, b] for a, b in zip(line, line[1:])]
+        boundaries[name] = np.array(found, dtype=np.int64).reshape(-1, 3 if quadratic else 2)
+    points = np.array(nodes.points)
+    return Grid(points, np.arange(1, len(points) + 1), layers, boundaries)
+
+
+def _rows(table: np.ndarray) -> list[list[int]]:
+    return [list(map(int, row)) for row in table]
+
+
+def _parts(grid: Grid, nodes: _Nodes, row: list[int], quadratic: bool) -> list[list[int]]:
+    """The triangles that one is cut into."""
+    element, at = grid.points[row], {row[k]: np.eye(3)[k] for k in range(3)}      # area coordinates of nodes
+    sides = {}
+    for k, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
+        middle = [row[3 + k]] if quadratic else []
+        line, places = nodes.along(row[i], row[j], grid.points[[row[i], row[j], *middle]])
+        sides[k] = line
+        at |= {n: (1 - s) * np.eye(3)[i] + s * np.eye(3)[j] for n, s in zip(line[1:-1], places[1:-1])}
+        if quadratic and len(line) == 2:
+            nodes.keep(row[i], row[j], middle[0])
+    # rows begin at the corner that faces the side with the fewest cuts; their last triangle is a fan, if that has any
+    side = min(range(3), key=lambda k: (len(sides[k]), *element[(k + 2) % 3]))
+    corner = (side + 2) % 3
+    left, right, end = sides[corner], sides[(side + 1) % 3][::-1], sides[side]
+    found, tip, i, j = [[left[0], left[1], right[1]]], left[0], 1, 1
+    while (i, j) != (len(left) - 1, len(right) - 1):
+        on_left = j == len(right) - 1 or i < len(left) - 1 and at[left[i + 1]][corner] >= at[right[j + 1]][corner]
+        tip = left[i] if on_left else right[j]
+        found.append([left[i], left[i + 1], right[j]] if on_left else [left[i], right[j + 1], right[j]])
+        i, j = (i + 1, j) if on_left else (i, j + 1)
+    found[-1:] = [[tip, a, b] for a, b in zip(end, end[1:])]
+    if quadratic:
+        found = [[*new, *(nodes.middle(a, b, _in_element(element, (at[a] + at[b]) / 2))
+                          for a, b in zip(new, [*new[1:], new[0]]))] for new in found]
+    return found

@@ -1,0 +1,262 @@
+"""What a heating run gives back."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from dolfinx import fem
+
+from ...errors import InputError, finite, known
+from ...ranks import gathered
+from ...results import files
+from ...scene.fields import PointReader
+from .conduction import Conduction
+
+_POINTS = 201
+"""On a line through the body."""
+
+
+class Spot(NamedTuple):
+    """The hottest or coldest node of a body: temperature, and (R, Z) in the reference, length."""
+
+    temperature: float
+    R: float
+    Z: float
+
+
+class Window(NamedTuple):
+    """When the whole body came between two temperatures, and when some of it left them again; None: it did not."""
+
+    reached: float | None
+    left: float | None
+
+
+class HeatRun:
+    """Temperatures of a body over time: every accepted step.
+
+    At a time between two steps the temperature is a cubic in time; times of output are ends of steps.
+
+    Attributes:
+        mesh: that the temperature was computed on: the one given, its elements cut into layers where heat passes faces.
+        outputs: times asked for.
+        errors_in_space: estimated largest error of the temperature that is due to the mesh, at these times, degrees.
+        unit: of temperatures, "C" or "K".
+        states: [[T of the nodes, own part, then the lines of each conducting tool]] of the steps.
+    """
+
+    def __init__(self, body: Conduction, unit: str, outputs: np.ndarray):
+        self._body, self.unit, self.outputs = body, unit, outputs
+        self.mesh, self._comm = body.mesh, body.comm
+        self.states = [body.start()]
+        self._times, self._errors, self._stored = [0.0], [0.0], [0.0]
+        self._heats = [np.zeros(len(body.names))]
+        self.errors_in_space: np.ndarray = np.zeros(len(outputs))
+
+    def record(self, time: float, step: Any) -> None:
+        """Take up an accepted step (`formingx.extensions.heat.stepping.Step`)."""
+        self.states.append(step.state)
+        self._times.append(time)
+        self._errors.append(step.error)
+        self._stored.append(step.stored)
+        self._heats.append(step.heats)
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times of the steps, from 0, shape (n,)."""
+        return np.array(self._times)
+
+    @property
+    def errors(self) -> np.ndarray:
+        """Estimated error of each step, degrees, shape (n,)."""
+        return np.array(self._errors)
+
+    @property
+    def heat_stored(self) -> np.ndarray:
+        """Heat that the body took up in each step, shape (n,); the first is 0."""
+        return np.array(self._stored)
+
+    @property
+    def heat_through(self) -> dict[str, np.ndarray]:
+        """{boundary or source: heat that it gave the body in each step, shape (n,)}; per depth in plane strain."""
+        return dict(zip(self._unique_names(), np.array(self._heats).T))
+
+    @property
+    def balance(self) -> np.ndarray:
+        """Heat stored less heat given in each step, over the largest of them, shape (n,)."""
+        heats = np.array(self._heats)
+        largest = np.abs(np.column_stack([heats, self._stored])).max(1)
+        return (np.array(self._stored) - heats.sum(1)) / np.where(largest > 0, largest, 1.0)
+
+    def temperature(self, time: float | None = None) -> fem.Function:
+        """The temperature at a time (default: the end) as a P2 Function on the mesh."""
+        T = fem.Function(self._body.space, name="temperature")
+        T.x.array[: len(self._body.points)] = self._at(time)[0]
+        T.x.scatter_forward()
+        return T
+
+    def at(self, points: Any, times: Any = None) -> np.ndarray:
+        """Temperatures at points (R, Z), shape (n, 2), the same on all ranks, at times (default: `outputs`).
+
+        Shape (times, n).
+
+        Raises:
+            InputError: a point outside the body, a time outside the run.
+        """
+        points = np.atleast_2d(np.asarray(points, dtype=float))
+        reader = PointReader(self._body.space, points)
+        return np.array([reader.read(self.temperature(t).x.array) for t in self._chosen(times)])
+
+    def through(self, times: Any = None, *, line: Any = None, points: int = _POINTS) -> tuple[np.ndarray, np.ndarray]:
+        """(distance from the first end, temperatures, shape (times, points)) along a straight line through the body.
+
+        line: its two ends (R, Z); default: from `bottom` to `top` (or `inner` to `outer`) at their first nodes.
+        """
+        first, last = np.array(self._ends() if line is None else line, dtype=float).reshape(2, 2)
+        s = np.linspace(0, 1, points)
+        return s * float(np.hypot(*(last - first))), self.at(first + np.outer(s, last - first), times)
+
+    def mean_through(self, times: Any = None, *, line: Any = None) -> np.ndarray:
+        """Mean temperature over such a line, shape (times,), by Simpson's rule."""
+        _, T = self.through(times, line=line)
+        weights = np.full(_POINTS, 2.0)
+        weights[1::2], weights[0], weights[-1] = 4.0, 1.0, 1.0
+        return T @ (weights / weights.sum())
+
+    def hottest(self, time: float | None = None) -> Spot:
+        """The hottest node at a time (default: the end)."""
+        return self._extreme(self._at(time)[0], 1)
+
+    def coldest(self, time: float | None = None) -> Spot:
+        """The coldest node at a time (default: the end)."""
+        return self._extreme(self._at(time)[0], -1)
+
+    def time_to_reach(self, low: float, high: float) -> Window:
+        """When the whole body is first between two temperatures, and when it is so no longer.
+
+        Raises:
+            InputError: low is not below high.
+        """
+        low, high = finite("time_to_reach: low", low), finite("time_to_reach: high", high)
+        if not low < high:
+            raise InputError(f"time_to_reach: low = {low!r}: must be below high = {high!r}")
+
+        def out(time):                                       # below 0: inside
+            return max(low - self.coldest(time).temperature, self.hottest(time).temperature - high)
+        reached = self._first(out, self._times)
+        if reached is None:
+            return Window(None, None)
+        later = [t for t in self._times if t > reached]
+        return Window(reached, self._first(lambda t: -out(t), later, from_time=reached))
+
+    def tool_profile(self, on: str, at: Any, time: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """(depths, temperatures), shape (m,), of the conducting tool below the node of a face nearest to a point.
+
+        The first is the tool's face. Depths are lengths from there.
+
+        Raises:
+            InputError: no conducting tool touches that boundary.
+        """
+        conducting = {t.on: k for k, t in enumerate(self._body.touches) if t.conducts}
+        known("tool_profile: conducting tool on boundary", on, conducting)
+        number = conducting[on]
+        touch, lines = self._body.touches[number], self._at(time)[1 + number]
+        away = np.hypot(*(touch.points - np.asarray(at, dtype=float)).T)
+        mine = (away.min(initial=np.inf), self._comm.rank)
+        nearest = min(self._comm.allgather(mine))
+        line = self._comm.bcast(lines[np.argmin(away)] if nearest == mine else None, root=nearest[1])
+        return touch.depths, touch.back + np.append(line, 0.0)
+
+    def to_csv(self, file: Any) -> None:
+        """Write one row per step: time, error, coldest, hottest, heat stored, heat through each boundary (rank 0)."""
+        header = ["time", f"estimated_error [{self.unit}]", f"coldest [{self.unit}]", f"hottest [{self.unit}]",
+                  "heat_stored", *(f"heat of {name}" for name in self._unique_names())]
+        rows = [[t, e, self._extreme(state[0], -1).temperature, self._extreme(state[0], 1).temperature, stored, *heats]
+                for t, e, state, stored, heats in zip(self._times, self._errors, self.states, self._stored,
+                                                      self._heats)]
+        files.write_rows(file, header, rows, self._comm)
+
+    def field_to_csv(self, file: Any, time: float | None = None) -> None:
+        """Write the temperature at a time (default: the end) as CSV, columns R, Z, T, for `start` (rank 0)."""
+        table = np.column_stack([self._body.points, self._at(time)[0]])
+        rows = gathered(self._comm, table)
+        files.write_rows(file, ["R", "Z", "T"], rows.tolist(), self._comm)
+
+    def plot_through(self, times: Any = None, *, line: Any = None, scale: float = 1.0, axes: Any = None,
+                     **style: Any) -> Any:
+        """Draw the temperature through the thickness at times (default: `outputs`); returns the matplotlib axes.
+
+        scale: what lengths are multiplied with.
+        """
+        from ...figures import figure
+        axes = figure()[1] if axes is None else axes
+        chosen = self._chosen(times)
+        distance, T = self.through(chosen, line=line)
+        for k, (t, row) in enumerate(zip(chosen, T)):
+            shade = {"color": _shade(k, len(chosen))} | style
+            axes.plot(scale * distance, row, **{"label": f"t = {t:g}"} | shade)
+        axes.set(xlabel="distance through the thickness", ylabel=f"temperature, {_DEGREES[self.unit]}")
+        return axes
+
+    def _unique_names(self) -> list[str]:
+        names = self._body.names
+        return [n if names.count(n) == 1 else f"{n} {names[: k + 1].count(n)}" for k, n in enumerate(names)]
+
+    def _chosen(self, times: Any) -> np.ndarray:
+        return self.outputs if times is None else np.atleast_1d(np.asarray(times, dtype=float))
+
+    def _ends(self) -> list[np.ndarray]:
+        for low, high in (("bottom", "top"), ("inner", "outer")):
+            if {low, high} <= set(self.mesh.boundaries):
+                return [self.mesh.line_of(low)[0], self.mesh.line_of(high)[0]]
+        raise InputError(f"a line through the body: the mesh has no faces 'bottom' and 'top', only"
+                         f" {', '.join(map(repr, self.mesh.boundaries))}: give its ends as line=((R, Z), (R, Z))")
+
+    def _at(self, time: float | None) -> list[np.ndarray]:
+        """The state at a time: a step's own, or Hermite's cubic with slopes of parabolas through three steps."""
+        times = self._times
+        t = times[-1] if time is None else finite("time", time)
+        near = 1e-12 * times[-1]
+        if not -near <= t <= times[-1] + near:
+            raise InputError(f"time = {t!r}: must be from 0 to {times[-1]:g}")
+        k = int(np.argmin(np.abs(np.array(times) - t)))
+        if abs(times[k] - t) <= near:
+            return self.states[k]
+        k = int(np.searchsorted(times, t)) - 1
+        dt = times[k + 1] - times[k]
+        s = (t - times[k]) / dt
+        a, b, slope_a, slope_b = self.states[k], self.states[k + 1], self._slope(k), self._slope(k + 1)
+        return [(1 + 2 * s) * (1 - s) ** 2 * va + s**2 * (3 - 2 * s) * vb + dt * s * (1 - s) * ((1 - s) * da - s * db)
+                for va, vb, da, db in zip(a, b, slope_a, slope_b)]
+
+    def _slope(self, k: int) -> list[np.ndarray]:
+        """Change in time at a step, of the parabola through it and its neighbours."""
+        i = min(max(k, 1), len(self._times) - 2)
+        if i < 1:
+            return [(b - a) / (self._times[1] - self._times[0]) for a, b in zip(*self.states[:2])]
+        t0, t1, t2 = (self._times[j] - self._times[k] for j in (i - 1, i, i + 1))
+        weights = (-(t1 + t2) / ((t0 - t1) * (t0 - t2)), -(t0 + t2) / ((t1 - t0) * (t1 - t2)),
+                   -(t0 + t1) / ((t2 - t0) * (t2 - t1)))
+        return [sum(w * v for w, v in zip(weights, parts)) for parts in zip(*self.states[i - 1: i + 2])]
+
+    def _extreme(self, T: np.ndarray, sign: int) -> Spot:
+        k = int(np.argmax(sign * T)) if len(T) else -1
+        mine = (sign * T[k], *self._body.points[k].tolist()) if len(T) else (-np.inf, 0.0, 0.0)
+        value, R, Z = max(self._comm.allgather(mine))
+        return Spot(float(sign * value), R, Z)
+
+    def _first(self, out: Any, times: list[float], from_time: float | None = None) -> float | None:
+        """The first time at which `out` is not above 0, found between steps."""
+        from scipy.optimize import brentq
+        before = from_time
+        for t in times:
+            if out(t) <= 0:
+                return t if before is None or out(before) <= 0 else float(brentq(out, before, t, xtol=1e-9 * t))
+            before = t
+        return None
+
+
+_DEGREES = {"C": "°C", "K": "K"}
+
+
+def _shade(k: int, n: int) -> Any:
+    from matplotlib import colormaps
+    return colormaps["viridis"](0.9 * (1 - k / max(n - 1, 1)))

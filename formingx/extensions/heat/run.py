@@ -1,0 +1,212 @@
+"""Heating and cooling over time: `heat`."""
+
+import logging
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from ... import _compat
+from ...errors import ConvergenceError, InputError, finite, instance, known, positive, several
+from ...mesh import Mesh
+from ...mesh.nodes import of_space
+from ...physics.kinematics import Axisymmetric
+from ...scene import fields
+from ...values.temperature import ABSOLUTE_ZERO
+from . import stepping
+from .boundaries import Absorption, FixedTemperature, ThermalProperties
+from .conduction import Conduction
+from .layers import layered
+from .result import HeatRun
+from .space_error import SpaceError
+
+PROMISE = 3e-4
+"""Of the error in space, over the span of temperatures in a run."""
+_EARLY = 0.01
+"""Part of the time of a run from which on temperatures are as exact as at the times of output."""
+
+_log = logging.getLogger(__name__)
+
+
+def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperties], boundaries: Sequence[Any] = (), *,
+         start: Any, times: Any, unit: str, kinematics: Any = None, displacement: Any = None, tolerance: float = 1e-3,
+         max_steps: int = 10000) -> HeatRun:
+    """Conduction of heat in a body over time, from t = 0.
+
+    Args:
+        mesh: of the body, from `formingx.mesh`. A boundary without a law lets no heat through.
+        materials: {layer: `ThermalProperties`}, or one for all layers.
+        boundaries: a list of `Convection`, `Radiation`, `HeatFlux`, `FixedTemperature`, `ContactWithTool`,
+            `Absorption`; several on one boundary add up.
+        start: temperature at first: a number, a `table` over R, a function of arrays (R, Z), a CSV file with columns
+            R, Z, T, an earlier `HeatRun` (its end), or a DOLFINx Function.
+        times: when to look at it, times above 0 that grow, the last one the end; or the end alone. Steps end there.
+        unit: of all temperatures, "C" or "K".
+        kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
+        displacement: (u_r, u_z) of a deformed body, a Function or UFL expression on the mesh, length; None: at rest.
+        tolerance: the largest estimated error of one step, degrees.
+        max_steps: more are not taken.
+
+    Raises:
+        InputError: something of this is not allowed.
+        ConvergenceError: steps became too short, or too many.
+
+    >>> sheet = fx.mesh.disc(radius=20.0, thickness=2.0, elements=(4, 2))
+    >>> polymer = fx.ThermalProperties(conductivity=0.2, density=1e-3, heat_capacity=2000.0)
+    >>> run = fx.heat(sheet, polymer, [fx.Convection("top", h=0.01, air=20.0)], start=180.0, times=[10.0], unit="C")
+    >>> [round(spot.temperature, 2) for spot in (run.coldest(), run.hottest())]
+    [171.33, 178.44]
+    """
+    if not isinstance(mesh, Mesh):
+        raise InputError(f"heat: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")
+    known("heat: unit", unit, ABSOLUTE_ZERO)
+    materials = checked_materials(mesh, materials)
+    boundaries = checked_boundaries(mesh, boundaries, ABSOLUTE_ZERO[unit])
+    outputs = _times(times)
+    kinematics = Axisymmetric() if kinematics is None else kinematics
+    if not hasattr(kinematics, "area_vector") or isinstance(kinematics, type):
+        raise InputError(f"heat: kinematics = {kinematics!r}: must be Axisymmetric() or PlaneStrain()")
+    if displacement is not None and getattr(displacement, "ufl_shape", None) != (2,):
+        raise InputError(f"heat: displacement = {displacement!r}: must be a Function or expression (u_r, u_z)")
+    tolerance = positive("heat: tolerance", tolerance)
+    moved = None if displacement is None else _Displaced(displacement, mesh)
+    fine = layered(mesh, _depths(materials, boundaries, outputs), moved)
+    make = partial(Conduction, fine, materials, boundaries, kinematics, ABSOLUTE_ZERO[unit],
+                   displacement if moved is None or fine is mesh else moved.on(fine))
+    body = make()
+    try:
+        _begin(body, start, unit)
+        run = HeatRun(body, unit, outputs)
+        _advance(run, body, outputs, tolerance, max_steps)
+        _look_at_space(run, SpaceError(body, make(degree=3)), tolerance)
+    finally:
+        body.destroy()
+    return run
+
+
+def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any],
+            times: np.ndarray) -> dict[str, tuple[float, float]]:
+    """{boundary: depths that heat has gone at the first and the last time of interest}, of those that heat passes."""
+    slowest = min(material.diffusivity for material in materials.values())
+    fastest = max(material.diffusivity for material in materials.values())
+    first = np.sqrt(slowest * min(times[0], _EARLY * times[-1]))
+    last = np.sqrt(fastest * times[-1])
+    depths: dict[str, tuple[float, float]] = {}
+    for law in boundaries:
+        depth = 1 / law.coefficient if isinstance(law, Absorption) else first
+        depths[law.on] = min(depth, depths.get(law.on, (depth,))[0]), last
+    return depths
+
+
+class _Displaced:
+    """A displacement on a mesh, at points of the body and on another mesh of it; collective."""
+
+    def __init__(self, displacement: Any, mesh: Mesh):
+        space = fem.functionspace(mesh.domain, ("Lagrange", 2, (2,)))
+        u = fem.Function(space)
+        u.interpolate(_compat.compile_expression(displacement, _compat.interpolation_points(space)))
+        self._mesh, self._parts = mesh, [u.sub(k).collapse() for k in (0, 1)]
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Where points, shape (n, 2), are in the deformed body."""
+        return points + np.column_stack([fields.values_at(part, points, self._mesh, "heat: displacement")
+                                         for part in self._parts])
+
+    def on(self, mesh: Mesh) -> fem.Function:
+        """The displacement as a P2 Function on another mesh."""
+        u = fem.Function(fem.functionspace(mesh.domain, ("Lagrange", 2, (2,))))
+        points = of_space(u.function_space)
+        u.x.array[:] = (self(points) - points).ravel()
+        return u
+
+
+def _begin(body: Conduction, start: Any, unit: str) -> None:
+    if getattr(start, "unit", unit) != unit:
+        raise InputError(f"heat: start: is in {start.unit!r}, this run in {unit!r}: must be in the same unit")
+    T = fields.values_at(start, body.points, body.mesh, "heat: start")
+    lowest = body.comm.allreduce(T.min(initial=np.inf), MPI.MIN)
+    if lowest < ABSOLUTE_ZERO[unit]:
+        raise InputError(f"heat: start: its lowest temperature is {lowest:.6g} {unit}: must be at least"
+                         f" {ABSOLUTE_ZERO[unit]:g}, absolute zero")
+    body.T.x.array[: len(T)] = T
+    body.T.x.scatter_forward()
+
+
+def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: float, max_steps: int) -> None:
+    """Step through the times of output, as the estimate of the error allows."""
+    state, t, dt = run.states[0], 0.0, 1e-3 * outputs[0]
+    for end in outputs:
+        while t < end:
+            trial = stepping.fitted(dt, end - t)
+            found = stepping.step(body, state, trial)
+            dt = stepping.next_length(trial, found.error, tolerance)
+            if found.error > tolerance:
+                if dt < 1e-13 * outputs[-1]:
+                    raise ConvergenceError(f"heat: steps became shorter than {dt:.3g} at time {t:.6g}: the estimated"
+                                           f" error does not fall below {tolerance:g}", run)
+                continue
+            if len(run.times) > max_steps:
+                raise ConvergenceError(f"heat: max_steps = {max_steps} were used up at time {t:.6g}", run)
+            t = float(end) if trial == end - t else t + trial
+            state = found.state
+            run.record(t, found)
+    _log.info("heat: %d steps to time %g", len(run.times) - 1, t)
+
+
+def _look_at_space(run: HeatRun, estimate: SpaceError, tolerance: float) -> None:
+    """Estimate the error in space at the times of output, and say where it is more than is promised."""
+    try:
+        run.errors_in_space = np.array([estimate.of(run.states[k], run.times[k])
+                                        for k in np.searchsorted(run.times, run.outputs)])
+    finally:
+        estimate.destroy()
+    allowed = max(tolerance, PROMISE * (max(run.hottest(t).temperature for t in run.times)
+                                        - min(run.coldest(t).temperature for t in run.times)))
+    worst = int(np.argmax(run.errors_in_space))
+    if run.errors_in_space[worst] > allowed:
+        _log.warning("heat: the error in space is about %.2g degrees at time %g, more than %.2g: use more elements"
+                     " along the body, or through it where it is curved", run.errors_in_space[worst],
+                     run.outputs[worst], allowed)
+
+
+def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties]:
+    """{layer: `ThermalProperties`} of what a user gave, or an InputError."""
+    if isinstance(materials, ThermalProperties):
+        materials = dict.fromkeys(mesh.layers, materials)
+    if not isinstance(materials, Mapping):
+        raise InputError(f"heat: materials = {materials!r}: must be ThermalProperties(...), or {{layer: ...}}")
+    for name, material in materials.items():
+        known("heat: materials: layer", name, mesh.layers)
+        instance(f"heat: materials[{name!r}]", material, ThermalProperties, "ThermalProperties(...)")
+    missing = [name for name in mesh.layers if name not in materials]
+    if missing:
+        raise InputError(f"heat: layer {missing[0]!r} has no material: give its ThermalProperties")
+    return dict(materials)
+
+
+def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> list[Any]:
+    """The laws of the faces that a user gave, or an InputError."""
+    found = several("heat: boundaries", boundaries, "boundaries, such as Convection('top', h=40, air=20)")
+    held = [b.on for b in found if isinstance(b, FixedTemperature)]
+    for boundary in found:
+        if not hasattr(boundary, "on") or not (hasattr(boundary, "flux") or hasattr(boundary, "check")) \
+                or isinstance(boundary, type):
+            raise InputError(f"heat: boundaries: {boundary!r} is not allowed here: must be a list of Convection,"
+                             f" Radiation, HeatFlux, FixedTemperature, ContactWithTool, Absorption")
+        known(f"heat: {boundary!r}: boundary", boundary.on, mesh.boundaries)
+        if hasattr(boundary, "check"):
+            boundary.check(mesh, absolute_zero)
+        if boundary.on in held and hasattr(boundary, "check") and not isinstance(boundary, FixedTemperature):
+            raise InputError(f"heat: {boundary!r}: the temperature of {boundary.on!r} is fixed, so this does nothing")
+    return found
+
+
+def _times(times: Any) -> np.ndarray:
+    listed = [times] if np.ndim(times) == 0 and not isinstance(times, str) else several("heat: times", times, "times")
+    found = np.array([positive("heat: times", finite("heat: times", t)) for t in listed])
+    if not len(found) or np.any(np.diff(found) <= 0):
+        raise InputError(f"heat: times = {times!r}: must be one time or several that grow")
+    return found

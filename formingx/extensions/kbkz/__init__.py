@@ -1,0 +1,1 @@
+"""Integral constitutive laws of K-BKZ type."""

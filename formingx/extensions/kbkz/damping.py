@@ -1,0 +1,112 @@
+"""How much of a past state's stress is left, h(I1, I2), for `KBKZ`."""
+
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError, finite, positive
+
+_NEAR = 1e-4
+"""Of the square root in Wagner's exponent: below it its slope, infinite at rest, is that at it."""
+
+
+class Damping:
+    """h(I1, I2) of the Finger tensor since a past state: 1 where I1 = I2 = 3.
+
+    With a term in I2 the stress h B has no potential: only functions of I1 alone have one.
+    """
+
+    def __call__(self, I1: Any, I2: Any) -> Any:
+        """h at invariants of any shape."""
+        return self.derivatives(I1, I2)[0]
+
+    def derivatives(self, I1: Any, I2: Any) -> tuple[Any, Any, Any]:
+        """(h, dh/dI1, dh/dI2) at invariants of any shape."""
+        raise NotImplementedError
+
+    @property
+    def of_I1_alone(self) -> bool:
+        """True if the stress has a potential, and the tangent is symmetric."""
+        return not np.any(self.derivatives(np.array(5.0), np.array(5.0))[2])
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{k}={v!r}' for k, v in vars(self).items())})"
+
+    __repr__ = __str__
+
+
+class PSM(Damping):
+    """h = alpha/[(alpha - 3) + beta I1 + (1 - beta) I2]: Papanastasiou, Scriven and Macosko, J. Rheol. 27 (1983) 387.
+
+    Args:
+        alpha: above 0; the larger, the less is damped.
+        beta: from 0 to 1; the smaller, the less is damped in uniaxial, and the more in equibiaxial extension.
+
+    >>> melt = fx.KBKZ([(0.1, 1.0), (0.02, 10.0)], damping=fx.PSM(alpha=10.0, beta=0.5))         # (modulus, time)
+    """
+
+    def __init__(self, alpha: float, beta: float):
+        self.alpha, self.beta = positive("PSM: alpha", alpha), _share("PSM: beta", beta)
+
+    def derivatives(self, I1, I2):
+        h = self.alpha / (self.alpha - 3 + self.beta * I1 + (1 - self.beta) * I2)
+        return h, -self.beta * h**2 / self.alpha, -(1 - self.beta) * h**2 / self.alpha
+
+
+class Wagner(Damping):
+    """h = exp(-beta sqrt(alpha I1 + (1 - alpha) I2 - 3)): Wagner, Rheol. Acta 15 (1976) 136 and 18 (1979) 33.
+
+    Args:
+        alpha: from 0 to 1, the share of I1.
+        beta: above 0; the larger, the more is damped.
+
+    >>> fx.Wagner(alpha=0.1, beta=0.2)
+    Wagner(alpha=0.1, beta=0.2)
+    """
+
+    def __init__(self, alpha: float, beta: float):
+        self.alpha, self.beta = _share("Wagner: alpha", alpha), positive("Wagner: beta", beta)
+
+    def derivatives(self, I1, I2):
+        return _exponential(self.alpha, [(1.0, self.beta)], I1, I2)
+
+
+def LuoTanner(n: float, beta: float) -> Wagner:  # noqa: N802  a card's name for a law
+    """`Wagner` in the letters of Luo and Tanner: h = exp(-n sqrt(beta I1 + (1 - beta) I2 - 3)); n above 0.
+
+    >>> fx.LuoTanner(n=0.2, beta=0.1)
+    Wagner(alpha=0.1, beta=0.2)
+    """
+    return Wagner(alpha=_share("LuoTanner: beta", beta), beta=positive("LuoTanner: n", n))
+
+
+class DoubleWagner(Damping):
+    """h = f exp(-n1 s) + (1 - f) exp(-n2 s), s = sqrt(alpha I1 + (1 - alpha) I2 - 3): Osaki (1976), Laun (1978).
+
+    Args:
+        alpha, f: from 0 to 1. n1, n2: above 0.
+
+    >>> fx.DoubleWagner(alpha=0.05, f=0.57, n1=0.31, n2=0.106)
+    DoubleWagner(alpha=0.05, f=0.57, n1=0.31, n2=0.106)
+    """
+
+    def __init__(self, alpha: float, f: float, n1: float, n2: float):
+        self.alpha, self.f = _share("DoubleWagner: alpha", alpha), _share("DoubleWagner: f", f)
+        self.n1, self.n2 = positive("DoubleWagner: n1", n1), positive("DoubleWagner: n2", n2)
+
+    def derivatives(self, I1, I2):
+        return _exponential(self.alpha, [(self.f, self.n1), (1 - self.f, self.n2)], I1, I2)
+
+
+def _exponential(alpha: float, terms: list[tuple[float, float]], I1: Any, I2: Any) -> tuple[Any, Any, Any]:
+    """Of the sum of f exp(-n s)."""
+    s = np.sqrt(np.maximum(alpha * I1 + (1 - alpha) * I2 - 3, 0))
+    each = [f * np.exp(-n * s) for f, n in terms]
+    slope = -sum(n * h for (_, n), h in zip(terms, each)) / (2 * np.maximum(s, _NEAR))
+    return sum(each), alpha * slope, (1 - alpha) * slope
+
+
+def _share(name: str, value: Any) -> float:
+    if not 0 <= (number := finite(name, value)) <= 1:
+        raise InputError(f"{name} = {value!r}: must be from 0 to 1")
+    return number

@@ -1,0 +1,178 @@
+"""The stress of a fading memory of all past states, at points: `KBKZ` in a scene.
+
+With Cbar = J^(-2/3) C and the past states C_k, at ages that the material feels, the second Piola-Kirchhoff stress is,
+up to a pressure,
+
+    S = sum_k W_k h(I1, I2) C_k^-1,   I1 = Cbar : C_k^-1,   I2 = Cbar^-1 : C_k,   W_k = sum_j G_j w_kj,
+
+w_kj the weights of mode j that are exact where h C_k^-1 goes linearly with the age from state to state. The first
+state, rest, stands for all time before; the last bears no more than a pressure. A form holds S linear in Cbar and the
+step of time, exact where it is refreshed, with the consistent tangent. A symmetric tensor is kept as its entries (11,
+22, 12, 33); arrays are of shape (4, n).
+"""
+
+from typing import Any
+
+import numpy as np
+
+from ...materials.tensors import cofactor, entries
+
+_COUNT = np.array([1.0, 1.0, 2.0, 1.0])[:, None]
+"""How often an entry is in the tensor."""
+
+
+class Integral:
+    """Past states' weights and stress.
+
+    Args:
+        spectrum: [(G, tau), ...]. damping: a `Damping` or None. irreversible: see `KBKZ`. shifted: True if the time
+            that the material feels depends on the temperature.
+    """
+
+    coefficients = {"past_S": (0.0,) * 4, "past_C": (1.0, 1.0, 0.0, 1.0), "past_D": ((0.0,) * 4,) * 4,
+                    "past_T": (0.0,) * 4}
+    """What a form holds, at zero: S - T dt, Cbar, dS/dCbar and T = dS/dt where it was refreshed, the entries of S as
+    often as they are in the tensor."""
+
+    def __init__(self, spectrum: list[tuple[float, float]], damping: Any, irreversible: bool, shifted: bool):
+        self.modulus, self.tau = np.array(spectrum).T
+        self.damping, self.irreversible, self.shifted = damping, irreversible, shifted
+
+    def weights(self, ages: np.ndarray) -> np.ndarray:
+        """w of the states at these falling ages, the last 0, shape (K,) or (K, n): of shape (K, modes[, n])."""
+        x = ages[:, None] / (self.tau if ages.ndim == 1 else self.tau[:, None])
+        step, young = x[:-1] - x[1:], np.exp(-x[1:])
+        mean = _mean_decay(step)
+        w = np.zeros_like(x)
+        w[0] = np.exp(-x[0])
+        w[:-1] += young * (mean - np.exp(-step))
+        w[1:] += young * (1 - mean)
+        known = step[:-1] > 0                                   # the way before one that is a parabola
+        s = np.where(known, step[1:] / np.where(known, step[:-1], 1), np.inf)
+        ends, middle, first = (young[1:] * _bulge(step[1:]) * c for c in _parabola(s))
+        w[2:] -= ends
+        w[1:-1] += middle
+        w[:-2] -= first
+        return w
+
+    def after(self, weights: np.ndarray, step: Any, before: Any = 0.0,
+              near: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
+        """(W, dW/dstep) of the states of `weights` a step of the material's time later; shape (K, n or 1).
+
+        before: the time between the last two states, 0: not known. The step is exact where h C_k^-1 goes along a
+        parabola through these, which makes it of second order for steps far longer than tau, too (`TransientNetwork`).
+        near: 1, or 0 where the two are far apart, shape (n,).
+        """
+        each = weights.ndim == 3
+        y = np.atleast_1d(step) / self.tau[:, None]                         # (modes, n or 1)
+        decay, G = np.exp(-y), self.modulus[:, None]
+        kept = decay * (weights if each else weights[:, :, None])
+        W, slope = np.sum(G * kept, axis=1), -np.sum(G / self.tau[:, None] * kept, axis=1)
+        mean = _mean_decay(y)
+        W[-1] += np.sum(G * (mean - decay), axis=0)
+        slope[-1] += np.sum(G / self.tau[:, None] * (_mean_decay_slope(y) + decay), axis=0)
+        if len(W) > 1 and np.any(before):
+            known = np.asarray(before) > 0
+            rate = np.where(known, near / np.where(known, before, 1), 0)
+            shape = len(W), max(W.shape[1], np.size(rate))
+            W, slope = np.broadcast_to(W, shape).copy(), np.broadcast_to(slope, shape).copy()
+            bulge, by_step = np.sum(G * _bulge(y), axis=0), np.sum(G / self.tau[:, None] * _bulge_slope(y), axis=0)
+            (_, middle, first), (middle_slope, first_slope) = _parabola(step * rate), _parabola_slopes(step * rate)
+            for k, c, by_s in ((-1, middle, middle_slope), (-2, -first, -first_slope)):
+                W[k] += bulge * c
+                slope[k] += by_step * c + bulge * by_s * rate
+        return W, slope
+
+    def damped(self, C: np.ndarray, past: np.ndarray, least: np.ndarray | None = None) -> tuple[Any, ...]:
+        """(C_k^-1, shape (K, 4, n), h, dh/dI1, dh/dI2, shape (K, n)) of past states, shape (K, 4, n), at C."""
+        inverse = _inverse(past)
+        if self.damping is None:
+            one = np.ones((len(past), C.shape[1]))
+            return inverse, one, 0 * one, 0 * one
+        I1 = np.sum(_COUNT * inverse * C, axis=1)
+        I2 = np.sum(_COUNT * past * _inverse(C), axis=1)
+        h, h1, h2 = self.damping.derivatives(I1, I2)
+        if least is not None:
+            known = h > least
+            h, h1, h2 = np.where(known, least, h), np.where(known, 0, h1), np.where(known, 0, h2)
+        return inverse, h, h1, h2
+
+    def stress(self, C: np.ndarray, past: np.ndarray, W: np.ndarray, slope: np.ndarray,
+               least: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(S, dS/dC, dS/dstep), shapes (4, n), (4, 4, n), (4, n), at C, of past states of weights W, dW/dstep."""
+        inverse, h, h1, h2 = self.damped(C, past, least)
+        S, T = (np.einsum("kn,kin->in", np.broadcast_to(w, h.shape) * h, inverse) for w in (W, slope))
+        if self.damping is None:
+            return S, np.zeros((4, *S.shape)), T
+        by_I2 = np.stack([C[3] * past[:, 1] + C[1] * past[:, 3], C[3] * past[:, 0] + C[0] * past[:, 3],
+                          -2 * (C[3] * past[:, 2] + C[2] * past[:, 3]),
+                          C[1] * past[:, 0] + C[0] * past[:, 1] - 2 * C[2] * past[:, 2]], axis=1)
+        by = (W * h1)[:, None] * _COUNT * inverse + (W * h2)[:, None] * by_I2
+        return S, np.einsum("kin,kjn->ijn", inverse, by), T
+
+    def potential(self, C: Any, held: dict[str, Any], time_step: Any) -> Any:
+        """A UFL scalar whose derivative by F is the stress, but for the unsymmetric part of dS/dC; `held`: see
+        `coefficients`; C: entries of Cbar."""
+        S, D, T, change = held["past_S"], held["past_D"], held["past_T"], _change(C, held)
+        linear = sum((S[i] + T[i] * time_step) * C[i] for i in range(4))
+        return (linear + sum(D[i, j] * change[i] * change[j] for i in range(4) for j in range(4)) / 2) / 2
+
+    def unsymmetric_work(self, C: Any, dC: Any, held: dict[str, Any]) -> Any:
+        """What is left of the virtual work for the entries dC of a virtual change of Cbar (UFL); 0 where refreshed."""
+        D, change = held["past_D"], _change(C, held)
+        return sum((D[i, j] - D[j, i]) * change[j] * dC[i] for i in range(4) for j in range(4)) / 4
+
+
+def _inverse(C: np.ndarray) -> np.ndarray:
+    """Of tensors of determinant 1, shape (..., 4, n)."""
+    return np.stack(cofactor(entries(np.moveaxis(C, -2, 0))), axis=-2)
+
+
+def _change(C: Any, held: dict[str, Any]) -> list[Any]:
+    return [C[i] - held["past_C"][i] for i in range(4)]
+
+
+def _mean_decay(x: np.ndarray) -> np.ndarray:
+    """(1 - e^-x)/x."""
+    return np.where(x < 1e-12, 1.0, -np.expm1(-x) / np.where(x < 1e-12, 1.0, x))
+
+
+def _mean_decay_slope(x: np.ndarray) -> np.ndarray:
+    """Derivative of (1 - e^-x)/x."""
+    small = x < 1e-2
+    y = np.where(small, 1.0, x)
+    series = -1 / 2 + x / 3 - x**2 / 8 + x**3 / 30 - x**4 / 144
+    return np.where(small, series, (np.exp(-y) * (1 + y) - 1) / y**2)
+
+
+def _parabola(s: Any) -> tuple[Any, Any, Any]:
+    """(f, f (1 + s), f s), f = s/(1 + s), of a step over the one before: its bulge times (-C^-1, C_n^-1, -C_n-1^-1).
+
+    0 from s = 4 on, and less from 2 on: steps that grow by more leave BDF2 unstable.
+    """
+    s = np.minimum(s, 4.0)
+    share = np.minimum(1.0, 2 - s / 2) * s
+    return share / (1 + s), share, share * s / (1 + s)
+
+
+def _parabola_slopes(s: Any) -> tuple[Any, Any]:
+    """Derivatives of the latter two."""
+    s = np.minimum(s, 4.0)
+    share, slope = np.minimum(1.0, 2 - s / 2) * s, np.where(s < 2, 1.0, np.where(s < 4, 2 - s, 0.0))
+    return slope, slope * s / (1 + s) + share / (1 + s) ** 2
+
+
+def _bulge(x: np.ndarray) -> np.ndarray:
+    """[x - 2 + (x + 2) e^-x]/x^2."""
+    small = x < 1e-2
+    y = np.where(small, 1.0, x)
+    series = x * (1 / 6 - x / 12 + x**2 / 40 - x**3 / 180 + x**4 / 1008)
+    return np.where(small, series, (y - 2 + (y + 2) * np.exp(-y)) / y**2)
+
+
+def _bulge_slope(x: np.ndarray) -> np.ndarray:
+    """Its derivative."""
+    small = x < 1e-2
+    y = np.where(small, 1.0, x)
+    series = 1 / 6 - x / 6 + 3 * x**2 / 40 - x**3 / 45 + 5 * x**4 / 1008
+    return np.where(small, series, (1 - (y + 1) * np.exp(-y)) / y**2 - 2 * _bulge(y) / y)

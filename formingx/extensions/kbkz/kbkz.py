@@ -1,0 +1,197 @@
+"""The factorised K-BKZ equation: a fading memory of all past states, each damped by how far it is away.
+
+    tau(t) = integral over t' of m(t - t') h(I1, I2) B(t, t') dt',    m(s) = sum (G_k/tau_k) exp(-s/tau_k),
+
+tau the Kirchhoff stress up to a pressure, B(t, t') the Finger tensor of the deformation from t' to t, I1 = tr B,
+I2 = tr B^-1: Kaye (1962), Bernstein, Kearsley and Zapas (1963); factorised, without a term in B^-1, as by Wagner (1976)
+and Papanastasiou, Scriven and Macosko (1983). Without damping it is Lodge's (1956) network, `TransientNetwork`.
+In a scene its stress is computed at each quadrature point from the past states there (`discrete.past_states`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...errors import InputError, instance, known, positive
+from ...materials import branches
+from ...materials.constants import OfTemperature, Sample
+from ...materials.homogeneous import MODES
+from ...materials.in_time import Relaxing, checked_pairs, checked_shift
+from ...materials.material import Material
+from ...materials.tensors import inner, isochoric
+from .damping import Damping
+from .integral import Integral
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+_PANELS = 1.5
+"""Ratio of the ages between which one rule is used; below half the shortest relaxation time there is one panel."""
+_STRAIN = 0.25
+"""Longest logarithmic strain in a panel."""
+
+
+class KBKZ(Relaxing):
+    """The factorised K-BKZ equation, the body at rest before.
+
+    In small strains G(t) = G_equilibrium + sum G_k exp(-t/tau_k); after a step of strain the stress is G(t) h times
+    that of a neo-Hookean body of unit modulus, so that time and strain separate. A damped material stores no
+    energy that the state alone would tell, so runs with it have no columns of energies.
+
+    Args:
+        spectrum: [(G, tau), ...], at least one: modulus, stress, and relaxation time, time; each above 0.
+        damping: `PSM`, `Wagner`, ... or None: h = 1.
+        equilibrium: a material that does not relax, beside it, or None.
+        shift: how relaxation times depend on the temperature of the scene, see `Viscoelastic`.
+        irreversible: h of a past state is the least that it has been since then.
+
+    >>> melt = fx.KBKZ([(0.1, 0.5), (0.02, 10.0)], damping=fx.PSM(alpha=14.4, beta=0.05))
+    >>> round(melt.shear_modulus, 12)
+    0.12
+    """
+
+    def __init__(self, spectrum: Any, damping: Damping | None = None, equilibrium: Material | None = None,
+                 shift: Any = None, irreversible: bool = False):
+        super().__init__(equilibrium)
+        self.spectrum = [(positive(f"KBKZ: G_{k}", G), positive(f"KBKZ: tau_{k}", tau))
+                         for k, (G, tau) in enumerate(checked_pairs("KBKZ: spectrum", spectrum, "G, tau"), 1)]
+        G, tau = np.array(self.spectrum).T
+        if len(G) > 2 and np.all(np.diff(G[np.argsort(tau)]) > 0) and np.ptp(np.log(G)) > 3:
+            raise InputError(f"KBKZ: spectrum = {spectrum!r}: the moduli grow with the times, from {G.min():g} to"
+                             f" {G.max():g}: must be (G, tau); of (eta, lambda) make KBKZ.of_viscosities(...)")
+        if damping is not None:
+            instance("KBKZ: damping", damping, Damping, "PSM(alpha, beta), Wagner(alpha, beta) or None")
+        self.damping = damping
+        self.integral = Integral(self.spectrum, damping, instance("KBKZ: irreversible", irreversible, bool,
+                                                                  "True or False"), shift is not None)
+        if shift is not None:
+            self.parameters["aT"] = OfTemperature(checked_shift("KBKZ", shift), repr(shift))
+        self.check()
+
+    of_flow = ("aT",)
+    stores_energy = False
+
+    @classmethod
+    def of_viscosities(cls, spectrum: Sequence[tuple[float, float]], *args: Any, **more: Any) -> KBKZ:
+        """The same from a card of viscosities and times, [(eta, lambda), ...]: G = eta/lambda."""
+        return cls([(positive("KBKZ: eta", eta) / positive("KBKZ: lambda", time), time) for eta, time in spectrum],
+                   *args, **more)
+
+    @property
+    def symmetric(self) -> bool:  # type: ignore[override]  # read only here
+        """See `Material`."""
+        return self.damping is None or self.damping.of_I1_alone
+
+    def shear_modulus_at(self, sample: Sample) -> np.ndarray:
+        rest = 0.0 if self._equilibrium is None else self._equilibrium.shear_modulus_at(sample)
+        return np.atleast_1d(sum(G for G, _ in self.spectrum) + rest)
+
+    def strain_energy(self, F, **constants):
+        """That at once, of the network without damping: for moduli and stresses at rest."""
+        G = sum(G for G, _ in self.spectrum)
+        return G / 2 * (inner(isochoric(F), (1, 1, 0, 1)) - 3) + self._relaxed_energy(F, constants)
+
+    def step_energy(self, F, internal, time_step, **constants):
+        """A UFL scalar whose derivative by F is the stress at the end of a step; no energy."""
+        return self.integral.potential(isochoric(F), internal, time_step) + self._relaxed_energy(F, constants)
+
+    def stored_energy(self, F, internal, **constants):
+        """As `step_energy` where no time passes: its derivative is the stress; its value means nothing."""
+        return self.step_energy(F, internal, 0.0, **constants)
+
+    def _modulus(self, times):
+        return sum(G * np.exp(-np.asarray(times, float) / tau) for G, tau in self.spectrum)
+
+    def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), times: ArrayLike | None = None,
+               between: str = "stretch", *, true: bool = False) -> np.ndarray:
+        """Nominal stress, force over reference area, of a test (`true`: over the area as it is); stress.
+
+        Error below 1e-8 of it.
+
+        Args:
+            mode: "uniaxial", "pure_shear" or "equibiaxial"; without times "biaxial", see `Material.stress`, too.
+            stretches: of any shape without times, (n,) with them.
+            times: when the stretches are met, shape (n,), not falling; a step from one stretch to another at the same
+                time is put on at once, and so is the first stretch. None: every stretch is put on at once.
+            between: what grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
+
+        Raises:
+            InputError: unknown mode, a stretch that is not above 0, times that fall or are not one for each stretch.
+        """
+        if times is None:
+            l = np.asarray(stretches, float)
+            if mode == "biaxial":
+                return self._biaxial(l) * (l if true else 1.0)
+            branches.checked(f"{self}: stress", mode, np.zeros(l.size), l.ravel(), between)
+            at_once = self._modulus(0.0) * self._strained(mode, l) / l
+            return (at_once + self._relaxed_stress(mode, l)) * (l if true else 1.0)
+        t, l = branches.checked(f"{self}: stress", mode, times, stretches, between)
+        found = np.array([self._at(mode, t[:n + 1], l[:n + 1], between) for n in range(len(t))]) / l
+        return (found + self._relaxed_stress(mode, l)) * (l if true else 1.0)
+
+    def _biaxial(self, l: np.ndarray) -> np.ndarray:
+        """Nominal stresses of a step to (l1, l2), shape (2, ...)."""
+        if l.shape[:1] != (2,) or not np.all((l > 0) & np.isfinite(l)):
+            raise InputError(f"{self}: stress: stretches of a biaxial test must be (l1, l2), each above 0")
+        squares = np.stack([*l**2, 1 / (l[0] * l[1])**2])
+        h = 1.0 if self.damping is None else self.damping(squares.sum(0), (1 / squares).sum(0))
+        return self._modulus(0.0) * h * (squares[:2] - squares[2]) / l + self._relaxed_stress("biaxial", l)
+
+    def rupture_stretch(self, mode: str) -> float:
+        """The stretch at which h (B_11 - B_33) of a step of strain is largest; infinity without a maximum up to 100.
+
+        Put on at once, no more stress is to be had beyond: a damped melt that is stretched faster than it relaxes thins
+        there without end.
+        """
+        known(f"{self}: rupture_stretch: mode", mode, MODES)
+        l = np.geomspace(1, 100, 4000)
+        bears = self._modulus(0.0) * self._strained(mode, l) + self._relaxed_stress(mode, l) * l
+        falls = np.flatnonzero(bears[1:] < bears[:-1])
+        return float(l[falls[0]]) if len(falls) else np.inf
+
+    def _at(self, mode: str, times: np.ndarray, stretches: np.ndarray, between: str) -> float:
+        """tau_1 - tau_3 at the last of the times."""
+        now, last = times[-1], stretches[-1]
+        modulus, tau = np.array(self.spectrum).T
+        rested = self._modulus(now - times[0]) * self._strained(mode, last)
+        ends = self._ages(times, stretches)
+        half = np.diff(ends)[:, None] / 2
+        age = (ends[:-1, None] + half * (1 + _NODES))
+        memory = np.exp(-age[..., None] / tau) @ (modulus / tau)
+        relative = last / _between(now - age, times, stretches, between)
+        return float(rested + np.sum(half * _WEIGHTS * memory * self._strained(mode, relative)))
+
+    def _ages(self, times: np.ndarray, stretches: np.ndarray) -> np.ndarray:
+        """Ages between which the integrand is smooth, rising from 0."""
+        whole, shortest = times[-1] - times[0], min(tau for _, tau in self.spectrum)
+        count = max(0, int(np.log(max(2 * whole / shortest, 1)) / np.log(_PANELS)) + 1)
+        ages = [np.array([0, whole]), shortest / 2 * _PANELS ** np.arange(count), times[-1] - times]
+        for i in np.flatnonzero(np.diff(times) > 0):
+            parts = int(np.abs(np.log(stretches[i + 1] / stretches[i])) / _STRAIN) + 1
+            if parts > 1:
+                ages.append(times[-1] - np.linspace(times[i], times[i + 1], parts + 1))
+        found = np.unique(np.concatenate(ages))
+        return found[found <= whole]
+
+    def _strained(self, mode: str, stretch: np.ndarray) -> np.ndarray:
+        """h (B_11 - B_33) of a stretch."""
+        square = np.asarray(stretch, float)[..., None] ** (2 * np.array([1, MODES[mode], -1 - MODES[mode]]))
+        difference = square[..., 0] - square[..., 2]
+        return difference if self.damping is None else difference * self.damping(square.sum(-1), (1 / square).sum(-1))
+
+    def __str__(self) -> str:
+        more = f", equilibrium={self.equilibrium}" if self._equilibrium is not None else ""
+        more += f", shift={self.parameters['aT']!r}" if "aT" in self.parameters else ""
+        return f"KBKZ({self.spectrum!r}, damping={self.damping}{more}" + ", irreversible=True" * (
+            self.integral.irreversible) + ")"
+
+    __repr__ = __str__
+
+
+def _between(at: np.ndarray, times: np.ndarray, stretches: np.ndarray, between: str) -> np.ndarray:
+    """The stretches of a history at these times."""
+    if between == "stretch":
+        return np.interp(at, times, stretches)
+    return np.exp(np.interp(at, times, np.log(stretches)))

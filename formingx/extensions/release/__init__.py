@@ -1,0 +1,1 @@
+"""Springback of a formed part, and its mesh."""

@@ -1,0 +1,118 @@
+"""The formed body as a new mesh, free of stress: to be crushed, formed once more, or written for another program."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+
+from ... import _compat
+from ...errors import InputError, finite, instance, positive
+from ...forms.outline import Outline
+from ...mesh.grid import Grid, counter_clockwise, gathered, to_mesh
+from ...mesh.mesh import Mesh
+from ...mesh.nodes import own_cells
+from ..remeshing.remeshed import remeshed
+
+_NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
+_TO_GRID = [0, 1, 2, 5, 3, 4]                               # middles of the edges 01, 12, 20
+
+
+def formed(problem: Any, state: Any, size: float | None = None) -> Mesh:
+    """The deformed elements of a state, with the names of layers and boundaries; second-order geometry; collective.
+
+    size: of new elements in their place, length.
+
+    Raises:
+        InputError: a membrane, or deformed elements that are no mesh (inside out, or one over another); new ones of
+            several layers, on several ranks, or round a hole.
+    """
+    forms, mesh = problem.forms, problem.scene.mesh
+    domain, comm = mesh.domain, mesh.comm
+    if forms.domain is not domain:
+        raise InputError("Path.formed: a membrane has no elements across its thickness: form a solid, MixedPressure()")
+    if size is not None:
+        return _of_size(problem, state, positive("Path.formed: size", size))
+    numbers = fem.functionspace(domain, ("Lagrange", 2)).dofmap
+    cells = own_cells(domain)
+    triangles = numbers.index_map.local_to_global(np.asarray(numbers.list)[cells].ravel().astype(np.int32))
+    triangles = triangles.reshape(-1, 6)
+    points = np.zeros((len(cells), 6, forms.scene.kinematics.components))
+    if len(cells):
+        with problem.at(state):
+            moved = _compat.compile_expression(forms.X + forms.u, _NODES)
+            points = moved.eval(domain, cells).reshape(points.shape)
+    layers = {name: triangles[(found := mesh.cells.find(tag))[found < len(cells)]] for name, tag in mesh.layers.items()}
+    domain.topology.create_connectivity(1, 2)
+    domain.topology.create_connectivity(2, 1)
+    to_cell, to_facet = domain.topology.connectivity(1, 2), domain.topology.connectivity(2, 1)
+    edges: dict[str, list] = {name: [] for name in mesh.boundaries}
+    for name, rows in edges.items():
+        for facet in mesh.facets_of(name):
+            cell = to_cell.links(facet)[0]
+            if cell < len(cells):
+                k = int(np.flatnonzero(to_facet.links(cell) == facet)[0])
+                rows.append(triangles[cell, [(k + 1) % 3, (k + 2) % 3, 3 + k]])
+    parts = comm.allgather((triangles, points, layers, edges))
+
+    def grid() -> Grid:
+        place = np.zeros((1 + max(int(t.max(initial=0)) for t, *_ in parts), points.shape[-1]))
+        for t, x, *_ in parts:
+            place[t] = x
+        if problem.scene.kinematics.axisymmetric:            # what is on the axis is there to the last bit
+            place[np.abs(place[:, 0]) < 1e-12 * np.ptp(place), 0] = 0.0
+        return Grid(place, np.arange(1, len(place) + 1),
+                    {name: counter_clockwise(place, np.concatenate([p[2][name] for p in parts])[:, _TO_GRID])
+                     for name in mesh.layers},
+                    {name: np.array([row for p in parts for row in p[3][name]], dtype=np.int64).reshape(-1, 3)
+                     for name in mesh.boundaries})
+    return to_mesh(grid, comm, "Path.formed: the deformed mesh")
+
+
+def _of_size(problem: Any, state: Any, size: float) -> Mesh:
+    """The deformed outline, with new elements inside."""
+    mesh, outline = problem.scene.mesh, Outline(problem.forms)
+    if len(mesh.layers) > 1 or mesh.comm.size > 1:
+        raise InputError(f"Path.formed: size = {size:g}: new elements are made of one layer, on one rank: leave it out")
+    with problem.at(state):
+        edges = outline.edges()
+    of, order = {name: outline.of(name) for name in mesh.boundaries}, outline.around("Path.formed: size")
+    names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
+    (layer,), axisymmetric = mesh.layers, problem.scene.kinematics.axisymmetric
+    return remeshed(edges[order], names, np.zeros((0, edges.shape[-1])), size, size, layer, axisymmetric, mesh.comm)
+
+
+def imperfect(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
+    """The mesh with its nodes moved along a mode, free of stress there: an imperfection; collective.
+
+    Args:
+        mode: a `Loss` with n = 0 of a run on this mesh, or on one with the same nodes.
+        amplitude: the largest motion of a node, length; negative: against the mode.
+
+    Raises:
+        InputError: the mode varies round the body, or is of other nodes; the moved elements are no mesh.
+
+    >>> column = fx.mesh.disc(radius=1.0, thickness=3.0, elements=(1, 4))
+    >>> pressed = fx.Scene(mesh=column, materials=fx.NeoHookean(c10=0.5), supports=[
+    ...     fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.Displaced("top", "z")])
+    >>> loss = fx.trace(pressed, until=fx.travel(-1.9), progress=False).stability([0]).first
+    >>> bent = fx.imperfect(column, loss, 0.01)
+    """
+    from ..stability.instability import Loss
+    instance("imperfect: mesh", mesh, Mesh, "a mesh")
+    mode, amplitude = instance("imperfect: mode", mode, Loss, "a loss that Path.stability found"), finite(
+        "imperfect: amplitude", amplitude)
+    if mode.number or mode.flipped:
+        raise InputError(f"imperfect: mode: {mode!r}: varies round the body, or is antisymmetric about a mirror"
+                         " plane: no mesh of the section can have it; give a mode of n = 0")
+    grid = gathered(mesh)
+    keys, near = (np.round(points / (1e-7 * np.ptp(grid.points))).astype(np.int64) for points in (
+        mode.points, grid.points))
+    there = {tuple(key): k for k, key in enumerate(keys.tolist())}
+    found = [there.get(tuple(key), -1) for key in near.tolist()]
+    if min(found) < 0:
+        R, Z = grid.points[int(np.argmin(found))]
+        raise InputError(f"imperfect: mode: it has no node at (R, Z) = ({R:.6g}, {Z:.6g}): it is of another mesh")
+    moved = grid.points + amplitude * mode.amplitudes[found][:, : grid.points.shape[1]]
+    return to_mesh(lambda: grid._replace(points=moved), mesh.comm, "imperfect: the moved mesh")

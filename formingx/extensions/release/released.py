@@ -1,0 +1,206 @@
+"""A part that is let go: out of its tools, trimmed, cooled; what it springs back, shrinks and warps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...errors import ConvergenceError, InputError, finite, positive
+from ...forms.carry import carry, take_fields
+from ...forms.schedule import Setting
+from ...mesh.mesh import Mesh
+from ...physics.supports import Held, PinnedNode, Support, Symmetry
+from ...problem.problem import Problem
+from ...results.evaluate.part import strips_within
+from ...results.evaluate.profile import FACES
+from ...results.evaluate.wall import Wall
+from ...results.numbers import KeyNumbers
+from ...scene.scene import Scene
+from ...solve.arc_length import Curve
+from ...solve.newton import Tolerances
+from ...solve.process import Execution
+from ...solve.record import Record
+from ...solve.stage import Stage, plan
+from ...solve.stepping import allowed as allowed_error
+from ...units import NONE, Units
+from .part import part_along
+
+_THROUGH = 1.0
+"""Time that a wall is given to cool, over thickness^2/diffusivity: exp(-pi^2) of a difference is left."""
+
+
+@dataclass(frozen=True, repr=False)
+class Released(KeyNumbers):
+    """A part before and after it was let go.
+
+    Attributes:
+        path: the run from the part in its tools to the part at rest (`Path`).
+        before, after: its `Wall` then.
+        trimmed: radius of the middle line in the tools where it was cut off, length.
+        units: of the labels.
+    """
+
+    path: Any
+    before: Wall
+    after: Wall
+    trimmed: float
+    units: Units = field(repr=False, default=NONE)
+
+    @property
+    def height(self) -> float:
+        """Largest distance along the axis from the pole, the part's base, length."""
+        return _height(self.after)
+
+    @property
+    def springback(self) -> float:
+        """Height that it had more in its tools, length."""
+        return _height(self.before) - self.height
+
+    @property
+    def least_wall(self) -> float:
+        """Length."""
+        return float(self.after.wall.min())
+
+    @property
+    def diameter(self) -> float:
+        """The largest, outside, length."""
+        return _diameter(self.after)
+
+    @property
+    def shrinkage(self) -> float:
+        """1 - diameter over that in its tools."""
+        return 1 - self.diameter / _diameter(self.before)
+
+    @property
+    def flange_angle(self) -> float:
+        """By how much the end of its middle line has turned upward (along Z), degrees: its warpage."""
+        turned = _end(self.after) - _end(self.before)
+        return (turned + 180) % 360 - 180
+
+    @property
+    def rows(self) -> list[tuple[str, str]]:
+        """(what, its value with its unit), for people."""
+        said, before = self._length, self.before
+        return [("trimmed at the radius", said(self.trimmed)),
+                ("height (in its tools)", f"{said(self.height)} ({said(_height(before))})"),
+                ("springback of the height", said(self.springback)),
+                ("largest diameter (in its tools)", f"{said(self.diameter)} ({said(_diameter(before))})"),
+                ("shrinkage of the diameter", f"{100 * self.shrinkage:.3g} %"),
+                ("least wall", said(self.least_wall)),
+                ("flange has turned by", f"{self.flange_angle:.3g} degrees")]
+
+
+def _height(wall: Wall) -> float:
+    return float(wall.height.max())
+
+
+def _diameter(wall: Wall) -> float:
+    return 2 * float(max(wall.profile.bottom[:, 0].max(), wall.profile.top[:, 0].max()))
+
+
+def _end(wall: Wall) -> float:
+    """Direction of the last edge of the middle line, degrees from R."""
+    (r, z) = wall.profile.middle[-1] - wall.profile.middle[-3]
+    return float(np.degrees(np.arctan2(z, r)))
+
+
+def released(path: Any, source: Any, make_path: Any, state: Any, temperature: Any, trim: Any, boundaries: Any,
+             duration: Any, accuracy: Any, units: Any) -> Released:
+    """See `Path.released`; make_path: of a record."""
+    mesh, trimmed = source.scene.mesh, float(path.wall(state).r[-1])
+    if source.forms.domain is not mesh.domain:
+        raise InputError("Path.released: a membrane has no bending stiffness to keep a shape: form a solid,"
+                         " MixedPressure()")
+    if trim is not None:
+        if source.scene.preformed is not None:
+            raise InputError("Path.released: trim: is not available for a remeshed run: leave it out")
+        mesh, trimmed = _trimmed(mesh, path.wall(state), trim)
+    heat, cools = _heat(source.scene, mesh, temperature, boundaries, duration, path.wall(state))
+    problem = Problem(_scene(source.scene, mesh, heat))
+    x = _carried(source, state, problem)
+    problem.enter(Setting([0.0] * len(problem.scene.things) + [state.time], [0.0] * (1 + len(problem.scene.things)),
+                          [], fading=True), x, 0.0)
+    return _run(problem, x, make_path, cools, allowed_error("Path.released", accuracy), trimmed, units or NONE)
+
+
+def _run(problem: Problem, x: np.ndarray, make_path: Any, cools: float, accuracy: float, trimmed: float,
+         units: Units) -> Released:
+    """Let the body go, and let time go by."""
+    stages = [Stage("let go"), *([Stage("cool", duration=cools)] if cools else [])]
+    record = Record(problem, Curve(problem, Tolerances()))
+    path = make_path(record)
+    record.stage = stages[0].name
+    try:
+        record.accept(record.curve.resume(x, 0.0))
+        Execution(record, [plan(problem.scene, stage) for stage in stages], [], lambda *_: None, None,
+                  Tolerances().residual, accuracy).run(None, False)
+    except ConvergenceError as error:
+        error.path = path if path.states else None
+        raise
+    return Released(path, path.wall(path.states[0]), path.wall(), trimmed, units)
+
+
+def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration: Any, wall: Wall) -> tuple[Any, float]:
+    """(how the part cools, or None; how long)."""
+    if scene.heat is None:
+        if temperature is not None or boundaries is not None:
+            raise InputError("Path.released: temperature: the scene has no heat=Cooling(...) that could change it:"
+                             " leave the temperature out, or give the scene one")
+        return None, 0.0 if duration is None else positive("Path.released: duration", duration)
+    if (temperature is None) == (boundaries is None):
+        raise InputError("Path.released: give the temperature to which the part is cooled, or the boundaries= at which"
+                         " it loses heat, and not both")
+    if boundaries is not None and duration is None:
+        raise InputError("Path.released: boundaries: for how long? give duration=...")
+    faces = next(pair for pair in FACES if all(face in mesh.boundaries for face in pair))
+    heat = scene.heat.without_tools(boundaries if temperature is None else dict.fromkeys(
+        faces, finite("Path.released: temperature", temperature)))
+    if duration is not None:
+        return heat, positive("Path.released: duration", duration)
+    return heat, _THROUGH * heat.time_through(scene.mesh, float(wall.wall.max()))
+
+
+def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
+    """The part alone: held on its planes and lines of symmetry, and against rigid motion."""
+    symmetries = [s for s in scene.supports if isinstance(s, Symmetry) and len(mesh.nodes_of(str(s.on)))]
+    supports: list[Support] = [*symmetries]
+    held = {s.component for s in symmetries}
+    anywhere = mesh.nodes_of(str(symmetries[0].on) if symmetries else next(iter(mesh.boundaries)))[0]
+    if 1 not in held:
+        supports.append(_Still(1, anywhere))
+    if 0 not in held and not scene.kinematics.axisymmetric:
+        supports.append(_Still(0, anywhere))
+    return Scene(mesh=mesh, materials=scene.materials, supports=supports, model=scene.model, heat=heat,
+                 kinematics=scene.kinematics, quadrature_degree=scene.quadrature_degree, preformed=scene.preformed,
+                 temperature=None if scene.temperature is None else scene.temperature.T,
+                 expansion=dict(scene.expansion) or None)
+
+
+class _Still(PinnedNode):
+    """One displacement component of a node stays as it is; a free body pushes nothing there."""
+
+    def __init__(self, component: int, point: np.ndarray):
+        super().__init__(*point)
+        self._component = component
+
+    def constraints(self):
+        return [Held(self._component, point=self.point)]
+
+
+def _trimmed(mesh: Mesh, wall: Wall, trim: Any) -> tuple[Mesh, float]:
+    """(the mesh up to the line of nodes next to where it is trimmed, radius there now)."""
+    kept = float(strips_within(wall, trim).sum())                                 # edges have two parts
+    last = int(np.clip(round(kept / 2), 1, (len(wall.r) - 1) // 2))
+    middle = (wall.profile.rest_bottom + wall.profile.rest_top)[::2] / 2
+    return part_along(mesh, middle, last), float(wall.r[2 * last])
+
+
+def _carried(source: Any, state: Any, problem: Problem) -> np.ndarray:
+    """The unknowns of the part, own part; its histories remember what those of the whole body do."""
+    take_fields(source, state, problem)
+    x = np.zeros(problem.x.getLocalSize())
+    x[: problem.n_owned] = problem.forms.w.x.array[: problem.n_owned]
+    carry(source, state, problem, x, 0.0)
+    return x

@@ -1,0 +1,1 @@
+"""New meshes for deformed bodies during a run."""

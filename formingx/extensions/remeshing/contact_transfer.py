@@ -1,0 +1,101 @@
+"""What a face in contact takes over from the same face of the body on another mesh, of which its own is what it is now.
+
+On one rank. Values are linear between neighbouring points of the other face. At a node on the axis, whose share of the
+area is a rule's choice (`Lobatto`), the pressure is that beside it, and there is no friction.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...contact.face import FaceContact, Memory
+from ...contact.rule import Lobatto
+from ...physics.contact_law import Touch
+
+
+class Worn(NamedTuple):
+    """A face in contact as a state leaves it: its n points in m pairs of neighbours.
+
+    position, distance: seen from the tool, shapes (n, 2), (n,), length; touches: shape (n,); traction: pressure and
+    friction over present area, shape (n, 2), stress; pairs: shape (m, 2); slip: the largest elastic slip, over
+    thickness.
+    """
+
+    position: np.ndarray
+    distance: np.ndarray
+    touches: np.ndarray
+    traction: np.ndarray
+    pairs: np.ndarray
+    slip: float
+
+    @classmethod
+    def of(cls, face: FaceContact, fields: np.ndarray, control: float) -> Worn:
+        """fields: owned unknowns."""
+        found, rule, x = face.tractions(fields, control), face.rule, face.positions(fields, control)
+        assert isinstance(rule, Lobatto)
+        share = np.divide(rule.area, rule.lumped, out=np.zeros_like(rule.area), where=rule.has_area)
+        traction = np.column_stack([found.normal, found.tangential]) * (share / rule.area_ratio(fields))[:, None]
+        pairs = np.concatenate([rule.edges[:, [0, 2]], rule.edges[:, [2, 1]]])
+        touches, d = face.touching(fields, control), face.contact.tool.signed_distance(x)
+        for axis in np.flatnonzero(~rule.has_area):
+            ends = rule.edges[(rule.edges == axis).any(1), :2].ravel()
+            beside = ends[ends != axis][0]
+            traction[axis], touches[axis], d[axis] = (traction[beside, 0], 0.0), touches[beside], d[beside]
+        slip = 0.0 if face.touch is None else np.abs(face.touch.slip).max(initial=0.0) / face.thickness
+        return cls(x, d, touches, traction, pairs, slip)
+
+    def moved_in(self, x: np.ndarray, d: np.ndarray) -> np.ndarray:
+        """How far points, shape (n, 2), at distances d, are to be moved out of the tool, length.
+
+        No point of the body lies deeper in it than what touches beside it; between two that touch as deep as they.
+        """
+        pair, share = self._near(x)
+        both = self.touches[pair]
+        share = np.where(both.all(1), share, np.where(both[:, 0], 0.0, 1.0))
+        depth = np.where(both.any(1), _between(self.distance[pair], share), 0.0)
+        return np.where(both.all(1), d - depth, np.maximum(d - np.maximum(depth, 0.0), 0.0))
+
+    def at(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(pressure, friction, whether both neighbours touch) at points, shape (n,) each."""
+        pair, share = self._near(x)
+        found = _between(self.traction[pair], share[:, None])
+        return found[:, 0], found[:, 1], self.touches[pair].all(1)
+
+    def _near(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The nearest pair of neighbours to points, shape (n, 2), and how far from the first to the second, (n,)."""
+        a, b = np.moveaxis(self.position[self.pairs], 1, 0)
+        by = x[:, None] - a
+        share = np.clip(np.einsum("nmi,mi->nm", by, b - a) / np.einsum("mi,mi->m", b - a, b - a), 0.0, 1.0)
+        k = np.linalg.norm(by - share[..., None] * (b - a), axis=2).argmin(1)
+        return self.pairs[k], share[np.arange(len(x)), k]
+
+
+def take_over(face: FaceContact, worn: Worn, fields: np.ndarray, control: float) -> None:
+    """A face carries the same pressure and friction per present area as on the mesh before, however deep it lies in the
+    tool: distances count from where it has that pressure. fields: owned unknowns."""
+    x, law, rule = face.positions(fields, control), face.law, face.rule
+    assert isinstance(rule, Lobatto)
+    theta, d = law.theta, face.contact.tool.signed_distance(x)
+    pressure, friction, touches = worn.at(x)
+    share = np.where(rule.has_area, rule.lumped / rule.area, 0.0)
+    touches &= pressure > 0
+    depth = law.depth(np.where(touches, pressure * share, 0.0))
+    face.shift_distances(np.where(touches, d - depth, np.maximum(d + theta, 0.0)))
+    if not face.remembers:
+        return
+    law, none = face.law, np.zeros(len(x))
+    slip, arrived = none, np.zeros(len(x), dtype=bool)
+    if law.has_friction:
+        held = law.tractions(x, Touch(x, depth, none + 1e-9 * theta, x)).tangential
+        slip = np.divide(friction * share * 1e-9 * theta, held, out=none.copy(), where=touches & (held != 0))
+        most = 2 * worn.slip * face.thickness            # where next to nothing presses, nothing can hold
+        slip = np.clip(slip, -most, most)
+    distance = np.where(touches, depth, np.minimum(d - law.shift, -(1 + 1e-9) * theta))
+    face.put(Memory(Touch(x, distance, slip, x), arrived, np.ones(len(x))))
+
+
+def _between(values: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Of pairs, shape (n, 2, ...)."""
+    return values[:, 0] + share * (values[:, 1] - values[:, 0])

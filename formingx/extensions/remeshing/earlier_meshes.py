@@ -1,0 +1,96 @@
+"""A body whose mesh was made again on the way: where points of its first mesh are in the present one, and back."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...forms.carry import Carrier
+from ...forms.outline import Outline, along
+from ...forms.probes import Probe
+from ...mesh.nodes import of_mesh, of_space
+
+_NEAR = 0.02
+"""Of the size of an element: a point so near to the outline lies on it; edges are not where the old ones were."""
+
+_PARTS = 16                # of an edge, to find the nearest of its points
+
+
+class FollowedProbe(Probe):
+    """The same at points of the first mesh: they are followed from mesh to mesh.
+
+    Attributes:
+        points: (R, Z) on the first mesh, shape (n, 2); so_far: how they had moved as the last mesh was made, likewise.
+    """
+
+    def __init__(self, problem: Any, points: Any):
+        first = np.atleast_2d(np.asarray(points, dtype=float))
+        super().__init__(problem, followed(problem, first))
+        self.points, self.so_far = first, self.points - first
+
+    def _read(self) -> np.ndarray:
+        return super()._read() + self.so_far
+
+
+def first_places(preformed: Any, points: np.ndarray) -> np.ndarray:
+    """Where points of a new mesh, shape (n, 2), are on the first one: fitted to the nodes of the one before."""
+    old, state = preformed.before
+    nodes = of_mesh(old.forms.domain)
+    first = nodes if old.scene.preformed is None else first_places(old.scene.preformed, nodes)
+    found = Carrier(old.comm, nodes + Probe(old, nodes).displacement_in(state), points).fitted(first)
+    return np.clip(found, first.min(0), first.max(0))
+
+
+def scene_on(mesh: Any, preformed: Any) -> Any:
+    """The scene of the mesh before on a new one of the body as it was left, with its temperature then."""
+    old, state = preformed.before
+    if old.temperature is None:
+        return old.scene.with_mesh(mesh, preformed)
+    with old.at(state):
+        field = old.temperature.T.copy()
+    nodes, T = of_space(field.function_space), field.x.array
+    moved = nodes + Probe(old, nodes).displacement_in(state)
+    return old.scene.with_mesh(mesh, preformed, lambda R, Z: np.clip(
+        Carrier(old.comm, moved, np.column_stack([R, Z])).fitted(T), T.min(), T.max()))
+
+
+def followed(problem: Any, points: np.ndarray) -> np.ndarray:
+    """Where points of the first mesh, shape (n, 2), are in that of a problem."""
+    if problem.scene.preformed is None:
+        return points
+    old, state = problem.scene.preformed.before
+    points = followed(old, points)
+    return _Onto(problem)(points + Probe(old, points).displacement_in(state))
+
+
+class _Onto:
+    """Puts points that are outside a mesh, or nearly, on its outline."""
+
+    def __init__(self, problem: Any):
+        self._edges = Outline(problem.forms).rest
+        self._near = _NEAR * np.linalg.norm(self._edges[:, 1] - self._edges[:, 0], axis=1)
+
+    @cached_property
+    def _tree(self) -> Any:
+        from scipy.spatial import cKDTree
+        return cKDTree(along(self._edges, _PARTS).reshape(-1, self._edges.shape[-1]))
+
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        edge, part = np.divmod(self._tree.query(x)[1], _PARTS + 1)
+        a, b, middle = np.moveaxis(self._edges[edge], 1, 0)
+        s = part[:, None] / _PARTS
+        bend = 2 * (a + b - 2 * middle)
+        for _ in range(4):                                   # Newton's method for the nearest point of the parabola
+            slope, off = b - a + (2 * s - 1) * bend, _on(a, b, middle, s) - x
+            rate = (slope * slope + bend * 2 * off).sum(1, keepdims=True)
+            s = np.clip(s - (slope * off).sum(1, keepdims=True) / rate, 0.0, 1.0)
+        slope, off = b - a + (2 * s - 1) * bend, _on(a, b, middle, s) - x
+        outside = slope[:, 0] * off[:, 1] - slope[:, 1] * off[:, 0] > 0          # the body is to the left
+        put = outside | (np.linalg.norm(off, axis=1) < self._near[edge])
+        return x + np.where(put[:, None], off, 0.0)
+
+
+def _on(a: np.ndarray, b: np.ndarray, middle: np.ndarray, s: np.ndarray) -> np.ndarray:
+    return (1 - s) * (1 - 2 * s) * a + s * (2 * s - 1) * b + 4 * s * (1 - s) * middle

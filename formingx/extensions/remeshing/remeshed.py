@@ -1,0 +1,116 @@
+"""A mesh of what lies inside a closed outline of curved edges, by gmsh: small elements at corners, names kept."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...mesh import with_gmsh
+from ...mesh.grid import Grid, to_mesh
+from ...mesh.mesh import Mesh
+
+_GROWTH = 0.3
+"""Of the size of elements, by the distance from a corner."""
+
+_FINE = 16                 # straight pieces of an edge, to measure its length
+
+
+def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.ndarray, size: float, corner: float,
+             layer: str, axisymmetric: bool, comm: Any, volume: float | None = None,
+             outside: Callable[[np.ndarray, frozenset[str]], np.ndarray] = lambda points, names: points) -> Mesh:
+    """Six-node triangles inside an outline, with second-order geometry along it; on one rank.
+
+    Args:
+        edges: of the outline one after the other, each from where the last ended, the body to the left: end, other end,
+            middle, shape (m, 3, 2), length.
+        names: the boundaries that each belongs to.
+        corners: where elements are `corner` long, shape (k, 2); `size` elsewhere, lengths.
+        axisymmetric, volume: R is scaled so that the volume of revolution (else: the area) is this, by default that
+            inside the outline.
+        outside: (points, shape (n, 2), names of their boundaries) -> where they may be, outside tools, length.
+    """
+    turns = [k for k in range(len(edges)) if names[k] != names[k - 1] or (corners == edges[k, 0]).all(1).any()] or [0]
+    ends, middles, named = [], [], []
+    for first, last in zip(turns, [*turns[1:], turns[0] + len(edges)]):
+        part = edges[np.arange(first, last) % len(edges)]
+        points, between = _along(part, corners, size, corner)
+        here = names[first % len(edges)]
+        ends += [outside(points[:1], here | names[first - 1]), outside(points[1:-1], here)]
+        middles.append(outside(between, here))
+        named += [names[first % len(edges)]] * len(between)
+    ring, middle = np.concatenate(ends), np.concatenate(middles)
+    n = len(ring)
+    try:
+        with with_gmsh.model("body") as gmsh:
+            geo = gmsh.model.geo
+            tags = [geo.addPoint(r, z, 0) for r, z in ring]
+            lines = [geo.addLine(tags[k], tags[(k + 1) % n]) for k in range(n)]
+            for line in lines:
+                geo.mesh.setTransfiniteCurve(line, 2)
+            geo.addPlaneSurface([geo.addCurveLoop(lines)])
+            geo.synchronize()
+            gmsh.model.mesh.generate(2)
+            numbers, coordinates, _ = gmsh.model.mesh.getNodes()
+            _, triangles = gmsh.model.mesh.getElementsByType(2)
+    except Exception as error:
+        raise InputError(f"remesh: gmsh made no mesh of the body: {error}") from None
+    points = np.asarray(coordinates).reshape(-1, 3)[:, :2]
+    place = {int(number): k for k, number in enumerate(numbers)}
+    cells = np.array([place[int(t)] for t in triangles]).reshape(-1, 3)
+    from scipy.spatial import cKDTree
+    on_ring = np.asarray(cKDTree(points).query(ring)[1])
+    curved = {tuple(sorted((int(on_ring[k]), int(on_ring[(k + 1) % n])))): middle[k] for k in range(n)}
+    known: dict[tuple[int, ...], int] = {}
+    extra: list[np.ndarray] = []
+
+    def between_nodes(i: int, j: int) -> int:
+        key = (min(i, j), max(i, j))
+        if key not in known:
+            known[key] = len(points) + len(extra)
+            extra.append(curved.get(key, (points[i] + points[j]) / 2))
+        return known[key]
+    six = np.array([[a, b, c, between_nodes(a, b), between_nodes(b, c), between_nodes(c, a)] for a, b, c in cells])
+    nodes = np.concatenate([points, extra])
+    boundaries: dict[str, Any] = {name: [] for name in sorted(frozenset().union(*named))}
+    for k, of in enumerate(named):
+        i, j = int(on_ring[k]), int(on_ring[(k + 1) % n])
+        for name in of:
+            boundaries[name].append([i, j, between_nodes(i, j)])
+    new = np.stack([nodes[on_ring], nodes[np.roll(on_ring, -1)],
+                    nodes[[between_nodes(int(i), int(j)) for i, j in zip(on_ring, np.roll(on_ring, -1))]]], 1)
+    share = (volume or enclosed(edges, axisymmetric)) / enclosed(new, axisymmetric)
+    nodes[:, 0] *= np.sqrt(share) if axisymmetric else share
+    return to_mesh(lambda: Grid(nodes, np.arange(1, len(nodes) + 1), {layer: six},
+                                {name: np.array(rows) for name, rows in boundaries.items()}), comm, "remesh")
+
+
+def enclosed(edges: np.ndarray, axisymmetric: bool) -> float:
+    """Volume of revolution (area) inside a closed outline of parabolas, the body to the left: exact."""
+    at, weights = np.polynomial.legendre.leggauss(4)
+    s = (1 + at) / 2
+    shapes = np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)])
+    slopes = np.column_stack([4 * s - 3, 4 * s - 1, 4 - 8 * s])
+    r, dz = (shapes @ edges)[..., 0], (slopes @ edges)[..., 1]
+    return float(((np.pi * r**2 if axisymmetric else r) * dz * weights / 2).sum())
+
+
+def _along(edges: np.ndarray, corners: np.ndarray, size: float, corner: float) -> tuple[np.ndarray, np.ndarray]:
+    """New ends, shape (n + 1, 2), and middles, shape (n, 2), on a line of edges; sizes by the distance from corners."""
+    parameter = np.linspace(0, len(edges), _FINE * len(edges) + 1)
+
+    def place(t: np.ndarray) -> np.ndarray:
+        k = np.minimum(t.astype(int), len(edges) - 1)
+        s = t - k
+        shapes = np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)])
+        return np.einsum("nk,nki->ni", shapes, edges[k])
+    x = place(parameter)
+    away = np.linalg.norm(x[:, None] - corners[None], axis=2).min(1) if len(corners) else np.full(len(x), np.inf)
+    h = np.minimum(size, corner + _GROWTH * away)
+    steps = np.linalg.norm(np.diff(x, axis=0), axis=1)
+    number = np.concatenate([[0.0], np.cumsum(steps * (1 / h[1:] + 1 / h[:-1]) / 2)])
+    n = max(int(np.ceil(number[-1] - 0.3)), 1)
+    t = np.interp(number[-1] * np.arange(2 * n + 1) / (2 * n), number, parameter)
+    t[0], t[-1] = 0.0, len(edges)
+    points = place(t)
+    return points[::2], points[1::2]

@@ -1,0 +1,348 @@
+"""Runs whose mesh is made again on the way: the deformed body becomes the reference, F = grad x . F_old.
+
+For blocks that are crushed: where the volume ratio J at a quadrature point leaves its range, a new mesh is made of the
+outline as it is now, and takes over what the body carries: deformation so far, pressures, what touches and with which
+pressure and friction. The state that the new mesh comes to at the same travel is one of kind "remesh".
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...errors import ConvergenceError, InputError, instance, pair, positive
+from ...forms.carry import carry
+from ...forms.outline import Outline
+from ...materials.constants import OfMesh
+from ...measures.targets import Amplitude, Target
+from ...physics.contact import Contact
+from ...physics.supports import Support
+from ...problem.problem import Problem
+from ...solve.arc_length import Curve
+from ...solve.newton import Failure, Tolerances, fixed
+from ...solve.path_following import Run
+from ...solve.record import Record, Segment
+from ...solve.state import State
+from ...solve.stepping import StepControl
+from .contact_transfer import Worn, take_over
+from .earlier_meshes import scene_on
+from .preformed import Preformed
+from .remeshed import enclosed, remeshed
+
+log = logging.getLogger("formingx")
+
+_SHARES = (1.0, 0.9, 1.1, 0.8)
+"""Sizes that are tried, over what is asked for."""
+
+_GOOD = 0.4
+"""Part of the way from the limits of J to 1 that is good."""
+
+_FEWEST = 3
+"""States on a mesh, after which it may be the reason why no state follows."""
+
+_CHANGED = 0.1
+"""A change of the volume of elements from which on the mesh may be the reason."""
+
+_FAILED = 4
+"""At most so many states in a row of which no new mesh is found."""
+
+_CRUSHED = 0.5
+"""Of the least J of a good mesh: an old one with less is not kept for another state."""
+
+_POCKET = 0.25
+"""Of the size of an element: a pocket between the body and a tool that is not so deep is closed."""
+
+_OWN = "step", "counts", "until"
+"""What `Record.complete_step` notes by itself."""
+
+_WORN = "the mesh is worn"
+"""Why a run ends whose mesh is to be made again."""
+
+
+@dataclass(frozen=True)
+class Remesh:
+    """When a mesh is made again, and of which elements: for `formingx.trace`.
+
+    Args:
+        size: length of an edge of an element, as the body is then.
+        corner: the same where faces meet that tools press on, and where they leave them; default a third of it.
+        volume_ratio: (least, largest) volume ratio J at a quadrature point of a good mesh, of a material that keeps its
+            volume.
+
+    Raises:
+        InputError: a size that is not positive, a range that does not hold 1.
+
+    >>> fx.Remesh(size=0.5, corner=0.1)
+    Remesh(size=0.5, corner=0.1, volume_ratio=(0.6, 1.5))
+    """
+
+    size: float
+    corner: float | None = None
+    volume_ratio: tuple[float, float] = (0.6, 1.5)
+
+    def __post_init__(self) -> None:
+        positive("Remesh: size", self.size)
+        if self.corner is not None and positive("Remesh: corner", self.corner) > self.size:
+            raise InputError(f"Remesh: corner = {self.corner!r}: must be at most size = {self.size!r}")
+        low, high = pair("Remesh: volume_ratio", self.volume_ratio)
+        if not 0 < low < 1 < high:
+            raise InputError(f"Remesh: volume_ratio = {self.volume_ratio!r}: must be a number between 0 and 1, and one"
+                             f" above 1")
+
+
+def check(who: str, scene: Any, remesh: Any, targets: Sequence[Target]) -> None:
+    """An InputError if a scene has what is not carried to another mesh, or a target is not one of what is driven."""
+    instance(f"{who}: remesh", remesh, Remesh, "a formingx.Remesh")
+    why = ""
+    if scene.mesh.comm.size > 1:
+        why = "several ranks (gmsh makes a mesh on one): run without mpirun"
+    elif not scene.model.solid:
+        why = "a membrane"
+    elif scene.kinematics.components > 2:
+        why = "a sheet in space"
+    elif len(scene.mesh.layers) > 1:
+        why = "several layers"
+    elif any(isinstance(constant, OfMesh) for material in scene.materials.values()
+             for constant in material.constants().values()):
+        why = "a constant that is a Function on the mesh: give a function of (R, Z)"
+    elif scene.expansion:
+        why = "thermal expansion"
+    elif any(type(support).stored_energy is not Support.stored_energy or any(
+            getattr(held, "point", None) is not None for held in support.held()) for support in scene.supports):
+        why = "a support at a node, or an elastic one"
+    elif any(not contact.separates or contact.points != "nodes" for contact in scene.contacts):
+        why = "a contact with separates=False, or at Gauss points"
+    elif any(type(contact).law is not Contact.law for contact in scene.contacts):
+        why = "a law of contact of one's own"
+    if why:
+        raise InputError(f"{who}: remesh: is not available with {why}")
+    for target in targets:
+        if not target.name.endswith(("travel", "pressure", "process_time")):
+            raise InputError(f"{who}: remesh: target {target}: must be a travel, a pressure or a process_time: other"
+                             f" measures change a little at each remeshing, and may jump over their target")
+
+
+def follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[], None],
+           done: Callable[[], bool]) -> None:
+    """Follow a path with as many meshes as it takes.
+
+    Args:
+        part: goes on from the last state, on the mesh of that, as a run that was interrupted does.
+        done: True if nothing is left to do.
+
+    Raises:
+        ConvergenceError: its end was not reached.
+    """
+    record = path.record
+    record.on_state.append(lambda state: _look(record, state, remesh))
+    worn = bool(record.states) and _worn(record, record.last, remesh)
+    failed: list[State] = []
+    while not (worn and done()):
+        record.problem.limit.one_by_one()                    # a mesh that wears is looked at as each node arrives
+        if worn:
+            try:
+                _take_up(path, remesh, tolerances)
+                failed = []
+            except ConvergenceError as error:                # the next state may have a mesh
+                crushed = _ratios(record, record.last)[0] < _CRUSHED * remesh.volume_ratio[0]
+                if crushed or len(failed) == _FAILED or any(record.last is state for state in failed):
+                    raise
+                failed.append(record.last)
+                log.info("the old mesh is kept for a state: %s", error)
+        record.ended = ""
+        try:
+            part()
+        except ConvergenceError as error:
+            low, high = _ratios(record, record.last) if record.states else (1.0, 1.0)
+            if len(record.segments[-1].states) < _FEWEST or low > 1 - _CHANGED and high < 1 + _CHANGED:
+                raise                                        # the mesh is not the reason
+            log.info("a new mesh, as no state was found: %s", error)
+            record.ended = _WORN
+        worn = record.ended == _WORN
+        if not worn:
+            return
+    record.ended = ""
+
+
+def _take_up(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
+    """Make the mesh again, and take up the first state on it, from which a part goes on with the steps before."""
+    record, last = path.record, path.last
+    kept = next(s.stepping for s in reversed(record.segments[-1].states) if s.stepping)
+    first = record.segments[-1].states[0].stepping.get("step", kept["step"])
+    segment, start = _best(path, remesh, tolerances)
+    record.segments.append(segment)
+    try:
+        path._view(segment)
+        record.stage = last.stage
+        record.accept(start)
+    except BaseException:
+        record.segments.pop()                                # a mesh without a state: the path ends before it
+        raise
+    if segment.problem.has_kinks:
+        segment.curve.look_ahead(start)
+    record.counts.iterations += segment.curve.spent()
+    name, value = kept["until"]
+    record.complete_step(StepControl(**kept["step"] | {"length": min(kept["step"]["length"], 4 * first["length"])}),
+                         Target(name, value, None), **{k: v for k, v in kept.items() if k not in _OWN})
+
+
+def _best(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, State]:
+    """A new mesh and the first state on it: of sizes about the one that is asked for the first whose elements keep
+    their volumes well, or else the best."""
+    low, high = remesh.volume_ratio
+    found, why = [], ""
+    for share in _SHARES:
+        try:
+            segment, start = _again(path, remesh, tolerances, share)
+        except (ConvergenceError, Failure, InputError) as error:
+            why = why or str(getattr(error, "reason", error))
+            continue
+        segment.problem.x.array_w[:] = start.x
+        segment.problem.look_at(start.x, start.control)
+        least, largest = segment.problem.admissible.volume_ratios()
+        found.append((min((least - low) / (1 - low), (high - largest) / (high - 1)), segment, start))
+        if found[-1][0] > _GOOD:
+            break
+    if not found:
+        raise ConvergenceError(f"remesh: no equilibrium was found on a new mesh ({len(_SHARES)} sizes were tried):"
+                               f" {why}")
+    _, segment, start = max(found, key=lambda one: one[0])
+    return segment, start
+
+
+def _ratios(record: Record, state: State) -> tuple[float, float]:
+    with record.problem.at(state) as problem:
+        return problem.admissible.volume_ratios()
+
+
+def _look(record: Record, state: State, remesh: Remesh) -> None:
+    """End the run where a mesh is worn; note of a remeshed state what it changed."""
+    if state.kind == "remesh":
+        before = record.segments[-2].states[-1].measures
+        force = next((name for name in before if name.endswith("force")), None)
+        for what, name in (("force", force), ("energy", "strain_energy")):
+            if name and before.get(name):
+                state.jump[what] = state.measures[name] / before[name] - 1
+        log.info("a new mesh: %s", state.jump)
+    elif _worn(record, state, remesh):
+        record.ended = _WORN
+
+
+def _worn(record: Record, state: State, remesh: Remesh) -> bool:
+    """True if the mesh of a state is to be made again."""
+    if state.kind in ("start", "remesh"):
+        return False
+    low, high = _ratios(record, state)
+    return not (remesh.volume_ratio[0] <= low and high <= remesh.volume_ratio[1])
+
+
+def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> tuple[Segment, State]:
+    """A new mesh of the last state's body, elements `share` of the size, and the body in balance there."""
+    record, old, state = path.record, path.problem, path.last
+    scene = old.scene
+    outline = Outline(old.forms)
+    with old.at(state):
+        edges = outline.edges()
+        of = {name: outline.of(name) for name in scene.mesh.boundaries}
+        x_old = old.x.array_r[: old.n_owned].copy()
+        worn = [(c, Worn.of(c, x_old, state.control), c.travelled(state.control)) for c in old.contacts]
+    touched = [(c.contact.on, w.position[w.touches] + by) for c, w, by in worn]
+    order = outline.around("remesh")
+    names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
+    sizes = share * remesh.size, share * (remesh.corner or remesh.size / 3)
+    volume = enclosed(edges[order], scene.kinematics.axisymmetric)
+    on_tools = np.concatenate([edges[:0, 0], *(points for _, points in touched)])
+    edges = _without_pockets(edges[order], on_tools, _POCKET * sizes[1])
+    corners = _corners(edges, names, touched)
+    layer, = scene.mesh.layers
+    mesh = remeshed(edges, names, corners, *sizes, layer, scene.kinematics.axisymmetric, scene.mesh.comm, volume,
+                    lambda x, names: _outside(x, names, worn))
+    made = scene_on(mesh, Preformed.of(old, state))
+    problem = Problem(made)
+    problem.limit.one_by_one()
+    setting, control = old.setting.on_next_mesh(old.scales, problem.scales, state.control)
+    curve = Curve(problem, tolerances)
+    x = made.preformed.unknowns(problem)
+    problem.enter(setting, x, control)
+    if not setting.rate[-1]:
+        problem.clock = state.time
+    carry(old, state, problem, x, control, moved=True)
+    for new, (_, before, _) in zip(problem.contacts, worn, strict=True):
+        take_over(new, before, x[: problem.n_owned], control)
+    volume = problem.forms.volume / old.forms.volume / (1 + state.measures["mass_error"]) - 1
+    x = x if setting.fading else _balanced(problem, curve, x, control)      # else what is left over fades, too
+    start = curve.resume(x, control)
+    if start.slope * state.slope < 0:
+        start.direction, start.slope, start.orientation = -start.direction, -start.slope, -start.orientation
+    start.kind, start.jump, start.met = "remesh", {"volume": volume}, state.met
+    record.counts.iterations += curve.spent()
+    return Segment(problem, curve), start
+
+
+def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> np.ndarray:
+    """The state at the same control: by Newton's method, or as what is left without balance fades."""
+    first = problem.setting
+    problem.x.array_w[:] = x
+    try:
+        curve.newton.correct(problem.x, control, fixed(control))
+        if not problem.folded(problem.x, control):
+            return problem.x.array_r.copy()
+        why = "an element turned inside out"
+    except Failure as failure:
+        why = failure.reason
+    log.info("the forces that a new mesh leaves without balance are taken away gradually: %s", why)
+    time = problem.time_at(control)
+    still = replace(first, base=[*first.standing(control)[:-1], time], rate=[0.0] * len(first.rate), fading=True)
+    record, target = Record(problem, curve), Target("change", 1.0, None)
+    try:
+        problem.enter(still, x, 0.0)
+        Run(record, [(target, Amplitude(problem, None))]).follow(200, False, curve.resume(x, 0.0))
+    except (ConvergenceError, Failure) as error:
+        raise ConvergenceError(f"remesh: no equilibrium was found on a new mesh: {error}; give Remesh another size, or"
+                               f" a range of volume_ratio nearer to 1") from None
+    problem.enter(first, record.last.x, control)
+    problem.clock += time - problem.time_at(control)         # of a flow it is no part of the setting
+    return record.last.x
+
+
+def _without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np.ndarray:
+    """An outline, shape (m, 3, 2), whose nodes between two that touch lie on the line between these, if within a depth
+    of it: where a side rolls onto a plate, a node between may stay behind in a crease."""
+    nodes, n = edges[:, [0, 2]].reshape(-1, 2).copy(), 2 * len(edges)
+    close = 1e-6 * np.ptp(nodes, axis=0).max()
+    on = np.flatnonzero(np.linalg.norm(nodes[:, None] - touched[None], axis=2).min(1, initial=np.inf) < close)
+    for a, b in zip(on, np.roll(on, -1)):
+        between, along = (a + np.arange(1, (b - a) % n)) % n, nodes[b] - nodes[a]
+        by, length = nodes[between] - nodes[a], np.linalg.norm(along)
+        if length > 0 and np.abs(by[:, 0] * along[1] - by[:, 1] * along[0]).max(initial=0.0) < depth * length:
+            nodes[between] = nodes[a] + np.linspace(0, 1, len(between) + 2)[1:-1, None] * along
+    return np.stack([nodes[::2], np.roll(nodes[::2], -1, axis=0), nodes[1::2]], axis=1)
+
+
+def _outside(x: np.ndarray, names: frozenset[str], worn: list[tuple[Any, Worn, np.ndarray]]) -> np.ndarray:
+    """Points of an outline, shape (n, 2), no deeper in tools than what touched beside them: edges cut corners."""
+    for contact, before, by in worn:
+        if contact.contact.on in names:
+            near = contact.contact.tool.nearest(x - by)
+            x = x - before.moved_in(x - by, near.distance)[:, None] * near.normal
+    return x
+
+
+def _corners(edges: np.ndarray, names: list[frozenset[str]], touched: list[tuple[str, np.ndarray]]) -> np.ndarray:
+    """Where two faces meet that tools may press on, and the ends of what they do press on, shape (k, 2)."""
+    faces = {on for on, _ in touched}
+    found = []
+    press = np.zeros(len(edges), dtype=bool)
+    for on, points in touched:
+        if len(points):
+            near = np.linalg.norm(edges[:, 2][:, None] - points[None], axis=2).min(1)
+            press |= np.array([on in of for of in names]) & (near < 1e-6 * np.ptp(edges[:, 0], axis=0).max())
+    for k in range(len(edges)):
+        a, b = names[k - 1] & faces, names[k] & faces
+        if (a and b and a != b) or ((a or b) and press[k] != press[k - 1] and a and b):
+            found.append(edges[k, 0])
+    return np.array(found).reshape(-1, 2)

@@ -1,0 +1,1 @@
+"""Membranes in three dimensions and their tools."""

@@ -1,0 +1,113 @@
+"""A formed part in space in numbers, and how far it fills a tool."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError, finite, positive
+from ...mesh.nodes import COORDINATES
+from ...results.files.sheet import Sheet
+from ...results.numbers import PartNumbers
+from ...units import NONE, Units
+from .wall import WallInSpace
+
+
+@dataclass(frozen=True, repr=False)
+class PartInSpace(PartNumbers):
+    """A part as modelled (a quarter of a sheet is a quarter of the part).
+
+    Attributes:
+        volume, area: length^3, of the surface length^2; draw_ratio: area over that at rest; mean_wall: volume/area.
+        least_wall: length; least_at: (x, y, z) where; least_from: (x, y) where it was on the flat sheet.
+        evenness: least over mean wall; variation: standard deviation of the wall over the surface, over its mean.
+        weight: grams if a density in g/cm3 was given; else None. scrap: volume beyond the trim over that of the sheet.
+        wrinkled: share of the area at rest that is in compression. units: of the labels.
+    """
+
+    volume: float
+    area: float
+    draw_ratio: float
+    mean_wall: float
+    least_wall: float
+    least_at: tuple[float, ...]
+    least_from: tuple[float, ...]
+    evenness: float
+    variation: float
+    weight: float | None
+    scrap: float
+    wrinkled: float
+    units: Units = field(repr=False, default=NONE)
+
+    @property
+    def rows(self) -> list[tuple[str, str]]:
+        """(what, its value with its unit), for people."""
+        at, rest = (", ".join(f"{v:.4g}" for v in where) for where in (self.least_at, self.least_from))
+        return self._rows(f"(x, y, z) = ({at}), from (X, Y) = ({rest})", []) + (
+            [("in compression, of the sheet", f"{100 * self.wrinkled:.3g} %")] if self.wrinkled else [])
+
+
+def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, units: Units) -> PartInSpace:
+    """See `Path.part`; trim: the z of the plane beyond which, seen from the flat sheet, the part lies."""
+    if len(tuple(heights)):
+        raise InputError("part: heights: in space use path.wall().section(point, normal)")
+    share = np.ones(len(wall.wall))
+    if trim is not None:
+        level, z = finite("part: trim", trim), wall.now[:, 2]
+        if not z.min() < level < z.max():
+            raise InputError(f"part: trim = {trim!r}: must be a z that the part passes: it goes from {z.min():.6g} to"
+                             f" {z.max():.6g}")
+        share = _beyond((z - level)[wall.triangles] * np.sign(z[np.argmax(np.abs(z))] - level))
+    kept = share > 0
+    h, area, rest = wall.wall[kept], (wall.area * share)[kept], (wall.area_at_rest * share)[kept]
+    volume = float((h * area).sum())
+    mean, k = volume / area.sum(), int(np.flatnonzero(kept)[np.argmin(h)])
+    whole = float((wall.wall * wall.area).sum())
+    weight = None if density is None else units.mass(volume, positive("part: density", density))
+    return PartInSpace(volume, float(area.sum()), float(area.sum() / rest.sum()), mean, float(wall.wall[k]),
+                       tuple(wall.middle[k].tolist()),
+                       tuple(wall.rest[wall.triangles[k], :COORDINATES].mean(0).tolist()), float(wall.wall[k] / mean),
+                       float(np.sqrt(np.average((h - mean) ** 2, weights=area)) / mean),
+                       weight, 1 - volume / whole, float(rest[wall.wrinkled[kept]].sum() / rest.sum()), units)
+
+
+def _beyond(d: np.ndarray) -> np.ndarray:
+    """Part of triangles' areas where what is d at their corners, shape (m, 3), and linear between, is above 0."""
+    alone = np.argmax((d > 0) == ((d > 0).sum(1) == 1)[:, None], axis=1)       # the corner that is on its own side
+    a, b, c = (np.take_along_axis(d, (alone[:, None] + k) % 3, 1)[:, 0] for k in range(3))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        tip = a * a / ((a - b) * (a - c))
+    return np.where((d > 0).all(1), 1.0, np.where((d <= 0).all(1), 0.0, np.where(a > 0, tip, 1 - tip)))
+
+
+@dataclass(frozen=True, repr=False)
+class FillingInSpace(Sheet):
+    """How far a tool is filled, state by state: touching: share of the sheet's area at rest that is held or nearer to
+    the tool than a tenth of its thickness; gap: the largest distance from it, length; control, states: of the run."""
+
+    control: tuple[str, np.ndarray]
+    touching: np.ndarray
+    gap: np.ndarray
+    comm: Any
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        return {self.control[0]: self.control[1], "touching": self.touching, "gap": self.gap}
+
+
+def filling(path: Any, contact: Any) -> FillingInSpace:
+    """See `Path.filling`."""
+    rows, comm = [], path.problem.comm
+    for state in path.states:
+        with path.problem.at(state) as problem:
+            d = contact.contact.tool.signed_distance(contact.positions(problem.x.array_r, state.control))
+            held = contact.touching(problem.x.array_r, state.control) | (d > -0.1 * contact.thickness)
+        area = contact.rule.area
+        parts = comm.allgather((float(area[held].sum()), float(area.sum()), float((-d).max(initial=0.0))))
+        touching, whole, gap = (list(column) for column in zip(*parts))
+        rows.append((sum(touching) / sum(whole), max(gap)))
+    name = path.columns[0]
+    touched, gaps = np.array(rows).T
+    return FillingInSpace((name, path[name]), touched, gaps, comm)

@@ -1,0 +1,111 @@
+"""What a scene in space may have, and what is not proven there and so refused."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError, finite, known, positive, together, values
+from ...physics.loads import Pressure, Spin
+from ...physics.supports import PinnedNode
+from ...ranks import gathered
+from .sheet import Sheet
+from .solid_tool import Swept
+
+_LARGER = 9.0
+"""Sheet over tool, or tool over sheet, that looks like another unit of length. (The sheet may be a quarter.)"""
+
+
+def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
+    """{layer: its thickness, a function of arrays (x, y)}, above 0 at all nodes; collective."""
+    mesh = scene.mesh
+    if not isinstance(mesh, Sheet):
+        raise InputError("Scene: mesh: one in space must come from fx.mesh.sheet")
+    if given is None:
+        raise InputError("Scene: a sheet in space needs a thickness=...: a length, a function of (x, y), or {layer: "
+                         "...}")
+    each = given if isinstance(given, Mapping) else dict.fromkeys(mesh.layers, given)
+    for name in each:
+        known("Scene: thickness: layer", name, mesh.layers)
+    for name in mesh.layers:
+        if name not in each:
+            raise InputError(f"Scene: thickness: layer {name!r} has none")
+    if not isinstance(given, Mapping) and len(mesh.layers) > 1:
+        raise InputError(f"Scene: thickness = {given!r}: the sheet has several layers, {', '.join(mesh.layers)}: must "
+                         f"be {{layer: its thickness}}")
+    X = mesh.domain.geometry.x
+    found: dict[str, Callable] = {}
+    for name, h in each.items():
+        if callable(h):
+            found[name] = h
+            together(mesh.comm, [partial(_check, name, h, X)])
+        else:
+            found[name] = _Constant(positive(f"Scene: thickness of {name!r}", h))
+    return found
+
+
+class _Constant:
+    """A thickness that is the same everywhere."""
+
+    def __init__(self, value: float):
+        self.value = value
+
+    def __call__(self, x: Any, y: Any) -> Any:
+        return self.value + 0 * x
+
+
+def _check(name: str, function: Callable, X: np.ndarray) -> None:
+    found = values(f"Scene: thickness of {name!r}", function, {"x": X[:, 0], "y": X[:, 1]})
+    if len(found) and found.min() <= 0:
+        k = int(np.argmin(found))
+        raise InputError(f"Scene: thickness of {name!r} = {found[k]:.6g} at ({X[k, 0]:.6g}, {X[k, 1]:.6g}): must be"
+                         f" greater than 0")
+
+
+def refuse(scene: Any, heat: Any) -> None:
+    """An InputError for what is not proven in space."""
+    if scene.model.solid:
+        raise InputError(f"Scene: model = {scene.model!r}: a sheet in space is a Membrane(): solids in space are not"
+                         f" available yet")
+    if heat is not None:
+        raise InputError("Scene: heat: is not available in space yet: give a temperature=... that stays as it is")
+    for load in scene.loads:
+        if isinstance(load, Spin):
+            raise InputError(f"Scene: {load!r}: it spins about the axis of a round body, which a sheet in space has"
+                             " not")
+        if isinstance(load, Pressure) and load.on not in ("bottom", "top"):
+            raise InputError(f"Scene: {load!r}: a sheet in space takes a pressure on its 'bottom' or its 'top'")
+    for support in scene.supports:
+        if isinstance(support, PinnedNode):
+            raise InputError(f"Scene: {support!r}: a sheet in space is held at its boundaries, not at nodes")
+
+
+def check_contact(scene: Any, contact: Any) -> None:
+    """The sheet starts outside the tool, on which it sticks, in the same unit of length; collective."""
+    mesh, tool = scene.mesh, contact.tool
+    if contact.on not in ("bottom", "top"):
+        raise InputError(f"{contact!r}: a sheet in space touches with its 'bottom' or its 'top'")
+    if not contact.sticks and (contact.friction_by_temperature or contact.mu > 0 or not contact.separates):
+        raise InputError(f"{contact!r}: in space a sheet sticks where it touches, or slides without friction: must be"
+                         f" 'stick', or 'none' without separates=False; Coulomb friction is not available there")
+    if not contact.sticks and not isinstance(tool, Swept):
+        raise InputError(f"{contact!r}: sliding over a tool of flat triangles is not available, as their edges stop a"
+                         f" sheet: must be 'stick', or a tool made by box, revolved or extruded")
+    if contact.separates and any(material.internal or material.integral for material in scene.materials.values()):
+        raise InputError(f"{contact!r}: separates = True: in space a sheet that relaxes is held where it touches, until"
+                         f" a stage leaves the tool out (without=[...]): must be 'stick', with separates left out")
+    if contact.points != "nodes":
+        raise InputError(f"{contact!r}: points = {contact.points!r}: in space contact acts at 'nodes'")
+    size, length = float(np.ptp(tool.bounds, axis=0).max()), float(max(scene.extent))
+    if tool.sized and np.isfinite(size) and not 1 / _LARGER < length / size < _LARGER:
+        raise InputError(f"{contact!r}: the tool is {size:.4g} large, the sheet {length:.4g}: are the units of length"
+                         f" the same (mm, cm, inches)?")
+    points = gathered(mesh.comm, mesh.domain.geometry.x)
+    depth = tool.signed_distance(points)
+    k = int(np.argmax(depth))
+    finite(f"{contact!r}: distance to the tool", float(depth[k]))
+    if depth[k] > 1e-6 * length:
+        at = ", ".join(f"{v:.6g}" for v in points[k])
+        raise InputError(f"{contact!r}: the sheet starts inside the tool: {depth[k]:.6g} deep at (x, y, z) = ({at}):"
+                         f" move the tool (moved), or is the solid of its profile on the other side (Tool.reversed())?")

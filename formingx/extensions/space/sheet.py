@@ -1,0 +1,262 @@
+"""Flat sheets in space, z = 0: triangles within an outline, by gmsh."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+
+from ...errors import InputError, instance, known, non_negative, pair, positive, several
+from ...mesh import with_gmsh
+from ...mesh.check import crossing
+from ...mesh.grid import Grid, counter_clockwise, to_mesh
+from ...mesh.mesh import Mesh
+
+_MOST = 500_000            # triangles
+_PARTS = ("whole", "half", "quarter")
+
+
+@dataclass(frozen=True)
+class Sheet(Mesh):
+    """A sheet in space: plane triangles at rest, coordinates (x, y, z). Its layers are all over it.
+
+    Beside the boundaries that its outline names there are its faces, "bottom" and "top" (towards +z): as a boundary
+    each has all edges. A membrane has one surface only; on which face a pressure acts says which way it pushes.
+
+    Attributes:
+        of_size: the same sheet of triangles of another size (or function of x and y).
+    """
+
+    of_size: Callable[[Any], Sheet] | None = None
+
+    def __str__(self) -> str:
+        x, n = self.domain.geometry.x, self.domain.topology.index_map(2).size_global
+        span = ", ".join(f"{a} from {x[:, k].min():.6g} to {x[:, k].max():.6g}" for k, a in enumerate("xy"))
+        return "\n".join([f"{n} triangles" + f", {span}" * (self.comm.size == 1),
+                          f"layers: {', '.join(self.layers)}", f"boundaries: {', '.join(self.boundaries)}"])
+
+    def facets_of(self, boundary: str) -> np.ndarray:
+        if boundary in ("bottom", "top"):
+            edges = self.domain.topology
+            edges.create_entities(1)
+            return np.arange(edges.index_map(1).size_local + edges.index_map(1).num_ghosts, dtype=np.int32)
+        return super().facets_of(boundary)
+
+
+class Edge(NamedTuple):
+    """One piece of an outline: its ends (x, y), the centre of an arc or None, the name of its boundary."""
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+    centre: tuple[float, float] | None
+    name: str
+
+
+def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "whole") -> list[Edge]:
+    """The outline of a rectangle about (0, 0), for `sheet`.
+
+    Args:
+        width, height: along x and y, of the whole, length; corner: radius of its corners.
+        part: "whole"; "half": where x > 0; "quarter": where y > 0 too. Where it is cut it is called "x0" and "y0".
+
+    >>> [edge.name for edge in fx.mesh.rectangle(200.0, 100.0, part="quarter")]
+    ['rim', 'rim', 'x0', 'y0']
+    """
+    a, b = positive("rectangle: width", width) / 2, positive("rectangle: height", height) / 2
+    r = non_negative("rectangle: corner", corner)
+    known("rectangle: part", part, _PARTS)
+    if r > min(a, b):
+        raise InputError(f"rectangle: corner = {corner!r}: must be at most half the shorter side, {min(a, b):g}")
+    found: list[Edge] = []
+    last, names = (0.0, -b) if part == "half" else (a, 0.0), "rim"
+
+    def to(point: tuple[float, float], centre: tuple[float, float] | None = None, name: str = names) -> None:
+        nonlocal last
+        if math.dist(last, point) > 1e-12 * (a + b):
+            found.append(Edge(last, point, centre, name))
+        last = point
+    if part != "quarter":
+        start = 0.0 if part == "half" else -a + r
+        last = (start, -b)
+        to((a - r, -b))
+        to((a, -b + r), (a - r, -b + r))
+    to((a, b - r))
+    to((a - r, b), (a - r, b - r))
+    if part == "whole":
+        to((-a + r, b))
+        to((-a, b - r), (-a + r, b - r))
+        to((-a, -b + r))
+        to((-a + r, -b), (-a + r, -b + r))
+        return found
+    to((0.0, b))
+    to((0.0, 0.0 if part == "quarter" else -b), name="x0")
+    if part == "quarter":
+        to((a, 0.0), name="y0")
+    return found
+
+
+def circle(radius: float, *, part: str = "whole") -> list[Edge]:
+    """The outline of a circle about (0, 0), for `sheet`; see `rectangle`.
+
+    >>> fx.mesh.circle(100.0, part="quarter")[0].name
+    'rim'
+    """
+    return rectangle(2 * positive("circle: radius", radius), 2 * radius, corner=radius, part=part)
+
+
+def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, names: Sequence[str] | None = None,
+          layers: Sequence[str] = ("sheet",), comm: MPI.Comm = MPI.COMM_WORLD) -> Sheet:
+    """A flat sheet within an outline, of triangles of a size, by gmsh.
+
+    Args:
+        outline: `rectangle(...)`, `circle(...)`, or the corners (x, y) of a polygon, length.
+        size: of the triangles' edges, length; or a function of (x, y).
+        names: of the polygon's edges, from the first corner on; default "rim".
+        layers: their names; `Scene(thickness=...)` says how thick they are.
+
+    Raises:
+        InputError: an outline that is none or crosses itself, a size that is not above 0, more than 500,000 triangles.
+
+    >>> print(fx.mesh.sheet(fx.mesh.rectangle(300, 200, corner=20, part="quarter"), size=40))
+    35 triangles, x from 0 to 150, y from 0 to 100
+    layers: sheet
+    boundaries: rim, x0, y0, bottom, top
+    """
+    edges = several("sheet: outline", outline, "corners (x, y), or what fx.mesh.rectangle gives")
+    if not all(isinstance(edge, Edge) for edge in edges):
+        corners = [pair("sheet: outline: corner", point) for point in edges]
+        if len(corners) < 3:
+            raise InputError(f"sheet: outline = {outline!r}: must have at least three corners")
+        edges = [Edge(a, b, None, "rim") for a, b in zip(corners, [*corners[1:], corners[0]])]
+    if names is not None:
+        called = several("sheet: names", names, "words")
+        if len(called) != len(edges):
+            raise InputError(f"sheet: names: {len(called)} names for {len(edges)} edges: must be one for each")
+        edges = [edge._replace(name=name) for edge, name in zip(edges, called)]
+    for edge in edges:
+        if instance("sheet: names: name", edge.name, str, "a word") in ("bottom", "top", ""):
+            raise InputError(f"sheet: names: name = {edge.name!r}: must be a word, not that of a face")
+    x = _chords(edges)
+    asked = _Size(size)
+    areas, sizes = asked.over(x)
+    if np.sum(areas / (0.4 * sizes**2)) > _MOST:
+        raise InputError(f"sheet: size = {size!r}: would make more than {_MOST} triangles of the sheet, whose area is"
+                         f" {areas.sum():.4g}")
+    words = several("sheet: layers", layers, "names")
+    if not words or len(set(words)) < len(words):
+        raise InputError(f"sheet: layers = {layers!r}: must be at least one name, and each another")
+    plain = to_mesh(lambda: _grid(edges, asked), comm, "sheet")
+    return Sheet(**{**vars(plain), "layers": dict.fromkeys(words, 1),
+                    "boundaries": plain.boundaries | {"bottom": (), "top": ()},
+                    "of_size": lambda size: sheet(edges, size, layers=words, comm=comm)})
+
+
+def _chords(edges: list[Edge]) -> np.ndarray:
+    """Corners of the outline, arcs as chords, shape (n, 2).
+
+    Raises:
+        InputError: it crosses or touches itself (gmsh may work on that for ever).
+    """
+    points = []
+    for edge in edges:
+        a, b = np.array(edge.start), np.array(edge.end)
+        if not np.any(a != b):
+            raise InputError(f"sheet: outline: the corner ({a[0]:.6g}, {a[1]:.6g}) is there twice, one after the other")
+        line = a + np.linspace(0, 1, 2 if edge.centre is None else 9)[:-1, None] * (b - a)
+        if edge.centre is not None:
+            away = line - edge.centre
+            line = edge.centre + away * (math.dist(a, edge.centre) / np.linalg.norm(away, axis=1))[:, None]
+        points.append(line)
+    x = np.concatenate(points)
+    if (place := crossing(x, np.column_stack([np.arange(len(x)), np.roll(np.arange(len(x)), -1)]))) is not None:
+        raise InputError(f"sheet: outline: crosses or touches itself near ({place[0]:.6g}, {place[1]:.6g})")
+    return x
+
+
+class _Size:
+    """What a user asks for; as a function for gmsh, which swallows errors: the first is kept in `refused`."""
+
+    def __init__(self, size: Any):
+        self._size = size
+        self.everywhere = None if callable(size) else positive("sheet: size", size)
+        self.refused: InputError | None = None
+
+    def __call__(self, x: float, y: float) -> float:
+        where = f"sheet: size at ({x:.6g}, {y:.6g})"
+        try:
+            return positive(where, float(self._size(x, y)))
+        except InputError:
+            raise
+        except Exception as error:
+            raise InputError(f"{where}: the function fails: {type(error).__name__}: {error}") from error
+
+    def kept(self, dim: int, tag: int, x: float, y: float, z: float, size: float) -> float:
+        try:
+            return self(x, y)
+        except InputError as error:
+            self.refused = self.refused or error
+            return 1e22
+
+    def over(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Areas that make up the outline with corners x, and the sizes there, shape (m,) each."""
+        y = np.roll(x, -1, axis=0)
+        area = abs(np.sum(x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0])) / 2
+        if self.everywhere:
+            return np.array([area]), np.array([self.everywhere])
+        low, high = x.min(0), x.max(0)
+        p = np.stack(np.meshgrid(*(a + (b - a) * (np.arange(40) + 0.5) / 40 for a, b in zip(low, high))), -1)
+        p = p.reshape(-1, 1, 2)
+        above = (x[:, 1] > p[..., 1]) != (y[:, 1] > p[..., 1])              # edges that a line along x crosses
+        slope = np.divide(y[:, 0] - x[:, 0], y[:, 1] - x[:, 1], out=np.zeros(len(x)), where=y[:, 1] != x[:, 1])
+        inside = np.sum(above & (p[..., 0] < x[:, 0] + (p[..., 1] - x[:, 1]) * slope), axis=1) % 2 == 1
+        places = [*p[inside, 0], *x]
+        return np.full(len(places), area / len(places)), np.array([self(*place) for place in np.array(places).tolist()])
+
+
+def _grid(edges: list[Edge], size: _Size) -> Grid:
+    """The triangles, on one rank."""
+    options = {"General.NumThreads": 1.0, "Mesh.MeshSizeExtendFromBoundary": 0.0}
+    if size.everywhere:
+        options |= {"Mesh.MeshSizeMin": size.everywhere, "Mesh.MeshSizeMax": size.everywhere}
+    with with_gmsh.model("sheet", options) as gmsh:
+        geo, points = gmsh.model.geo, {}
+        span = max(abs(v) for e in edges for v in e.start)
+
+        def point(at: tuple[float, float]) -> int:
+            key = tuple(np.round(np.array(at) / span, 12))
+            if key not in points:
+                points[key] = geo.addPoint(*at, 0.0)
+            return points[key]
+        tags = [geo.addLine(point(e.start), point(e.end)) if e.centre is None
+                else geo.addCircleArc(point(e.start), point(e.centre), point(e.end)) for e in edges]
+        geo.addPlaneSurface([geo.addCurveLoop(tags)])
+        geo.synchronize()
+        for name in dict.fromkeys(e.name for e in edges):
+            group = gmsh.model.addPhysicalGroup(1, [t for t, e in zip(tags, edges) if e.name == name])
+            gmsh.model.setPhysicalName(1, group, name)
+        if not size.everywhere:
+            gmsh.model.mesh.setSizeCallback(size.kept)
+        try:
+            gmsh.model.mesh.generate(2)
+        except Exception as error:
+            raise size.refused or InputError(f"sheet: gmsh makes no mesh of this outline: {error}") from None
+        if size.refused:
+            raise size.refused
+        numbers, X, _ = gmsh.model.mesh.getNodes()
+        row = np.zeros(int(numbers.max()) + 1, dtype=np.int64)
+        row[numbers.astype(np.int64)] = np.arange(len(numbers))
+        X = X.reshape(-1, 3)
+        cells = row[gmsh.model.mesh.getElementsByType(2)[1].astype(np.int64)].reshape(-1, 3)
+        boundaries = {}
+        for dim, group in gmsh.model.getPhysicalGroups(1):
+            rows = [gmsh.model.mesh.getElementsByType(1, tag)[1] for tag in
+                    gmsh.model.getEntitiesForPhysicalGroup(dim, group)]
+            boundaries[gmsh.model.getPhysicalName(dim, group)] = row[
+                np.concatenate(rows).astype(np.int64)].reshape(-1, 2)
+        if not len(cells):
+            raise InputError("sheet: the outline holds no triangle: must be closed, and not cross itself")
+        return Grid(X, np.arange(1, len(X) + 1), {"sheet": counter_clockwise(X, cells)}, boundaries)

@@ -1,0 +1,151 @@
+"""Parts in space as pictures, solids for other programs, and a report."""
+
+from __future__ import annotations
+
+import html
+from pathlib import Path as FilePath
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...mesh.nodes import COORDINATES
+from ...results import files
+from ...results.show import page
+from ...results.show.views import look, plotted, shading
+from ...scene.summary import summary
+from ...units import Units
+from .wall import WallInSpace, wall_of
+
+_SIDE = ((0, "x0"), (1, "y0"))
+
+
+def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
+    """The part of a state, whole where it was modelled in part, coloured by its wall, as PNG (rank 0 draws).
+
+    grid: size of the squares that were printed on the flat sheet, length; None: not drawn.
+
+    Raises:
+        InputError: there is neither a screen nor Xvfb to draw on.
+    """
+    file, wall = files.named("view3d", file, ".png"), wall_of(path, state)
+    lines = wall.printed(grid) if grid else []
+    mirrored = _mirrors(path, wall)
+
+    def draw():
+        import pyvista
+        below = wall.now[:, 2].min() < -wall.now[:, 2].max()            # look into the part
+        camera = np.array([0.8, -2.0, 3.6] if below else [1.7, -2.4, 1.7])
+        lift = 0.004 * np.ptp(wall.now, axis=0).max() * camera / np.linalg.norm(camera)         # else lines flicker
+        values = wall.at_nodes / wall.to_nodes(wall.thickness_at_rest)
+        faces = np.column_stack([np.full(len(wall.triangles), 3), wall.triangles]).ravel()
+        with plotted(file) as plotter:
+            for side in mirrored:
+                surface = pyvista.PolyData(wall.now * side, faces)
+                surface["ratio"] = values
+                plotter.add_mesh(surface, **shading(values), specular=0.2, split_sharp_edges=False)
+                for line in lines:
+                    plotter.add_mesh(pyvista.lines_from_points(line * side + lift), color="black", line_width=1.5)
+            look(plotter, camera, np.vstack([wall.now * side for side in mirrored]))
+    files.on_root(path.problem.comm, draw)
+
+
+def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(points, shape (n, 3), triangles that look outward, (m, 3), wall ratio at the points) of the part as modelled.
+
+    The wall is put half to each side of the surface, along the normals at the nodes.
+    """
+    wall = wall_of(path, state)
+    corners = wall.now[wall.triangles]
+    normal, n = np.zeros_like(wall.now), len(wall.now)
+    each = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    np.add.at(normal, wall.triangles.ravel(), np.repeat(each, 3, axis=0))
+    normal *= wall.at_nodes[:, None] / 2 / np.linalg.norm(normal, axis=1, keepdims=True)
+    ends = np.concatenate([wall.triangles[:, [i, (i + 1) % 3]] for i in range(3)])
+    _, which, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
+    rim = ends[times[which.ravel()] == 1]
+    side = np.concatenate([np.column_stack([rim[:, 1], rim[:, 0], rim[:, 0] + n]),
+                           np.column_stack([rim[:, 1], rim[:, 0] + n, rim[:, 1] + n])])
+    triangles = np.concatenate([wall.triangles[:, ::-1], wall.triangles + n, side[:, ::-1]])
+    ratio = wall.to_nodes(wall.ratio)
+    return np.vstack([wall.now - normal, wall.now + normal]), triangles, np.concatenate([ratio, ratio])
+
+
+def shell_model(path: Any, file: Any, state: Any = None) -> None:
+    """Write the part as shells with a thickness each, as an input file (.inp) for Abaqus or CalculiX (rank 0 writes).
+
+    Each triangle is an S3 with its wall as the section's thickness; the material must be given there.
+    """
+    file, wall = files.named("shell_model", file, ".inp"), wall_of(path, state or path.last)
+
+    def write(stream):
+        stream.write("** formed part: shells with the wall of each element\n*NODE\n")
+        stream.writelines(f"{k}, {x:.9g}, {y:.9g}, {z:.9g}\n" for k, (x, y, z) in enumerate(wall.now, 1))
+        stream.write("*ELEMENT, TYPE=S3, ELSET=PART\n")
+        stream.writelines(f"{k}, {a}, {b}, {c}\n" for k, (a, b, c) in enumerate(wall.triangles + 1, 1))
+        for k, h in enumerate(wall.wall, 1):
+            stream.write(f"*ELSET, ELSET=E{k}\n{k}\n*SHELL SECTION, ELSET=E{k}, MATERIAL=POLYMER\n{h:.9g}\n")
+    files.on_root(path.problem.comm, lambda: files.replace(file, write))
+
+
+def report(path: Any, file: Any, title: str, failure: Any, units: Units, density: float | None, trim: Any) -> FilePath:
+    """See `Path.report`: pictures, the part in numbers, stages, inputs, warnings."""
+    from .part import part
+    wall, last, comm = path.wall(), path.last, path.problem.comm
+    found = part(wall, density, trim, (), units)
+    size = np.ptp(wall.rest[:, :COORDINATES], axis=0).max() / 12
+    pictures: list[str] = []
+    with TemporaryDirectory() as folder:
+        for caption, grid in (("The wall over the original thickness.", None),
+                              ("Squares that were printed on the flat sheet.", size)):
+            target = FilePath(folder) / "picture.png"
+            try:
+                view(path, last, target, grid)
+            except (InputError, ImportError) as error:
+                pictures = [f"<p class=note>No pictures: {html.escape(str(error))}.</p>"]
+                break
+            if comm.rank == 0:
+                pictures.append(page.picture(target.read_bytes(), caption, "wide"))
+    counts = path.counts
+    body = [f"<h1>{html.escape(title or 'Report of a run')}</h1>",
+            f"<p class=lead>{counts.steps} states after the start, {counts.iterations} Newton iterations,"
+            f" {counts.seconds:.1f} s. A sheet in space, as a membrane.</p>"]
+    if failure is not None:
+        body.append(f"<div class='note bad'><h2>The run could not go on</h2><p>{page.lines(str(failure))}</p></div>")
+    body += [f"<p class=note>{html.escape(text)}</p>" for _, text in doubts(path, wall)]
+    body += ["<div class=grid>", *pictures, "</div><h2>The answer</h2>",
+             page.table(["", ""], [list(row) for row in found.rows])]
+    names = list(dict.fromkeys(state.stage for state in path.states))
+    columns = [c for c in path.columns if not c.endswith("error")]
+    ends = [next(s for s in reversed(path.states) if s.stage == name) for name in names]
+    body += ["<h2>Stages</h2>", page.table(["stage", *(units.label(c) for c in columns)], [
+        [state.stage or "run", *(page.number(state.measures[c]) for c in columns)] for state in ends])]
+    body += ["<h2>Inputs</h2>", page.table(["", ""], [[k, v] for k, v in summary(path.problem.scene).items()])]
+    text = page.page(title or "Report of a run", body, "")
+    files.on_root(comm, lambda: files.replace(file, lambda stream: stream.write(text)))
+    return FilePath(file)
+
+
+def doubts(path: Any, wall: WallInSpace) -> list[tuple[str, str]]:
+    """(how bad, what) a reader should know of a membrane in compression whose energy is not relaxed there."""
+    if path.problem.scene.model.wrinkles is not None:
+        return []
+    share = float(wall.area_at_rest[wall.wrinkled].sum() / wall.area_at_rest.sum())
+    if share < 1e-3:
+        return []
+    k = int(np.argmax(wall.wrinkled))
+    at = ", ".join(f"{v:.4g}" for v in wall.middle[k])
+    return [("serious", f"{100 * share:.3g} % of the sheet is in compression in the last state, one place at (x, y, z)"
+                        f" = ({at}): it wrinkles there, and its wall depends on the mesh: use Membrane(wrinkles=0.01),"
+                        f" and look at path.wall().wrinkled.")]
+
+
+def _mirrors(path: Any, wall: WallInSpace) -> list[np.ndarray]:
+    """Factors by which the part and its mirror images make the whole."""
+    sides = [np.ones(3)]
+    for axis, name in _SIDE:
+        at = wall.rest[:, axis]
+        if name in path.problem.scene.mesh.boundaries and min(abs(at.min()), abs(at.max())) < 1e-9 * np.ptp(at):
+            sides += [side * np.where(np.arange(3) == axis, -1.0, 1.0) for side in sides]
+    return sides

@@ -1,0 +1,341 @@
+"""Rigid tools in space: profiles swept about an axis, along a line or round a box, and closed surfaces of triangles.
+
+Distances to swept profiles are exact where the profile's are, off the edges at which a profile ends.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError, as_points, direction, instance, known, non_negative, pair, place, positive, triple
+from ...io.output import replace
+from ...tools.profile import Tool
+from .bodies import apart, volume
+
+_PER_CORNER = 24           # straight pieces of a rounded corner in `surface`
+
+
+class SolidTool:
+    """A tool in space: `signed_distance` (positive inside), `bounds`, `surface`, `moved` (by its `shift`)."""
+
+    components = 3
+    sized = True
+    """False for a plane, whose drawing has no size."""
+    shift: tuple[float, ...] = (0.0, 0.0, 0.0)
+
+    def signed_distance(self, x: np.ndarray) -> np.ndarray:
+        """Distance of points x, shape (n, 3), to the surface, positive inside the tool, shape (n,), length."""
+        return self._distance(as_points("signed_distance: x", x, 3) - self.shift)
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Lowest and highest coordinates of the surface as drawn, shape (2, 3), length."""
+        points = self.surface()[0]
+        return np.array([points.min(0), points.max(0)])
+
+    def surface(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points, shape (n, 3), length, and triangles, shape (m, 3), of the surface, for drawing."""
+        points, triangles = self._surface()
+        return points + self.shift, triangles
+
+    def moved(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
+        """The tool, moved."""
+        import copy
+        found = copy.copy(self)
+        found.shift = tuple(a + b for a, b in zip(self.shift, triple("moved", (x, y, z))))
+        return found
+
+    def _distance(self, x: np.ndarray) -> np.ndarray:
+        raise NotImplementedError
+
+    def _surface(self) -> tuple[np.ndarray, np.ndarray]:
+        raise NotImplementedError
+
+
+class Swept(SolidTool):
+    """A profile (r, z) swept along a curve in the plane of x and y, to which r is a distance.
+
+    Args:
+        profile: the solid to its left; kind: "revolved" (r from the axis x = y = 0), "extruded" (r = x, or y: `along`)
+            or "box" (r from the middle line of a rounded rectangle of half widths `half`, across, the corners' radius
+            at the widest `corner`).
+    """
+
+    def __init__(self, profile: Tool, kind: str, half: tuple[float, float] = (0.0, 0.0), corner: float = 0.0,
+                 along: str = "y"):
+        self.profile, self.kind, self.half, self.corner, self.along = profile, kind, half, corner, along
+        self.sized = len(profile.pieces) > 1
+
+    def _distance(self, x):
+        if self.kind == "revolved":
+            r = np.hypot(x[:, 0], x[:, 1])
+        elif self.kind == "extruded":
+            r = x[:, "yx".index(self.along)]
+        else:
+            u = np.abs(x[:, :2]) - np.array(self.half) + self.corner
+            outside = np.hypot(*np.maximum(u, 0.0).T)
+            r = min(self.half) - self.corner + outside + np.minimum(u.max(1), 0.0)
+        return self.profile.signed_distance(np.column_stack([r, x[:, 2]]))
+
+    def _surface(self):
+        return self._swept(self.profile.outline())
+
+    def to_stl(self, file: Any, wall: float) -> None:
+        """Write it as a closed solid, binary STL: a mould `wall` thick below its lowest point. Not of an extruded one.
+
+        Raises:
+            InputError: the profile is not open, from r above 0 to r = 0.
+        """
+        outline, wall = self.profile.outline(), positive("to_stl: wall", wall)
+        if self.kind == "extruded" or outline[-1, 0] != 0 or outline[0, 0] <= 0:
+            raise InputError(f"to_stl: {self!r}: must be a mould revolved or round a box, its profile to end at r = 0")
+        low = outline[:, 1].min() - wall
+        (top, upper), (back, lower) = (self._swept(np.array(line)) for line in (
+            outline, [[0.0, low], [outline[0, 0], low], outline[0]]))
+        points, triangles = merged(np.vstack([top, back]), np.vstack([upper, lower + len(top)]))
+        write_stl(points + self.shift, triangles if volume(points, triangles) > 0 else triangles[:, ::-1], file)
+
+    def _swept(self, outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The surface over points (r, z) of a profile."""
+        rings = np.array([np.insert(self._ring(r), 2, z, axis=1) for r, z in outline])
+        m, n = rings.shape[:2]
+        row = np.arange(m * n).reshape(m, n)
+        a, b, c, d = row[:-1, :-1], row[1:, :-1], row[1:, 1:], row[:-1, 1:]
+        return rings.reshape(-1, 3), np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], -2).reshape(-1, 3)
+
+    def _ring(self, r: float) -> np.ndarray:
+        """The curve at r, shape (n, 2)."""
+        turn = np.linspace(0, np.pi / 2, _PER_CORNER + 1)
+        if self.kind == "extruded":
+            ends = np.array([-1.0, 1.0]) * np.ptp(self.profile.bounds, axis=0).max() / 2
+            line = np.column_stack([np.full(2, r), ends])
+            return line if self.along == "y" else line[:, ::-1]
+        off = r - (min(self.half) if self.kind == "box" else 0.0)
+        radius = max(self.corner + off, 0.0)
+        middle = np.array(self.half) + (off if self.kind == "box" else 0.0) - radius
+        middle = middle if self.kind == "box" else np.zeros(2)
+        found = [np.column_stack([sx * middle[0] + radius * np.cos(turn + q),
+                                  sy * middle[1] + radius * np.sin(turn + q)])
+                 for sx, sy, q in ((1, 1, 0), (-1, 1, np.pi / 2), (-1, -1, np.pi), (1, -1, 1.5 * np.pi))]
+        ring = np.concatenate(found)
+        return np.vstack([ring, ring[:1]])
+
+    def __repr__(self) -> str:
+        more = f", half={self.half}, corner={self.corner:g}" if self.kind == "box" else ""
+        return f"{self.kind}({self.profile!r}{more})"
+
+
+class Triangulated(SolidTool):
+    """A closed surface of triangles that look outward; the distance is VTK's, exact, the sign by its normals.
+
+    Attributes:
+        name: of its file; triangles: how many; volume: of its bodies, length^3 (what two share counts twice); middle:
+            the mean of its points.
+    """
+
+    def __init__(self, points: np.ndarray, triangles: np.ndarray, name: str):
+        self._points, self._triangles, self.name = points, triangles, name
+        self._groups = apart(points, triangles, f"solid: {name!r}")
+        self._implicit: list[Any] = []
+        self.triangles, self.volume = len(triangles), round(volume(points, triangles), 12)
+        self.middle = points.mean(0)
+
+    def _distance(self, x):
+        from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+        from vtkmodules.vtkCommonCore import vtkDoubleArray
+        if not self._implicit:
+            self._implicit = [_implicit(self._points, group) for group in self._groups]
+        if not len(x):
+            return np.zeros(0)
+        given, found = numpy_to_vtk(np.ascontiguousarray(x), deep=True), np.full(len(x), -np.inf)
+        for implicit in self._implicit:
+            out = vtkDoubleArray()
+            implicit.FunctionValue(given, out)
+            np.maximum(found, -vtk_to_numpy(out), out=found)
+        return found
+
+    def _surface(self):
+        return self._points, self._triangles
+
+    def undercuts(self, along: tuple[float, float, float] = (0, 0, 1)) -> dict[str, float]:
+        """How a part comes out of a mould along a direction: {"undercut_area", "least_draft"} (area; degrees).
+
+        Of the faces that look into the hull of the tool, and lie in no other of its bodies: the area of those that look
+        against the direction, and the least angle of the others to it (90: a floor).
+        """
+        from scipy.spatial import ConvexHull
+        way = direction("undercuts: along", along)
+        corners = self._points[self._triangles]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.linalg.norm(normal, axis=1) / 2
+        hull = ConvexHull(self._points).equations
+        depth = -(corners.mean(1) @ hull[:, :3].T + hull[:, 3]).max(1)
+        near = 1e-6 * np.ptp(self._points, axis=0).max()
+        inner = (depth > near) & (self._distance(corners.mean(1) + near * normal / (2 * area[:, None])) <= 0)
+        draft = np.degrees(np.arcsin(np.clip(normal @ way / (2 * area), -1, 1)))
+        under = inner & (draft < -0.01)
+        return {"undercut_area": float(area[under].sum()),
+                "least_draft": float(draft[inner & ~under].min(initial=90.0))}
+
+    def __repr__(self) -> str:
+        return f"solid({self.name!r})"
+
+
+def revolved(profile: Tool) -> Swept:
+    """A profile turned about the axis x = y = 0.
+
+    >>> ball = fx.tools.revolved(fx.tools.sphere(radius=10.0, z=0.0))
+    >>> ball.bounds.round(6).tolist()
+    [[-10.0, -10.0, 0.0], [10.0, 10.0, 20.0]]
+    """
+    return Swept(instance("revolved: profile", profile, Tool, "a Tool"), "revolved")
+
+
+def extruded(profile: Tool, along: str = "y") -> Swept:
+    """A profile (r, z) drawn along y, r being x; or along x, r being y.
+
+    >>> fx.tools.extruded(fx.tools.sphere(radius=10.0)).signed_distance([[0.0, 55.0, -1.0]]).tolist()
+    [-1.0]
+    """
+    known("extruded: along =", along, ("x", "y"))
+    return Swept(instance("extruded: profile", profile, Tool, "a Tool"), "extruded", along=along)
+
+
+def box(*, half: tuple[float, float], depth: float, corner: float = 0.0, fillet: float = 0.0, lip: float = 0.0,
+        draft: float = 0.0, mouth: float = 0.0, plug: bool = False) -> Swept:
+    """A mould that is a box with rounded corners, open upwards, about x = y = 0; or the plug that fits it.
+
+    Args:
+        half: half widths along x and y at the mouth (of a plug: at its upper end), length.
+        depth: from the mouth down to the floor; mouth: its z.
+        corner: radius in plan at the mouth; with draft that of the floor is less, and must not be below `fillet`.
+        fillet, lip: radii between wall and floor, and wall and flange (of a plug none).
+        draft: angle between wall and z axis, degrees.
+        plug: the solid is inside, and goes up from there.
+
+    >>> tray = fx.tools.box(half=(60.0, 40.0), depth=20.0, corner=15.0, fillet=5.0)
+    >>> tray.signed_distance([[0.0, 0.0, -18.0]]).tolist()
+    [-2.0]
+    """
+    a, b = (positive("box: half", value) for value in pair("box: half", half))
+    depth, corner, fillet = positive("box: depth", depth), non_negative("box: corner", corner), non_negative(
+        "box: fillet", fillet)
+    if corner > min(a, b):
+        raise InputError(f"box: corner = {corner!r}: must be at most the smaller half width, {min(a, b):g}")
+    r = min(a, b)
+    floor = r - depth * np.tan(np.radians(non_negative("box: draft", draft)))
+    if floor <= fillet:
+        raise InputError(f"box: draft = {draft!r} degrees and fillet = {fillet!r}: leave no floor at depth {depth:g}")
+    points = [(3 * r + lip, mouth), (r, mouth), (floor, mouth - depth), (0.0, mouth - depth)]
+    if plug:
+        return Swept(Tool([*points[:1:-1], (r, mouth), (r, mouth + depth)], [0.0, fillet, 0.0, 0.0]), "box", (a, b),
+                     corner)
+    return Swept(Tool(points, [0.0, non_negative("box: lip", lip), fillet, 0.0]), "box", (a, b), corner)
+
+
+def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False) -> Triangulated:
+    """A tool from an STL file, binary or text: one or more closed surfaces.
+
+    Args:
+        scale: the sheet's unit of length over the file's is 1/scale: 25.4 for inches and a sheet in mm.
+        inverted: its triangles look inward.
+
+    Raises:
+        InputError: the file cannot be read, or is no closed surface whose triangles look outward; the message says
+            where it is open.
+
+    >>> cup = fx.tools.revolved(fx.tools.cup(radius=30.0, depth=20.0, draft=5.0).mirrored())
+    >>> cup.to_stl("mould.stl", wall=5.0)
+    >>> mould = fx.tools.solid("mould.stl")
+    >>> mould.triangles, round(mould.undercuts()["least_draft"], 1)
+    (768, 5.0)
+    """
+    name = os.fspath(place("solid: file", file))
+    points, triangles = merged(*_read(name))
+    points = points * positive("solid: scale", scale)
+    _check_closed(points, triangles, f"solid: {name!r}")
+    if instance("solid: inverted", inverted, bool, "True or False"):
+        triangles = triangles[:, ::-1]
+    if volume(points, triangles) <= 0:
+        raise InputError(f"solid: {name!r} is inside out: its triangles look inward: use inverted={not inverted}")
+    return Triangulated(points, triangles, os.path.basename(name))
+
+
+def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points that are the same as one, without triangles that are then none."""
+    size = max(float(np.ptp(points, axis=0).max(initial=0.0)), 1e-300)
+    _, first, same = np.unique(np.round(points / size, 7), axis=0, return_index=True, return_inverse=True)
+    triangles = same.ravel()[triangles]
+    a, b, c = triangles.T
+    return points[first], triangles[(a != b) & (b != c) & (c != a)]
+
+
+def write_stl(points: np.ndarray, triangles: np.ndarray, file: Any) -> None:
+    """A surface as binary STL."""
+    corners = points[triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    rows = np.zeros(len(triangles), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
+    rows["normal"], rows["corners"] = normal, corners
+    replace(file, lambda f: f.write(b"formingx".ljust(80) + np.uint32(len(rows)).tobytes() + rows.tobytes()), "wb")
+
+
+def _read(name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Points and triangles of an STL file."""
+    try:
+        with open(name, "rb") as stream:
+            data = stream.read()
+    except OSError as error:
+        raise InputError(f"solid: {name!r} cannot be read: {error}") from None
+    n = int(np.frombuffer(data[80:84], "<u4")[0]) if len(data) >= 84 else -1
+    if len(data) == 84 + 50 * n:
+        rows = np.frombuffer(data[84:], dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
+        points = rows["corners"].astype(float).reshape(-1, 3)
+    else:
+        words = data.split()
+        at = [k for k, word in enumerate(words) if word.lower() == b"vertex"]
+        try:
+            points = np.array([[float(w) for w in words[k + 1:k + 4]] for k in at]).reshape(-1, 3)
+        except ValueError:
+            raise InputError(f"solid: {name!r} is no STL file: a vertex is not three numbers") from None
+    if len(points) < 12 or len(points) % 3 or not np.isfinite(points).all():
+        raise InputError(f"solid: {name!r} is no STL file of a solid: it has {len(points)} corners of triangles, which"
+                         f" must be finite and at least 12")
+    return points, np.arange(len(points)).reshape(-1, 3)
+
+
+def _check_closed(points: np.ndarray, triangles: np.ndarray, who: str) -> None:
+    """An InputError unless each edge has two triangles that go along it opposite ways."""
+    ends = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
+    edges, which, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
+    sense = np.zeros(len(edges))
+    np.add.at(sense, which.ravel(), np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0))
+    for bad, words in ((times == 1, "is open: {n} edges have a triangle on one side only, one at {at}: close the holes"
+                                    " where it was drawn"),
+                       (times % 2 == 1, "has {n} edges with an odd number of triangles, one at {at}: it crosses itself,"
+                                        " or holds a sheet without thickness"),
+                       (sense != 0, "has triangles that look the other way than their neighbours, at {n} edges, one at"
+                                    " {at}: let the program that wrote it unify its normals")):
+        if bad.any():
+            x = points[edges[np.argmax(bad)]].mean(0)
+            at = "(" + ", ".join(f"{v:.6g}" for v in x) + ")"
+            raise InputError(f"{who} {words.format(n=int(bad.sum()), at=at)}")
+
+
+def _implicit(points: np.ndarray, triangles: np.ndarray) -> Any:
+    """VTK's distance to the surface, negative inside."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+    from vtkmodules.vtkFiltersCore import vtkImplicitPolyDataDistance
+    where, cells, surface, found = vtkPoints(), vtkCellArray(), vtkPolyData(), vtkImplicitPolyDataDistance()
+    where.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))
+    rows = np.column_stack([np.full(len(triangles), 3), triangles]).astype(np.int64).ravel()
+    cells.SetCells(len(triangles), numpy_to_vtkIdTypeArray(rows, deep=True))
+    surface.SetPoints(where)
+    surface.SetPolys(cells)
+    found.SetInput(surface)
+    return found

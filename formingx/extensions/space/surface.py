@@ -1,0 +1,141 @@
+"""A scene in space as a membrane: triangles of a flat sheet that deform in three dimensions, its thickness as data.
+
+With the columns f1, f2 of the deformed sheet's gradient and J = |f1 x f2|, F = [[|f1|, f1.f2/|f1|, 0],
+[0, J/|f1|, 0], [0, 0, 1/J]] is, up to a rotation, the deformation gradient of the material, whose volume is kept
+exactly. It has the block structure of a section, so every material takes it. Displacements are linear in each triangle
+(P2 gains nothing on a polygonal rim, and lumps no area to vertices). A flat membrane without stretch has no stiffness
+normal to itself; a very small one, of the gradient of the displacement, keeps the tangent regular there.
+
+In compression a membrane wrinkles. With `Membrane(wrinkles=c)` its energy is c W + (1 - c) W_r, W_r the relaxed energy
+of tension-field theory (Pipkin, IMA J. Appl. Math. 36 (1986) 85): the energy at the stretch l2 = l1^(-1/2) of simple
+tension where l2 is below that, and none where l1 is below 1.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from ...forms.formulation import Formulation
+from ...forms.membrane import FIRST_STRETCH
+from ...forms.probes import Probe
+
+_REGULAR = 1e-7
+"""That stiffness, over the shear modulus."""
+
+
+class Surface(Formulation):
+    """The forms of a sheet in space; the only field is its displacement.
+
+    Attributes:
+        thicknesses: {layer: its thickness at rest (`Function`, length)}.
+    """
+
+    slack_at_rest = True
+
+    def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
+        """(normal at rest, the whole surface): "top" looks along +z, "bottom" along -z."""
+        return ufl.as_vector([0, 0, 1.0 if name == "top" else -1.0]), self.dx(metadata={"quadrature_degree": 1})
+
+    def constraints(self, support: Any) -> list[Any]:
+        return self.scene.kinematics.in_axes(support, support.constraints())
+
+    def nearest(self, points: np.ndarray) -> np.ndarray:
+        return points
+
+    def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
+        return Z
+
+    def weighted(self, density: Any, layers: list[str], metadata: dict | None = None) -> Any:
+        return density * sum(self.thicknesses[name] for name in layers) * (
+            self.dx(metadata=metadata) if metadata else self.dx)
+
+    def probe(self, problem: Any, points: Any) -> Probe:
+        return Probe(problem, points)
+
+    def admissible(self) -> Any:
+        """A surface cannot be inside out: J > 0."""
+        return _Always()
+
+    def set_stiff(self) -> None:
+        """A small stretch in all directions."""
+        self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X)
+
+    def area_row(self) -> Any:
+        """Linear form whose vector is, at the first component of a node, the area that belongs to it."""
+        return ufl.split(self.test_function())[0][0] * self.dx(metadata={"quadrature_degree": 1})
+
+    def _make_mesh(self) -> Any:
+        return self.scene.mesh
+
+    def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
+        element = basix.ufl.element("Lagrange", cell, 1)
+        return element, [basix.ufl.blocked_element(element, shape=(3,))]
+
+    def _weight(self) -> Any:
+        space, self.thicknesses = fem.functionspace(self.domain, ("Lagrange", 1)), {}
+        for name, given in self.scene.thickness.items():
+            h = self.thicknesses[name] = fem.Function(space, name=f"thickness of {name}")
+            h.interpolate(lambda X, given=given: given(X[0], X[1]))
+        return sum(self.thicknesses.values())
+
+    def _deformation_gradient(self) -> Any:
+        """In a basis of the tangent plane."""
+        F = self.scene.kinematics.deformation_gradient(self.u, self.X)
+        f1, f2 = (ufl.as_vector([F[i, k] for i in range(3)]) for k in (0, 1))
+        n = ufl.cross(f1, f2)
+        l1, J = ufl.sqrt(ufl.inner(f1, f1)), ufl.sqrt(ufl.inner(n, n))
+        return ufl.as_tensor([[l1, ufl.inner(f1, f2) / l1, 0], [0, J / l1, 0], [0, 0, 1 / J]])
+
+    def _groups(self) -> list[tuple[Any, list[str]]]:
+        return [(material, [name]) for name, material in self.scene.materials.items()]
+
+    def _energy(self, of: Any) -> Any:
+        left, F = self.scene.model.wrinkles, self.F
+        grad = ufl.grad(self.u)
+        energy = self.constant(_REGULAR * self.stress) / 2 * ufl.inner(grad, grad)
+        energy = self.weighted(self._scale * energy, list(self.thicknesses))
+        for terms in self._terms.values():
+            W = of(terms, F)
+            if left is not None:
+                c = self.constant(left)
+                W = c * W + (1 - c) * of(terms, relaxed(F))
+            energy += self.weighted(self._scale * W, terms.names)
+        return energy
+
+
+class _Always:
+    """In place of `Admissible`."""
+
+    def holds(self) -> bool:
+        return True
+
+    def furthest_volume_ratio(self) -> None:
+        return None
+
+
+def relaxed(F: Any) -> Any:
+    """The deformation gradient, in principal axes where it wrinkles, whose energy is the relaxed one of F."""
+    C11, C22, C12 = F[0, 0]**2, F[0, 1]**2 + F[1, 1]**2, F[0, 0] * F[0, 1]
+    J = F[0, 0] * F[1, 1]
+    squared = ((C11 - C22) / 2) ** 2 + C12**2
+    apart = ufl.sqrt(ufl.conditional(ufl.lt(squared, 1e-24), 1e-24, squared))       # finite where stretches coincide
+    largest = (C11 + C22) / 2 + apart                                               # l1^2
+    taut = ufl.Or(ufl.gt(J**2, ufl.sqrt(largest)), ufl.lt(squared, 1e-24))          # l2 > l1^(-1/2)
+    taut = ufl.And(taut, ufl.gt(largest, 1))
+    l1 = ufl.sqrt(ufl.conditional(ufl.gt(largest, 1), largest, 1))
+    l2 = 1 / ufl.sqrt(l1)
+
+    def either(a: Any, b: Any) -> Any:
+        return ufl.conditional(taut, a, b)
+    return ufl.as_tensor([[either(F[0, 0], l1), either(F[0, 1], 0), 0], [0, either(F[1, 1], l2), 0],
+                          [0, 0, either(F[2, 2], l2)]])
+
+
+def wrinkled(stretches: np.ndarray) -> np.ndarray:
+    """Where a membrane of these principal stretches, the larger first, shape (n, 2), is in compression, shape (n,)."""
+    return (stretches[:, 1] < stretches[:, 0] ** -0.5 * (1 - 1e-9)) | (stretches[:, 0] < 1 - 1e-9)

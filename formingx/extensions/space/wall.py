@@ -1,0 +1,205 @@
+"""The wall of a part in space, triangle by triangle: where it is thin, along a cut; where a printed grid comes to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError, direction, pair, positive, triple
+from ...mesh.nodes import COORDINATES, of_cells, own_cells
+from ...ranks import gathered
+from ...results.files.sheet import Sheet
+from .surface import wrinkled
+
+
+@dataclass(frozen=True, repr=False)
+class WallInSpace(Sheet):
+    """The wall of m triangles in one state; all ranks hold all of it.
+
+    Attributes:
+        rest, now: of the n nodes, shape (n, 3), length; triangles: nodes of each, shape (m, 3), seen from +z at rest
+            counter-clockwise.
+        layers: {name: thickness at rest, in the middle of each triangle, shape (m,)}.
+        comm: of the run.
+    """
+
+    rest: np.ndarray
+    now: np.ndarray
+    triangles: np.ndarray
+    layers: Mapping[str, np.ndarray]
+    comm: Any
+
+    @cached_property
+    def area_at_rest(self) -> np.ndarray:
+        """Of each triangle, shape (m,), length^2."""
+        return np.linalg.norm(_normals(self.rest[self.triangles]), axis=1)
+
+    @cached_property
+    def area(self) -> np.ndarray:
+        """Of each triangle now, shape (m,), length^2."""
+        return np.linalg.norm(_normals(self.now[self.triangles]), axis=1)
+
+    @property
+    def thickness_at_rest(self) -> np.ndarray:
+        """Of all layers, shape (m,), length."""
+        return np.sum(list(self.layers.values()), axis=0)
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """The wall over the thickness at rest: rest area over area, as the volume is kept, shape (m,)."""
+        return self.area_at_rest / self.area
+
+    @property
+    def wall(self) -> np.ndarray:
+        """Of each triangle, shape (m,), length."""
+        return self.thickness_at_rest * self.ratio
+
+    @cached_property
+    def middle(self) -> np.ndarray:
+        """Of each triangle now, shape (m, 3), length."""
+        return self.now[self.triangles].mean(1)
+
+    @cached_property
+    def stretches(self) -> np.ndarray:
+        """Principal, in the surface, the larger first, shape (m, 2)."""
+        a, b = (x[self.triangles[:, 1:]] - x[self.triangles[:, :1]] for x in (self.rest, self.now))
+        inverse = np.linalg.inv(a[..., :COORDINATES])                             # the sheet is flat at rest
+        F = np.einsum("mij,mjk->mki", inverse, b)
+        return np.linalg.svd(F, compute_uv=False)
+
+    @property
+    def wrinkled(self) -> np.ndarray:
+        """Which triangles are in compression, shape (m,): a membrane wrinkles there."""
+        return wrinkled(self.stretches)
+
+    @cached_property
+    def at_nodes(self) -> np.ndarray:
+        """The wall at the nodes, shape (n,), length: of the triangles around each, by their areas."""
+        return self.to_nodes(self.wall)
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """{name: values, shape (m,)}: what the files hold."""
+        X, x = self.rest[self.triangles].mean(1), self.middle
+        each = {f"wall_of_{name}": h * self.ratio for name, h in self.layers.items()}
+        return {"X": X[:, 0], "Y": X[:, 1], "x": x[:, 0], "y": x[:, 1], "z": x[:, 2], "area": self.area,
+                "wall": self.wall, "wall_ratio": self.ratio, "stretch_1": self.stretches[:, 0],
+                "stretch_2": self.stretches[:, 1], "wrinkled": self.wrinkled.astype(float),
+                **(each if len(each) > 1 else {})}
+
+    def at(self, x: float, y: float) -> float:
+        """The wall at the node that was nearest to a place of the flat sheet, length."""
+        away = np.hypot(*(self.rest[:, :COORDINATES] - pair("at", (x, y))).T)
+        return float(self.at_nodes[np.argmin(away)])
+
+    def around(self, point: tuple[float, float, float], radius: float) -> float:
+        """Mean wall ratio of the triangles whose middle is now within a radius of a point; else of the nearest one.
+
+        Weighted by their areas at rest.
+        """
+        away = np.linalg.norm(self.middle - triple("around: point", point), axis=1)
+        near = away <= positive("around: radius", radius)
+        if not near.any():
+            return float(self.ratio[np.argmin(away)])
+        return float(np.average(self.ratio[near], weights=self.area_at_rest[near]))
+
+    def section(self, point: tuple[float, float, float], normal: tuple[float, float, float]) -> dict[str, np.ndarray]:
+        """The wall along a plane cut: {"arc_length", "x", "y", "z", "wall"}, shape (k,) each, from end to end.
+
+        Where the cut has several pieces, their arc lengths follow one another.
+
+        Raises:
+            InputError: the plane does not meet the part.
+        """
+        d = (self.now - triple("section: point", point)) @ direction("section: normal", normal)
+        size = 1e-9 * np.ptp(self.now, axis=0).max()
+        beyond = size if d.min() < -size else -size         # where nodes on the plane count to; it may be a symmetry's
+        d = np.where(np.abs(d) < size, beyond, d)
+        sides = d[self.triangles] > 0
+        crossed = np.flatnonzero(sides.any(1) & ~sides.all(1))
+        if not len(crossed):
+            raise InputError(f"section: the plane through {point!r} normal to {normal!r} does not meet the part")
+        ends: dict[Any, list[Any]] = {}
+        for row in self.triangles[crossed].tolist():
+            a, b = (tuple(sorted((i, j))) for i, j in ((row[0], row[1]), (row[1], row[2]), (row[2], row[0]))
+                    if (d[i] > 0) != (d[j] > 0))
+            ends.setdefault(a, []).append(b)
+            ends.setdefault(b, []).append(a)
+        found, length = [], 0.0
+        while ends:
+            here: Any = next((e for e, others in ends.items() if len(others) == 1), next(iter(ends)))
+            before = None
+            while here is not None:
+                i, j = here
+                s = d[i] / (d[i] - d[j])
+                x, h = (v[i] + s * (v[j] - v[i]) for v in (self.now, self.at_nodes))
+                step = np.inf if before is None else float(np.linalg.norm(x - before))
+                if step > size:
+                    length += 0.0 if before is None else step
+                    found.append([length, *x, h])
+                    before = x
+                after = ends.pop(here)
+                here = next((e for e in after if e in ends), None)
+        return dict(zip(("arc_length", "x", "y", "z", "wall"), np.array(found).T))
+
+    def printed(self, size: float) -> list[np.ndarray]:
+        """Where the lines of a square grid printed on the flat sheet are now: lines, shape (k, 3) each, length.
+
+        Lines x = i size and y = j size; nodes between where they cross edges of triangles.
+        """
+        size, found = positive("printed: size", size), []
+        edges = np.unique(np.sort(np.concatenate([self.triangles[:, [i, j]] for i, j in ((0, 1), (1, 2), (2, 0))]), 1),
+                          axis=0)
+        for axis in (0, 1):
+            a, b = self.rest[edges[:, 0]], self.rest[edges[:, 1]]
+            low, high = self.rest[:, axis].min(), self.rest[:, axis].max()
+            for k in range(int(np.ceil(low / size)), int(np.floor(high / size)) + 1):
+                at = k * size + 1e-9 * size * (1 if k * size < (low + high) / 2 else -1)
+                cut = (a[:, axis] - at) * (b[:, axis] - at) < 0
+                s = ((at - a[cut, axis]) / (b[cut, axis] - a[cut, axis]))[:, None]
+                order = np.argsort((a[cut] + s * (b[cut] - a[cut]))[:, 1 - axis])
+                i, j = edges[cut].T
+                line = (self.now[i] + s * (self.now[j] - self.now[i]))[order]
+                if len(line) > 1:
+                    found.append(line)
+        return found
+
+    def to_nodes(self, values: np.ndarray) -> np.ndarray:
+        """Values of triangles, shape (m,), as those of nodes, (n,): means over those around, by their areas at rest."""
+        total, weight = np.zeros(len(self.rest)), np.zeros(len(self.rest))
+        np.add.at(total, self.triangles.ravel(), np.repeat(values * self.area_at_rest, 3))
+        np.add.at(weight, self.triangles.ravel(), np.repeat(self.area_at_rest, 3))
+        return total / weight
+
+
+def wall_of(path: Any, state: Any) -> WallInSpace:
+    """The wall in a state, nodes and triangles in an order that does not depend on ranks; collective."""
+    problem = path.problem
+    forms, domain, comm = problem.forms, problem.forms.domain, problem.comm
+    own = own_cells(domain)
+    vectors, numbers = forms.space.sub(0).collapse()
+    dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, 3)
+    with problem.at(state):
+        now = forms.length * forms.w.x.array[dofs]
+    cells = vectors.dofmap.list[own]
+    X = vectors.tabulate_dof_coordinates()
+    middles = of_cells(domain, own).mean(1)[:, :COORDINATES].T
+    h = {name: given(*middles) for name, given in problem.scene.thickness.items()}
+    order = np.argsort(gathered(comm, domain.topology.original_cell_index[own]))
+    rest, moved = (gathered(comm, part)[order].reshape(-1, 3) for part in (X[cells], X[cells] + now[cells]))
+    keys = np.round(rest / max(problem.scene.extent), 10)
+    _, first, row = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    triangles = row.reshape(-1, 3)
+    turned = _normals(rest[first][triangles])[:, 2] < 0
+    triangles[turned] = triangles[turned][:, ::-1]
+    layers = {name: gathered(comm, values)[order] for name, values in h.items()}
+    return WallInSpace(rest[first], moved[first], triangles, layers, comm)
+
+
+def _normals(corners: np.ndarray) -> np.ndarray:
+    """Of triangles, shape (m, 3, 3): half the cross product of two edges, shape (m, 3)."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2

@@ -1,0 +1,1 @@
+"""Loss of stability and buckling modes of axisymmetric bodies."""

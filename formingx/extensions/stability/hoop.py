@@ -1,0 +1,69 @@
+"""Forces round the axis along a sheet: where they are below 0 it may wrinkle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...physics.models import Membrane
+from ...results.evaluate.tension import Tension
+from ...results.evaluate.wall import between_layers
+from ...results.files.sheet import Sheet
+
+_THROUGH = 4               # Gauss points of a layer
+
+
+@dataclass(frozen=True, repr=False)
+class HoopResultants(Sheet):
+    """The force round the axis at n places of a sheet, from the axis to the rim, in one state.
+
+    Compression is where wrinkles may begin, and no proof of them: what is thick stands (`Path.stability`); a membrane,
+    which has no bending stiffness, wrinkles there.
+
+    Attributes:
+        points: of the middle line at rest, (R, Z), in the middle of its elements, shape (n, 2), length.
+        resultant: N = the integral of P (first Piola-Kirchhoff, hoop) through the sheet at rest, shape (n,): force by
+            length of the middle line at rest.
+        comm: of the run.
+    """
+
+    points: np.ndarray
+    resultant: np.ndarray
+    comm: Any
+
+    @property
+    def compressed(self) -> np.ndarray:
+        """Where it is below 0, shape (n,)."""
+        return self.resultant < 0
+
+    @property
+    def least(self) -> tuple[float, float]:
+        """(the least resultant, the reference radius where it is)."""
+        k = int(np.argmin(self.resultant))
+        return float(self.resultant[k]), float(self.points[k, 0])
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        return {"reference_radius": self.points[:, 0], "Z": self.points[:, 1], "hoop_resultant": self.resultant}
+
+
+def hoop_resultants(path: Any, problem: Any, state: Any) -> HoopResultants:
+    """See `Path.hoop_resultants`; collective."""
+    scene = problem.scene
+    if not scene.kinematics.axisymmetric:
+        raise InputError("hoop_resultants: in plane strain nothing goes round an axis")
+    if isinstance(scene.model, Membrane):
+        return HoopResultants(*Tension(problem).hoop(state), problem.comm)
+    profile = path.profile(state)
+    (names, between), bottom, top = between_layers(scene.mesh, profile), profile.rest_bottom, profile.rest_top
+    lines = np.array([bottom, *between, top])[:, 1::2]                       # beside the corners of a rim, not on it
+    gauss, weights = np.polynomial.legendre.leggauss(_THROUGH)
+    stress, resultant = path.stress(state), np.zeros(lines.shape[1])
+    for name, a, b in zip(names, lines[:-1], lines[1:], strict=True):
+        points = a[:, None] + (b - a)[:, None] * (1 + gauss)[:, None] / 2
+        P = stress.at(points.reshape(-1, points.shape[-1]), name).first_piola[:, 2, 2].reshape(points.shape[:2])
+        resultant += np.linalg.norm(b - a, axis=1) * (P @ weights) / 2
+    return HoopResultants((lines[0] + lines[-1]) / 2, resultant, problem.comm)

@@ -1,0 +1,269 @@
+"""Modes in which a state is not stable: how many there are (inertia), which (shift-invert), and where they begin.
+
+The second variation K of a saddle point, with pressures and Lagrange multipliers, has one negative pivot for each of
+these in K = L D L^T, and one more for each unstable mode (Sylvester's law of inertia).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ...solve.arc_length import Curve
+from ...solve.equations import Array
+from ...solve.linear import DirectSolver
+from ...solve.newton import Failure
+from ...solve.state import State
+from .second_variation import SecondVariation
+
+
+@dataclass(frozen=True)
+class Lanczos:
+    """How modes are computed, by Lanczos' method with the inverse.
+
+    Attributes:
+        steps: at most, each a solve with factors that are there.
+        accurate: error of an eigenvalue, relative to it, at which it ends.
+        exhausted: size of what is left of a new vector, over the largest eigenvalue of the inverse, that is round-off:
+            all modes are found.
+    """
+
+    steps: int = 80
+    accurate: float = 1e-10
+    exhausted: float = 1e-14
+
+
+@dataclass(frozen=True)
+class Locating:
+    """How the state at which a mode ceases to be stable is located between two others.
+
+    Attributes:
+        states: solved for at most.
+        located: error of its place, in parts of the distance of the two.
+        beside: how far beside it counts of unstable modes make sure of it, in the same parts.
+        patience: how often the bracket may fail to halve before it is halved.
+        alike: scalar product of two normed modes above which they are one, seen from two states.
+        astray: how far a state may be from the cubic between the two, over their distance: further off lies another
+            branch.
+    """
+
+    states: int = 60
+    located: float = 1e-8
+    beside: float = 1e-6
+    patience: int = 3
+    alike: float = 0.7
+    astray: float = 0.1
+
+
+class Kind(NamedTuple):
+    """Modes with so many waves round the axis (in plane strain the wave number); flipped: see `SecondVariation`."""
+
+    number: float
+    flipped: str | None = None
+
+
+class Located(NamedTuple):
+    """Where a mode begins, or ceases, to be unstable.
+
+    kind: of the mode; left, right: the states before and behind; state: there; mode: amplitudes (U, W, V) at `nodes` of
+    the second variation, own part; x: its U and W as unknowns of the problem, own part; fraction: where it is from left
+    (0) to right (1); gained: True if the body is less stable behind; solved: True if `state` was solved for, else it
+    lies on the cubic between left and right.
+    """
+
+    kind: Kind
+    left: State
+    right: State
+    state: State
+    fraction: float
+    mode: Array
+    x: Array
+    gained: bool
+    solved: bool
+
+
+class _Look(NamedTuple):
+    """A state between two others, how many modes are unstable, and those nearest to 0: eigenvalues, ascending,
+    dimensionless, and own unknowns."""
+
+    fraction: float
+    state: State
+    unstable: int
+    values: Array
+    modes: Array
+
+
+class Modes:
+    """The unstable modes of the states of a problem; created once.
+
+    Args:
+        curve: the `Curve` that solves for states. lanczos, locating: how it is done.
+
+    Raises:
+        InputError: as `SecondVariation`.
+    """
+
+    def __init__(self, curve: Curve, lanczos: Lanczos | None = None, locating: Locating | None = None):
+        self.curve, self.problem = curve, curve.problem
+        self._by, self._how = lanczos or Lanczos(), locating or Locating()
+        self.variation = SecondVariation(curve.problem)
+        self._solver = DirectSolver(self.variation.matrix, True, inertia=True)
+        self._in, self._out = self.variation.matrix.createVecs()
+
+    def count(self, state: State, kind: Kind) -> int:
+        """The number of unstable modes of a kind."""
+        with self.problem.at(state):
+            return self._count(kind)
+
+    def _count(self, kind: Kind) -> int:
+        self.variation.fill(*kind)
+        if not self._solver.factorise():
+            raise Failure("the stiffness is singular for every mode: some part of the body has no stiffness", [])
+        return self._solver.negative_pivots() - self.variation.negative
+
+    def locate(self, a: State, b: State, kind: Kind, index: int) -> Located:
+        """Where between two states the eigenvalue with so many below it changes its sign.
+
+        Counts bracket it; inside the bracket it is foretold by the eigenvalues of one mode, which is followed by its
+        shape: others cross it on their way.
+        """
+        looks = [self._look(0.0, a, kind, index), self._look(1.0, b, kind, index)]
+        (low, high), how = looks, self._how
+        gained, solved, shrunk = high.unstable > low.unstable, True, 0
+        while True:
+            values = self._follow(looks, high if gained else low, index)
+            guess = _root(values, low.fraction, high.fraction) if shrunk < how.patience else None
+            fraction, shrunk = ((low.fraction + high.fraction) / 2, 0) if guess is None else (guess, shrunk)
+            nearest = min(looks, key=lambda look: abs(look.fraction - fraction))
+            width = high.fraction - low.fraction
+            if width < 2 * how.beside or len(looks) == how.states:
+                break
+            if abs(nearest.fraction - fraction) < how.located:     # a root, but of the mode that is looked for?
+                fraction = low.fraction + how.beside if nearest is low else high.fraction - how.beside
+            try:
+                looks.append(new := self._look(fraction, self._between(a, b, fraction), kind, index))
+            except Failure:
+                solved = False
+                break
+            low, high = (low, new) if (new.unstable > index) is gained else (new, high)
+            shrunk = 0 if high.fraction - low.fraction < width / 2 else shrunk + 1
+        state, exact = nearest.state, width < 2 * how.beside
+        if exact:
+            fraction = nearest.fraction
+        else:
+            x, control = self.curve.interpolate(a, b, fraction)
+            state = State(x, control, a.direction, a.slope, memory=a.memory, stage=a.stage, setting=a.setting,
+                          time=self.problem.time_at(control))
+        with self.problem.at(nearest.state):
+            self.variation.fill(*kind)
+            x = nearest.modes[np.argmin(abs(nearest.values))] if exact else self._of_index(nearest, index)
+            mode, plane = self.variation.amplitudes(x), self.variation.plane(x)
+        return Located(kind, a, b, state, fraction, mode, plane, gained, solved and exact)
+
+    def _look(self, fraction: float, state: State, kind: Kind, index: int) -> _Look:
+        with self.problem.at(state):
+            count = self._count(kind)
+            return _Look(fraction, state, count, *self._lanczos(4 + abs(count - index)))
+
+    def _of_index(self, look: _Look, index: int) -> Array:
+        """The mode whose eigenvalue has so many below it; of those that are known the nearest to it."""
+        negative = np.flatnonzero(look.values < 0)
+        k = (negative[-1] + 1 if len(negative) else 0) + index - look.unstable
+        return look.modes[min(max(k, 0), len(look.modes) - 1)]
+
+    def _follow(self, looks: list[_Look], end: _Look, index: int) -> list[tuple[float, float]]:
+        """(fraction, eigenvalue) of the mode that is unstable at that end of the bracket, where it is found again."""
+        mode, found = self._of_index(end, index), []
+        for look in looks:
+            alike = [abs(self._inner(mode, other)) for other in look.modes]
+            if max(alike) > self._how.alike:
+                found.append((look.fraction, float(look.values[np.argmax(alike)])))
+        return found
+
+    def _between(self, a: State, b: State, fraction: float) -> State:
+        """The state there, solved for; raises `Failure`."""
+        if self.problem.has_history:
+            raise Failure("with a history the state between two others depends on the steps", [])
+        with self.problem.at(a):
+            state = self.curve.inside(a, b, fraction)
+        self.curve.spent()
+        state.stage, state.setting, state.memory = a.stage, a.setting, a.memory
+        x, control = self.curve.interpolate(a, b, fraction)
+        guess = State(x, control, a.direction, a.slope)
+        if self.curve.distance(guess, state) > self._how.astray * self.curve.distance(a, b):
+            raise Failure("the state that was found lies on another branch", [])
+        return state
+
+    def _lanczos(self, number: int) -> tuple[Array, Array]:
+        """Eigenvalues nearest to 0 of K x = value M x, and modes; all vectors are kept orthogonal to each other.
+
+        M is the lumped mass, which is 0 for pressures: so all begin in the range of K^-1 M. Rigid motions are left out.
+        """
+        variation = self.variation
+        out: list[Array] = []
+        for mode in variation.rigid:
+            out.append(self._normal(self._clean(mode, out)))
+        rng = np.random.default_rng(0)
+        first = self._in.getOwnershipRange()
+        start = rng.standard_normal(self._in.getSize())[first[0]: first[1]]
+        basis = [self._normal(self._clean(self._invert(start), out))]
+        alpha: list[float] = []
+        beta: list[float] = []
+        while True:
+            w = self._invert(basis[-1])
+            alpha.append(self._inner(w, basis[-1]))
+            w = self._clean(self._clean(w, out + basis), out + basis)
+            size = np.sqrt(max(self._inner(w, w), 0.0))
+            T = np.diag(alpha) + np.diag(beta, 1) + np.diag(beta, -1)
+            theta, ways = np.linalg.eigh(T)
+            best = np.argsort(-abs(theta))[:number]
+            rest = size * abs(ways[-1, best])
+            accurate = len(alpha) >= number and np.all(rest < self._by.accurate * abs(theta[best]))
+            if accurate or len(alpha) == self._by.steps or size < self._by.exhausted * abs(theta).max():
+                break
+            beta.append(size)
+            basis.append(w / size)
+        best = best[np.argsort(1 / theta[best])]
+        modes = ways[:, best].T @ np.array(basis)
+        return 1 / theta[best], modes
+
+    def _invert(self, x: Array) -> Array:
+        """K^-1 M x."""
+        self._in.array_w[:] = self.variation.mass(x)
+        self._solver.solve(self._in, self._out)
+        return self._out.array_r.copy()
+
+    def _inner(self, x: Array, y: Array) -> float:
+        return float(self.problem.comm.allreduce(float(x @ self.variation.mass(y))))
+
+    def _normal(self, x: Array) -> Array:
+        return x / np.sqrt(self._inner(x, x))
+
+    def _clean(self, x: Array, others: list[Array]) -> Array:
+        """x without its parts along others, which are normal to each other."""
+        if not others:
+            return x
+        basis = np.array(others)
+        parts = self.problem.comm.allreduce(basis @ self.variation.mass(x))
+        return x - parts @ basis
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        self._solver.destroy()
+        self._in.destroy()
+        self._out.destroy()
+        self.variation.destroy()
+
+
+def _root(values: list[tuple[float, float]], low: float, high: float) -> float | None:
+    """Where the polynomial (of the fraction over the eigenvalue) through those nearest to 0 has its root, if inside."""
+    known = sorted(values, key=lambda one: abs(one[1]))[:4]
+    for n in range(len(known), 1, -1):
+        s, f = (np.array([one[k] for one in known[:n]]) for k in (0, 1))
+        if len(np.unique(f)) == n:
+            guess = sum(s[i] * np.prod([f[j] / (f[j] - f[i]) for j in range(n) if j != i]) for i in range(n))
+            if low < guess < high:
+                return float(guess)
+    return None

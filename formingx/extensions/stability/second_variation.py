@@ -1,0 +1,335 @@
+"""The second variation of the energy of an accepted state for modes that vary round the body (or along its depth).
+
+A mode is u_r = U cos(n theta), u_z = W cos(n theta), u_hoop = V sin(n theta), pressure Q cos(n theta); in plane strain
+the same with k x3 for n theta. Modes of different n do not couple, nor do, at second order and by reflection, changes
+of F within its blocks (from U, W and the hoop stretch) and across them, so
+
+    d2E[mode, mode] = d2E(F + H within) + d2E(F + H across),      H: `Kinematics.mode_gradient`,
+
+each the potential of the scene derived twice. n is a number in one form. At n = 0 V is torsion, and the rest the
+tangent of the path; amplitudes count alike at all n (round the body cos^2 has half the mean of 1). A follower pressure
+and friction have no energy: the symmetric part of their tangents counts. Where a point slides, nothing holds it round
+the axis, which is a bound. A material that relaxes has the stiffness of the instant.
+
+Unknowns are (U, W, V + m U, Q), m = 1 for n = 1 and 0 else: what is to be 0 on the axis is then an unknown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from ...errors import InputError
+from ...forms.loaded_body import LoadedBody
+from ...forms.matrix import ExtendedMatrix
+from ...physics.kinematics import BLOCK
+from ...physics.supports import Held, Symmetry
+
+_AT_REST = 1e-6
+"""Forces by a rigid motion (over those of its single unknowns) below which nothing holds it."""
+
+
+class _ModedBody(LoadedBody):
+    """The body as `Load.mode_work` sees it."""
+
+    def __init__(self, forms: Any, mode: Any, dmode: Any, H: Any):
+        super().__init__(forms)
+        self.mode, self.dmode, self.H = mode, dmode, H
+
+
+class SecondVariation:
+    """That of a problem, at the state that the problem stands at; created once.
+
+    Args:
+        problem: of a solid.
+
+    Attributes:
+        matrix: of the modes that `fill` was last told; symmetric. Of each rigid motion that nothing holds one unknown
+            is held: what other modes do is the same, and the matrix is regular.
+        rigid: these motions, own parts of unknowns. negative: pivots of `matrix` that are so in stable states, too.
+        nodes: reference positions of the nodes, own, shape (m, 2), length.
+        mirrors: names of the boundaries that are mirrors.
+
+    Raises:
+        InputError: a membrane, an elastic support, or a load that does not know how it changes with a mode.
+    """
+
+    def __init__(self, problem: Any):
+        forms = problem.forms
+        if forms.domain.geometry.dim == 3:
+            raise InputError("stability: is not available yet for a sheet in space")
+        if forms.domain.topology.dim != 2:
+            raise InputError("stability: a membrane has no bending stiffness: under hoop compression it wrinkles in"
+                             " ever shorter waves; look at its stresses, or use a solid model, MixedPressure()")
+        for support, _ in forms.elastic_supports:
+            raise InputError(f"stability: is not available with an elastic support, {support!r}")
+        self.problem, self.comm, self._forms = problem, problem.comm, forms
+        self.space = forms.mode_space()
+        self._axisymmetric = problem.scene.kinematics.axisymmetric
+        self._number, self._turned = forms.constant(0.0), forms.constant(0.0)
+        self._number_unknowns()
+        self.mirrors = [s.on for s in problem.scene.supports if isinstance(s, Symmetry) and s.mirror]
+        self._means = list(self._mean_rows())
+        self._matrix = ExtendedMatrix(forms.compile(self._form()), self.space.dofmap.index_map, [],
+                                      [(row != 0) + (u != 0) for _, row, u in self._means], self.comm, True)
+        self.matrix = self._matrix.mat
+        self._held = np.zeros(0, dtype=np.int32)
+
+    def fill(self, number: float, flipped: str | None = None) -> Any:
+        """`matrix` of modes with so many waves; `flipped`: those for which a mirror turns their image round."""
+        problem, m = self.problem, float(self._axisymmetric and number == 1)
+        self._number.value, self._turned.value = number, m
+        self._held = self._find_held(number, flipped)
+        own = self._held[self._held < self._own]
+        off, rows = problem.setting.off, []
+        for thing, row, u in self._means:
+            rows.append((row - m * u) * (thing not in off))
+            rows[-1][own] = 0
+        self._matrix.hold([fem.dirichletbc(fem.Function(self.space), self._held)], rows)
+        self._rows = rows
+        self.negative = self._pressures + sum(bool(self.comm.allreduce(int(np.any(row)))) for row in rows)
+        fields = problem.x.array_r[: problem.n_owned]
+        blocks = [self._of_contact(contact, fields, m) for contact in problem.present]
+        guided = [self._of_guided(fields, m)] if self._axisymmetric else []
+        self._matrix.fill([*blocks, *guided])
+        self.rigid = self._find_rigid()
+        self._pin()
+        return self.matrix
+
+    def mass(self, x: np.ndarray) -> np.ndarray:
+        """The lumped mass times a mode, own parts."""
+        U, W, V = self._unknowns.T
+        m, out = self._turned.value, np.zeros_like(x)
+        round_axis = self._lumped * (x[V] - m * x[U])
+        out[V], out[W], out[U] = round_axis, self._lumped * x[W], self._lumped * x[U] - m * round_axis
+        out[self._held[self._held < self._own]] = 0
+        return out
+
+    def amplitudes(self, x: np.ndarray) -> np.ndarray:
+        """(U, W, V) of a mode at `nodes`, shape (m, 3)."""
+        U, W, V = self._unknowns[~self._bubble].T
+        return np.column_stack([x[U], x[W], x[V] - self._turned.value * x[U]])
+
+    def plane(self, x: np.ndarray) -> np.ndarray:
+        """What a mode is to the problem: its U, W and pressures as unknowns, own part, shape of the problem's x."""
+        found = np.zeros(self.problem.x.getLocalSize())
+        found[: self.problem.n_owned] = x[self._to_mode[: self.problem.n_owned]]
+        return found
+
+    def _find_rigid(self) -> list[np.ndarray]:
+        """The body's rigid motions that nothing holds."""
+        kinematics, own = self.problem.scene.kinematics, self._held[self._held < self._own]
+        R = np.array([self._unknowns_of(mode) for mode in kinematics.rigid_modes(float(self._number.value))])
+        if not len(R):
+            return []
+        kept = [self.comm.allreduce(R[:, own] @ R[:, own].T)]
+        kept += [np.outer(v, v) for v in (self.comm.allreduce(R[:, : self._own] @ row) for row in self._rows)]
+        size, ways = np.linalg.eigh(sum(kept))
+        free = [way @ R for s, way in zip(size, ways.T) if s < 1e-14]
+        return [mode / np.sqrt(self._sum(mode * mode)) for mode in free if self._moves_freely(mode)]
+
+    def _moves_freely(self, mode: np.ndarray) -> bool:
+        x, y, diagonal = self.matrix.createVecRight(), self.matrix.createVecRight(), self.matrix.getDiagonal()
+        x.array_w[:] = mode
+        self.matrix.mult(x, y)
+        forces = y.norm()
+        diagonal.array_w[:] = diagonal.array_r * mode
+        single = diagonal.norm()
+        for vector in (x, y, diagonal):
+            vector.destroy()
+        return bool(forces < _AT_REST * single)
+
+    def _pin(self) -> None:
+        """Hold, of each rigid motion, the unknown that it moves most, the motions before it being held."""
+        first, rest = self.matrix.getOwnershipRange()[0], [mode.copy() for mode in self.rigid]
+        rows = []
+        while rest:
+            mode = rest.pop(0)
+            here = int(np.argmax(abs(mode))) if len(mode) else 0
+            parts = self.comm.allgather((float(abs(mode).max(initial=0.0)), first + here,
+                                         [float(one[here]) if len(mode) else 0.0 for one in [mode, *rest]]))
+            _, row, (most, *others) = max(parts, key=lambda part: part[0])
+            rows.append(row)
+            rest = [one - other / most * mode for one, other in zip(rest, others, strict=True)]
+        if rows:
+            self.matrix.zeroRowsColumns(rows if self.comm.rank == 0 else [], 1.0)
+
+    def _sum(self, values: np.ndarray) -> float:
+        return float(self.comm.allreduce(values.sum()))
+
+    def _form(self) -> Any:
+        """Bilinear form of the second variation, dimensionless."""
+        forms, kinematics = self._forms, self.problem.scene.kinematics
+        h, v, w = fem.Function(self.space), ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
+
+        def displacement(mode: Any) -> Any:
+            U, W, V = (ufl.split(mode)[0][i] for i in range(3))
+            return forms.constant(forms.length) * ufl.as_vector([U, W, V - self._turned * U])
+
+        def gradient(mode: Any) -> Any:
+            return kinematics.mode_gradient(displacement(mode), forms.X, self._number)
+        F, H = forms.elastic_F, forms.elastic(gradient(h))
+
+        def changed(within: bool) -> Any:
+            return ufl.as_tensor([[(F[i, j] if (i, j) in BLOCK else 0) + (H[i, j] if ((i, j) in BLOCK) is within
+                                                                            else 0)
+                                   for j in range(3)] for i in range(3)])
+        now, change = ufl.split(forms.w)[1:], ufl.split(h)[1:]
+        then = [p + q for p, q in zip(now, change, strict=True)]
+        scale, energy = forms.constant(1 / (forms.stress * forms.volume)), 0
+        for _, names in forms.bodies:
+            for F_changed, pressures in ((changed(True), then), (changed(False), now)):
+                for density, metadata in forms.elastic_densities(names, F_changed, pressures):
+                    energy += forms.weighted(scale * density, names, metadata)
+        form = ufl.replace(ufl.derivative(ufl.derivative(energy, h, v), h, w), {h: ufl.zero(h.ufl_shape)})
+        half = forms.constant(0.5 / (forms.stress * forms.volume))
+        for load, value in forms.load_values:
+            for a, b in ((v, w), (w, v)):
+                work = load.mode_work(_ModedBody(forms, displacement(b), displacement(a), gradient(b)), value)
+                form = form if work is None else form - half * work
+        return form
+
+    def _number_unknowns(self) -> None:
+        """Nodes, their unknowns, and which those of the problem are."""
+        forms, problem = self._forms, self.problem
+        index_map, old, new = self.space.dofmap.index_map, forms.space, self.space
+        self._own, size = index_map.size_local, index_map.size_local + index_map.num_ghosts
+        ours = old.dofmap.index_map
+        self._to_mode = np.zeros(ours.size_local + ours.num_ghosts, dtype=np.int32)
+        components = range(forms.scene.kinematics.components)
+        pairs = [(old.sub(0).sub(i), new.sub(0).sub(i)) for i in components]
+        pairs += [(old.sub(i), new.sub(i)) for i in range(1, old.num_sub_spaces)]
+        for a, b in pairs:
+            self._to_mode[np.asarray(a.dofmap.list)] = np.asarray(b.dofmap.list)
+        lists = [np.asarray(new.sub(0).sub(i).dofmap.list) for i in range(3)]
+        all_U, first = np.unique(lists[0], return_index=True)
+        all_W, all_V = (found.ravel()[first] for found in lists[1:])
+        self._V_of = np.zeros(size, dtype=np.int32)
+        self._V_of[all_U] = all_V
+        old_lists = [np.asarray(old.sub(0).sub(i).dofmap.list).ravel()[first] for i in components]
+        bubble = (first % lists[0].shape[1]) >= 6
+        axis, numbers = new.sub(0).sub(0).collapse()
+        X = np.zeros((size, len(components)))                           # unknowns of bubbles are no values at a point
+        place = fem.Function(axis)
+        for i in components:
+            place.interpolate(lambda X, i=i: X[i])
+            X[np.asarray(numbers), i] = place.x.array
+        on_axis = self._axisymmetric & (X[all_U, 0] < 1e-9 * forms.length) & ~bubble
+        self._axis = np.column_stack([all_U, all_W, all_V])[on_axis]
+        own = all_U < self._own
+        self._unknowns = np.column_stack([all_U, all_W, all_V])[own]
+        self._old, self._bubble, self._X = np.column_stack(old_lists)[own], bubble[own], X[all_U[own]]
+        self.nodes = self._X[~self._bubble]
+        ones, mass = problem.x.duplicate(), problem.x.duplicate()
+        ones.set(1.0)
+        problem.metric_times(ones, mass)
+        self._lumped = mass.array_r[self._old[:, 0]].copy()
+        ones.destroy()
+        mass.destroy()
+        idle = [(np.asarray(dofs), dofs[dofs < ours.size_local]) for _, dofs in forms.idle_unknowns()]
+        self._idle = [self._to_mode[dofs] for dofs, _ in idle]
+        mine = sum(int(np.sum(np.unique(old.sub(i).dofmap.list) < ours.size_local))
+                   for i in range(1, old.num_sub_spaces)) - sum(len(own) for _, own in idle)
+        self._pressures = int(self.comm.allreduce(mine))
+
+    def _dofs(self, component: int, item: Any) -> np.ndarray:
+        """Local numbers of an unknown displacement where something is held."""
+        space, forms = self.space.sub(0).sub(component), self._forms
+        if item.on is not None:
+            return fem.locate_dofs_topological(space, 1, forms.mesh.facets_of(item.on))
+        near, point = 1e-8 * forms.length, np.array(item.point)
+        return fem.locate_dofs_geometrical((space, space.collapse()[0]),
+                                           lambda X: np.hypot(X[0] - point[0], X[1] - point[1]) < near)[0]
+
+    def _find_held(self, number: float, flipped: str | None) -> np.ndarray:
+        """Local numbers of the unknowns that are held, ghosts too.
+
+        Round the axis what is held in r and in z is held, too: a clamped rim, a node, a face that is driven.
+        """
+        problem, held, places = self.problem, [*self._idle], {0: [], 1: []}     # type: ignore[var-annotated]
+        for i, thing in enumerate(problem.scene.things):
+            items = [] if i in problem.setting.off else self._forms.constraints(thing)
+            for item in items:
+                if isinstance(item, Held):
+                    if isinstance(thing, Symmetry) and thing.mirror and thing.on == flipped:
+                        held += [self._dofs(c, item) for c in (1 - item.component, 2)]
+                    else:
+                        held.append(self._dofs(item.component, item))
+                        places[item.component].append(item)
+        none = np.zeros(0, dtype=np.int32)
+        facets = [np.concatenate([none, *(self._forms.mesh.facets_of(item.on) for item in found
+                                          if item.on is not None)]) for found in places.values()]
+        both = np.intersect1d(*facets).astype(np.int32)
+        gripped = [fem.locate_dofs_topological(self.space.sub(0).sub(2), 1, both)]
+        gripped += [self._dofs(2, item) for item in places[0] if item.on is None
+                    and any(item.point == other.point for other in places[1])]
+        marks = np.zeros(len(self._V_of), dtype=bool)
+        marks[np.concatenate(held + gripped)] = True
+        U, W, V = self._axis.T
+        fixed = marks[V]
+        marks[V] = True
+        marks[U], marks[W] = (fixed, True) if number == 1 else (True, marks[W] | (number > 1))
+        return np.flatnonzero(marks).astype(np.int32)
+
+    def _mean_rows(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+        """(number of the thing, row of a mean that it holds, what m takes off it), own parts; the mean of V, too."""
+        forms, problem = self._forms, self.problem
+        n = problem.n_owned
+        for number, thing in enumerate(problem.scene.things):
+            means = {item.component: item for item in forms.constraints(thing) if not isinstance(item, Held)}
+            for item in means.values():
+                row = np.zeros(self._own)
+                row[self._to_mode[:n]] = problem.assemble(forms.compile(forms.mean_row(item)))
+                yield number, row, np.zeros(self._own)
+                if item.component == 0 and 1 in means:
+                    round_axis = np.zeros(self._own)
+                    round_axis[self._V_of[: self._own][row != 0]] = row[row != 0]
+                    yield number, round_axis, row
+
+    def _of_contact(self, contact: Any, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
+        """(unknowns, stiffness) of the points of a contact, for `ExtendedMatrix.fill`."""
+        control = self.problem.control
+        plane = contact.stiffness(fields, control)
+        plane, turn = (plane + plane.transpose(0, 2, 1)) / 2, contact.stiffness_round(fields, control)
+        dofs = self._to_mode[contact.rule.dofs]
+        k = dofs.shape[1]
+        values = np.zeros((len(dofs), k + k // 2, k + k // 2))
+        values[:, :k, :k] = plane
+        values[:, 0:k:2, 0:k:2] += m**2 * turn
+        values[:, 0:k:2, k:] = values[:, k:, 0:k:2] = -m * turn
+        values[:, k:, k:] = turn
+        return np.column_stack([dofs, self._V_of[dofs[:, ::2]]]), values
+
+    def _of_guided(self, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
+        """The same of nodes whose radius is held, but not their way round the axis.
+
+        The force f on such a node, outward, is that on a circle: it takes -f V^2/r.
+        """
+        r = self._X[:, 0] + self._forms.length * fields[self._old[:, 0]]
+        held = np.zeros(len(self._V_of), dtype=bool)
+        held[self._held] = True
+        guided = held[self._unknowns[:, 0]] & ~held[self._unknowns[:, 2]]
+        force = self.problem.forces(self.problem.x, self.problem.control)[self._old[guided, 0]]
+        turn = -self._forms.length * force / r[guided]
+        values = np.zeros((len(turn), 3, 3))
+        values[:, 0, 0], values[:, 2, 2] = m**2 * turn, turn
+        values[:, 0, 2] = values[:, 2, 0] = -m * turn
+        return self._unknowns[guided], values
+
+    def _unknowns_of(self, mode: Any) -> np.ndarray:
+        """A rigid mode as unknowns, own part."""
+        forms, fields = self._forms, self.problem.x.array_r
+        u = forms.length * fields[self._old]
+        values = mode(self._X + u) / forms.length
+        x = np.zeros(self.matrix.getLocalSize()[0])
+        U, W, V = self._unknowns.T
+        x[U], x[W], x[V] = values[:, 0], values[:, 1], values[:, 2] + self._turned.value * values[:, 0]
+        return x
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        self._matrix.destroy()

@@ -1,0 +1,153 @@
+"""The top load of a formed body: pushed down on a plate by its neck, where it buckles and how much it bears.
+
+Elastic: nothing is plastic here. Units are those of the script; a force is one round the whole axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import ConvergenceError, InputError, instance, known, positive
+from ...measures.targets import travel as travel_to
+from ...mesh.mesh import Mesh
+from ...physics.contact import Contact
+from ...physics.supports import Displaced, Symmetry
+from ...results.path import Path
+from ...runs import trace
+from ...scene.scene import Scene
+from ...solve.stepping import StepControl
+from ...tools import Tool, plane
+from .instability import Loss, Stability, wave_numbers
+
+_FOOT: dict[str, Any] = {"points": 16, "penalty": 2.0, "ramp": 1e-4}
+"""Contact of the foot: a line on a rigid plate hops from point to point; this many, on a plate that gives way by a
+thousandth of the wall or so, roll."""
+
+_STEP = 0.004
+"""Longest step: a crushed wall snaps through short arcs."""
+
+
+@dataclass(eq=False, repr=False)
+class TopLoad:
+    """What a body bears that is pushed down on a plate; print it.
+
+    Attributes:
+        path: its axisymmetric path; stability: modes that are lost along it.
+        travel, force: of the neck, positive downwards, at all states, shape (n,) each, length and force.
+        largest_force, at_travel: the peak of the force of the axisymmetric path.
+        peak: False if the force is largest in the last state: it may grow further.
+        ended: why the path ended before the travel that was asked for, in words, or "".
+        energy: up to the first buckling, or to the largest force, length force.
+    """
+
+    path: Path
+    stability: Stability
+    travel: np.ndarray
+    force: np.ndarray
+    ended: str
+
+    @property
+    def largest_force(self) -> float:
+        """See the class."""
+        return float(self.force.max())
+
+    @property
+    def at_travel(self) -> float:
+        """See the class."""
+        return float(self.travel[self.force.argmax()])
+
+    @property
+    def peak(self) -> bool:
+        """See the class."""
+        return bool(self.force.argmax() < len(self.force) - 1)
+
+    @property
+    def first(self) -> Loss | None:
+        """Where it buckles first, or None."""
+        return self.stability.first
+
+    def of(self, number: float) -> Loss | None:
+        """Where it buckles first in so many waves, or None; `buckling` has its force and travel."""
+        return self.stability.first_of(number)
+
+    def buckling(self, number: float) -> tuple[float, float] | None:
+        """(force, travel) at which it first buckles in so many waves, or None."""
+        loss = self.of(number)
+        return None if loss is None else (loss.state.measures["support_force"], -loss.control)
+
+    @property
+    def energy(self) -> float:
+        """See the class."""
+        first = self.first
+        end = self.at_travel if first is None else -first.control
+        there = int(np.argmax(self.travel >= end * (1 - 1e-12)))
+        x, F = self.travel[: there + 1].copy(), self.force[: there + 1].copy()
+        if there and x[-1] > end:
+            x[-1], F[-1] = end, F[-2] + (end - x[-2]) / (x[-1] - x[-2]) * (F[-1] - F[-2])
+        return float(np.trapezoid(F, x))
+
+    def __str__(self) -> str:
+        what = "" if self.peak else " (the last state: it may grow further)"
+        lines = ["top load, elastic:",
+                 f"  axisymmetric path: largest force {self.largest_force:.5g} at travel {self.at_travel:.4g}{what}"]
+        for n in self.stability.numbers:
+            if (found := self.buckling(n)) is not None:
+                lines.append(f"  n = {n:g}: buckles at force {found[0]:.5g}, travel {found[1]:.4g}")
+        lines.append("  no mode buckles" if self.first is None else
+                     f"  first: n = {self.first.number:g}; energy to it {self.energy:.4g}")
+        return "\n".join([*lines, f"  the path ended before: {self.ended}"] if self.ended else lines)
+
+    __repr__ = __str__
+
+
+def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = None,
+             modes: Iterable[float] = range(2, 9), neck: str = "neck", foot: str = "outer",
+             step: StepControl | None = None) -> TopLoad:
+    """Push a body, free of stress, down on a frictionless plate by its neck; look where it buckles round the axis.
+
+    The neck is held radially and round the axis. Contact gives way by about a thousandth of the wall, so that the ring
+    on which a bottle stands rolls on.
+
+    Args:
+        body: for example `Path.formed()`.
+        material: as in `Scene`.
+        travel: how far the neck is to go down, length; the run may end earlier, see `TopLoad.ended`.
+        floor: what it stands on; default: a plane at its lowest node.
+        modes: waves round the axis that are looked for.
+        neck, foot: the boundaries that are pushed and that stand.
+        step: default `StepControl(largest=0.004)`.
+
+    Raises:
+        InputError: an argument that is not allowed; the foot does not come to the floor.
+        ConvergenceError: not even the first state was found.
+
+    >>> tube = fx.mesh.disc(radius=1.0, inner_radius=0.8, thickness=4.0, elements=(1, 8))
+    >>> found = fx.top_load(tube, material=fx.NeoHookean(c10=1.0), travel=0.3, neck="top", foot="bottom", modes=[1],
+    ...                     step=fx.StepControl(largest=0.2))
+    >>> round(found.largest_force, 2)
+    0.21
+    """
+    instance("top_load: body", body, Mesh, "a mesh, such as path.formed()")
+    known("top_load: neck", neck, body.boundaries)
+    known("top_load: foot", foot, body.boundaries)
+    travel = positive("top_load: travel", travel)
+    if floor is None:
+        floor = plane(float(body.nodes_of(foot)[:, 1].min())).reversed()
+    scene = Scene(mesh=body, materials=material,
+                  supports=[*[Symmetry("axis")] * ("axis" in body.boundaries), Symmetry(neck, "r"),
+                            Displaced(neck, "z")],
+                  contacts=[Contact(foot, floor, "none", **_FOOT)])
+    modes, ended = wave_numbers(scene, modes), ""
+    try:
+        path = trace(scene, until=travel_to(-travel), progress=False, step=step or StepControl(largest=_STEP))
+    except ConvergenceError as error:
+        if error.path is None or len(error.path.states) < 2:
+            raise
+        path, ended = error.path, str(error).split(". ")[0]
+    if not path["contact_length"].any():
+        raise InputError(f"top_load: floor = {floor!r}: {foot!r} does not reach it within travel = {travel:g}")
+    return TopLoad(path, path.stability(modes, "all"), -path["travel"], path["support_force"], ended)

@@ -1,0 +1,323 @@
+"""The forms of a scene: what a solid and a membrane have in common.
+
+Unknowns are dimensionless: displacement over `length` (the largest extent of the mesh) and pressure over `stress` (the
+largest shear modulus). The energy is divided by stress times reference volume. So a run does not depend on the
+user's units, and what `solve` sees are numbers of order one.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+from ufl.algorithms.analysis import extract_constants
+
+from .. import _compat
+from ..errors import together
+from ..extensions.heat.free_stretch import FreeStretch
+from ..extensions.heat.temperature_field import Temperature
+from ..extensions.kbkz.past_states import PastStates
+from ..extensions.remeshing.earlier_meshes import FollowedProbe
+from ..physics import kinematics as kin
+from .admissible import Admissible
+from .history import History
+from .loaded_body import LoadedBody
+from .material_history import MaterialHistory
+from .material_terms import MaterialTerms
+from .probes import Probe
+
+
+class Formulation(ABC):
+    """The forms of a scene.
+
+    Attributes:
+        scene: the scene.
+        mesh: the `Mesh` that the fields live on; domain, comm: its `dolfinx.mesh.Mesh` and communicator.
+        length, stress, volume: scales L and mu, and the reference volume, in the user's units.
+        space, w: the mixed `FunctionSpace` and the `Function` of all fields (dimensionless), displacement first.
+        displacement_element: the scalar element of a displacement component.
+        u, X: displacement and reference position (UFL, user's unit of length, shape (2,)).
+        F: deformation gradient (UFL, shape (3, 3)); elastic_F: less thermal expansion; J: determinant of
+            that over `ratio_before`: det F of what a body brings from another mesh (`Preformed`).
+        dx, weight: weight * dx is the element of reference volume.
+        control: the `Constant` of the dimensionless control; time: process time (UFL), which follows it.
+        scales: the user's value (pressure, travel, ...) over the amplitude (`Setting`), for every thing of the scene;
+            last, 1 for the time. control_scale: that of the only driven thing, or L.
+        terms: of each material of the scene its `MaterialTerms`.
+        histories: what the forms depend on besides fields, control and time (`History`).
+        potential: of a step, over stress times volume (UFL, rank 0); energy: the energy stored, likewise: the same
+            without histories. dissipation: power, over stress times volume (UFL, rank 0), damage_energy: energy,
+            likewise. Each but the first may be None.
+        load_values: [(load, its value (UFL, the user's unit))], as the stage and the control have it.
+        residual: dpotential/dw - external virtual work (UFL, rank 1); control_derivative, time_derivative: its
+            derivative by the control, in the loads and by way of the time in materials, or None.
+        elastic_supports: [(support with an energy, 1 where it is there, else 0 (`Constant`))].
+        load_works: of each load of the scene its virtual work at the value that it has (UFL, rank 1, user's units).
+        temperature: the `Temperature` of the body, or None.
+        slack_at_rest: True if the body at rest has no stiffness in some direction.
+    """
+
+    slack_at_rest, ratio_before = False, 1.0
+
+    def __init__(self, scene: Any):
+        self.scene = scene
+        self.length = float(max(scene.extent))
+        self.stress = max(scene.shear_modulus(name) for name in scene.mesh.layers)
+        self.mesh = self._make_mesh()
+        self.domain = self.mesh.domain
+        self.temperature: Any = None if scene.temperature is None else Temperature(scene.temperature)
+        self.comm = scene.mesh.comm
+        self.displacement_element, elements = self._elements(self.domain.basix_cell())
+        self.space = fem.functionspace(self.domain, basix.ufl.mixed_element(elements))
+        self.w = fem.Function(self.space, name="w")
+        self.control = self.constant(0.0)
+        self._control = ufl.variable(self.control)
+        self._time = self.constant(0.0), self.constant(0.0)                    # base, and rate by the control
+        self.time = self._time[0] + self._time[1] * self._control
+        self.u = self.constant(self.length) * ufl.split(self.w)[0]
+        self.X = ufl.SpatialCoordinate(self.domain)
+        self.dx = ufl.Measure("dx", self.domain, subdomain_data=self.mesh.cells,
+                              metadata={"quadrature_degree": scene.quadrature_degree})
+        self.ds = ufl.Measure("ds", self.domain, subdomain_data=self.mesh.facets)
+        self.weight = self._weight()
+        self.volume = self.integral(self.weight * self.dx)
+        self._scale = self.constant(1 / (self.stress * self.volume))
+        self.F = self._deformation_gradient()
+        self._free = FreeStretch(self, scene.expansion) if scene.expansion else None
+        self.elastic_F = self.elastic(self.F)
+        self.J = kin.volume_ratio(self.elastic_F) / self.ratio_before
+        body = LoadedBody(self)
+        self.scales = [load.unit(body) if load.driven else self.length for load in scene.loads]
+        self.scales += [self.length] * (len(scene.things) - len(self.scales)) + [1.0]
+        self.control_scale = next((s for s, t in zip(self.scales, scene.things) if t is scene.driven), self.length)
+        self._take_materials()
+        self._take_supports(body)
+        self.residual, self.control_derivative, self.time_derivative = self._residual(body)
+
+    @abstractmethod
+    def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
+        """(outward normal, measure) of a boundary that a load acts on."""
+
+    @abstractmethod
+    def constraints(self, support: Any) -> list[Any]:
+        """What a support holds: a list of Held or MeanHeld."""
+
+    @abstractmethod
+    def nearest(self, points: np.ndarray) -> np.ndarray:
+        """The points of `mesh` that stand for points of the body, shape (n, 2)."""
+
+    @abstractmethod
+    def weighted(self, density: Any, layers: list[str], metadata: dict | None = None) -> Any:
+        """The integral (UFL) of a density over the reference volume of some layers."""
+
+    @abstractmethod
+    def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
+        """Z, shape (n,), of the points of a layer that those of `mesh` at (R, Z), shape (n,), stand for."""
+
+    @abstractmethod
+    def _make_mesh(self) -> Any:
+        """The `Mesh` of the fields."""
+
+    @abstractmethod
+    def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
+        """The scalar element of the displacement, and those of all fields."""
+
+    @abstractmethod
+    def _groups(self) -> list[tuple[Any, list[str]]]:
+        """[(material, layers)]: what has one form of the energy."""
+
+    @abstractmethod
+    def _weight(self) -> Any:
+        """See `weight`."""
+
+    @abstractmethod
+    def _deformation_gradient(self) -> Any:
+        """See `F`."""
+
+    @abstractmethod
+    def _energy(self, of: Any) -> Any:
+        """`potential` or `energy`: of(terms, F) is the energy density (stress) of a `MaterialTerms`."""
+
+    def _take_materials(self) -> None:
+        """Coefficients, histories and energies."""
+        self._terms = {name: terms for material, names in self._groups()
+                       for terms in [MaterialTerms(self, material, names)] for name in names}
+        self.terms = list(dict.fromkeys(self._terms.values()))
+        self._pasts = [PastStates(self, terms) for terms in self.terms if terms.held]
+        changing = [terms for terms in self.terms if terms.internal]
+        self.histories: list[History] = [*self._pasts, *(MaterialHistory(self, terms) for terms in changing)]
+        self.potential = self._energy(MaterialTerms.step_energy)
+        self.energy = self.dissipation = None
+        timed = [terms for terms in changing if terms.material.rate_dependent]
+        if all(terms.material.stores_energy for terms in self.terms):
+            self.energy = self._energy(MaterialTerms.stored_energy) if changing else self.potential
+            self.dissipation = self.dissipated(self._scale) if timed else None
+        damaged = [self.weighted(self._scale * terms.damage_energy(), terms.names)
+                   for terms in changing if terms not in timed]
+        self.damage_energy = sum(damaged[1:], damaged[0]) if damaged else None
+
+    def _take_supports(self, body: LoadedBody) -> None:
+        """The energies of elastic supports."""
+        self.elastic_supports: list[tuple[Any, fem.Constant]] = []
+        for support in self.scene.supports:
+            energy = body.stored(support)
+            if energy is not None:
+                there = self.constant(1.0)
+                self.elastic_supports.append((support, there))
+                self.potential, self.energy = (None if e is None else e + self._scale * there * energy
+                                               for e in (self.potential, self.energy))
+
+    def refresh(self) -> None:
+        """The fields or the time have changed: coefficients that depend on them follow."""
+        for past in self._pasts:
+            past.refresh()
+
+    def dissipated(self, factor: Any) -> Any:
+        """The integral (UFL) of a factor times the power that is dissipated per reference volume."""
+        return sum(self.weighted(factor * terms.dissipation(self.elastic_F), terms.names)
+                   for terms in self.terms if terms.internal)
+
+    def elastic(self, F: Any) -> Any:
+        """What strains the material of a deformation gradient F (UFL, shape (3, 3)): all but thermal expansion."""
+        return F if self._free is None else self._free.elastic(F)
+
+    def temperatures(self, terms: MaterialTerms) -> np.ndarray:
+        """`Temperature.now_and_before` at the quadrature points of a material."""
+        return np.asarray(self.temperature.now_and_before(terms.cells, terms.places))
+
+    def take_temperature(self) -> None:
+        """The temperature has changed: constants follow it; scales stay as they are; collective.
+
+        Raises:
+            InputError: a constant has no value at a temperature.
+        """
+        following: list[Any] = [*self.terms, *([self._free] if self._free else [])]
+        together(self.comm, [one.take_temperature for one in following])
+
+    def cells_of(self, layers: list[str]) -> np.ndarray:
+        """The cells of `mesh` in which some layers are, this rank's own and ghosts, ascending local numbers."""
+        return np.sort(np.concatenate([self.mesh.cells.find(self.mesh.layers[name]) for name in layers]))
+
+    def admissible(self) -> Any:
+        """What tells whether the body has a shape."""
+        return Admissible(self)
+
+    def probe(self, problem: Any, points: Any) -> Probe:
+        """The displacement at reference points (R, Z), shape (n, 2)."""
+        return Probe(problem, points) if self.scene.preformed is None else FollowedProbe(problem, points)
+
+    def mean_row(self, held: Any) -> Any:
+        """Linear form: mean of a displacement component (dimensionless) over a boundary, as a `MeanHeld` asks."""
+        raise NotImplementedError
+
+    def idle_unknowns(self) -> list[tuple[Any, np.ndarray]]:
+        """[(sub space, local dofs)] of unknowns that no equation holds: they stay 0."""
+        return []
+
+    def set_stiff(self) -> None:
+        """Put `w` to a state near rest whose tangent is regular: its tangent gives a path its first direction."""
+        self.w.x.array[:] = 0
+
+    def constant(self, value: float) -> fem.Constant:
+        """A number in a form that can be changed without compiling it again."""
+        return fem.Constant(self.domain, PETSc.ScalarType(value))
+
+    def compile(self, form: Any) -> Any:
+        """A compiled form."""
+        try:
+            return _compat.compile_form(form)
+        except TimeoutError as error:
+            raise TimeoutError(
+                f"waited {_compat.JIT_OPTIONS['timeout']} s for another process to compile a form; a compilation that"
+                " was killed leaves such a wait behind: if no other run is going on, remove the folder"
+                " .cache/fenics") from error
+
+    def integral(self, form: Any) -> float:
+        """The value of a UFL integral over all ranks, compiled for this one use."""
+        return float(self.comm.allreduce(fem.assemble_scalar(self.compile(form)), MPI.SUM))
+
+    def test_function(self) -> Any:
+        """The test function of all fields (dimensionless)."""
+        return ufl.TestFunction(self.space)
+
+    def test_displacement(self) -> Any:
+        """The test function of the displacement (UFL, the user's unit of length, shape (2,))."""
+        return self.constant(self.length) * ufl.split(self.test_function())[0]
+
+    def metric_row(self) -> Any:
+        """Linear form whose vector is the lumped mass of the displacement, over the volume."""
+        v = ufl.split(self.test_function())[0]
+        dx = ufl.dx(self.domain, metadata={"quadrature_degree": 4})
+        return sum(v[i] for i in range(self.domain.geometry.dim)) * self.weight / self.constant(self.volume) * dx
+
+    def viscosity(self) -> Any:
+        """Bilinear form of a viscous stress, P = dF/dt, as the residual is scaled: dF : dF over the volume."""
+        F = self.scene.kinematics.deformation_gradient(self.u, self.X)
+        potential = ufl.inner(F, F) / 2 * self.weight / self.constant(self.volume)
+        dx = ufl.dx(self.domain, metadata={"quadrature_degree": 4})
+        return ufl.derivative(ufl.derivative(potential * dx, self.w, self.test_function()), self.w)
+
+    def thickness(self, boundary: str) -> float:
+        """Volume of the body over the area of a boundary, length."""
+        return self.volume / self.integral(self.scene.kinematics.weight(self.X) * self.face(boundary, 2)[1])
+
+    @property
+    def clock(self) -> float:
+        """Process time at control 0: of the setting, or what a run that chooses its times has set since."""
+        return float(self._time[0].value)
+
+    @clock.setter
+    def clock(self, time: float) -> None:
+        self._time[0].value = time
+
+    def time_at(self, control: float) -> float:
+        """Process time at a control, under the setting that holds now."""
+        base, rate = self._time
+        return float(base.value + rate.value * control)
+
+    @property
+    def time_now(self) -> float:
+        """Process time at the control that the forms hold now."""
+        return self.time_at(float(self.control.value))
+
+    def set_loads(self, setting: Any) -> None:
+        """Loads, elastic supports and process time as a `Setting` wants them."""
+        for support, present in self.elastic_supports:
+            present.value = float(not any(self.scene.things[i] is support for i in setting.off))
+        for i, (load, base, rate) in enumerate(self._loads):
+            there = i not in setting.off
+            base.value = there * (setting.base[i] if load.driven else load.value)
+            rate.value = there * setting.rate[i]
+        for constant, value in zip(self._time, (setting.base[-1], setting.rate[-1])):
+            constant.value = value
+
+    def _residual(self, body: LoadedBody) -> tuple[Any, Any, Any]:
+        """`residual`, `control_derivative` and `time_derivative`."""
+        v, control = self.test_function(), self._control
+        residual = ufl.derivative(self.potential, self.w, v)
+        for one in self.terms:
+            if work := one.unsymmetric_work(self.elastic_F, lambda f: ufl.derivative(f, self.w, v)):
+                residual += self.weighted(self._scale * work, one.names)
+        timed = ufl.Form([i for i in self.potential.integrals() if self.control in extract_constants(i.integrand())])
+        by_time = ufl.derivative(ufl.diff(timed, control), self.w, v) if timed.integrals() else None
+        terms = []
+        self._loads = []
+        self.load_works = []
+        self.load_values = []
+        for load, scale in zip(self.scene.loads, self.scales):
+            base, rate = self.constant(0.0 if load.driven else load.value), self.constant(0.0)
+            self._loads.append((load, base, rate))
+            value = self.constant(scale) * (base + rate * control) if load.driven else base
+            self.load_values.append((load, value))
+            work = body.work(load, value)
+            self.load_works.append(work)
+            residual -= self._scale * work
+            if load.driven:
+                terms.append(-self._scale * ufl.diff(work, control))
+        return residual, sum(terms[1:], terms[0]) if terms else None, by_time

@@ -1,0 +1,22 @@
+"""Which formulation a model has."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..extensions.space.surface import Surface
+from ..physics.models import DisplacementPenalty, Membrane, MixedPressure, Model
+from .formulation import Formulation
+from .membrane import MidSurface
+from .solid import Solid
+
+FORMULATIONS: dict[type[Model], type[Formulation]] = {MixedPressure: Solid, DisplacementPenalty: Solid,
+                                                      Membrane: MidSurface}
+"""The formulation of each kind of model; of a user's own, made from one of these, that of the one it is made from."""
+
+
+def formulate(scene: Any) -> Formulation:
+    """The forms of a scene."""
+    if scene.kinematics.components == 3:
+        return Surface(scene)
+    return next(FORMULATIONS[kind] for kind in type(scene.model).__mro__ if kind in FORMULATIONS)(scene)

@@ -1,0 +1,106 @@
+"""What F(x, control) depends on besides x and control: the histories of a problem, and the time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..extensions.kbkz.past_states import PastStates
+from .history import History, Start
+from .material_history import MaterialHistory
+
+
+class Histories:
+    """Of a problem with forms: what contact remembers first, then what its forms do (materials, then heat)."""
+
+    forms: Any
+    histories: list[History]
+    _foretold: tuple[Any, list[Any]] = None, []             # x, and what the forms' histories would remember there
+
+    @property
+    def n_owned(self) -> int:
+        """Number of fields' unknowns that this rank owns."""
+        raise NotImplementedError
+
+    @property
+    def control(self) -> float:
+        """The control that the forms see now."""
+        raise NotImplementedError
+
+    def look_at(self, x: np.ndarray, control: float) -> None:
+        """Put the fields of x, own part, and the control where the forms see them."""
+        raise NotImplementedError
+
+    @property
+    def has_history(self) -> bool:
+        """True if F depends on more than x and control."""
+        return bool(self.histories)
+
+    @property
+    def materials(self) -> list[MaterialHistory | PastStates]:
+        """The histories of materials."""
+        return [history for history in self.forms.histories if isinstance(history, (MaterialHistory, PastStates))]
+
+    @property
+    def body_has_history(self) -> bool:
+        """True if materials or the temperature have a history."""
+        return bool(self.forms.histories)
+
+    @property
+    def relaxes(self) -> bool:
+        """True if F depends on time: on histories other than those of rate-independent materials."""
+        return any(not isinstance(history, MaterialHistory) or history.rate_dependent
+                   for history in self.forms.histories)
+
+    @property
+    def time(self) -> float:
+        """Process time at the control that the forms see now."""
+        return self.forms.time_at(self.control)
+
+    @property
+    def clock(self) -> float:
+        """Process time at control 0: of the setting, or what a run that chooses its times has set since."""
+        return self.forms.clock
+
+    @clock.setter
+    def clock(self, time: float) -> None:
+        self.forms.clock = time
+
+    def time_at(self, control: float) -> float:
+        """Process time at a control, under the setting that holds now."""
+        return self.forms.time_at(control)
+
+    @property
+    def memory(self) -> list[Any]:
+        """What each history remembers of the last accepted state."""
+        return [history.get() for history in self.histories]
+
+    @memory.setter
+    def memory(self, memory: list[Any]) -> None:
+        self._foretold = None, []
+        for history, remembered in zip(self.histories, memory, strict=True):
+            history.put(remembered)
+
+    def advance(self, x: np.ndarray, control: float) -> None:
+        """A state is accepted: what has a history takes it up. x: own part, shape (n,)."""
+        if self.forms.histories:
+            self.look_at(x, control)
+        known = self._foretold[1] if self._foretold[0] is x else []
+        for history in self.histories[: len(self.histories) - len(known)]:
+            history.advance(x[: self.n_owned], control)
+        for history, memory in zip(self.forms.histories, known):
+            history.put(memory)
+        self._foretold = None, []
+
+    def foretell(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
+        """What the histories of the forms remember if a state is accepted; who asks puts them back.
+
+        start: the state that the step begins at.
+        """
+        self.look_at(x, control)
+        for history in self.forms.histories:
+            history.advance(x[: self.n_owned], control, start)
+        after = [history.get() for history in self.forms.histories]
+        self._foretold = x, after
+        return after

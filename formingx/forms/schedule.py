@@ -1,0 +1,71 @@
+"""What a stage of a process sets: how everything that can be driven follows the control, and what takes no part."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Setting:
+    """amplitude = base + rate * control of every thing of a scene (`Scene.things`), dimensionless; last, process time.
+
+    Attributes:
+        base, rate: one number for each thing (0 unless it can be driven), then those of the process time.
+        off: numbers of the things that take no part.
+        fading: the control takes away, from 0 to 1, the forces that what has changed left without balance.
+        stage, piece: number of the stage in its process, and of the piece of it that has one control.
+        changed: numbers of the things that leave or come in while it fades.
+        mesh: how often the mesh was made again before (`formingx.extensions.remeshing.remeshing`).
+    """
+
+    base: list[float]
+    rate: list[float]
+    off: list[int]
+    fading: bool = False
+    stage: int = 0
+    piece: int = 0
+    changed: list[int] = field(default_factory=list)
+    mesh: int = 0
+
+    @classmethod
+    def first(cls, scene: Any) -> Setting:
+        """Everything at 0 and there; what is driven, if it is one thing, is the control."""
+        rate = [float(scene.driven is not None and t.driven) for t in scene.things] + [0.0]
+        return cls([0.0] * len(rate), rate, [])
+
+    @property
+    def leading(self) -> int | None:
+        """Number of what the control stands for: the time if it runs, else the one thing that is driven, or None."""
+        if self.rate[-1]:
+            return len(self.rate) - 1
+        return next((i for i, rate in enumerate(self.rate) if rate), None)
+
+    @property
+    def rests(self) -> bool:
+        """True if only the time changes, or nothing."""
+        return not any(self.rate[:-1])
+
+    def amplitude(self, number: int, control: float) -> float:
+        """Of a thing, or with -1 the process time."""
+        return self.base[number] + self.rate[number] * control
+
+    def acting(self, number: int, control: float) -> float:
+        """The part of a load's amplitude that acts: none of one that takes no part, all once what has changed did."""
+        there = float(number not in self.off)
+        if self.fading and number in self.changed:
+            there = control if there else 1 - control
+        return there * self.amplitude(number, control)
+
+    def standing(self, control: float) -> list[float]:
+        """Amplitudes at a control, of the things and the time."""
+        return [self.amplitude(i, control) for i in range(len(self.base))]
+
+    def on_next_mesh(self, before: Sequence[float], now: Sequence[float], control: float) -> tuple[Setting, float]:
+        """(the same setting, the same control) where the user's values over the amplitudes are `now`."""
+        ratio = [b / n for b, n in zip(before, now, strict=True)]
+        of_control = 1.0 if self.leading is None else ratio[self.leading]
+        return replace(self, base=[r * b for r, b in zip(ratio, self.base, strict=True)],
+                       rate=[r * b / of_control for r, b in zip(ratio, self.rate, strict=True)],
+                       mesh=self.mesh + 1), of_control * control

@@ -1,0 +1,1 @@
+"""The discrete problem of a scene: forms and contact together."""

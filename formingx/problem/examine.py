@@ -1,0 +1,200 @@
+"""What a body tells about an attempt that failed: where it is worst, how near to its limits, what is left over."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from .. import figures
+from ..contact.tooling import Tooling
+from ..errors import InputError
+from ..extensions.kbkz.past_states import PastStates
+from ..forms.elements import Body, body
+from ..mesh.nodes import COORDINATES, of_space
+from ..mesh.triangles import Place, place
+
+
+class Examination:
+    """The last good state and a failed attempt, looked at; collective.
+
+    Args:
+        problem: the `Problem`. last: the state, None: there is none. attempt: where Newton's method ended, with x,
+            control and the last corrections dx and dcontrol; None: no iteration failed.
+
+    Attributes:
+        facts: {field of a `Diagnosis`: what was found}.
+    """
+
+    def __init__(self, problem: Any, last: Any, attempt: Any):
+        self.facts: dict[str, Any] = {}
+        self._problem, self._last = problem, last
+        self._shape: Body | None = None
+        self._marks: list[tuple[str, np.ndarray]] = []
+        x = problem.x.duplicate()
+        if last is not None:
+            x.array_w[:] = last.x
+            self._shape = body(problem, x, last.control)
+            self.facts["touching"] = problem.comm.allreduce(
+                sum(int(np.sum(touch)) for touch in _touching(problem, last.x, last.control)), MPI.SUM)
+            if self._shape:
+                self._take_worst(self._shape)
+            self._take_rupture()
+        if attempt is not None:
+            self._take_attempt(x, attempt)
+        x.destroy()
+        self._tools: list = []
+        if last is not None:
+            tooling = Tooling.of_problem(problem)
+            self._tools = tooling.placed(tooling.travels(last.setting, last.control))
+
+    def _take_worst(self, shape: Body) -> None:
+        """Smallest J, worst shape and nearness to a material's limit in the last good state."""
+        problem, facts = self._problem, self.facts
+        facts["smallest_J"], facts["at_J"], at = _smallest_J(problem, shape)
+        facts["shape"] = float((shape.quality / shape.at_rest).min())
+        self._marks.append((f"smallest J {facts['smallest_J']:.3g}", shape.moved[at]))
+        limits = np.array([problem.scene.materials[_layer(problem, tag)].largest_I1 for tag in shape.layers])
+        near = (shape.I1 - 3) / (limits[:, None] - 3)
+        if np.isfinite(limits).any():
+            at = np.unravel_index(int(np.argmax(near)), near.shape)
+            facts["I1"] = float(near[at])
+            facts["limit"] = place(problem.scene.mesh, shape.points[at], _layer(problem, shape.layers[at[0]]))
+            self._marks.append(("nearest to the material's limit", shape.moved[at]))
+
+    def _take_rupture(self) -> None:
+        """How far the damped melt that is nearest to its rupture is drawn in the last good state."""
+        problem = self._problem
+        with problem.at(self._last):
+            for past in (h for h in problem.materials if isinstance(h, PastStates)):
+                melt = getattr(past.material, "base", past.material)
+                most, (least, point) = melt.rupture_stretch("equibiaxial"), past.thinnest()
+                if (drawn := least**-0.5) > max(most, self.facts.get("drawn", (0.0,))[0]):
+                    where = place(problem.scene.mesh, point[:COORDINATES])
+                    self.facts |= {"drawn": (drawn, most), "ruptures": where}
+
+    def _take_attempt(self, x: Any, attempt: Any) -> None:
+        problem, facts = self._problem, self.facts
+        x.array_w[:] = attempt.x
+        failed = body(problem, x, attempt.control)
+        if failed and bool(np.isfinite(failed.J).all()):
+            facts["failed_J"], facts["at_failed_J"], _ = _smallest_J(problem, failed)
+        facts["residual"], facts["worst"], point = _residuals(problem, x, attempt.control)
+        if self._last is not None and self._shape:
+            self._marks.append(("largest out-of-balance force", _moved(problem, self._last, point)))
+        facts["flipped"] = _flips(problem, attempt)
+
+    def draw(self, file: Any, title: str) -> None:
+        """Draw the last good state, deformed, its elements coloured by J, the worst places marked, and the tools.
+
+        Rank 0 draws.
+
+        Raises:
+            InputError: a membrane has no elements to draw, nor has a run without a good state.
+        """
+        if self._shape is None:
+            raise InputError("Diagnosis.picture: there are no elements to draw: a membrane has none across its"
+                             " thickness, and without a good state there is no shape")
+        if self._problem.comm.rank == 0:
+            os.makedirs(os.path.dirname(os.path.abspath(file)), exist_ok=True)
+            _draw(self._shape, self._marks, self._tools, title, file)
+
+
+def _layer(problem: Any, tag: int) -> str:
+    return next((name for name, t in problem.scene.mesh.layers.items() if t == tag), "")
+
+
+def _smallest_J(problem: Any, shape: Body) -> tuple[float, Place, tuple]:
+    at = np.unravel_index(int(np.argmin(shape.J)), shape.J.shape)
+    return float(shape.J[at]), place(problem.scene.mesh, shape.points[at], _layer(problem, shape.layers[at[0]])), at
+
+
+def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], Place, np.ndarray]:
+    """The residual by field, over the support forces of the state; the place and the node of its largest displacement
+    entry."""
+    out, comm, space = x.duplicate(), problem.comm, problem.forms.space
+    problem.residual(x, control, out)
+    values, n = out.array_r.copy(), space.dofmap.index_map.size_local
+    out.destroy()
+    vectors, numbers = space.sub(0).collapse()
+    dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, problem.forms.domain.geometry.dim)
+    points = of_space(vectors)[: len(dofs)]
+    own = dofs[:, 0] < n
+    dofs, points = dofs[own], points[own]
+    is_u = np.zeros(n, dtype=bool)
+    is_u[dofs.ravel()] = True
+    parts = {"displacement": values[:n][is_u], "pressure": values[:n][~is_u], "multipliers": values[n:]}
+    scale = problem.force_scale if np.isfinite(problem.force_scale) and problem.force_scale > 0 else 1.0
+    residual = {}
+    for name, part in parts.items():
+        if comm.allreduce(len(part), MPI.SUM):
+            total = comm.allreduce(float(np.sum(part**2)), MPI.SUM)
+            residual[name] = float(np.sqrt(total)) / scale if np.isfinite(total) else np.inf
+    sizes = np.nan_to_num(np.linalg.norm(values[dofs], axis=1), nan=np.inf)
+    mine = (float(sizes.max(initial=-1.0)), points[np.argmax(sizes)].tolist() if len(sizes) else [0.0, 0.0])
+    point = np.array(max(comm.allgather(mine))[1])
+    return residual, place(problem.scene.mesh, point), point
+
+
+def _moved(problem: Any, state: Any, point: np.ndarray) -> np.ndarray:
+    """Where a node at a reference point is in a state, shape (2,)."""
+    vectors, numbers = problem.forms.space.sub(0).collapse()
+    dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, problem.forms.domain.geometry.dim)
+    points = of_space(vectors)[: len(dofs)]
+    own = dofs[:, 0] < problem.forms.space.dofmap.index_map.size_local
+    away = np.hypot(*(points[own] - point).T)
+    at = int(np.argmin(away)) if len(away) else 0
+    mine = (np.inf, [0.0, 0.0])
+    if len(away):
+        mine = (float(away[at]), (problem.forms.length * state.x[dofs[own][at]]).tolist())
+    return point + np.array(min(problem.comm.allgather(mine))[1])
+
+
+def _touching(problem: Any, x: np.ndarray, control: float) -> list[np.ndarray]:
+    """For every contact: True for each own node in touch, shape (n,)."""
+    return [c.touching(x[: problem.forms.space.dofmap.index_map.size_local], control) for c in problem.present]
+
+
+def _flips(problem: Any, attempt: Any) -> int | None:
+    """Nodes whose contact changed in the last iteration; None without contact."""
+    if not problem.present:
+        return None
+    n, count = problem.forms.space.dofmap.index_map.size_local, 0
+    before = attempt.x - attempt.dx, attempt.control - attempt.dcontrol
+    for contact, a, b in zip(problem.present, _touching(problem, *before),
+                             _touching(problem, attempt.x, attempt.control), strict=True):
+        slides = [contact.law.tractions(contact.positions(x[:n], c), contact.touch).sense
+                  for x, c in (before, (attempt.x, attempt.control))]
+        count += int(np.sum((a != b) | (a & b & (slides[0] != slides[1]))))
+    return problem.comm.allreduce(count, MPI.SUM)
+
+
+def _draw(shape: Body, marks: list, tools: list, title: str, file: Any) -> None:
+    from matplotlib.collections import PolyCollection
+    size = np.ptp(shape.outline, axis=(0, 1))
+    wide = size[0] > 4 * size[1]
+    height = float(np.clip(7.0 * size[1] / size[0], 2.0, 7.0)) + 1.2
+    figure, axes = figures.figure(width=8.0, height=height)
+    J = shape.J[np.arange(len(shape.J)), np.argmax(np.abs(shape.J - 1), axis=1)]
+    reach = float(np.clip(np.abs(J - 1).max(), 1e-3, 1.0))
+    drawn = PolyCollection(list(shape.outline), array=J, cmap="RdBu", edgecolors="0.35", linewidths=0.4,
+                           clim=(1 - reach, 1 + reach))
+    axes.add_collection(drawn)
+    for (label, point), mark, colour in zip(marks, "osD^", ("tab:red", "black", "tab:purple", "tab:green")):
+        axes.plot(*point, mark, label=label, markersize=11, fillstyle="none", markeredgewidth=1.8, color=colour,
+                  zorder=3, clip_on=False)
+    axes.autoscale_view()
+    axes.set_aspect("equal", adjustable="datalim" if wide else "box")
+    axes.set_xlabel("r")
+    axes.set_ylabel("z")
+    axes.set_title(title, fontsize=10)
+    figure.colorbar(drawn, ax=axes, label="J where it is farthest from 1 in the element", shrink=0.85, extend="both")
+    if marks:
+        figure.legend(loc="outside lower center", ncols=len(marks), frameon=False, fontsize=9)
+    figure.draw_without_rendering()                        # the aspect changes the limits
+    axes.autoscale(False)
+    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+    figures.tools(axes, tools, low, high, mirror=shape.outline[..., 0].min() > -1e-9 * size[0])
+    figure.savefig(file, dpi=150)

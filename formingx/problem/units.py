@@ -1,0 +1,75 @@
+"""What the dimensionless numbers of a problem stand for, in words and in the user's units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..forms.schedule import Setting
+from ..scene.aims import beyond_all
+from ..scene.scene import Scene
+
+
+class Units:
+    """Of a problem with a scene and its forms, in the setting that it stands in."""
+
+    scene: Scene
+    forms: Any
+
+    @property
+    def setting(self) -> Setting:
+        """What the stage that the problem stands in has set."""
+        raise NotImplementedError
+
+    @property
+    def why_not_finite(self) -> str:
+        """What makes a residual infinite or not a number in this scene."""
+        limits = {f"{m} was stretched beyond its limit, I1 < {m.largest_I1:.6g}": None
+                  for m in self.scene.materials.values() if m.largest_I1 < np.inf}
+        strained = limits or ["a material was strained beyond what its law allows"]
+        return ", or ".join(["an element turned inside out", *strained])
+
+    def shown(self, control: float) -> tuple[str, float]:
+        """What the control stands for, in words, and its value in the user's units."""
+        number, things = self.setting.leading, self.scene.things
+        if number is None:
+            return "control", control
+        name = "process time" if number == len(things) else self.scene.column(things[number]).replace("_", " ")
+        return name, self.forms.scales[number] * self.setting.amplitude(number, control)
+
+    def absurd(self, control: float) -> str | None:
+        """Why no process comes to a control, in words, or None."""
+        return beyond_all(self.scene, self.drives, self.shown(control)[1])
+
+    @property
+    def drives(self) -> str | None:
+        """What the control stands for: "pressure", "travel", "time" or, if it is none of them, None."""
+        number, things = self.setting.leading, self.scene.things
+        return None if number is None else "time" if number == len(things) else things[number].quantity
+
+    @property
+    def fixed_loads(self) -> list[str]:
+        """The loads that act already where nothing is driven yet."""
+        return [repr(load) for load in self.scene.loads if not load.driven]
+
+    @property
+    def main_columns(self) -> list[str]:
+        """The measures that tell one state from another in a line."""
+        return ["process_time", *map(self.scene.column, self.scene.drivable), "pole_height", "pole_stretch"]
+
+    @property
+    def scales(self) -> Sequence[float]:
+        """The user's value over the amplitude of each thing of the scene; last, 1.0 for the time."""
+        return self.forms.scales
+
+    @property
+    def units(self) -> tuple[float, float]:
+        """One of the dimensionless energy (stress length^3) and length in the user's units."""
+        return self.forms.stress * self.forms.volume, self.forms.length
+
+    @property
+    def slack_at_rest(self) -> bool:
+        """True if the body at rest has no stiffness in some direction."""
+        return self.forms.slack_at_rest
