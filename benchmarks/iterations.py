@@ -8,12 +8,11 @@ from its summary.json; what was cut back counts.
 
 import argparse
 import json
-import subprocess
-import sys
 from pathlib import Path
 from statistics import median
 
-DEMOS = Path(__file__).parents[1] / "demos"
+from all_demos import NAMES, run_demo
+
 SECONDS = 600                                               # that a demo may take
 
 
@@ -31,21 +30,16 @@ def paths(summary, name=""):
 
 def main():
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    names = sorted(file.stem for file in DEMOS.glob("*.py") if "main()" in file.read_text())
-    options.add_argument("--demos", nargs="+", choices=names, default=names)
+    options.add_argument("--demos", nargs="+", choices=NAMES, default=NAMES)
     options.add_argument("--full", action="store_true", help="not --quick")
     options.add_argument("--out", type=Path, default=Path("results/iterations"), help="where the demos' results are")
     args = options.parse_args()
     found = []
     for demo in args.demos:
         summary = args.out / demo / "summary.json"
-        if not summary.exists():
-            command = [sys.executable, DEMOS / f"{demo}.py", "--out", summary.parent, *["--quick"] * (not args.full)]
-            try:
-                subprocess.run(command, check=True, capture_output=True, text=True, timeout=SECONDS)
-            except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
-                print(f"{demo}: left out: {(error.stderr or str(error)).strip().splitlines()[-1]}", flush=True)
-                continue
+        if not summary.exists() and (why := run_demo(demo, summary.parent, not args.full, SECONDS)):
+            print(f"{demo}: left out: {why}", flush=True)
+            continue
         for name, states, iterations in paths(json.loads(summary.read_text())):
             if states:
                 found.append(iterations / states)

@@ -38,6 +38,27 @@ def test_treloar_quick_on_two_ranks(tmp_path):
     assert found["simply_supported"]["limit_pressure_kg_per_cm2"] == pytest.approx(0.49328, abs=1e-5)
 
 
+def test_summaries_are_compared_key_by_key(tmp_path, capsys, monkeypatch):
+    """A number that differs, one that is missing and a new one are told; times, words and round-off are not."""
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    import all_demos
+    now = {"wall": [1.0, 2.0], "steps": 31, "solve_seconds": 5.0, "name": "a", "deep": {"force": 3.1, "new": None}}
+    then = {"wall": [1.00001, 2.0], "steps": 30, "solve_seconds": 9.0, "name": "b", "deep": {"force": 3.0, "old": 1}}
+    for folder, summary in (("now", now), ("then", then)):
+        (tmp_path / folder / "cup").mkdir(parents=True)
+        (tmp_path / folder / "cup" / "summary.json").write_text(json.dumps(summary))
+    arguments = ["all_demos", "cup", "--only-compare", "--out", str(tmp_path / "now"), "--against"]
+    monkeypatch.setattr(sys, "argv", [*arguments, str(tmp_path / "then")])
+    assert all_demos.main() == 1
+    said = capsys.readouterr().out
+    assert [row.split() for row in said.splitlines()[2:-1]] == [
+        ["cup", "deep/force", "3", "3.1", "3.3e-02"], ["cup", "deep/old", "1", "-"], ["cup", "deep/new", "-", "None"]]
+    monkeypatch.setattr(sys, "argv", [*arguments, str(tmp_path / "now")])
+    assert all_demos.main() == 0
+    monkeypatch.setattr(sys, "argv", [*arguments[:3], "--out", str(tmp_path)])
+    assert all_demos.main() == 1 and "no summary" in capsys.readouterr().out
+
+
 def test_help_names_every_option():
     text = run("demos/treloar.py", "--help")
     for option in ("--elements", "--layers", "--out", "--quick", "--help"):
