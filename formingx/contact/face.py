@@ -276,6 +276,22 @@ class FaceContact:
                 distance=np.where(free, -2 * self.law.theta, touch.distance))))
         return found
 
+    def hold_late(self, fields: np.ndarray, control: float, most: float) -> bool:
+        """Hold the points that came deeper than `most` (length) into a tool in space in the step to a state.
+
+        Each sticks, or slides, from where its way met the tool. False if there are none; collective.
+        """
+        if self._memory is None or not self.contact.lagged:
+            return False
+        old, x, theta = self._memory.touch, self.positions(fields, control), self.law.theta
+        late = (old.distance <= -theta) & (self.law.distance(x) > most)
+        found = bool(self.comm.allreduce(int(late.sum())))
+        if found:
+            new = self.law.tractions(x, old).touch
+            self._take(self._memory._replace(touch=Touch(*(
+                np.where(late if a.ndim == 1 else late[:, None], b, a) for a, b in zip(old, new)))))
+        return found
+
     def get(self) -> Memory | None:
         """See `History`; None without friction."""
         return self._memory

@@ -51,8 +51,7 @@ class Path(States):
         if self._in_space:
             from ..extensions.space import show
             found += show.doubts(self, self.wall())
-        else:
-            found += self._view(self.segments[-1]).verdict.doubts(self.last)
+        found += self._view(self.segments[-1]).verdict.doubts(self.last)
         found += edges.doubts(edges.coarsest(self, self.last)) + tension.doubts(tension.first_compression(self))
         return found + snaps.doubts(snaps.largest(self))
 

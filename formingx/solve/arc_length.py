@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -27,11 +28,13 @@ class Curve:
 
     Attributes:
         fixed_control: True if it cannot pass a limit point.
+        sweeps: solutions at a target, at most, until no point comes into a tool in space in the step to it.
         control_weight: of the squared control against the mean squared displacement in arc length (dimensionless).
     """
 
     fixed_control = False
     control_weight = 0.1
+    sweeps = 30
 
     def __init__(self, problem: Equations, tolerances: Tolerances):
         self.problem = problem
@@ -292,6 +295,27 @@ class Curve:
                 break
             a, b = (found, b) if found.slope * a.slope > 0 else (a, found)
         return found
+
+    def hold_late(self, old: State, states: list[State], targets: Sequence[tuple[Target, Measure]]) -> list[State]:
+        """The states after `old`; where the first meets one of (target, its measure), without late contact.
+
+        What came into a tool in space in that step is held from where it met the tool, and the state solved for again.
+
+        Raises:
+            Failure: no such state was found.
+        """
+        limit, (new, *rest) = self.problem.limit, states
+        bound = next((bound for target, bound in targets if target is new.met), None)
+        if limit is None or new.met is None or bound is None:
+            return states
+        for _ in range(self.sweeps):
+            if not limit.hold_late(new):
+                return [new, *rest]
+            found = self.solve(new.x, new.control, bound.equation(new.met.value), new.kind, old)
+            sense = float(np.sign(found.slope * new.slope)) or 1.0
+            new = replace(found, direction=sense * found.direction, slope=sense * found.slope, met=new.met,
+                          jump=new.jump)
+        raise Failure("points that are held bring others into their tool again and again", [])
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""

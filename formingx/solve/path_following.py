@@ -356,7 +356,7 @@ class Run:
         else:
             raise failure
         self._ahead = min(10 * self._ahead, settings.furthest)
-        new.met = self.aim.met_by(new)
+        new = self.curve.hold_late(old, [replace(new, met=self.aim.met_by(new))], self.aim.open)[0]
         self.step.length = max(self.step.length, step / 2)
         log.info("a jump: %s", new.jump)
         return new
@@ -409,7 +409,7 @@ class Run:
                 state.met = target
                 found.append(state)
         found.sort(key=lambda state: self.curve.progress(old, state))
-        return [*found, new]
+        return self.curve.hold_late(old, [*found, new], self.aim.open)
 
     def _accept(self, state: State) -> None:
         """Take up a state and close the targets that it meets."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from ...contact import resultants
 from ...forms.outline import Outline, along
+from ...ranks import gathered
 from ...scene.tool_width import CUT
 from ...solve.state import State
 
@@ -63,6 +64,13 @@ class Depth(NamedTuple):
     name: str
 
 
+    @property
+    def words(self) -> str:
+        """Of a contact point in space."""
+        at = ", ".join(f"{v:.5g}" for v in self.place)
+        return f"A contact point is {self.depth:.4g} deep in the tool of {self.name!r} at (x, y, z) = ({at})"
+
+
 class Verdict:
     """Looks at the states of one problem; what does not change is found once."""
 
@@ -80,7 +88,8 @@ class Verdict:
     def doubts(self, state: State) -> list[tuple[str, str]]:
         """(how bad, what), as `volume.doubts`, of a state that a body can have; collective."""
         if not self._solid:
-            return []
+            return [("serious", f"{deep.words}: shorter steps (StepControl(length=...)), or a larger penalty.")
+                    for deep in self._deepest_points(state, lambda contact: CUT * contact.thickness)]
         with self._problem.at(state):
             edges, found = self._outline.edges(), []
             for contact in self._problem.present:
@@ -102,6 +111,8 @@ class Verdict:
         if measures.get("pole_stretch", 1.0) > _LIMITS.thinnest:
             yield "the two faces cross at the pole"
         if not self._solid:
+            for deep in self._deepest_points(state, _most_inside):
+                yield f"{deep.words}: the step was too long, or smaller triangles are needed there"
             return
         if measures["volume_error"] > _LIMITS.volume:
             yield (f"the elements do not keep their volumes: the root mean square of J - 1 is"
@@ -147,6 +158,19 @@ class Verdict:
             if share[k] > 1:
                 yield Depth(share[k], depth[k].max(), points[k, np.argmax(depth[k])], contact, _name(contact))
 
+    def _deepest_points(self, state: State, allowed: Callable[[Any], Any]) -> Iterator[Depth]:
+        """The contact point of each tool in space that is deepest, over what is allowed (length), if it is too deep."""
+        if self._problem.scene.kinematics.components < 3:
+            return
+        with self._problem.at(state) as problem:
+            for contact in problem.present:
+                x = contact.positions(state.x, state.control)
+                depth, place = contact.law.distance(x), x + contact.travelled(state.control)
+                rows = gathered(contact.comm, np.column_stack([depth / allowed(contact), depth, place]))
+                k = int(np.argmax(rows[:, 0]))
+                if rows[k, 0] > 1:
+                    yield Depth(rows[k, 0], rows[k, 1], rows[k, 2:], contact, _name(contact))
+
     def _sunk(self, edges: np.ndarray, state: State) -> Iterator[Depth]:
         """Contact points that the penalty lets too deep into tools: over the wall there now, whose volume is kept."""
         weight, rest = self._problem.scene.kinematics.weight, self._outline.rest
@@ -165,6 +189,12 @@ def _depths(contact: Any, points: np.ndarray, state: State) -> np.ndarray:
     """How deep points, shape (m, n, components), are in a tool, shape (m, n), length."""
     at = points - contact.travelled(state.control)
     return contact.contact.tool.signed_distance(at.reshape(-1, at.shape[-1])).reshape(at.shape[:2])
+
+
+def _most_inside(contact: Any) -> np.ndarray:
+    """How deep the points of a contact may be in its tool, shape (n,), length: those that it holds already."""
+    most = _LIMITS.inside * np.maximum(contact.thickness, contact.rule.lengths)
+    return np.where(contact.area < contact.rule.area, np.inf, most)
 
 
 def _off(contact: Any, state: State) -> float:

@@ -1,0 +1,52 @@
+"""Points that come into a tool in space in a step are held before a target, or the end of a stage, is accepted."""
+
+import numpy as np
+import pytest
+
+import formingx as fx
+
+THICKNESS = 1.0
+
+
+def draw(size, friction="stick", **more):
+    """A scene in which a box, or another tool, is pushed into the sheet of a tray of 160 x 100 mm."""
+    plug = fx.tools.box(half=(52, 27), depth=30, corner=15, fillet=8, draft=5, mouth=30.5, plug=True)
+    contact = fx.Contact("top", more.pop("tool", plug), friction, moves=(0, 0, -1), name="plug")
+    sheet = fx.mesh.sheet(fx.mesh.rectangle(160, 100, corner=20), size=size)
+    return fx.Scene(mesh=sheet, thickness=THICKNESS, materials=fx.NeoHookean(c10=0.1), contacts=[contact],
+                    supports=[fx.SimplySupported("rim")], model=fx.Membrane(wrinkles=0.01), **more)
+
+
+@pytest.mark.parametrize("more", [{}, {"friction": "none"}, {"tool": fx.tools.revolved(fx.tools.sphere(
+    radius=35.0, z=0.5))}])
+def test_nothing_is_in_a_tool_at_a_target(more):
+    """Targets are met exactly, of a box one of the force, too; between them points do come late."""
+    targets = [fx.travel(5.0), *([] if more else [fx.force(2.0)]), fx.travel(20.0)]
+    path = fx.trace(draw(16.0, **more), until=targets[-1], through=targets[:-1], progress=False)
+    for target in targets:
+        met = path.met(target).measures
+        assert abs(met["travel" if target.name == "travel" else "tool_force"]) == pytest.approx(target.value, rel=1e-8)
+        assert met["penetration"] < 2e-3 * THICKNESS
+    assert path["penetration"].max() > 0.05 * THICKNESS and path.doubts() == []
+
+
+def test_a_stage_ends_without_late_contact():
+    """A step to its end would leave a point 0.5 deep in the plug; the next stage begins with nothing in it either."""
+    scene = draw(16.0)
+    path = fx.Process(scene).run([fx.Stage("plug", drive="plug", until=fx.travel(12.0), speed=60.0),
+                                  fx.Stage("hold", duration=0.1)], progress=False)
+    for name in ("plug", "hold"):
+        end = [state for state in path.states if state.stage == name][-1]
+        assert end.measures["penetration"] < 2e-3 * THICKNESS
+
+
+def test_a_point_deep_in_a_tool_is_told_in_words():
+    """Of the state that a run ends in it is doubted; a state that is much deeper is none."""
+    path = fx.trace(draw(16.0), until=fx.travel(12.0), progress=False)
+    state, found, up = path.last, path.last.x.copy(), np.arange(2, len(path.last.x), 3)
+    assert path.doubts() == [] and path._view(path.segments[-1]).verdict.of(state) == ""
+    state.x[up] = found[up] + 0.2 / path.problem.forms.length
+    ((bad, words),) = path.doubts()
+    assert bad == "serious" and "point is 0.2 deep in the tool of 'plug' at (x, y, z) = (" in words
+    state.x[up] = found[up] + 5.0 / path.problem.forms.length
+    assert "deep in the tool of 'plug'" in path._view(path.segments[-1]).verdict.of(state)
