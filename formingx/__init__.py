@@ -15,6 +15,7 @@ import sys as _sys
 from . import _calls, _interrupts, mesh, tools
 from .checks.doctor import doctor
 from .errors import ConvergenceError, InputError, Interrupted
+from .extensions import contact_events as _contact_events
 from .extensions.compare.compare import Comparison, compare
 from .extensions.compare.compare_nodes import NodalComparison, compare_nodes, write_nodes
 from .extensions.design.design import Design

@@ -228,7 +228,7 @@ def test_contacts_of_a_script_stay_as_they_are():
         return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1)), contacts=[mould], **CAN,
                         materials=fx.NeoHookean(c10=c10)), fx.pressure(0.06)
     run = fx.Design(build, {"c10": (0.5, 0.4, 0.6)}).run()
-    assert mould.nodes_per_step is None and not run.path.problem.limit.foretells
+    assert mould.nodes_per_step is None and not run.path.problem.limit.predicts_events
 
 
 def test_a_stage_that_waits_ends_where_its_target_is_met():

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
-from ..extensions.contact_events.event_sequence import arrivals
 from ..ranks import gathered
 from .face import FaceContact
 
@@ -20,7 +20,6 @@ class StepLimits:
         as_good: part of a step within which a point is as good as in touch.
         beyond: how far a step goes that is to end at an arrival, over the length to there.
         near: distances, over thickness, at which a point is as good as in touch.
-        share: of the points of a face, that a step may bring if they are foretold one after the other.
         at_end: part of a step from which on what arrives, and will stick, has no friction until the next.
         slides: how far a point may slide so, over the length of face that is its own.
         nearer: part of its distance from the tool that a point may move in a step of lagged contact, beside its length
@@ -33,7 +32,6 @@ class StepLimits:
     as_good: float = 0.02
     beyond: float = 1.001
     near: float = 1e-3
-    share: float = 0.05
     at_end: float = 0.95
     slides: float = 2e-3
     nearer: float = 0.7
@@ -53,23 +51,17 @@ class Approach:
         conducts: heat flows through what touches, from the end of the step on.
 
     Attributes:
-        at_once, foretold: so many points a step may bring into contact, along the tangent and one foretold after the
-            other. (Where it does not matter when they come, the convergence of contact limits steps.)
+        points: of the face, all ranks.
+        at_once: so many points a step may bring into contact along the tangent. (Where it does not matter when they
+            come, the convergence of contact limits steps.)
     """
 
     def __init__(self, face: FaceContact, conducts: bool):
         self.face, self._comm, given = face, face.comm, face.contact.nodes_per_step
-        points = face.comm.allreduce(len(face.rule.points))
-        share = max(points // 100, 1) if face.contact.lagged else 1
+        self.points = face.comm.allreduce(len(face.rule.points))
+        share = max(self.points // 100, 1) if face.contact.lagged else 1
         self.at_once = (given or 1) * share * (1 if face.law.remembers or conducts else 10)
-        several = face.law.has_friction and not given and not face.contact.lagged
-        self.foretold = max(self.at_once, round(LIMITS.share * points)) if several else self.at_once
         self._foreseen = 0                                  # points that the step is going to bring, all ranks
-
-    @property
-    def foretells(self) -> bool:
-        """True if more arrivals than one by one may be foretold for its sake: where it sticks depends on them."""
-        return self.face.contact.sticks and self.foretold > self.at_once
 
     def touches(self, fields: np.ndarray, control: float) -> bool:
         """True if a point touches the tool."""
@@ -88,7 +80,7 @@ class Approach:
             speed = np.linalg.norm(velocity, axis=1)
             most = np.divide(most, speed, out=np.full(len(speed), length), where=free & (speed > 0))
             length = self._comm.allreduce(float(most.min(initial=length)), MPI.MIN)
-        times = arrivals(face.law, start, velocity, free, length)
+        times = gap_closures(face.law, start, velocity, free, length)
         ahead = (times > LIMITS.as_good * length) & (times < length)
         times = np.sort(gathered(self._comm, times[ahead]))
         touching = self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM)
@@ -101,7 +93,7 @@ class Approach:
         face = self.face
         start, velocity = face.positions(fields, control), face.moved(direction, slope)
         free = ~face.law.touching(start, face.touch) & (face.rule.area > 0)
-        times = arrivals(face.law, start, velocity, free, length)
+        times = gap_closures(face.law, start, velocity, free, length)
         return times, start + times[:, None] * velocity
 
     def prepare(self, times: np.ndarray, places: np.ndarray, guessed: np.ndarray | None, length: float,
@@ -175,3 +167,18 @@ class Approach:
             wrong = (slid * counted < 0) & (np.minimum(np.abs(slid), np.abs(counted)) > law.elastic_slip)
         late = (touch.distance <= -law.theta) & (F > 0) & wrong
         return float(self._comm.allreduce(1 - float(since[late].max(initial=0.0)) / length, MPI.MIN))
+
+
+def gap_closures(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> np.ndarray:
+    """Arc length at which free points (a mask) that go straight meet the ramp, `length` if not before, shape (n,)."""
+    at, times = length * np.linspace(0, 1, 17), np.full(len(start), length)
+    ways = 1.01 * length * np.linalg.norm(velocity, axis=1)             # none comes nearer by more
+    near = np.flatnonzero(free & (law.distance(start) + ways > -law.theta))
+    if len(near):
+        gap = -law.theta - law.part(near).distance(start[near] + at[:, None, None] * velocity[near])    # shape (17, m)
+        hit = np.flatnonzero((gap[1:] <= 0).any(0))
+        k = np.argmax(gap[1:, hit] <= 0, axis=0)
+        before, now = np.maximum(gap[k, hit], 0.0), gap[k + 1, hit]
+        share = np.divide(before, before - now, out=np.zeros(len(hit)), where=before > 0)
+        times[near[hit]] = at[k] + (at[k + 1] - at[k]) * share
+    return times

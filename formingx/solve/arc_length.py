@@ -10,7 +10,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..errors import ConvergenceError
-from ..extensions.contact_events.response import Response
 from ..measures.targets import Target
 from .equations import Array, Attempt, Constraint, Equations, Measure
 from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
@@ -121,7 +120,7 @@ class Curve:
         """
         self._x.array_w[:] = state.x
         limit, at_hand = self.problem.limit, state is self._found and not self.problem.body_has_history
-        at_hand, self._found = at_hand and not (limit and limit.foretells), None
+        at_hand, self._found = at_hand and not (limit and limit.predicts_events), None
         if at_hand and self.newton.update_ahead(self._x, state.control) or self.newton.tangent(
                 self._x, state.control, ahead=True):
             size = self._length_of(self.newton.b)
@@ -130,19 +129,16 @@ class Curve:
             state.direction, state.slope = sense * direction, sense * slope
             self._ahead_of = state, self.newton.solver.count
 
-    def response(self, state: State) -> Response | None:
-        """How the body gives way ahead of an accepted state, in the plane normal to its tangent; None: no tangent.
-
-        Of use until Newton's method begins anew.
-        """
+    def factorise_ahead(self, state: State) -> bool:
+        """Make the tangent ahead of an accepted state, unless it is at hand; False if it is singular."""
         if self._ahead_of != (state, self.newton.solver.count):
             self._x.array_w[:] = state.x
             if not self.newton.tangent(self._x, state.control, ahead=True):
-                return None
+                return False
             self._ahead_of = state, self.newton.solver.count
-        return Response(self.newton, state, self._along_plane(state), self._x, self._b)
+        return True
 
-    def _along_plane(self, state: State) -> Array:
+    def plane_normal(self, state: State) -> Array:
         """Derivative by x, own part, of the plane in which steps from a state end."""
         self._a.array_w[:] = state.direction
         self.problem.metric_times(self._a, self._b)

@@ -105,7 +105,7 @@ class FixedControlCurve(Curve):
         self._a.array_w[:] = state.direction
         return state.slope / self.norm(self._a, state.slope)
 
-    def _along_plane(self, state: State) -> Array:
+    def plane_normal(self, state: State) -> Array:
         return np.zeros(len(state.x))
 
     def _length_of(self, b: PETSc.Vec) -> float:

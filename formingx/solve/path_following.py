@@ -213,8 +213,7 @@ class Run:
         lengths, last = [*self.settings.snap_through.lengths, 0.0], self.settings.snap_through.lengths[-1]
         if snaps(self.curve, old, self._at_fold, self._sense):
             return self._snap(old)
-        response = self.curve.response(old) if limit and limit.foretells_from(old) else None
-        self._way = Way(old.x, old.control, old.direction, old.slope, 0.0, response)
+        self._way = Way(old.x, old.control, old.direction, old.slope, 0.0, limit and limit.predict(self.curve, old))
         while True:
             length = min(self.step.length, most)
             length = limit.length(self._way._replace(length=length)) if limit else length
@@ -234,7 +233,7 @@ class Run:
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good, failed = self.step.failed(), failed + (not isinstance(failure, _Astray))
                 self._failed(failure.reason, self.step.length)
-                self._way = self._way._replace(response=None if failed > 1 else self._way.response)
+                self._way = self._way._replace(events=None if failed > 1 else self._way.events)
                 soon = (self._jumps_soon and failed > 1 and length < lengths[0]
                         and (old.kind != "start" or not self.problem.has_history) and not self._found_no_rest_near(old))
                 if self._may_jump and (not good or soon):

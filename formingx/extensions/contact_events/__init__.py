@@ -1,1 +1,8 @@
-"""Contact events: closures of gaps predicted within one step."""
+"""Contact events: several gap closures in one step, predicted one after the other.
+
+It extends `forms.step_limit`. Without it, each step ends where a point touches that sticks."""
+
+from ...contact.step_limit import StepLimit
+from .prediction import ContactEventPredictor
+
+StepLimit.make_predictor = ContactEventPredictor

@@ -16,11 +16,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from .reduced_contact import FREE, STICKS, Points, Response
+from ...contact.approach import gap_closures
+from .reduced_contact import FREE, STICKS, Points
+from .response import Response
 
 
 @dataclass(frozen=True)
-class Foretelling:
+class EventSettings:
     """How far, and how exactly, arrivals are foretold.
 
     Attributes:
@@ -49,10 +51,10 @@ class Foretelling:
     late: float = 1.0
 
 
-_FORETELLING = Foretelling()
+_SETTINGS = EventSettings()
 
 
-class Arrival(NamedTuple):
+class GapClosure(NamedTuple):
     """A point of a face that meets the ramp of its tool; the same on all ranks.
 
     time: arc length; place: then, shape (2,). length: of face that is its own. sticks: whatever pulls at it.
@@ -108,7 +110,7 @@ class _Piece(NamedTuple):
         return self._replace(status=np.append(self.status, np.full(more, FREE)), **grown)
 
 
-class Foretold:
+class ContactEventSequence:
     """The arrivals ahead of a state, in order, and the path bent by them.
 
     Args:
@@ -130,7 +132,7 @@ class Foretold:
         self._free = [~face.law.touching(at, face.touch) & (face.rule.area > 0) for face, at in zip(faces, start)]
         self.touching = [int(self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM))
                          for face, free in zip(faces, self._free)]
-        self._arrivals: list[Arrival] = []
+        self._closures: list[GapClosure] = []
         self._points = Points(faces, n, len(x), response)
         none = np.zeros((0, start[0].shape[1]))
         self._pieces = [_Piece(0.0, start, self._along, np.zeros(0, dtype=int), none, none, none, none, none,
@@ -141,26 +143,26 @@ class Foretold:
         if not self._take_over():
             self._pieces, self.ends = self._pieces[:1], 0.0
 
-    def next(self, k: int, length: float) -> Arrival | None:
+    def next(self, k: int, length: float) -> GapClosure | None:
         """The arrival number k (from 0) within a length, or None; those before it are held."""
-        while len(self._arrivals) <= k:
+        while len(self._closures) <= k:
             if self.ends < np.inf:
                 return None
-            if self._taken < len(self._arrivals) and not self._hold(length):
-                self.ends = self._arrivals[-1].time
+            if self._taken < len(self._closures) and not self._hold(length):
+                self.ends = self._closures[-1].time
                 return None
             if not self._find(length):
                 return None
             if not self._settle(length):
-                self.ends = self._arrivals[-1].time
-        return self._arrivals[k] if self._arrivals[k].time < length else None
+                self.ends = self._closures[-1].time
+        return self._closures[k] if self._closures[k].time < length else None
 
-    def places(self, length: float) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
+    def closures(self, length: float) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
         """Of each face: arc length at which own points arrive, `length` if they do not; where they are then; which
         are where their forces want them at the end."""
         piece = self._piece(length)
         times, at = [np.full(len(x), length) for x in piece.at], piece.after(length).at
-        for arrival in self._arrivals:
+        for arrival in self._closures:
             if arrival.time < length and arrival.rank == self._comm.rank:
                 times[arrival.face][arrival.point] = arrival.time
                 at[arrival.face][arrival.point] = arrival.place
@@ -168,7 +170,7 @@ class Foretold:
         self._points.spread(piece.of(len(self._points.who)).status != FREE, sure)
         return times, at, sure
 
-    def at(self, length: float) -> list[np.ndarray]:
+    def positions(self, length: float) -> list[np.ndarray]:
         """Positions of own points of each face at an arc length, straight from the last change."""
         return self._piece(length).after(length).at
 
@@ -180,7 +182,7 @@ class Foretold:
         piece = piece.of(m).after(length)
         if not len(piece.status):
             return None
-        for _ in range(_FORETELLING.to_tools):
+        for _ in range(_SETTINGS.to_tools):
             piece = self._held(piece)
         if not np.isfinite(piece.extra).all():
             return None
@@ -210,7 +212,7 @@ class Foretold:
         slide = [~free & (face.rule.area > 0) & (face.law.friction < np.inf)
                  for face, free in zip(self._faces, self._free)]
         number = self._comm.allreduce(sum(int(np.sum(s)) for s in slide), MPI.SUM)
-        if not 0 < number <= _FORETELLING.taken_over:
+        if not 0 < number <= _SETTINGS.taken_over:
             return True
         if not self._points.learn([np.flatnonzero(s) for s in slide], touched=True):
             return False
@@ -243,7 +245,7 @@ class Foretold:
 
     def _hold(self, length: float) -> bool:
         """Hold the arrival that is not held yet: the next piece of the path; False: it cannot be told."""
-        last, arrival, end = self._pieces[-1], self._arrivals[-1], self._end
+        last, arrival, end = self._pieces[-1], self._closures[-1], self._end
         if end is None or arrival.who not in self._points.who and not self._learn(length):
             return False
         self._taken += 1
@@ -256,11 +258,11 @@ class Foretold:
 
     def _find(self, length: float) -> bool:
         """The next arrival within a length, on the last piece or off its end."""
-        for _ in range(_FORETELLING.changes):
+        for _ in range(_SETTINGS.changes):
             last = self._pieces[-1]
             if last.begins >= length:
                 return False
-            times = [arrivals(face.law, x, w, free, length - last.begins)
+            times = [gap_closures(face.law, x, w, free, length - last.begins)
                      for face, x, w, free in zip(self._faces, last.at, last.speed, self._free)]
             first = min(self._comm.allgather(min((float(t.min(initial=np.inf)) for t in times), default=np.inf)))
             after, status = self._points.change(last.status, self._points.near(last.at, last.force), last.force,
@@ -282,10 +284,10 @@ class Foretold:
         time, rank, f, i = min(self._comm.allgather(best))
         if not time < length:
             return False
-        self._arrivals.append(self._meets(rank, f, i, time, at.after(time).at))
+        self._closures.append(self._meets(rank, f, i, time, at.after(time).at))
         return True
 
-    def _meets(self, rank: int, f: int, i: int, time: float, at: list[np.ndarray]) -> Arrival:
+    def _meets(self, rank: int, f: int, i: int, time: float, at: list[np.ndarray]) -> GapClosure:
         """The arrival of a point near a time, when points are `at` their places."""
         told = None
         if rank == self._comm.rank:
@@ -294,25 +296,25 @@ class Foretold:
             near = law.nearest(x)
             for _ in range(3):
                 gap, rate = float(near.distance[0]) + law.theta, float(near.normal[0] @ w[0])
-                if abs(gap) < _FORETELLING.same_place * law.theta or not rate > 0:
+                if abs(gap) < _SETTINGS.same_place * law.theta or not rate > 0:
                     break
                 by = max(by - gap / rate, self._pieces[-1].begins - time)
                 near = law.nearest(x + by * w)
-            told = Arrival(time + by, rank, f, i, (x + by * w)[0], float(face.rule.lengths[i]),
+            told = GapClosure(time + by, rank, f, i, (x + by * w)[0], float(face.rule.lengths[i]),
                            bool(np.isinf(np.ravel(law.friction)[0])))
         return self._comm.bcast(told, root=rank)
 
     def _settle(self, length: float) -> bool:
         """Bring the path back to equilibrium where the last point found arrives, and that with it; False: it fails."""
-        last, arrival = self._pieces[-1], self._arrivals[-1]
+        last, arrival = self._pieces[-1], self._closures[-1]
         self._end = end = last.after(arrival.time)
-        if arrival.time - last.begins < _FORETELLING.soon * length:
+        if arrival.time - last.begins < _SETTINGS.soon * length:
             return True
         tried: list[tuple[_Piece, _Piece]] = []
-        for _ in range(_FORETELLING.iterations * _FORETELLING.earlier):
-            if len(tried) == _FORETELLING.iterations:
+        for _ in range(_SETTINGS.iterations * _SETTINGS.earlier):
+            if len(tried) == _SETTINGS.iterations:
                 return False
-            arrival, moved = self._arrivals[-1], self._moved(arrival.time, end)
+            arrival, moved = self._closures[-1], self._moved(arrival.time, end)
             if moved is None:
                 return False
             found = self._meets(*arrival.who, arrival.time, moved.at)
@@ -322,19 +324,19 @@ class Foretold:
                 return False
             end = mixed
             found = self._meets(*arrival.who, end.begins, end.at)
-            if not (found.time > last.begins and abs(found.time - arrival.time) < _FORETELLING.late * arrival.time):
+            if not (found.time > last.begins and abs(found.time - arrival.time) < _SETTINGS.late * arrival.time):
                 return False
-            self._arrivals[-1], self._end = found, (end := end.after(found.time))
-            near = (_FORETELLING.same_place if found.sticks else _FORETELLING.about_there) * found.length
+            self._closures[-1], self._end = found, (end := end.after(found.time))
+            near = (_SETTINGS.same_place if found.sticks else _SETTINGS.about_there) * found.length
             if np.linalg.norm(found.place - arrival.place) < near:
                 times = self._back(end, last, found)
                 if not self._first(times, found.time, end):
                     return True
-                self._arrivals.pop(-2)                      # another one has arrived before
+                self._closures.pop(-2)                      # another one has arrived before
                 tried = []
         return False
 
-    def _back(self, end: _Piece, last: _Piece, but: Arrival | None = None) -> list[np.ndarray]:
+    def _back(self, end: _Piece, last: _Piece, but: GapClosure | None = None) -> list[np.ndarray]:
         """When points that are inside their tools at an end of the last piece of path came there, else its time."""
         times = [np.full(len(free), end.begins) for free in self._free]
         for f, (t, face, x, w, free) in enumerate(zip(times, self._faces, end.at, last.speed, self._free)):
@@ -357,7 +359,7 @@ class Foretold:
         by = np.array([np.concatenate([(b - a).ravel() for a, b in zip(before.at, after.at)])
                        for before, after in tried])
         gram = self._comm.allreduce(by @ by.T)
-        if not gram.trace() < _FORETELLING.far:
+        if not gram.trace() < _SETTINGS.far:
             return None
         ahead = gram[-1, -1] - gram[-1, :-1] - gram[:-1, -1, None] + gram[:-1, :-1]
         right = gram[-1, -1] - gram[:-1, -1]
@@ -379,7 +381,7 @@ class Foretold:
         for given, free in zip(forces, self._free):
             given[free] = 0.0                               # what has not arrived yet touches nothing
         points.spread(piece.force, forces)
-        by = self._response.to_rest(
+        by = self._response.to_equilibrium(
             x + time * direction + piece.off[0] - points.columns @ piece.extra.ravel(),
             control + time * slope + piece.off[1] - float(points.steps @ piece.extra.ravel()), forces)
         if by is None:
@@ -392,28 +394,13 @@ class Foretold:
 
     def _learn(self, length: float) -> bool:
         """Columns of the arrival that is to be held and of those that come next as it looks; False: no factors."""
-        last, arrival, chosen = self._pieces[-1], self._arrivals[-1], []
+        last, arrival, chosen = self._pieces[-1], self._closures[-1], []
         left = length - last.begins
         for f, face in enumerate(self._faces):
-            times = arrivals(face.law, last.at[f], last.speed[f], self._free[f], left)
+            times = gap_closures(face.law, last.at[f], last.speed[f], self._free[f], left)
             times[[i for rank, g, i in self._points.who if (rank, g) == (self._comm.rank, f)]] = left
             if (arrival.rank, arrival.face) == (self._comm.rank, f):
                 times[arrival.point] = -1.0
             first = np.argsort(times, kind="stable")[: self._batch]
             chosen.append(np.sort(first[times[first] < left]))
         return self._points.learn(chosen)
-
-
-def arrivals(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> np.ndarray:
-    """Arc length at which free points (a mask) that go straight meet the ramp, `length` if not before, shape (n,)."""
-    at, times = length * np.linspace(0, 1, 17), np.full(len(start), length)
-    ways = 1.01 * length * np.linalg.norm(velocity, axis=1)             # none comes nearer by more
-    near = np.flatnonzero(free & (law.distance(start) + ways > -law.theta))
-    if len(near):
-        gap = -law.theta - law.part(near).distance(start[near] + at[:, None, None] * velocity[near])    # shape (17, m)
-        hit = np.flatnonzero((gap[1:] <= 0).any(0))
-        k = np.argmax(gap[1:, hit] <= 0, axis=0)
-        before, now = np.maximum(gap[k, hit], 0.0), gap[k + 1, hit]
-        share = np.divide(before, before - now, out=np.zeros(len(hit)), where=before > 0)
-        times[near[hit]] = at[k] + (at[k + 1] - at[k]) * share
-    return times

@@ -14,10 +14,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
+
+from .response import Response
 
 STICKS = 0
 """Status of a point that sticks; 1 and -1: it slides that way along the tangent of its tool."""
@@ -49,16 +51,6 @@ class Agreement:
 
 
 _AGREEMENT = Agreement()
-
-
-class Response(Protocol):
-    """How a body gives way, in the plane in which a step ends: (x, control), own part; None: no factors are at hand."""
-
-    def to_points(self, chosen: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray] | None:
-        """By forces -1 at own points (numbers) of each face, way by way, all ranks: shapes (n, m), (m,)."""
-
-    def to_rest(self, x: np.ndarray, control: float, forces: list[np.ndarray]) -> tuple[np.ndarray, float] | None:
-        """By what is left over at (x, control); forces: at points of each face, NaN: as the law says, (n, 2)."""
 
 
 class Near(NamedTuple):

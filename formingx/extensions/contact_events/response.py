@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
+from ...solve.arc_length import Curve
 from ...solve.equations import Array, ContactFace, Equations
 from ...solve.local_contact import unit_forces
-from ...solve.newton import BorderedNewton
 from ...solve.state import State
 
 
@@ -15,15 +15,15 @@ class Response:
     """Changes (x, control) by forces, in the plane in which a step from a state ends; None once its factors are gone.
 
     Args:
-        newton: it has just made the tangent ahead of the state.
-        normal: derivative by x of the equation of that plane, own part, shape (n,).
+        curve: it has just made the tangent ahead of the state.
         x, F: vectors to work with.
     """
 
-    def __init__(self, newton: BorderedNewton, state: State, normal: Array, x: PETSc.Vec, F: PETSc.Vec):
-        self._newton, self._state, self._made = newton, state, newton.solver.count
-        self._problem: Equations = newton.problem
-        self._x, self._F, self._normal = x, F, normal
+    def __init__(self, curve: Curve, state: State, x: PETSc.Vec, F: PETSc.Vec):
+        self._newton, self._state, self._made = curve.newton, state, curve.newton.solver.count
+        self._problem: Equations = curve.problem
+        self._normal = curve.plane_normal(state)
+        self._x, self._F = x, F
 
     @property
     def at_hand(self) -> bool:
@@ -37,7 +37,7 @@ class Response:
         """
         return self._by(unit_forces(self._problem, self._problem.present, chosen)) if self.at_hand else None
 
-    def to_rest(self, x: Array, control: float, forces: list[Array]) -> tuple[Array, float] | None:
+    def to_equilibrium(self, x: Array, control: float, forces: list[Array]) -> tuple[Array, float] | None:
         """From (x, control), no state, to one: by what is left over there, of x, own part, and of the control.
 
         forces: at the points of each face, NaN where the law of contact says it, shape (n, 2).

@@ -1,0 +1,181 @@
+"""Contact events: several gap closures in one step, predicted; the core without this extension."""
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from mpi4py import MPI
+from test_contact import cup, form
+
+import formingx as fx
+from formingx.contact.step_limit import Way
+from formingx.extensions.contact_events.event_sequence import ContactEventSequence
+from formingx.extensions.contact_events.reduced_contact import FREE, STICKS, Near, Points
+from formingx.extensions.contact_events.response import Response
+
+tools = fx.tools
+IMPORT = "from .extensions import contact_events as _contact_events\n"
+WITHOUT = """
+import formingx as fx
+mould = fx.tools.cup(radius=10.0, depth=5.0, mouth=0.3, fillet=1.0)
+scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(20, 1)),
+                 materials=fx.MooneyRivlin(c10=50.0, c01=15.0), loads=[fx.Pressure("bottom")],
+                 supports=[fx.Symmetry("axis"), fx.Clamped("rim")], contacts=[fx.Contact("top", mould, "stick")])
+path = fx.trace(scene, until=fx.pressure(30.0), progress=False)
+assert not path.problem.limit.predicts_events
+print(fx.__file__, path.counts.steps, *path.profile().thickness)
+"""
+
+
+def response_ahead(curve, state):
+    """How the body gives way ahead of a state of a curve."""
+    assert curve.factorise_ahead(state)
+    return Response(curve, state, *(curve.problem.x.duplicate() for _ in range(2)))
+
+def test_contact_events_in_one_step():
+    """A step with many gap closures gives the walls of one closure a step, in a third of the states."""
+    many, one = (form(cup("stick", (30, 1), nodes_per_step=n), 30.0, largest=largest)
+                 for n, largest in ((None, np.inf), (1, 0.02)))
+    single = form(cup("stick", (30, 1), nodes_per_step=1), 30.0)
+    inside = many.profile().reference_radius < 9.7
+    off = np.abs(many.profile().thickness / one.profile().thickness - 1)[inside]
+    assert off.max() < 6e-4             # 3.7e-3 where one may slide by 1e-2 of its length of face before it sticks
+    assert 3 * many.counts.steps < 1.2 * single.counts.steps and many.counts.failures < 0.1 * single.counts.steps
+
+
+def test_a_predicted_step_ends_near_its_state():
+    """The bent path ends nearer to the state found than the tangent; unit forces reproduce the compliance columns."""
+    path = form(cup("stick", (30, 1)), 8.0)
+    problem, curve = path.problem, path.record.curve
+    k = max(range(2, len(path.states)), key=lambda k: path["contact_length"][k] - path["contact_length"][k - 1])
+    old, new = path.states[k - 1], path.states[k]
+    touching = problem.contacts[0].touching(old.x, old.control)
+    point = int(np.flatnonzero(~touching & (problem.contacts[0].rule.area > 0))[0])
+    with problem.at(old):
+        length = curve.progress(old, new)
+        way = Way(old.x, old.control, old.direction, old.slope, length, problem.limit.predict(curve, old))
+        problem.limit.length(way)
+        dx, dc = problem.limit.prepare(way)
+        V, steps = response_ahead(curve, old).to_points([np.array([point])])
+        F = problem.x.duplicate()
+        x = problem.x.duplicate()
+        h = 1e-6
+        x.array_w[:] = old.x
+        before = _residual(problem, x, old.control, F)
+        x.array_w[:] = old.x + h * V[:, 1]
+        after = _residual(problem, x, old.control + h * steps[1], F)
+    forces = np.zeros_like(problem.contacts[0].points)
+    forces[point, 1] = 1.0
+    unit = np.zeros(len(before))
+    problem.contacts[0].add(unit, forces)
+    free = np.ones(len(before), dtype=bool)                  # of kinks: points that touch are as in the step ahead
+    free[problem.contacts[0].rule.dofs[touching]] = False
+    assert np.abs((after - before) / h - unit)[free].max() < 1e-4
+    straight = replace(new, x=old.x + length * old.direction, control=old.control + length * old.slope)
+    bent = replace(straight, x=straight.x + dx, control=straight.control + dc)
+    assert curve.distance(new, bent) < 0.5 * curve.distance(new, straight)
+
+
+def test_sliding_points_move_as_in_the_tangent():
+    """Sliding points of the reduced problem move as in the tangent; no point moves in a step of no length."""
+    mould = tools.cup(radius=38.0, depth=60.0, mouth=1.2, draft=6.0, fillet=5.0, lip=2.0)
+    plug = tools.male(radius=22.0, height=120.0, base=-120.0, draft=3.0, fillet=6.0)
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(20, 1)), materials=fx.NeoHookean(c10=0.4),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", mould, "stick", separates=False),
+                               fx.Contact("bottom", plug, 0.3, moves=(0, 1))])
+    path = fx.trace(scene, until=fx.travel(30.0), step=fx.StepControl(target=8), progress=False)
+    problem, curve, n = path.problem, path.record.curve, path.problem.n_owned
+    assert path.counts.failures <= 3                        # from rest, with 16 nodes flat on the plug, it took 6
+    sliding = 0
+    for old in path.states[2:-1]:
+        with problem.at(old):
+            faces = problem.present
+            ahead = ContactEventSequence(faces, n, old.x, old.control, old.direction, old.slope,
+                                         response_ahead(curve, old), 4)
+            law = faces[1].tractions(old.x[:n], old.control)
+            nothing = ahead.bend(1e-12)
+            assert nothing is not None and np.abs(nothing[0]).max() < 1e-8
+            if len(law.sense[law.normal > 0]) > 1 and np.all(law.sense[law.normal > 0] != 0):
+                speed = faces[1].moved(old.direction[:n], old.slope)
+                change = np.abs(np.subtract(ahead.positions(1e-6)[1], ahead.positions(0.0)[1]) / 1e-6 - speed).max()
+                assert change < 1e-3 * np.abs(speed).max()
+                sliding += 1
+    assert sliding > 3
+
+
+@pytest.mark.parametrize("before, force, moves, after, rate", [
+    (1, (1.0, 0.3), (0.0, 1.0), 1, (0.0, 0.0)),             # slides on
+    (1, (1.0, 0.3), (0.0, -1.0), STICKS, (0.0, -1.0)),      # turns back
+    (STICKS, (1.0, 0.3), (0.0, 1.0), 1, (0.0, 0.0)),        # is at the limit of friction
+    (STICKS, (1.0, 0.3), (0.0, -1.0), STICKS, (0.0, -1.0)),
+    (STICKS, (0.0, 0.0), (-1.0, 0.0), FREE, (0.0, 0.0))])   # goes away
+def test_a_point_sticks_slides_or_lets_go(before, force, moves, after, rate):
+    """One of unit compliance, mu = 0.3; (normal, tangential)."""
+    face = SimpleNamespace(comm=MPI.COMM_SELF, points=np.zeros((1, 2)))
+    points = Points([face], 0, 0, None)
+    points._C, points._S, points._pulls = np.eye(2), np.zeros((1, 2, 2)), np.zeros(1, dtype=bool)
+    points.friction, points.elastic_slip = np.array([0.3]), np.zeros(1)
+    near = Near(np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]]), np.zeros(1), np.zeros(1))
+    found = points.rates(np.array([moves]), np.array([before]), near, np.array([force]))
+    assert found is not None and found[2] == [after] and found[0][0] == pytest.approx(rate)
+
+
+def _residual(problem, x, control, F):
+    problem.residual(x, control, F)
+    return F.array_r.copy()
+
+
+def test_events_of_sliding_beside_sticking_points(monkeypatch):
+    """A plug with friction beside a rough mould takes fewer steps to the same wall; no event precedes its step."""
+    mould = fx.tools.cup(radius=38.0, depth=60.0, mouth=1.2, draft=6.0, fillet=5.0, lip=2.0)
+    tool = fx.tools.male(radius=22.0, height=120.0, base=-120.0, draft=3.0, fillet=6.0)
+    times, find = [], ContactEventSequence.next
+
+    def recorded(sequence, k, length):
+        closure = find(sequence, k, length)
+        times.append(sequence.ends if closure is None else closure.time)
+        return closure
+
+    monkeypatch.setattr(ContactEventSequence, "next", recorded)
+    many, one = (fx.trace(fx.Scene(
+        mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(30, 1)), materials=fx.MooneyRivlin(c10=0.35, c01=0.05),
+        supports=[fx.Symmetry("axis"), fx.Clamped("rim")], contacts=[
+            fx.Contact("top", mould, "stick", separates=False, nodes_per_step=n),
+            fx.Contact("bottom", tool, 0.3, moves=(0, 1), nodes_per_step=n)]),
+        until=fx.travel(48.0), step=fx.StepControl(target=8), progress=False) for n in (None, 1))
+    assert many.counts.steps < 0.7 * one.counts.steps and min(times) >= 0
+    assert many.profile().thickness == pytest.approx(one.profile().thickness, rel=2e-3)
+
+
+@pytest.mark.parametrize("friction", ["none", 0.3])
+def test_no_events_are_predicted_without_stick(friction):
+    """Contact of a ball at Gauss points without stick: few steps fail (200 of 450 with predicted events)."""
+    ball = fx.Contact("top", fx.tools.sphere(radius=4.0, z=0.3), friction, moves=(0, -1), points=3)
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(100, 2)),
+                     materials=fx.MooneyRivlin(c10=17.0, c01=1.0), contacts=[ball],
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
+    path = fx.trace(scene, until=fx.travel(8.0 if friction == "none" else 0.5), progress=False)
+    assert not path.problem.limit.predicts_events and path.counts.failures < 0.2 * path.counts.steps
+
+
+def test_the_core_without_contact_events(tmp_path):
+    """Without the folder the package is imported, and a stuck cup takes a step a gap closure to the same walls."""
+    shutil.copytree(ROOT / "formingx", tmp_path / "formingx", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.rmtree(tmp_path / "formingx" / "extensions" / "contact_events")
+    names = tmp_path / "formingx" / "__init__.py"
+    assert IMPORT in names.read_text()
+    names.write_text(names.read_text().replace(IMPORT, ""))
+    done = subprocess.run([sys.executable, "-c", WITHOUT], env=os.environ | {"PYTHONPATH": str(tmp_path)}, cwd=tmp_path,
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    file, steps, *walls = done.stdout.split()
+    path = form(cup("stick", (20, 1)), 30.0)
+    assert file.startswith(str(tmp_path)) and int(steps) > 2 * path.counts.steps
+    np.testing.assert_allclose(path.profile().thickness, [float(t) for t in walls], rtol=4e-3)
