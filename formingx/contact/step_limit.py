@@ -154,7 +154,7 @@ class StepLimit:
     def hold_late(self, new: Any) -> bool:
         """Hold what came into a tool in space in the step to a state that was found; False if nothing did."""
         return any([c.face.hold_late(new.x[: self._n], new.control, LIMITS.near * c.face.thickness)
-                    for c in self._present])
+                    for c in self.present])
 
     def passes_through(self, old: Any, new: Any) -> bool:
         """True if a contact point goes through its tool on the straight way from one state to another."""
