@@ -13,29 +13,10 @@ The examples of all classes and functions begin with these lines (mm and MPa):
 import sys as _sys
 
 from . import _calls, _interrupts, mesh, tools
+from ._extensions import add as _add
+from ._extensions import optional as _optional
 from .checks.doctor import doctor
 from .errors import ConvergenceError, InputError, Interrupted
-from .extensions import contact_events as _contact_events
-from .extensions.compare.compare import Comparison, compare
-from .extensions.compare.compare_nodes import NodalComparison, compare_nodes, write_nodes
-from .extensions.design.design import Design
-from .extensions.design.parameters import along
-from .extensions.fits.data import treloar1944
-from .extensions.fits.fit import Fit, fit
-from .extensions.fits.fit_in_time import TimedTest
-from .extensions.heat.boundaries import Absorption, Convection, FixedTemperature, HeatFlux, Radiation, ThermalProperties
-from .extensions.heat.contact import ConductingTool, ContactWithTool
-from .extensions.heat.cooling import Cooling
-from .extensions.heat.expansion import ThermalExpansion
-from .extensions.heat.result import HeatRun
-from .extensions.heat.run import heat
-from .extensions.kbkz.damping import PSM, Damping, DoubleWagner, LuoTanner, Wagner
-from .extensions.kbkz.kbkz import KBKZ
-from .extensions.release.formed import imperfect
-from .extensions.remeshing.remeshing import Remesh
-from .extensions.stability.instability import unstable
-from .extensions.stability.top_load import TopLoad, top_load
-from .extensions.study.study import Study, StudyRun, study
 from .materials.constants import entropic, of_temperature
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from .materials.material import Material
@@ -74,7 +55,55 @@ from .values.course import course
 from .values.table import table
 from .values.temperature import WLF, Arrhenius
 
+# Each extension adds its names and takes part by the interfaces of the core; its folder may be taken out.
+with _optional():
+    from .extensions import contact_events as _contact_events
+with _optional():
+    from .extensions.heat.boundaries import (
+        Absorption,
+        Convection,
+        FixedTemperature,
+        HeatFlux,
+        Radiation,
+        ThermalProperties,
+    )
+    from .extensions.heat.contact import ConductingTool, ContactWithTool
+    from .extensions.heat.cooling import Cooling
+    from .extensions.heat.expansion import ThermalExpansion
+    from .extensions.heat.result import HeatRun
+    from .extensions.heat.run import heat
+with _optional():
+    from .extensions.kbkz.damping import PSM, Damping, DoubleWagner, LuoTanner, Wagner
+    from .extensions.kbkz.kbkz import KBKZ
+with _optional():
+    from .extensions.fits.data import treloar1944
+    from .extensions.fits.fit import Fit, fit
+    from .extensions.fits.fit_in_time import TimedTest
+with _optional():
+    from .extensions.space.sheet import circle, rectangle, sheet
+    from .extensions.space.solid_tool import SolidTool, box, extruded, revolved, solid
+    _add(mesh, circle, rectangle, sheet)
+    _add(tools, SolidTool, box, extruded, revolved, solid)
+    del circle, rectangle, sheet, SolidTool, box, extruded, revolved, solid
+with _optional():
+    from .extensions.adapt import adapted
+    _add(mesh, adapted)
+    del adapted
+with _optional():
+    from .extensions.stability import TopLoad, imperfect, top_load, unstable
+with _optional():
+    from .extensions.remeshing import Remesh
+with _optional():
+    from .extensions.compare.compare import Comparison, compare
+    from .extensions.compare.compare_nodes import NodalComparison, compare_nodes, write_nodes
+with _optional():
+    from .extensions.study.study import Study, StudyRun, study
+with _optional():
+    from .extensions.design.design import Design
+    from .extensions.design.parameters import along
+
 __version__ = "0.1.0"
+
 
 for _module in (mesh, tools, _sys.modules[__name__]):
     _calls.explain(_module)

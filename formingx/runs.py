@@ -11,11 +11,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from .errors import ConvergenceError, InputError, Interrupted, count, finite, instance, known, several
-from .extensions.adapt.adapted import adapted, of_columns
-from .extensions.remeshing import remeshing
-from .extensions.remeshing.remeshing import Remesh
-from .extensions.space.sheet import Sheet
-from .extensions.stability.instability import Unstable
 from .measures.columns import Measure
 from .measures.targets import Amplitude, Target
 from .physics.contact import Contact
@@ -23,6 +18,7 @@ from .problem.problem import Problem
 from .results.evaluate import volume
 from .results.files.checkpoint import Checkpoint, holds_states, read
 from .results.path import Path
+from .run_hooks import MeshRenewal, StopCondition, adaptation
 from .scene import aims, clearance
 from .scene.scene import Scene
 from .solve.arc_length import Curve
@@ -43,8 +39,8 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
           tolerances: Tolerances | None = None, max_steps: int | None = None, progress: bool = True,
           start: Path | None = None, checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
           at_fold: str | None = None, resume: bool = False, beyond: bool = False,
-          pilot: bool | Mapping[str, float] = False, remesh: Remesh | None = None,
-          stop_at: Unstable | None = None) -> Path:
+          pilot: bool | Mapping[str, float] = False, remesh: MeshRenewal | None = None,
+          stop_at: StopCondition | None = None) -> Path:
     """Follow the equilibrium path from the unloaded body until a target is reached, through limit points.
 
     Args:
@@ -92,7 +88,8 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     """
     instance("trace: scene", scene, Scene, "a formingx.Scene")
     if remesh is not None:
-        remeshing.check("trace", scene, remesh, [*through, until])
+        instance("trace: remesh", remesh, MeshRenewal, "a formingx.Remesh")
+        remesh.check("trace", scene, [*through, until])
         if pilot is not False or stop_at is not None:
             raise InputError("trace: remesh: cannot be combined with pilot or stop_at")
     if pilot is not False:
@@ -107,7 +104,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     instance("trace: step", step, StepControl | None, "a StepControl or None")
     instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     instance("trace: progress", progress, bool, "True or False")
-    instance("trace: stop_at", stop_at, Unstable | None, "fx.unstable(modes=...) or None")
+    instance("trace: stop_at", stop_at, StopCondition | None, "fx.unstable(modes=...) or None")
     max_steps = None if max_steps is None else count("trace: max_steps", max_steps)
     known("trace: at_fold =", at_fold, AT_FOLD)
     scene.only_driven("trace")
@@ -131,8 +128,8 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
         if remesh is None:
             part()
         else:
-            remeshing.follow(path, remesh, tolerances or Tolerances(), part,
-                             lambda: path.last.met is not None and path.last.met[:2] == until[:2])
+            remesh.follow(path, tolerances or Tolerances(), part,
+                          lambda: path.last.met is not None and path.last.met[:2] == until[:2])
     return path
 
 
@@ -206,7 +203,7 @@ class Process:
             max_steps: int | None = None, progress: bool = True, start: Path | State | None = None,
             checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
             accuracy: str | float = "standard", resume: bool = False, beyond: bool = False,
-            pilot: bool | Mapping[str, float] = False, remesh: Remesh | None = None) -> Path:
+            pilot: bool | Mapping[str, float] = False, remesh: MeshRenewal | None = None) -> Path:
         """Run the stages; one path holds the states of all of them, every stage from a state of kind "start" on.
 
         Args:
@@ -234,7 +231,8 @@ class Process:
         """
         stages = self._checked(stages)
         if remesh is not None:
-            remeshing.check("Process", self.scene, remesh, [t for s in stages for t in (*s.through, s.until) if t])
+            instance("Process: remesh", remesh, MeshRenewal, "a formingx.Remesh")
+            remesh.check("Process", self.scene, [t for s in stages for t in (*s.through, s.until) if t])
             if pilot is not False:
                 raise InputError("Process: remesh: cannot be combined with pilot")
         if pilot is not False:
@@ -269,7 +267,7 @@ class Process:
             if remesh is None:
                 part()
             else:
-                remeshing.follow(path, remesh, tolerances, part, lambda: is_done(path.record, plans))
+                remesh.follow(path, tolerances, part, lambda: is_done(path.record, plans))
         return path
 
     def _look_again(self, plan: Plan, stands: Callable[[int], float]) -> None:
@@ -319,10 +317,10 @@ def _after_pilot(who: str, pilot: Any, start: Any, resume: bool, scene: Scene, c
         raise InputError(f"{who}: pilot = {pilot!r}: must be True, False or arguments of mesh.adapted, such as"
                          f" {{'error': 0.02}}")
     options = {} if pilot is True else dict(pilot)
+    meshes = adaptation(who)
     for name in options:
         known(f"{who}: pilot", name, ("share", "error"))
-    if not isinstance(scene.mesh, Sheet):
-        of_columns(scene.mesh)                              # or it says why not
+    meshes.check(scene.mesh)
     try:
         first = run(scene, None)
     except ConvergenceError as error:
@@ -331,7 +329,7 @@ def _after_pilot(who: str, pilot: Any, start: Any, resume: bool, scene: Scene, c
         first = error.path
         log.warning("the pilot run ended early, at %s; the mesh is adapted to what it has"
                     " computed", first.describe(first.last))
-    made = adapted(first, **options)
+    made = meshes.make(first, options)
     log.info("pilot run: %d states on %d elements; adapted: %d", len(first), *(
         mesh.domain.topology.index_map(2).size_global for mesh in (scene.mesh, made)))
     path = run(scene.with_mesh(made), checkpoint)

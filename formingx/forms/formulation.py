@@ -23,7 +23,6 @@ from ..errors import together
 from ..extensions.heat.free_stretch import FreeStretch
 from ..extensions.heat.temperature_field import Temperature
 from ..extensions.kbkz.past_states import PastStates
-from ..extensions.remeshing.earlier_meshes import FollowedProbe
 from ..physics import kinematics as kin
 from .admissible import Admissible
 from .history import History
@@ -210,7 +209,7 @@ class Formulation(ABC):
 
     def probe(self, problem: Any, points: Any) -> Probe:
         """The displacement at reference points (R, Z), shape (n, 2)."""
-        return Probe(problem, points) if self.scene.preformed is None else FollowedProbe(problem, points)
+        return Probe(problem, points) if self.scene.preformed is None else self.scene.preformed.probe(problem, points)
 
     def mean_row(self, held: Any) -> Any:
         """Linear form: mean of a displacement component (dimensionless) over a boundary, as a `MeanHeld` asks."""

@@ -1,7 +1,5 @@
 """Meshes of six-node triangles: discs, spheres, parisons, and meshes read from files; sheets in space."""
 
-from ..extensions.adapt.adapted import adapted
-from ..extensions.space.sheet import circle, rectangle, sheet
 from .build import ACCURACY, disc, from_lines, parison, sphere
 from .files import read, write
 from .grid import Grid, to_grid

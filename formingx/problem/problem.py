@@ -170,6 +170,11 @@ class Problem(Histories, Units):
                     raise InputError(f"{contact.contact!r} takes part again where the body is, which reaches"
                                      f" {depth:.6g} into the tool")
 
+    def followed(self, points: np.ndarray) -> np.ndarray:
+        """Return the positions on this mesh of points of the first mesh of a run, shape (n, 2), length."""
+        preformed = self.scene.preformed
+        return points if preformed is None else preformed.followed(self, points)
+
     @contextlib.contextmanager
     def at(self, state: Any) -> Iterator[Problem]:
         """Stand at a state: its setting, histories, unknowns (`x`, `forms.w`) and control; all restored on leaving.

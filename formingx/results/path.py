@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError, as_points, count
-from ..extensions.remeshing.earlier_meshes import followed
 from ..figures import Axes
 from ..solve.state import State
 from ..units import NONE, Units
@@ -62,7 +61,7 @@ class Path(States):
 
     def stress(self, state: State | None = None) -> StressField:
         """Stresses and stretches at a state (default: the last), layer by layer."""
-        self._section_only("stress", "look at path.wall(): stretches")
+        self.section_only("stress", "look at path.wall(): stretches")
         state = state or self.last
         return self._view(self.segment(state)).stresses.of(state)
 
@@ -160,47 +159,15 @@ class Path(States):
         (views.revolved if axisymmetric else views.extruded)(self.profile(state), file, self.problem.comm)
         return Picture(file)
 
-    def stability(self, modes: Any = range(9), states: Any = 20) -> Any:
-        """Which modes that vary round the body are unstable, and where the path loses them (`Stability`); print it.
-
-        modes: waves round the axis; in plane strain wave numbers along the depth. states: how many, "all", or those.
-        An InputError for a membrane, and for a load that does not say how it changes with a mode.
-        """
-        self._section_only("stability")
-        from ..extensions.stability.instability import Watch
-        self._watch = self._watch or Watch(self)
-        return self._watch.look(modes, states)
-
-    def hoop_resultants(self, state: State | None = None) -> Any:
-        """Forces round the axis along a sheet at a state (default: the last), `HoopResultants`: below 0 it may wrinkle.
-
-        A solid or a membrane; an InputError in plane strain, in space, and for a mesh that is no sheet.
-        """
-        self._section_only("hoop_resultants", "use path.wall().wrinkled")
-        from ..extensions.stability.hoop import hoop_resultants
-        state = state or self.last
-        return hoop_resultants(self, self.segment(state).problem, state)
-
     def formed(self, state: State | None = None, *, size: float | None = None) -> Any:
         """The body of a state (default: the last) as a new `Mesh`, free of stress; an InputError if it is none.
 
         size: of new elements, length, in place of the deformed ones: for a body of one layer without holes, on one
         rank. (With the stresses that it has a body is let go by `released`.)
         """
-        self._section_only("formed", "use to_stl, or shell_model")
+        self.section_only("formed", "use to_stl, or shell_model")
         from ..extensions.release.formed import formed
         return formed(self.segment(state).problem, state or self.last, size)
-
-    def column_factors(self, share: float | None, error: float | None) -> np.ndarray:
-        """Wanted over present length of the mesh's columns, shape (n,), by which `formingx.mesh.adapted` goes."""
-        self._section_only("column_factors", "use fx.mesh.adapted")
-        from ..extensions.adapt.column_factors import column_factors
-        return column_factors(self, share, error)
-
-    def wanted_sizes(self, share: float | None, error: float | None) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes of a flat sheet in space, (n, 2), and sizes of triangles there, (n,), by `formingx.mesh.adapted`."""
-        from ..extensions.adapt.sizes import wanted_sizes
-        return wanted_sizes(self, share, error)
 
     def wall(self, state: State | None = None) -> Any:
         """The wall of the part at a state (default: the last), place by place: to_csv, to_excel.
@@ -256,7 +223,7 @@ class Path(States):
             InputError: a membrane; arguments that do not fit the scene; the part does not reach the trim.
             ConvergenceError: no state of the free part was found; it carries the path so far.
         """
-        self._section_only("released")
+        self.section_only("released")
         from ..extensions.release.released import released
         state = state or self.last
         make = lambda record: Path(record, True)                           # noqa: E731
@@ -284,7 +251,7 @@ class Path(States):
 
     def contact(self, tool: Any = None, state: State | None = None) -> Any:
         """Contact pressure, friction and gap along the face that meets a tool (`ContactTable`): to_csv, to_excel."""
-        self._section_only("contact", "use tool_forces(), or filling()")
+        self.section_only("contact", "use tool_forces(), or filling()")
         from .evaluate.contact_face import ContactFace, contact_of
         alone = self.alone(state or self.last)
         return ContactFace(alone, contact_of(alone, tool, "contact")[0]).of(state or self.last)
@@ -295,7 +262,7 @@ class Path(States):
             raise InputError("temperature: the scene has none: give Scene a temperature=...")
         state = state or self.last
         with self.segment(state).problem.at(state) as problem:
-            return problem.temperature.at(followed(problem, as_points("Path.temperature: points", points)))
+            return problem.temperature.at(problem.followed(as_points("Path.temperature: points", points)))
 
     def tool_forces(self) -> dict[str, np.ndarray]:
         """{tool: its force at all states}: positive when it resists its travel; of a tool that stays, along Z."""
@@ -311,7 +278,7 @@ class Path(States):
         "strain_energy", above that at first; "dissipated_energy" in materials; "friction"; "jumps"; "bonds" to tools
         that the body may pull at, above that at first. "unbalanced": the error of the integrals, and of the run.
         """
-        self._section_only("work")
+        self.section_only("work")
         from .evaluate.work import work
         return work(self)
 
@@ -334,7 +301,7 @@ class Path(States):
             InputError: plane strain, fewer than 3 parts, or the mesh is no sheet.
         """
         from .files.shells import to_inp
-        self._section_only("to_inp", "use shell_model")
+        self.section_only("to_inp", "use shell_model")
         if not self.problem.scene.kinematics.axisymmetric or count("to_inp: parts", parts) < 3:
             raise InputError(f"to_inp: parts = {parts!r}: must be at least 3, of an axisymmetric body")
         to_inp(self.profile(state), parts, file, self.problem.comm)
@@ -351,8 +318,8 @@ class Path(States):
         from ..extensions.space.show import shell_model
         shell_model(self, file, state)
 
-    def _section_only(self, what: str, instead: str = "") -> None:
-        """An InputError in space."""
+    def section_only(self, what: str, instead: str = "") -> None:
+        """Raise an InputError if the body is a sheet in three dimensions, for which `what` is not available."""
         if self._in_space:
             raise InputError(f"{what}: is not available yet for a sheet in space" + (f": {instead}" if instead else ""))
 

@@ -49,7 +49,6 @@ class States:
         self.record, self._timed, self._own = record, timed, {} if columns is None else columns
         self._views = {} if views is None else views         # by id(problem)
         self._walls: Any = None
-        self._watch: Any = None
         self._view(record.segments[-1])                      # so that nothing is compiled on the way
         record.on_state.append(self._measure)
         record.judge = lambda state: self._view(record.segments[-1]).verdict.of(state)

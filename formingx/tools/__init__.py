@@ -1,6 +1,5 @@
 """Rigid tools as profiles of lines and arcs: shapes, and what other programs have drawn; tools in space."""
 
-from ..extensions.space.solid_tool import SolidTool, box, extruded, revolved, solid
 from .files import read
 from .profile import Tool
 from .shapes import Pot, bottle, clamp_ring, cone, cup, cylinder, male, plane, pot, sphere

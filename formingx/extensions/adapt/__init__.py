@@ -1,1 +1,22 @@
-"""Meshes adapted to a pilot run."""
+"""Meshes adapted to the states of a pilot run."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from ...mesh.mesh import Mesh
+from ...run_hooks import register_adaptation
+from .adapted import adapted, of_columns
+
+
+class _Adaptation:
+    """The `MeshAdaptation` of runs with a pilot."""
+
+    def check(self, mesh: Any) -> None:
+        if not hasattr(mesh, "of_size"):                     # a sheet in three dimensions
+            of_columns(mesh)
+
+    def make(self, path: Any, options: Mapping[str, float]) -> Mesh:
+        return adapted(path, **options)
+
+
+register_adaptation(_Adaptation())

@@ -8,7 +8,8 @@ import numpy as np
 
 from ...errors import InputError, positive
 from ...mesh.mesh import Columns, Mesh
-from ..space.sheet import Sheet
+from .column_factors import column_factors
+from .sizes import wanted_sizes
 
 _GROWTH = 0.25
 """By how much a column may be longer than its neighbour, over the neighbour."""
@@ -58,17 +59,17 @@ def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = Non
     if not hasattr(path, "problem"):
         raise InputError(f"adapted: path = {path!r}: must be what trace or Process.run gave back")
     mesh = path.problem.scene.mesh
-    if isinstance(mesh, Sheet):
-        return _sheet(mesh, *path.wanted_sizes(share, error))
+    if path.problem.scene.kinematics.components == 3:
+        return _sheet(mesh, *wanted_sizes(path, share, error))
     columns = of_columns(mesh)
-    factors = path.column_factors(share, error)
+    factors = column_factors(path, share, error)
     if not np.any(np.isfinite(factors)):
         raise InputError("adapted: the run gives no reason for other elements: nothing bends or touches a fillet, and"
                          " error is None: give error=0.02, or a run that goes further")
     return columns.make(_ends(columns, factors))
 
 
-def _sheet(mesh: Sheet, points: np.ndarray, sizes: np.ndarray) -> Mesh:
+def _sheet(mesh: Any, points: np.ndarray, sizes: np.ndarray) -> Mesh:
     """With triangles of sizes at points, linear between these."""
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import cKDTree

@@ -9,6 +9,8 @@ from scipy.spatial import cKDTree
 
 from ...errors import positive
 from ...forms.outline import Outline, along
+from ...results.extend import method_of
+from ...results.path import Path
 
 _STATES = 12
 """States whose stresses are looked at: those, evenly, of all."""
@@ -26,11 +28,13 @@ _ORDER = 2
 """Of the error of stresses."""
 
 
+@method_of(Path)
 def column_factors(path: Any, share: float | None, error: float | None) -> np.ndarray:
     """Wanted over present length of the n columns, the least of all states, shape (n,); inf: none is asked for.
 
     share, error: see `formingx.mesh.adapted`.
     """
+    path.section_only("column_factors", "use fx.mesh.adapted")
     share, error = (value if value is None else positive(f"column_factors: {name}", value)
                     for name, value in (("share", share), ("error", error)))
     columns = path.problem.scene.mesh.columns

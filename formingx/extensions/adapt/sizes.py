@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from ...mesh.nodes import COORDINATES
-from ..space.wall import wall_of
 
 _FINEST = 0.25
 """Wanted over present size, at the least: what a mesh does not resolve it shows, but not how fine it is."""
@@ -24,7 +23,7 @@ def wanted_sizes(path: Any, share: float | None, error: float | None) -> tuple[n
     """
     factor: np.ndarray = np.ones(0)
     for state in path.states:
-        wall = wall_of(path, state)
+        wall = path.wall(state)
         if not len(factor):
             pairs, factor = _neighbours(wall.triangles), np.ones(len(wall.triangles))
         a, b, c = (wall.now[wall.triangles[:, k]] for k in range(3))

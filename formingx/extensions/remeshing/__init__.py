@@ -1,1 +1,17 @@
 """New meshes for deformed bodies during a run."""
+
+from typing import Any
+
+from ...problem.problem import Problem
+from ...results.files.checkpoint import register_mesh_loader
+from ...solve.state import State
+from . import files
+from .preformed import Preformed
+from .remeshing import Remesh
+
+
+def _load(problem: Problem, last: State, data: dict[str, Any]) -> Problem:
+    return files.load((problem, last), data, Preformed)
+
+
+register_mesh_loader(_load)

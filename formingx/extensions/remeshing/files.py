@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,6 @@ from ...problem.problem import Problem
 from ...results.files.description import describe, differences
 from ...solve.state import State
 from .earlier_meshes import scene_on
-from .preformed import Preformed
 
 
 def save(problem: Any) -> dict[str, Any]:
@@ -30,9 +30,15 @@ def save(problem: Any) -> dict[str, Any]:
             "scene": describe(problem)["mesh"]}
 
 
-def load(before: tuple[Problem, State], data: dict[str, Any]) -> Problem:
+def load(before: tuple[Problem, State], data: dict[str, Any], preformed: Callable[..., Any]) -> Problem:
     """The problem on the mesh that `save` gave, after the last state on the mesh before; an InputError if it is not
-    that."""
+    that.
+
+    Args:
+        before: the problem and the last state on the mesh before.
+        data: what `save` gave.
+        preformed: makes the earlier deformation from its fields (`Preformed`).
+    """
     scene = before[0].scene
     if scene.mesh.comm.size > 1:
         raise InputError("load: a remeshed run can be loaded on one rank only")
@@ -40,7 +46,7 @@ def load(before: tuple[Problem, State], data: dict[str, Any]) -> Problem:
     grid = Grid(points, np.arange(1, len(points) + 1), {k: np.array(v) for k, v in data["layers"].items()},
                 {k: np.array(v) for k, v in data["boundaries"].items()})
     mesh = to_mesh(lambda: grid, scene.mesh.comm, "checkpoint: its mesh")
-    made = Problem(scene_on(mesh, Preformed(**data["preformed"])._replace(before=before)))
+    made = Problem(scene_on(mesh, preformed(**data["preformed"])._replace(before=before)))
     for contact, shift in zip(made.contacts, data["shifts"], strict=True):
         if shift is not None:
             contact.shift_distances(np.array(shift))

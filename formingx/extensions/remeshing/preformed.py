@@ -17,7 +17,8 @@ import ufl
 from dolfinx import fem
 
 from ...forms.carry import in_own_cells
-from .earlier_meshes import first_places
+from .earlier_meshes import FollowedProbe, first_places, followed
+from .files import save
 
 _QUADRATIC = basix.ufl.element("Lagrange", "triangle", 2)
 """Of what is carried, by its values at the corners and at the middles of the edges opposite to them."""
@@ -76,6 +77,18 @@ class Preformed(NamedTuple):
         scene = forms.scene
         held = scene.model.volume_stiffness * max(map(scene.shear_modulus, scene.mesh.layers)) / forms.stress
         return cls(x, rest, b, pressures, held, (problem, state))
+
+    def followed(self, problem: Any, points: np.ndarray) -> np.ndarray:
+        """Return the positions on the new mesh of points of the first mesh, shape (n, 2), length."""
+        return followed(problem, points)
+
+    def probe(self, problem: Any, points: np.ndarray) -> FollowedProbe:
+        """Return a probe of the displacement at points of the first mesh, shape (n, 2), length."""
+        return FollowedProbe(problem, points)
+
+    def save(self, problem: Any) -> dict[str, Any]:
+        """Return the data of a checkpoint from which the problem on this mesh is made again."""
+        return save(problem)
 
     def first_places(self, points: np.ndarray) -> np.ndarray:
         """Where points of the new mesh, shape (n, 2), are on the first one."""

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import ConvergenceError, InputError, instance, pair, positive
+from ...errors import ConvergenceError, InputError, pair, positive
 from ...forms.carry import carry
 from ...forms.outline import Outline
 from ...materials.constants import OfMesh
@@ -93,10 +93,16 @@ class Remesh:
             raise InputError(f"Remesh: volume_ratio = {self.volume_ratio!r}: must be a number between 0 and 1, and one"
                              f" above 1")
 
+    def check(self, caller: str, scene: Any, targets: Sequence[Target]) -> None:
+        """Raise an InputError if the scene or a target cannot be transferred to another mesh."""
+        _check(caller, scene, targets)
 
-def check(who: str, scene: Any, remesh: Any, targets: Sequence[Target]) -> None:
-    """An InputError if a scene has what is not carried to another mesh, or a target is not one of what is driven."""
-    instance(f"{who}: remesh", remesh, Remesh, "a formingx.Remesh")
+    def follow(self, path: Any, tolerances: Tolerances, part: Callable[[], None], done: Callable[[], bool]) -> None:
+        """Continue a path with as many meshes as it needs (`formingx.run_hooks.MeshRenewal`)."""
+        _follow(path, self, tolerances, part, done)
+
+
+def _check(who: str, scene: Any, targets: Sequence[Target]) -> None:
     why = ""
     if scene.mesh.comm.size > 1:
         why = "several ranks (gmsh makes a mesh on one): run without mpirun"
@@ -126,8 +132,8 @@ def check(who: str, scene: Any, remesh: Any, targets: Sequence[Target]) -> None:
                              f" measures change a little at each remeshing, and may jump over their target")
 
 
-def follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[], None],
-           done: Callable[[], bool]) -> None:
+def _follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[], None],
+            done: Callable[[], bool]) -> None:
     """Follow a path with as many meshes as it takes.
 
     Args:

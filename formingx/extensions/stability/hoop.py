@@ -11,7 +11,9 @@ from ...errors import InputError
 from ...physics.models import Membrane
 from ...results.evaluate.tension import Tension
 from ...results.evaluate.wall import between_layers
+from ...results.extend import method_of
 from ...results.files.sheet import Sheet
+from ...results.path import Path
 
 _THROUGH = 4               # Gauss points of a layer
 
@@ -50,8 +52,23 @@ class HoopResultants(Sheet):
         return {"reference_radius": self.points[:, 0], "Z": self.points[:, 1], "hoop_resultant": self.resultant}
 
 
-def hoop_resultants(path: Any, problem: Any, state: Any) -> HoopResultants:
-    """See `Path.hoop_resultants`; collective."""
+@method_of(Path)
+def hoop_resultants(path: Path, state: Any = None) -> HoopResultants:
+    """Compute the hoop forces along a sheet, of which negative ones may wrinkle it; collective.
+
+    Args:
+        path: the path of an axisymmetric solid or membrane.
+        state: a state of the path; default the last.
+
+    Returns:
+        The `HoopResultants`.
+
+    Raises:
+        InputError: plane strain, a sheet in three dimensions, or a mesh that is no sheet.
+    """
+    path.section_only("hoop_resultants", "use path.wall().wrinkled")
+    state = state or path.last
+    problem = path.segment(state).problem
     scene = problem.scene
     if not scene.kinematics.axisymmetric:
         raise InputError("hoop_resultants: in plane strain nothing goes round an axis")

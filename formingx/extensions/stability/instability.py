@@ -11,7 +11,9 @@ from mpi4py import MPI
 
 from ...errors import InputError, count, finite, several
 from ...ranks import gathered
+from ...results.extend import method_of
 from ...results.numbers import without_round_off
+from ...results.path import Path
 from ...results.show.picture import Picture
 from ...solve.record import Record
 from ...solve.state import State
@@ -239,6 +241,26 @@ class Watch:
         with segment.problem.at(found.left):
             driven, control = segment.problem.shown(found.state.control)
         return Loss(self._path, found, float(control), driven, fold, points, amplitudes)
+
+
+@method_of(Path)
+def stability(path: Path, modes: Any = range(9), states: Any = 20) -> Stability:
+    """Find the modes of instability of states of a path, and where the path loses its stability in them.
+
+    Args:
+        path: the path of a solid; no load on it may depend on the mode in an unknown way.
+        modes: circumferential wave numbers; in plane strain wave numbers along the depth, 1/length.
+        states: number of states, evenly spaced on the path; "all"; or a list of states of the path.
+
+    Returns:
+        The `Stability`, which prints a table.
+
+    Raises:
+        InputError: a membrane, or a load that does not say how it changes with a mode.
+    """
+    path.section_only("stability")
+    watch: Watch = vars(path).setdefault("_stability_watch", Watch(path))      # keeps its matrices
+    return watch.look(modes, states)
 
 
 class Unstable:

@@ -30,7 +30,6 @@ from petsc4py import PETSc
 
 from ... import _compat
 from ...errors import InputError, as_points, known, pair
-from ...extensions.remeshing.earlier_meshes import followed
 from ...mesh.locate import Place, locate
 from ...mesh.nodes import COORDINATES, of_cells, own_cells
 from ...physics.kinematics import BLOCK
@@ -243,7 +242,7 @@ class Stresses:
         """Where points lie in a layer; those of the last call are not looked for again; collective."""
         before = self._located.get(layer)
         if before is None or not np.array_equal(before[0], points):
-            forms, there = self.problem.forms, followed(self.problem, points)
+            forms, there = self.problem.forms, self.problem.followed(points)
             before = points.copy(), locate(forms.domain, there, forms.length, self.cells[layer], f"layer {layer!r}")
             self._located[layer] = before
         return before[1]

@@ -30,7 +30,6 @@ from mpi4py import MPI
 
 from ... import _compat
 from ...errors import InputError, instance, place
-from ...extensions.remeshing import files as remade
 from ...forms.schedule import Setting
 from ...measures.targets import Target
 from ...problem.problem import Problem
@@ -128,7 +127,7 @@ class Checkpoint:
         space = problem.forms.space
         data = _plain_state(state) | {"number": number, "memory": memory, "profile": _profile(self._path, state)}
         if state is segment.states[0] and segment is not self._path.segments[0]:
-            data["mesh"] = remade.save(problem)
+            data["mesh"] = problem.scene.preformed.save(problem)
         for name in _FIELDS:
             data |= {name: _by_cell(space, getattr(state, name)), f"{name}_tail": _tail(space, getattr(state, name))}
 
@@ -179,7 +178,7 @@ def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
     record = Record(problem, Curve(problem, Tolerances()))
     for k, data in enumerate(found):
         if "mesh" in data:
-            problem = remade.load((problem, record.last), data["mesh"])
+            problem = _on_next_mesh(problem, record.last, data["mesh"])
             record.segments.append(Segment(problem, Curve(problem, Tolerances())))
         record.segments[-1].states.append(_read_state(folder / _name(k), data, problem))
     kept = next((s.stepping for s in reversed(record.states) if s.stepping), None)
@@ -187,6 +186,21 @@ def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
     record.counts.steps = sum(s.kind != "start" for s in record.states)
     problem.stand(record.last)
     return record
+
+
+_mesh_loaders: list[Callable[[Problem, State, dict[str, Any]], Problem]] = []
+
+
+def register_mesh_loader(loader: Callable[[Problem, State, dict[str, Any]], Problem]) -> None:
+    """Provide the function that makes the problem on a mesh of a remeshed run again: (problem, last state, data)."""
+    _mesh_loaders[:] = [loader]
+
+
+def _on_next_mesh(problem: Problem, last: State, data: dict[str, Any]) -> Problem:
+    if not _mesh_loaders:
+        raise InputError("load: the checkpoint is of a remeshed run: the extension 'remeshing' of formingx is not"
+                         " installed")
+    return _mesh_loaders[0](problem, last, data)
 
 
 def holds_states(folder: Any, comm: Any) -> bool:

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...contact.tooling import Tooling
 from ...errors import InputError
-from ...extensions.remeshing.earlier_meshes import followed
 from .. import files
 from ..evaluate import volume
 from ..evaluate.contact_face import ContactFace, ContactTable, tool_forces
@@ -289,7 +288,7 @@ class _Fields:
 
     def __init__(self, path: Any, profile: Profile):
         self._path, self._points = path, [profile.rest_bottom, profile.rest_top]
-        self._here = [followed(path.problem, points) for points in self._points]
+        self._here = [path.problem.followed(points) for points in self._points]
         solid = path.problem.forms.domain.topology.dim == 2
         self._stressed = solid and len(path.problem.scene.mesh.layers) == 1
         self._faces = [ContactFace(path, contact) for contact in path.problem.contacts]

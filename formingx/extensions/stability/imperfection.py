@@ -1,0 +1,46 @@
+"""Geometric imperfections in the shape of a buckling mode."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError, finite, instance
+from ...mesh.grid import gathered, to_mesh
+from ...mesh.mesh import Mesh
+from .instability import Loss
+
+
+def imperfect(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
+    """The mesh with its nodes moved along a mode, free of stress there: an imperfection; collective.
+
+    Args:
+        mode: a `Loss` with n = 0 of a run on this mesh, or on one with the same nodes.
+        amplitude: the largest motion of a node, length; negative: against the mode.
+
+    Raises:
+        InputError: the mode varies round the body, or is of other nodes; the moved elements are no mesh.
+
+    >>> column = fx.mesh.disc(radius=1.0, thickness=3.0, elements=(1, 4))
+    >>> pressed = fx.Scene(mesh=column, materials=fx.NeoHookean(c10=0.5), supports=[
+    ...     fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.Displaced("top", "z")])
+    >>> loss = fx.trace(pressed, until=fx.travel(-1.9), progress=False).stability([0]).first
+    >>> bent = fx.imperfect(column, loss, 0.01)
+    """
+    instance("imperfect: mesh", mesh, Mesh, "a mesh")
+    mode, amplitude = instance("imperfect: mode", mode, Loss, "a loss that Path.stability found"), finite(
+        "imperfect: amplitude", amplitude)
+    if mode.number or mode.flipped:
+        raise InputError(f"imperfect: mode: {mode!r}: varies round the body, or is antisymmetric about a mirror"
+                         " plane: no mesh of the section can have it; give a mode of n = 0")
+    grid = gathered(mesh)
+    keys, near = (np.round(points / (1e-7 * np.ptp(grid.points))).astype(np.int64) for points in (
+        mode.points, grid.points))
+    there = {tuple(key): k for k, key in enumerate(keys.tolist())}
+    found = [there.get(tuple(key), -1) for key in near.tolist()]
+    if min(found) < 0:
+        R, Z = grid.points[int(np.argmin(found))]
+        raise InputError(f"imperfect: mode: it has no node at (R, Z) = ({R:.6g}, {Z:.6g}): it is of another mesh")
+    moved = grid.points + amplitude * mode.amplitudes[found][:, : grid.points.shape[1]]
+    return to_mesh(lambda: grid._replace(points=moved), mesh.comm, "imperfect: the moved mesh")
