@@ -90,6 +90,12 @@ def test_material_constants(tmp_path):
     assert uneven["case5"]["rim_over_pole_thickness"] > 1.25 > 1.15 > uneven["case4"]["rim_over_pole_thickness"]
     assert findings["A_over_B_initial_pole_height"] == pytest.approx(1, abs=2e-3)
     assert findings["A_over_B_pole_height_at_15_psi"] == pytest.approx(1.0406, abs=1e-3)
+    pressure, thickness = (found["lai_holt_relaxing"][f"{name}_over_elastic_at_height"]
+                           for name in ("pressure", "pole_thickness"))
+    ratios = [pressure[h] for h in ("0.5", "1.0", "1.5")]      # strain put on lately has relaxed less than t^-0.05
+    assert ratios == sorted(ratios, reverse=True) and all(r > (6 * k / 3) ** -0.05 for k, r in enumerate(ratios, 1))
+    assert ratios[0] == pytest.approx(1.0452, abs=5e-3) and ratios[1] == pytest.approx(1.003, abs=5e-3)
+    assert 1 < thickness["0.5"] < thickness["1.0"] < 1.02      # the pole strains fastest: it is stiffer
     pictures(tmp_path, "cases", "lai_holt", "plates")
 
 
