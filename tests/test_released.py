@@ -10,6 +10,7 @@ from dolfinx import fem
 from test_sets import BASE, air, balance, block, draw
 
 import formingx as fx
+from formingx.extensions.heat import cooling
 from formingx.extensions.release.part import part_along
 from formingx.forms.carry import take_fields
 from formingx.problem.problem import Problem
@@ -107,3 +108,55 @@ def test_setting_pot_quick(tmp_path):
     assert found["neither"]["springback"] > 10 * found["sets"]["springback"]
     assert found["sets"]["height"] > 6 and found["sets"]["least_wall"] > 0.03
     assert drawn(tmp_path / "setting_pot.png")
+
+
+RUBBER = fx.NeoHookean(c10=0.5e6)
+WARM = {"sets": fx.Sets(RUBBER, modulus=8e8, between=(90, 120)),
+        "relaxes and sets": fx.Sets(fx.Viscoelastic(fx.NeoHookean(c10=0.4e6), [(0.4e6, 0.5)],
+                                                    shift=fx.Arrhenius(100e3, 150.0, unit="C")),
+                                    modulus=8e8, between=(90, 120)),
+        "stiffens": fx.NeoHookean(c10=fx.table({19: 2e6, 151: 0.5e6}))}
+
+
+@pytest.fixture(scope="module")
+def chilled():
+    """A cap that was blown hot and chilled from above for 20 s, warm within: of a material of `WARM`."""
+    polymer = fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=1800.0)
+    found = {}
+
+    def of(name):
+        if name not in found:
+            scene = fx.Scene(mesh=fx.mesh.disc(radius=0.05, thickness=0.002, elements=(8, [2, 1])),
+                             materials=WARM[name], temperature=150.0,
+                             expansion=fx.ThermalExpansion(linear=7e-5, stress_free=150.0),
+                             heat=fx.Cooling(polymer, [fx.Convection("top", h=100.0, air=20.0)], unit="C",
+                                             tolerance=0.5),
+                             supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                             loads=[fx.Pressure("bottom", name="air")])
+            found[name] = fx.Process(scene).run([
+                fx.Stage("blow", drive="air", until=fx.pressure(4e4), duration=0.5),
+                fx.Stage("chill", duration=20.0)], accuracy="draft", progress=False)
+        return found[name]
+    return of
+
+
+@pytest.mark.parametrize("name", WARM)
+def test_faces_of_a_warm_part_may_be_chilled_at_once(chilled, name):
+    """What stiffens or sets as the faces go to 20 C: elastic parts go to their free size, set ones keep their shape."""
+    path = chilled(name)
+    assert path.temperature([(0.0, 0.0)]).min() > 85                    # within, not all has set
+    part = path.released(20.0, accuracy="draft")
+    assert part.path.temperature([(0.0, 0.0), (0.0, 0.002)]) == pytest.approx(20.0, abs=1e-4)
+    if name == "stiffens":
+        assert part.diameter == pytest.approx(0.1 * (1 - 7e-5 * 130), rel=1e-5) and part.height < 1e-5 * part.diameter
+    else:
+        assert 0.5 * 7e-5 * 130 < part.shrinkage < 7e-5 * 130 and abs(part.springback) < 0.01 * part.height
+
+
+def test_sudden_chill_is_the_limit_of_a_large_conductance(chilled, monkeypatch):
+    part = chilled("sets").released(20.0, accuracy="draft")
+    monkeypatch.setattr(cooling, "_CONTINUOUS", 1e3)
+    slower = chilled("sets").released(boundaries=[fx.FixedTemperature(face, temperature=20.0) for face in (
+        "bottom", "top")], duration=part.path.last.time - 20.5, accuracy="draft")
+    assert slower.shrinkage == pytest.approx(part.shrinkage, rel=0.01)
+    assert slower.least_wall == pytest.approx(part.least_wall, rel=1e-3)

@@ -155,11 +155,12 @@ def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration:
     if boundaries is not None and duration is None:
         raise InputError("Path.released: boundaries: for how long? give duration=...")
     faces = next(pair for pair in FACES if all(face in mesh.boundaries for face in pair))
-    heat = scene.heat.without_tools(boundaries if temperature is None else dict.fromkeys(
+    thickness = float(wall.wall.max())
+    heat = scene.heat.without_tools(scene.mesh, thickness, boundaries if temperature is None else dict.fromkeys(
         faces, finite("Path.released: temperature", temperature)))
     if duration is not None:
         return heat, positive("Path.released: duration", duration)
-    return heat, _THROUGH * heat.time_through(scene.mesh, float(wall.wall.max()))
+    return heat, _THROUGH * heat.time_through(scene.mesh, thickness)
 
 
 def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
