@@ -59,6 +59,7 @@ from .values.temperature import WLF, Arrhenius
 with _optional():
     from .extensions import contact_events as _contact_events
 with _optional():
+    from .extensions.heat import checks as _heat_checks
     from .extensions.heat.boundaries import (
         Absorption,
         Convection,
@@ -73,6 +74,7 @@ with _optional():
     from .extensions.heat.result import HeatRun
     from .extensions.heat.run import heat
 with _optional():
+    from .extensions.kbkz import rupture as _kbkz_checks
     from .extensions.kbkz.damping import PSM, Damping, DoubleWagner, LuoTanner, Wagner
     from .extensions.kbkz.kbkz import KBKZ
 with _optional():
@@ -80,6 +82,7 @@ with _optional():
     from .extensions.fits.fit import Fit, fit
     from .extensions.fits.fit_in_time import TimedTest
 with _optional():
+    from .extensions.space import checks as _space_checks
     from .extensions.space.sheet import circle, rectangle, sheet
     from .extensions.space.solid_tool import SolidTool, box, extruded, revolved, solid
     _add(mesh, circle, rectangle, sheet)

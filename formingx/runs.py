@@ -10,12 +10,13 @@ import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+from .checks.doctor import before_run
 from .errors import ConvergenceError, InputError, Interrupted, count, finite, instance, known, several
+from .findings import Finding, tell
 from .measures.columns import Measure
 from .measures.targets import Amplitude, Target
 from .physics.contact import Contact
 from .problem.problem import Problem
-from .results.evaluate import volume
 from .results.files.checkpoint import Checkpoint, holds_states, read
 from .results.path import Path
 from .run_hooks import MeshRenewal, StopCondition, adaptation
@@ -115,7 +116,8 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     start = _from_checkpoint("trace", resume, checkpoint, scene, start)
     with _carried(checkpoint) as carried:
         problem = Problem(scene) if start is None else start.problem
-        path = carried(_path(Curve(problem, tolerances or Tolerances()), start, record, beyond))
+        path = carried(_path(Curve(problem, tolerances or Tolerances()), start, record, beyond,
+                             before_run(scene, [*through, until])))
         _keep(path, checkpoint)
         if stop_at is not None:
             stop_at.watch(path)
@@ -169,7 +171,7 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     with _carried() as carried:
         problem = Problem(scene)
         curve = FixedControlCurve(problem, tolerances or Tolerances())
-        path = carried(_path(curve, None, record, beyond))
+        path = carried(_path(curve, None, record, beyond, before_run(scene, [Target(name, to, None)])))
         targets = [(Target(name, to * k / increments, None), Amplitude(problem, driven))
                    for k in range(1, increments + 1)]
         increment = abs(to / problem.forms.control_scale) / increments
@@ -257,7 +259,8 @@ class Process:
             for state in [start] if isinstance(start, State) else start.states[-1:] if start else []:
                 _check_start(state, stages, problem)
             timed = any(stage.timed for stage in stages)
-            path = carried(_path(Curve(problem, tolerances), start, record, beyond, timed))
+            found = before_run(self.scene, stages=stages)
+            path = carried(_path(Curve(problem, tolerances), start, record, beyond, found, timed))
             _keep(path, checkpoint)
             max_steps = None if max_steps is None else count("Process: max_steps", max_steps)
 
@@ -350,9 +353,14 @@ def _check_start(state: State, stages: list[Stage], problem: Problem) -> None:
 
 
 def _path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measure] | None, beyond: bool,
-          timed: bool = False) -> Path:
-    """A path to be solved for by `curve`, that begins with the states of another, or with a state."""
+          found: list[Finding], timed: bool = False) -> Path:
+    """A path to be solved for by `curve`, that begins with the states of another, or with a state.
+
+    found: by the checks before the run, told now.
+    """
     record = Record(curve.problem, curve)
+    record.findings = found
+    tell(found, curve.problem.comm.rank)
     record.beyond = instance("beyond", beyond, bool, "True or False")
     if isinstance(start, Path):
         record.go_on_from(start.record)
@@ -395,7 +403,7 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
     except (ConvergenceError, InputError) as error:
         error.path = path = so_far()
         if path is not None and isinstance(error, ConvergenceError):       # on all ranks
-            _end(path, str(error), path.doubts() if path.record.on_end else [])
+            _end(path, str(error), path.findings() if path.record.on_end else [])
         raise
     except KeyboardInterrupt:
         path = so_far()
@@ -405,23 +413,13 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
         how = (f"checkpoint={str(checkpoint)!r} holds it: the same script goes on with resume=True" if checkpoint else
                "it is lost; with checkpoint='folder', resume=True the same script would go on from there")
         raise Interrupted(f"interrupted {stands}; {how}", path) from None
-    found = paths[0].doubts()
-    for bad, text in [*_of_volume(paths[0]), *found]:
-        if bad == "serious" and paths[0].problem.comm.rank == 0:
-            log.warning("%s", text)
-    _end(paths[0], "", found)
+    path = paths[0]
+    found = path.findings()
+    tell([finding for finding in found if finding not in path.record.findings], path.problem.comm.rank)
+    _end(path, "", found)
 
 
-def _end(path: Path, failure: str, found: list[tuple[str, str]]) -> None:
-    """Tell those who keep the run how it ended, and what is to be doubted."""
+def _end(path: Path, failure: str, found: list[Finding]) -> None:
+    """Tell those who keep the run how it ended, and its findings."""
     for told in path.record.on_end:
         told(failure, found)
-
-
-def doubts(path: Path) -> list[tuple[str, str]]:
-    """(how bad, what) of all that a run says when it ends; collective."""
-    return [*_of_volume(path), *path.doubts()]
-
-
-def _of_volume(path: Path) -> list[tuple[str, str]]:
-    return volume.doubts(path.last.measures["volume_error"], "the last state")

@@ -1,15 +1,15 @@
-"""What `doctor` says of pressures, blow ratios and ways of tools: sizes against what the body is and bears."""
+"""Checks of pressures, blow ratios and ways of tools: sizes against what the body is and bears."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import InputError
-from ..extensions.kbkz import rupture
+from ..findings import Finding, register
 from ..materials.inflation import Inflated, Peak, first_peak
 from ..measures.targets import Target
 from ..mesh.triangles import Triangles
@@ -18,8 +18,9 @@ from ..scene.scene import Scene
 from ..solve.stage import Stage
 from ..tools.shapes import Tool
 from ..units import Units
+from .towards import free_way, through
 
-Found = Iterator[tuple[str, str]]
+Found = Iterator[Finding]
 
 _PRESSED = 100.0           # of the shear modulus: more presses no wall further into any corner
 _SLIGHT = 1e-4             # of shear modulus x thickness / length: as good as no pressure
@@ -47,7 +48,8 @@ class Body(Triangles):
 
     Attributes:
         moduli: {layer: shear modulus}; natural: a pressure of its size, shear modulus x thickness / length, stress.
-        aims: pressures and travels that the run goes to; targets: all that it aims at.
+        aims: pressures and travels that the run goes to; targets: all that it aims at;
+            highest: what its stages must not exceed.
     """
 
     def __init__(self, scene: Scene, targets: Sequence[Target], stages: Sequence[Stage], units: Units):
@@ -57,7 +59,8 @@ class Body(Triangles):
         self.natural = max(self.moduli.values()) * self.thickness / self.length
         self.aims = [aim for target in targets for aim in self._aim(target, scene.driven)]
         self.goals = bool(targets or stages)
-        self.targets = [*targets, *(t for stage in stages for t in (*stage.through, stage.until, stage.highest) if t)]
+        self.targets = [*targets, *(t for stage in stages for t in (*stage.through, stage.until) if t)]
+        self.highest = [stage.highest for stage in stages if stage.highest]
         for stage in stages:
             drive = None if stage.drive is None else scene.things[scene.number(stage.who, stage.drive)]
             for target in (*stage.through, stage.until):
@@ -121,11 +124,9 @@ class Pushed:
     def ways(self) -> tuple[np.ndarray, np.ndarray]:
         """Points of the other face, and where each meets a tool straight on (or infinity), shape (n, 2) each."""
         points = np.unique(np.vstack([self._body.scene.mesh.nodes_of(c.on) for c in self.tools]), axis=0)
-        through = points - self._line[np.argmin(np.hypot(*(points[:, None] - self._line).transpose(2, 0, 1)), axis=1)]
-        size = np.hypot(*through.T)
-        points, way = points[size > 0], through[size > 0] / size[size > 0, None]     # faces may share their ends
+        points, way = through(points, self._line)
         far = 100 * self._body.length
-        gone = np.min([_free_way(c.tool, points, way, far) for c in self.tools], axis=0)[:, None]
+        gone = np.min([free_way(c.tool, points, way, far) for c in self.tools], axis=0)[:, None]
         return points, np.where(np.isfinite(gone), points + np.where(np.isfinite(gone), gone, 0.0) * way, np.inf)
 
     def peak(self) -> Peak | None:
@@ -150,34 +151,27 @@ class Pushed:
                 for name, material in body.scene.materials.items()]
 
 
-def _free_way(tool: Tool, points: np.ndarray, way: np.ndarray, far: float) -> np.ndarray:
-    """How far points, shape (n, 2), go along unit vectors before they come into a tool; infinity beyond `far`."""
-    gone = np.zeros(len(points))
-    for _ in range(1000):                                    # as far at a time as no tool can be nearer
-        free = -tool.signed_distance(points + gone[:, None] * way)
-        if not np.any((free > 1e-6 * far / 100) & (gone < far)):
-            break
-        gone = np.minimum(gone + np.maximum(free, 0.0), far)
-    return np.where(gone < far, gone, np.inf)
-
-
+@register("start")
 def _pressures(body: Body) -> Found:
     """Pressures that no sheet of this stiffness feels, or that none bears: free, or in a mould."""
     stiff = max(body.moduli.values())
     for name, value in body.pressures():
         if 0 < abs(value) < _SLIGHT * body.natural:
-            yield name, (f"it is {abs(value) / body.natural:.2g} times shear modulus x thickness / length ="
-                         f" {body.say(body.natural, 'pressure')} (shear modulus {body.say(stiff, 'stress')}), and moves"
-                         f" nothing: are the units of stress the same (Pa, kPa, MPa)?")
+            yield Finding("warning", name,
+                          f"it is {abs(value) / body.natural:.2g} times shear modulus x thickness / length ="
+                          f" {body.say(body.natural, 'pressure')} (shear modulus {body.say(stiff, 'stress')}), and"
+                          f" moves nothing: are the units of stress the same (Pa, kPa, MPa)?")
         free = not body.scene.contacts and abs(value) > 1e3 * body.natural
         if free or abs(value) > _PRESSED * stiff:
             size, what, enough = (stiff, "shear modulus", "some ten times that fill a corner as small as the wall")
             if free:
                 size, what, enough = body.natural, "shear modulus x thickness / length", "a free sheet bears about that"
-            yield name, (f"it is {abs(value) / size:.2g} times {what} = {body.say(size, 'pressure')}: {enough}: are the"
-                         f" units of stress the same (Pa, kPa, MPa)?")
+            yield Finding("warning", name,
+                          f"it is {abs(value) / size:.2g} times {what} = {body.say(size, 'pressure')}: {enough}: are"
+                          f" the units of stress the same (Pa, kPa, MPa)?")
 
 
+@register("scene")
 def _bears(body: Body) -> Found:
     """A free sheet of an energy that does not stiffen has a largest pressure: no state lies above it."""
     for pushed in body.pushed:
@@ -185,12 +179,14 @@ def _bears(body: Body) -> Found:
             continue
         for name, value in body.pressures():
             if _BEYOND * peak.pressure < abs(value) <= 1e3 * body.natural:
-                yield name, (f"a free {'tube' if pushed.tall else 'sheet'} of {_names(body)} bears at most about"
-                             f" {body.say(peak.pressure, 'pressure')} (at a stretch of {peak.stretch:.3g}). Give a pole"
-                             f" height, a pole stretch or a volume as the target: these grow past that maximum;"
-                             f" {_STIFFENS} bear more")
+                yield Finding("warning", name,
+                              f"a free {'tube' if pushed.tall else 'sheet'} of {_names(body)} bears at most about"
+                              f" {body.say(peak.pressure, 'pressure')} (at a stretch of {peak.stretch:.3g}). Give a"
+                              f" pole height, a pole stretch or a volume as the target: these grow past that maximum;"
+                              f" {_STIFFENS} bear more")
 
 
+@register("scene")
 def _blow_ratio(body: Body) -> Found:
     """A tube whose pressure falls far behind its peak bulges at one place; what is blown first is thin in the end."""
     for pushed in body.pushed:
@@ -201,17 +197,20 @@ def _blow_ratio(body: Body) -> Found:
         beside = np.isfinite(ends[:, 0]) & (points[:, 0] > 0.95 * outer)     # not its round end
         ratio = float(ends[beside, 0].max(initial=outer) / outer)
         if ratio > _BLOWN:
-            yield repr(pushed.tools[0]), (f"the parison of radius {body.say(pushed.radius, 'travel')} is blown up"
-                                          f" {ratio:.3g}-fold in this mould: are the units of length the same (mm and"
-                                          f" cm)?")
+            yield Finding("warning", repr(pushed.tools[0]),
+                          f"the parison of radius {body.say(pushed.radius, 'travel')} is blown up"
+                          f" {ratio:.3g}-fold in this mould: are the units of length the same (mm and"
+                          f" cm)?")
         elif (found := pushed.left(ratio)) is not None and found[0] < _LEFT:
-            yield "materials", (f"a tube of {_names(body)} has its largest pressure,"
-                                f" {body.say(found[1].pressure, 'pressure')}, at a blow ratio of"
-                                f" {found[1].stretch:.3g}, and only {100 * found[0]:.0f} % of it on the way to this"
-                                f" mould's ratio of {ratio:.3g}: it bulges at one place, snaps, and may find no"
-                                f" equilibrium before the mould. Use a larger parison; {_STIFFENS} not bulge")
+            yield Finding("warning", "materials",
+                          f"a tube of {_names(body)} has its largest pressure,"
+                          f" {body.say(found[1].pressure, 'pressure')}, at a blow ratio of"
+                          f" {found[1].stretch:.3g}, and only {100 * found[0]:.0f} % of it on the way to this"
+                          f" mould's ratio of {ratio:.3g}: it bulges at one place, snaps, and may find no"
+                          f" equilibrium before the mould. Use a larger parison; {_STIFFENS} not bulge")
 
 
+@register("scene")
 def _closing(body: Body) -> Found:
     """A mould that leaves a way straight past it holds only what the sheet bears alone."""
     for pushed in body.pushed:
@@ -229,10 +228,11 @@ def _closing(body: Body) -> Found:
         if aims or deep:
             why = f"{aims[0][0]} is more than the {body.say(peak.pressure, 'pressure')} that the sheet bears alone" \
                 if aims and peak else "a sheet bears little alone"
-            yield repr(pushed.tools[0]), (f"the mould is open: straight ahead of (R, Z) = ({open_at[0, 0]:.4g},"
-                                          f" {open_at[0, 1]:.4g}) it has no surface, and {why}: the body would be"
-                                          f" blown past its end. Give the profile a floor to R = 0, or a pole height"
-                                          f" or a volume as the target")
+            yield Finding("warning", repr(pushed.tools[0]),
+                          f"the mould is open: straight ahead of (R, Z) = ({open_at[0, 0]:.4g},"
+                          f" {open_at[0, 1]:.4g}) it has no surface, and {why}: the body would be"
+                          f" blown past its end. Give the profile a floor to R = 0, or a pole height"
+                          f" or a volume as the target")
 
 
 def _across(pushed: Pushed, points: np.ndarray) -> np.ndarray:
@@ -241,6 +241,7 @@ def _across(pushed: Pushed, points: np.ndarray) -> np.ndarray:
     return np.array([0.0, np.sign(away[1])]) if not pushed.tall else np.array([1.0, 0.0])
 
 
+@register("start")
 def _mould_sizes(body: Body) -> Found:
     """A sheet beside a mould that stays, many times wider or narrower than what it is to be formed into."""
     for contact in body.scene.contacts:
@@ -255,10 +256,12 @@ def _mould_sizes(body: Body) -> Found:
         narrow = reach.max() < wide / _WIDER
         if abs(bottom) > abs(flange) and (narrow or reach.max() > _WIDER * wide and wide < gap < 20 * wide):
             what = "reaches to" if narrow else f"is {body.say(gap, 'travel')} away, and reaches to"
-            yield repr(contact), (f"the mould {what} R = {body.say(float(reach.max()), 'travel')}, the sheet to"
-                                  f" {body.say(wide, 'travel')}: are the units of length the same (mm and cm)?")
+            yield Finding("warning", repr(contact),
+                          f"the mould {what} R = {body.say(float(reach.max()), 'travel')}, the sheet to"
+                          f" {body.say(wide, 'travel')}: are the units of length the same (mm and cm)?")
 
 
+@register("start")
 def _ways(body: Body) -> Found:
     """A tool that moves away from its face, or past it."""
     for i, tool in enumerate(body.scene.things):
@@ -269,6 +272,11 @@ def _ways(body: Body) -> Found:
         meets = [c for c in (body.scene.things[k] for k in body.scene.together(i)) if isinstance(c, Contact)]
         aims = [aim.value for aim in body.aims if aim.thing is tool]
         if any(value < 0 for value in aims):                 # it is taken back, or pulls
+            if aims[0] < 0 and tool.separates:
+                yield Finding("warning", repr(tool),
+                              f"its first travel is {body.say(aims[0], 'travel')}: below 0 it moves away from"
+                              f" {tool.on!r}. A tool comes in along moves ="
+                              f" ({', '.join(f'{m:g}' for m in tool.moves)}) with a travel above 0")
             continue
         others = bool(body.scene.loads) or len(body.scene.drivable) > 1
         size = float(max(body.scene.extent))
@@ -280,20 +288,23 @@ def _ways(body: Body) -> Found:
         if gaps.min() <= near and (start > near or gaps[1] <= gaps[0]) or not far > 0:
             continue
         if gaps[1] > gaps[0] and gaps[-1] > gaps[0] and (start <= near or not others or not aims):
-            yield repr(tool), (f"it moves away from the body: over a travel of {body.say(far, 'travel')} its gap to"
-                               f" {tool.on!r} grows from {body.say(max(0.0, start), 'travel')} to"
-                               f" {body.say(gaps[-1], 'travel')}: must it be moves ="
-                               f" ({', '.join(f'{0 - m:g}' for m in tool.moves)})?")
+            yield Finding("warning", repr(tool),
+                          f"it moves away from the body: over a travel of {body.say(far, 'travel')} its gap to"
+                          f" {tool.on!r} grows from {body.say(max(0.0, start), 'travel')} to"
+                          f" {body.say(gaps[-1], 'travel')}: must it be moves ="
+                          f" ({', '.join(f'{0 - m:g}' for m in tool.moves)})?")
         elif not others and gaps.min() > near:
-            yield repr(tool), (f"it touches nothing on its way: over a travel of {body.say(far, 'travel')} it comes no"
-                               f" nearer to {tool.on!r} than {body.say(gaps.min(), 'travel')}: place it nearer (moved),"
-                               f" turn its way, or let it travel farther")
+            yield Finding("warning", repr(tool),
+                          f"it touches nothing on its way: over a travel of {body.say(far, 'travel')} it comes no"
+                          f" nearer to {tool.on!r} than {body.say(gaps.min(), 'travel')}: place it nearer (moved),"
+                          f" turn its way, or let it travel farther")
 
 
 def _gap(faces: list[tuple[Tool, np.ndarray]], moves: Any, travel: float) -> float:
     return min(float(-tool.signed_distance(nodes - travel * np.array(moves)).max()) for tool, nodes in faces)
 
 
+@register("scene")
 def _sharp_edges(body: Body) -> Found:
     """Under a sharp edge the force depends on where nodes lie, whatever the mesh: see tests/test_doctor.py."""
     for contact in body.scene.contacts:
@@ -305,16 +316,13 @@ def _sharp_edges(body: Body) -> Found:
         for a, b in zip(pieces, pieces[1:] + (pieces[:1] if contact.tool.closed else ())):
             turn = np.degrees((b.angles[0] - a.angles[1] + np.pi) % (2 * np.pi) - np.pi)
             if turn > _SHARP:                                # the solid is to the left: convex
-                yield repr(contact), (f"its edge at (R, Z) = ({a.ends[1][0]:.4g}, {a.ends[1][1]:.4g}) is sharp: forces"
-                                      f" there are off by 1 to 3 %, depending on where nodes lie, and more elements"
-                                      f" through the thickness ({rows:.2g} here) do not help: give it a fillet that"
-                                      f" spans some elements along the sheet")
+                yield Finding("warning", repr(contact),
+                              f"its edge at (R, Z) = ({a.ends[1][0]:.4g}, {a.ends[1][1]:.4g}) is sharp: forces"
+                              f" there are off by 1 to 3 %, depending on where nodes lie, and more elements"
+                              f" through the thickness ({rows:.2g} here) do not help: give it a fillet that"
+                              f" spans some elements along the sheet")
                 break
 
 
 def _names(body: Body) -> str:
     return ", ".join(dict.fromkeys(str(m) for m in body.scene.materials.values()))
-
-
-CHECKS: Sequence[Callable[[Body], Found]] = (_pressures, _bears, _blow_ratio, _closing, _mould_sizes, _ways,
-                                                 _sharp_edges, rupture.check)

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError, as_points, count
 from ..figures import Axes
+from ..findings import Finding, found_at, worst_first
 from ..solve.state import State
 from ..units import NONE, Units
-from .evaluate import edges, snaps, tension, volume
 from .evaluate.profile import Profile
 from .evaluate.stress import StressField
 from .show.picture import Picture
@@ -42,17 +42,16 @@ class Path(States):
     def __repr__(self) -> str:
         return f"Path({len(self.states)} states{f', to {self.last!r}' if self.states else ''})"
 
-    def doubts(self) -> list[tuple[str, str]]:
-        """(how bad: "serious" or "minor"; what) a run says when it ends, but for `volume_error`; collective."""
-        found = volume.doubts_of_point(self.problem.furthest_volume_ratio(self.last))
-        for history in self.problem.histories:
-            found += getattr(history, "doubts", lambda states: [])(self.segments[-1].states)
-        if self._in_space:
-            from ..extensions.space import show
-            found += show.doubts(self, self.wall())
-        found += self._view(self.segments[-1]).verdict.doubts(self.last)
-        found += edges.doubts(edges.coarsest(self, self.last)) + tension.doubts(tension.first_compression(self))
-        return found + snaps.doubts(snaps.largest(self))
+    def findings(self) -> list[Finding]:
+        """Return what the checks found before and after the run, worst first (`formingx.findings`); collective.
+
+        A finding has a severity ("serious": the results must not be used as they are; "warning": they may be another's
+        than was meant, or less exact than usual; "note"), the subject and the text.
+
+        >>> path.findings()
+        []
+        """
+        return worst_first([*self.record.findings, *(found_at("end", self) if self.states else [])])
 
     def profile(self, state: State | None = None) -> Profile:
         """Deformed outline and thickness of a sheet at a state (default: the last)."""
@@ -80,7 +79,7 @@ class Path(States):
         from .files.checkpoint import Checkpoint
         kept = Checkpoint(folder, self)
         kept.write()
-        kept.end("", self.doubts())
+        kept.end("", self.findings())
 
     def to_vtx(self, folder: Any, states: Any = None) -> None:
         """Write fields of states (default: the last) for ParaView, a time step each: `formingx.results.files.fields`.

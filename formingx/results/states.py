@@ -356,6 +356,11 @@ class States:
         record.segments, record.counts = [segment], self.counts
         return type(self)(record, self._timed, self._own, self._views)
 
+    @property
+    def admissibility(self) -> Verdict:
+        """What judges the states of the last segment."""
+        return self._view(self.segments[-1]).verdict
+
     def _view(self, segment: Segment) -> _View:
         key = id(segment.problem)
         if key not in self._views:

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..mesh.triangles import Place
 from .arc_length import Curve
-from .equations import Attempt, Findings
+from .equations import Attempt, Examined
 from .linear import DirectSolver, condition
 from .state import State
 
@@ -102,7 +102,7 @@ class Diagnosis:
     causes: tuple[str, ...] = ()
     advice: tuple[str, ...] = ()
     what: str = "control"
-    examined: Findings | None = field(default=None, repr=False)
+    examined: Examined | None = field(default=None, repr=False)
 
     def __str__(self) -> str:
         at = f", at {self.what} {self.aimed:.8g}" if self.aimed is not None else ""

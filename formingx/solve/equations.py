@@ -149,7 +149,7 @@ class Attempt(NamedTuple):
     dcontrol: float
 
 
-class Findings(Protocol):
+class Examined(Protocol):
     """What a body tells about a failed attempt: `facts` are fields of a `Diagnosis`."""
 
     facts: dict[str, Any]
@@ -360,7 +360,7 @@ class Units(Protocol):
         """What makes a residual infinite or not a number."""
         return "the equations are not defined there"
 
-    def examine(self, last: Standing | None, attempt: Attempt | None) -> Findings | None:
+    def examine(self, last: Standing | None, attempt: Attempt | None) -> Examined | None:
         """What the last good state and a failed attempt tell, for a `Diagnosis`; collective."""
         return None
 

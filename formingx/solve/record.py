@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from ..errors import ConvergenceError
+from ..findings import Finding
 from ..measures.targets import Target
 from .arc_length import Curve
 from .equations import Equations
@@ -59,8 +60,8 @@ class Record:
         ended: why the run ended before its targets, as a result and not as an error; "" if it did not.
         on_state: functions called with every accepted state, while the problem stands there (they fill `measures`).
         on_step: functions called whenever a step is complete.
-        on_end: functions called when the run ends, with the words of what failed, or "", and those of what is to be
-            doubted, [(how bad, what)].
+        on_end: functions called when the run ends, with the words of what failed, or "", and the findings of the run.
+        findings: of the checks before the run.
         judge: says of a state whose measures are known why it is none that a body can have, "" if it is one.
         beyond: keep such states, too.
     """
@@ -70,7 +71,8 @@ class Record:
         self.counts, self.stage, self.ended = Counts(), "", ""
         self.on_state: list[Callable[[State], None]] = []
         self.on_step: list[Callable[[], None]] = []
-        self.on_end: list[Callable[[str, list[tuple[str, str]]], None]] = []
+        self.on_end: list[Callable[[str, list[Finding]], None]] = []
+        self.findings: list[Finding] = []
         self.judge: Callable[[State], str] = lambda state: ""
         self.beyond = False
 

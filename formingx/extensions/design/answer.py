@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...findings import alarming
 from .run import DesignRun
 
 _SCATTER = 6e-5
@@ -92,7 +93,7 @@ class Answer:
         lines += [f"the run before predicted the wall to {100 * off:.2g} %"]
         lines += [f"bounds: {', '.join(met)}" for met in [self.at_bounds()] if met]
         lines += [f"no effect: {', '.join(none)}" for none in [self.without_effect()] if none]
-        lines += [f"the best run: {text}" for kind, text in self.best.path.doubts() if kind == "serious"]
+        lines += [f"the best run: {found.text}" for found in alarming(self.best.path.findings())]
         return "\n".join([*lines, *[self.lack] * bool(self.lack), *(f"failed: {text}" for text in self.failed)])
 
     __repr__ = __str__

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...contact.tooling import Tooling
 from ...figures import figure, tools
+from ...findings import alarming
 from ...results import files
 from ...results.show import page, plots
 
@@ -25,7 +26,7 @@ def of_answer(answer: Any, file: Any, title: str, deviations: Mapping[str, float
              (f"{walls[0].min():.4g} → {walls[1].min():.4g}", "least wall"),
              (f"{before.volume:.4g} → {best.volume:.4g}", "volume of the body at rest"),
              (str(answer.paths), "runs were taken")]
-    said = [("bad", text) for text in [answer.lack, *(text for kind, text in best.path.doubts() if kind == "serious")]]
+    said = [("bad", text) for text in [answer.lack, *(f.text for f in alarming(best.path.findings()))]]
     said += [("", f"A run failed: {text}") for text in answer.failed]
     said += [("", f"At bounds: {', '.join(met)}.")] * bool(met)
     said += [("", f"Without effect on the wall: {', '.join(none)}.")] * bool(none)
@@ -52,7 +53,7 @@ def of_run(run: Any, file: Any, title: str, deviations: Mapping[str, float] | No
     wall = run.wall
     cards = [(f"{wall.std() / wall.mean():.3g}", "unevenness, standard deviation over mean of the wall"),
              (f"{wall.min():.4g}", "least wall"), (f"{run.volume:.4g}", "volume of the body at rest")]
-    said = [("bad", text) for kind, text in run.path.doubts() if kind == "serious"]
+    said = [("bad", found.text) for found in alarming(run.path.findings())]
 
     def pictures() -> list[str]:
         drawing, axes = figure(1, width=9, height=4)

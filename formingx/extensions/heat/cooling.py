@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import ConvergenceError, InputError, instance, known, positive, several
+from ...findings import Finding
 from ...forms.carry import Carrier
 from ...forms.history import Start
 from ...ranks import gathered
@@ -211,8 +212,8 @@ class CoolingHistory:
             estimate.destroy()
         return np.array(found)
 
-    def doubts(self, states: Sequence[Any]) -> list[tuple[str, str]]:
-        """(how bad, what), as of a verdict, of the temperatures in states: where the mesh is too coarse; collective."""
+    def findings(self, states: Sequence[Any]) -> list[Finding]:
+        """Return the finding on the temperatures in states, where the mesh is too coarse for them; collective."""
         states = [state for state in states if state.time > 0]
         if not states:
             return []
@@ -228,9 +229,12 @@ class CoolingHistory:
         allowed = max(self._cooling.tolerance, _WARNS * span)
         if errors[worst] <= allowed:
             return []
-        return [("serious", f"The error of the temperature in space is about {errors[worst]:.2g} degrees at time"
-                            f" {states[looked[worst]].time:.4g}: use thinner elements at faces that touch a tool or"
-                            f" lose heat{_such_as(scene, errors[worst] / allowed, duration)}.")]
+        low, high = self._cooling.extremes(scene)
+        most = max(span, high - low) if np.isfinite(high - low) else span          # no error is larger
+        error = f"is about {errors[worst]:.2g}" if errors[worst] < most else f"may be their whole span, {most:.3g}"
+        return [Finding("warning", "temperature", f"The error of the temperature in space {error} degrees at time"
+                        f" {states[looked[worst]].time:.4g}: use thinner elements at faces that touch a tool or"
+                        f" lose heat{_such_as(scene, min(errors[worst], most) / allowed, duration)}.")]
 
     def start(self) -> None:
         """See `History`."""

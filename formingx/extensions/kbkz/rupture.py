@@ -1,13 +1,16 @@
-"""What `doctor` says of damped melts: how far a part is drawn, against the stretch beyond which they bear no more."""
+"""Check of damped melts: the draw of a part against the stretch beyond which the melt bears no more."""
 
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
+from ...findings import Finding, register
 
-def check(body: Any) -> Iterator[tuple[str, str]]:
-    """(about, what) of each draw beyond the equibiaxial `rupture_stretch` of a material."""
+
+@register("scene")
+def ruptures(body: Any) -> Iterator[Finding]:
+    """Draws beyond the equibiaxial `rupture_stretch` of a material."""
     for name, material in body.scene.materials.items():
         melt = getattr(material, "base", material)
         if not hasattr(melt, "rupture_stretch"):
@@ -15,11 +18,12 @@ def check(body: Any) -> Iterator[tuple[str, str]]:
         most = melt.rupture_stretch("equibiaxial")
         for about, stretch in _draws(body):
             if stretch > most:
-                yield f"materials[{name!r}]", (
-                    f"{about} stretches it about {stretch:.3g}-fold in all directions, but stretched suddenly it"
-                    f" carries its largest stress at {most:.3g}: drawn faster than it relaxes, it thins without end at"
-                    " its thinnest place. Draw less deep, slower or hotter, or check the damping: one fitted to shear"
-                    f" or uniaxial data is often too strong in equibiaxial extension")
+                yield Finding("warning", f"materials[{name!r}]",
+                              f"{about} stretches it about {stretch:.3g}-fold in all directions, but stretched suddenly"
+                              f" it carries its largest stress at {most:.3g}: drawn faster than it relaxes, it thins"
+                              f" without end at its thinnest place. Draw less deep, slower or hotter, or check the"
+                              f" damping: one fitted to shear or uniaxial data is often too strong in equibiaxial"
+                              f" extension")
 
 
 def _draws(body: Any) -> Iterator[tuple[str, float]]:
@@ -27,7 +31,7 @@ def _draws(body: Any) -> Iterator[tuple[str, float]]:
     for pushed in body.pushed:
         if not pushed.flat or not pushed.round:
             continue
-        for target in body.targets:
+        for target in (*body.targets, *body.highest):
             if (stretch := _of_cap(target, pushed.radius)) is not None:
                 yield str(target), stretch
         if pushed.tools:

@@ -113,7 +113,7 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
             f" {counts.seconds:.1f} s. A sheet in space, as a membrane.</p>"]
     if failure is not None:
         body.append(f"<div class='note bad'><h2>The run could not go on</h2><p>{page.lines(str(failure))}</p></div>")
-    body += [f"<p class=note>{html.escape(text)}</p>" for _, text in doubts(path, wall)]
+    body += [f"<p class=note>{html.escape(found.text)}</p>" for found in path.findings()]
     body += ["<div class=grid>", *pictures, "</div><h2>The answer</h2>",
              page.table(["", ""], [list(row) for row in found.rows])]
     names = list(dict.fromkeys(state.stage for state in path.states))
@@ -125,20 +125,6 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     text = page.page(title or "Report of a run", body, "")
     files.on_root(comm, lambda: files.replace(file, lambda stream: stream.write(text)))
     return FilePath(file)
-
-
-def doubts(path: Any, wall: WallInSpace) -> list[tuple[str, str]]:
-    """(how bad, what) a reader should know of a membrane in compression whose energy is not relaxed there."""
-    if path.problem.scene.model.wrinkles is not None:
-        return []
-    share = float(wall.area_at_rest[wall.wrinkled].sum() / wall.area_at_rest.sum())
-    if share < 1e-3:
-        return []
-    k = int(np.argmax(wall.wrinkled))
-    at = ", ".join(f"{v:.4g}" for v in wall.middle[k])
-    return [("serious", f"{100 * share:.3g} % of the sheet is in compression in the last state, one place at (x, y, z)"
-                        f" = ({at}): it wrinkles there, and its wall depends on the mesh: use Membrane(wrinkles=0.01),"
-                        f" and look at path.wall().wrinkled.")]
 
 
 def _mirrors(path: Any, wall: WallInSpace) -> list[np.ndarray]:

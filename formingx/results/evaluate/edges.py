@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...findings import Finding
 from ...ranks import gathered
 
 _TURN = 40.0
@@ -54,11 +55,11 @@ def coarsest(path: Any, state: Any) -> Edge | None:
     return max((edge for edge in found if edge.turn > 0), default=None)
 
 
-def doubts(edge: Edge | None) -> list[tuple[str, str]]:
-    """(how bad, what), as `volume.doubts`."""
+def findings(edge: Edge | None) -> list[Finding]:
+    """Return the finding on the coarsest edge that the body slides over."""
     if edge is None or edge.turn < _TURN:
         return []
-    return [("serious", f"The body slides over an edge of {edge.tool!r} near (r, z) = ({edge.point[0]:.5g},"
-                        f" {edge.point[1]:.5g}), and from one contact point to the next the tool turns by"
-                        f" {edge.turn:.0f} degrees: forces go up and down as points leave that edge. Use smaller"
-                        f" elements on the face that slides, or a larger fillet.")]
+    return [Finding("warning", edge.tool, f"The body slides over an edge of {edge.tool!r} near (r, z) ="
+                    f" ({edge.point[0]:.5g}, {edge.point[1]:.5g}), and from one contact point to the next the tool"
+                    f" turns by {edge.turn:.0f} degrees: forces go up and down as points leave that edge. Use smaller"
+                    f" elements on the face that slides, or a larger fillet.")]

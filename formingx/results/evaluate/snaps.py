@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import InputError
+from ...findings import Finding
 
 _WALL = 0.05
 """Change of the wall in one jump, over the wall, above which walls behind it are doubted."""
@@ -52,12 +53,13 @@ def largest(path: Any) -> Snap | None:
     return max(found, key=lambda snap: snap.change)
 
 
-def doubts(snap: Snap | None) -> list[tuple[str, str]]:
-    """(how bad, what), as `volume.doubts`."""
+def findings(snap: Snap | None) -> list[Finding]:
+    """Return the finding on the largest jump of the wall."""
     if snap is None or snap.change < _WALL:
         return []
     times = f"{snap.jumps} times, most" if snap.jumps > 1 else "once,"
-    return [("serious", f"The body snapped {times} in state {snap.state}: there the wall went from {snap.before:.4g} to"
-                        f" {snap.after:.4g} of the original at R = {snap.point:.5g}. With friction or relaxing material"
-                        f" where it comes to rest depends on the way there, so all that follows is only as certain as"
-                        f" runs with other steps agree: compare StepControl(target=4) and StepControl(target=8).")]
+    return [Finding("warning", "snap-through", f"The body snapped {times} in state {snap.state}: there the wall went"
+                    f" from {snap.before:.4g} to {snap.after:.4g} of the original at R = {snap.point:.5g}. With"
+                    f" friction or relaxing material where it comes to rest depends on the way there, so all that"
+                    f" follows is only as certain as runs with other steps agree: compare StepControl(target=4) and"
+                    f" StepControl(target=8).")]

@@ -11,6 +11,7 @@ import numpy as np
 import ufl
 
 from ... import _compat
+from ...findings import Finding
 from ...mesh.nodes import own_cells
 from ...physics.models import Membrane
 from ...ranks import gathered
@@ -91,11 +92,12 @@ def first_compression(path: Any) -> tuple[int, Resultant] | None:
     return None
 
 
-def doubts(first: tuple[int, Resultant] | None) -> list[tuple[str, str]]:
-    """(how bad: "serious"; what) of what `first_compression` found."""
+def findings(first: tuple[int, Resultant] | None) -> list[Finding]:
+    """Return the finding on the first compression of a membrane (`first_compression`)."""
     if first is None:
         return []
     k, (direction, value, point) = first
-    return [("serious", f"The membrane is in compression, first in state {k}: its {direction} resultant is {value:.2g}"
-                        f" of shear modulus times thickness at (R, Z) = ({point[0]:.5g}, {point[1]:.5g}): it would"
-                        f" wrinkle there, as it has no bending stiffness: use a solid model, MixedPressure().")]
+    return [Finding("serious", "membrane", f"The membrane is in compression, first in state {k}: its {direction}"
+                    f" resultant is {value:.2g} of shear modulus times thickness at (R, Z) = ({point[0]:.5g},"
+                    f" {point[1]:.5g}): it would wrinkle there, as it has no bending stiffness: use a solid model,"
+                    f" MixedPressure().")]

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...contact import resultants
+from ...findings import Finding
 from ...forms.outline import Outline, along
 from ...ranks import gathered
 from ...scene.tool_width import CUT
@@ -85,8 +86,8 @@ class Verdict:
         """Why a state, whose `measures` are known, is none that a body can have; "" if it is one; collective."""
         return next(self._reasons(state), "")
 
-    def doubts(self, state: State) -> list[tuple[str, str]]:
-        """(how bad, what), as `volume.doubts`, of a state that a body can have; collective."""
+    def findings(self, state: State) -> list[Finding]:
+        """Return the findings on the contact of a state that a body can have; collective."""
         if not self._solid:
             return [("serious", f"{deep.words}: shorter steps (StepControl(length=...)), or a larger penalty.")
                     for deep in self._deepest_points(state, lambda contact: CUT * contact.thickness)]
@@ -95,12 +96,13 @@ class Verdict:
             for contact in self._problem.present:
                 off = _off(contact, state)
                 if off > _LIMITS.warns:
-                    found.append(("serious", f"Penetration changes the force on the tool of {_name(contact)!r} by about"
-                                             f" {100 * off:.2g} %: {_harder(contact, off)}."))
+                    name = _name(contact)
+                    found.append(Finding("warning", name, f"Penetration changes the force on the tool of {name!r} by"
+                                         f" about {100 * off:.2g} %: {_harder(contact, off)}."))
             for cut in self._deepest(edges, state, own=True):
-                found.append(("serious", f"Between contact points the face is {cut.depth:.3g} deep in the tool of"
-                                         f" {cut.name!r} at (r, z) = ({cut.place[0]:.5g}, {cut.place[1]:.5g}): smaller"
-                                         f" elements there, or a larger fillet."))
+                found.append(Finding("warning", cut.name, f"Between contact points the face is {cut.depth:.3g} deep in"
+                                     f" the tool of {cut.name!r} at (r, z) = ({cut.place[0]:.5g}, {cut.place[1]:.5g}):"
+                                     f" smaller elements there, or a larger fillet."))
         return found
 
     def _reasons(self, state: State) -> Iterator[str]:

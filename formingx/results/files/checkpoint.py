@@ -19,7 +19,7 @@ import os
 import shutil
 import time
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path as FilePath
 from typing import Any
@@ -30,6 +30,7 @@ from mpi4py import MPI
 
 from ... import _compat
 from ...errors import InputError, instance, place
+from ...findings import SEVERITIES, Finding
 from ...forms.schedule import Setting
 from ...measures.targets import Target
 from ...problem.problem import Problem
@@ -81,9 +82,9 @@ class Checkpoint:
                 self._there = number + 1
                 done((self._there - first) / (len(path) - first))
 
-    def end(self, failure: str, doubts: list[tuple[str, str]]) -> None:
-        """Write that the run has ended, what failed, or "", and what is to be said of it (`Path.doubts`)."""
-        about = {"failure": failure, "doubts": doubts}
+    def end(self, failure: str, findings: Sequence[Finding]) -> None:
+        """Write that the run has ended, what failed, or "", and the findings (`Path.findings`)."""
+        about = {"failure": failure, "findings": findings}
         files.on_root(self._comm, lambda: _plainly(
             lambda: files.replace(self.folder / _END, lambda stream: json.dump(about, stream, indent=1)),
             self.folder, f"{_END} could not be written; its states are kept"))
@@ -240,15 +241,16 @@ def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]], float]:
 
 
 def ended(folder: Any) -> dict[str, Any] | None:
-    """{"failure": words, or "", "doubts": [(how bad, what)]} of a run that has ended; None: it did not, or is older."""
+    """{"failure": words, or "", "findings": [Finding]} of a run that has ended; None: it did not, or is older."""
     file = place("checkpoint", folder) / _END
     if not file.exists():
         return None
     found = _read_json(file)
-    if not (isinstance(found.get("failure"), str) and isinstance(found.get("doubts"), list) and all(
-            isinstance(one, list) and list(map(type, one)) == [str, str] for one in found["doubts"])):
+    rows = found.get("findings")
+    if not (isinstance(found.get("failure"), str) and isinstance(rows, list) and all(
+            isinstance(one, list) and list(map(type, one)) == [str] * 4 and one[0] in SEVERITIES for one in rows)):
         raise InputError(f"checkpoint: {str(file)!r} is damaged: it does not say how the run ended")
-    return found
+    return {"failure": found["failure"], "findings": [Finding(*one) for one in rows]}
 
 
 def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:

@@ -5,11 +5,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ...errors import non_negative, positive
+from ...findings import Finding, alarming
 from . import checkpoint
 
 _RECENT = 20
 """Of so many steps the pace is taken."""
+_MOVES = ("enclosed_volume", "pole_height", "contact_length", "contact_area", "strain_energy")
+_STILL = 1e-3
+"""Relative change of these over the recent steps below which the body stands still."""
 _MET = 1e-9
 """Distance from a target, over it, at which it is met."""
 
@@ -25,8 +31,10 @@ class Status:
             its last steps; None: it came no nearer in them.
         limits: {what made steps shorter: how often}, in the whole run.
         age: seconds since the last state was written.
-        ended: {"failure": what ended it, or "", "doubts": [(how bad, what)]} of a run that has ended; None: it goes on,
-            or was killed.
+        ended: {"failure": what ended it, or "", "findings": [Finding]} of a run that has ended; None: it goes on, or
+            was killed.
+        moved: the quantity that changed most over the last steps, with its values before and after them, or None: a
+            body may go on while the pressure falls past a maximum.
     """
 
     states: int
@@ -38,6 +46,14 @@ class Status:
     limits: dict[str, int]
     age: float
     ended: dict[str, Any] | None
+    moved: tuple[str, float, float] | None = None
+
+    @property
+    def findings(self) -> list[Finding]:
+        """Findings that are more than notes: on the last state, and on the run when it has ended."""
+        ended = [] if self.ended is None else alarming(self.ended["findings"])
+        state = [Finding("serious", "state", self.verdict)] if self.verdict else []
+        return state + [finding for finding in ended if not (state and finding.about == "state")]
 
     def __str__(self) -> str:
         lines = [f"{self.states} state{'s' * (self.states != 1)}" + f", stage {self.stage!r}" * bool(self.stage)]
@@ -45,19 +61,25 @@ class Status:
             name, goal, now = self.target
             lines[0] += f": {name.replace('_', ' ')} {now:.6g} of {goal:.6g}"
         spent = f"{self.spent:.0f} s" if self.spent >= 10 else f"{self.spent:.2g} s"
-        left = "no nearer to the target in the last steps" if self.left is None else \
+        left = self._without_pace() if self.left is None else \
             "the target is met" if self.left == 0 else f"about {self.left:.2g} s to the end of the stage"
         limits = ", ".join(f"{why} ({n} times)" for why, n in sorted(self.limits.items(), key=lambda one: -one[1])[:3])
         if self.ended is None:
             left += f"; the last state is {_words(self.age)} old"
         elif self.left != 0:
             left = "the run could not go on" if self.ended["failure"] else "the run ended before its target"
-        lines += [f"after {spent}: {left}", f"steps limited by: {limits or 'their own control only'}",
-                  f"verdict: {self.verdict or 'good'}"]
-        if self.ended is not None:
-            lines += [self.ended["failure"]] * bool(self.ended["failure"])
-            lines += [f"{bad}: {what}" for bad, what in self.ended["doubts"] if bad == "serious"]
-        return "\n".join(lines)
+        lines += [f"after {spent}: {left}", f"steps limited by: {limits or 'their own control only'}"]
+        if self.ended is not None and self.ended["failure"]:
+            lines.append(self.ended["failure"])
+        return "\n".join([*lines, *(map(str, self.findings) if self.findings else ["findings: none"])])
+
+    def _without_pace(self) -> str:
+        """Why the time left is not known."""
+        if self.moved is None:
+            return "no nearer to the target in the last steps"
+        name, before, now = self.moved
+        return (f"the body goes on, {name.replace('_', ' ')} {before:.5g} to {now:.5g} in the last steps; its time left"
+                f" is not known, as the target came no nearer")
 
 
 def of_folder(folder: Any) -> Status:
@@ -76,11 +98,14 @@ def of_folder(folder: Any) -> Status:
         return Status(n, last["stage"], last["verdict"], None, counts.get("seconds", 0.0), None,
                       counts.get("limits", {}), age, ended)
     now, before = done[-1]["measures"][name], done[0]["measures"][name]
+    moved = {c: (done[0]["measures"][c], done[-1]["measures"][c]) for c in _MOVES if c in last["measures"]}
+    most = max(moved, key=lambda c: abs(np.subtract(*moved[c])) / (max(map(abs, moved[c])) or 1.0), default=None)
     won = 1 - abs(goal - now) / abs(goal - before) if goal != before else 0.0
     took = counts["seconds"] - done[0]["stepping"]["counts"]["seconds"]
     left = 0.0 if abs(now - goal) <= _MET * abs(goal) else took * (1 - won) / won if won > 0 else None
     return Status(n, last["stage"], last["verdict"], (name, goal, now), counts["seconds"], left,
-                  counts.get("limits", {}), age, ended)
+                  counts.get("limits", {}), age, ended,
+                  (most, *moved[most]) if most and not np.isclose(*moved[most], rtol=_STILL, atol=0.0) else None)
 
 
 def _words(seconds: float) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...contact.tooling import Tooling
 from ...errors import InputError
+from ...findings import Finding, worst_first
 from .. import files
 from ..evaluate import volume
 from ..evaluate.contact_face import ContactFace, ContactTable, tool_forces
@@ -45,7 +46,7 @@ class Record:
             the profiles say; of those that are drawn. (A checkpoint knows the temperature alone.)
         heat: {tool: (conductance, its temperature in words)} where tools take heat; unit: of temperatures, or "".
         layers: of the last state, as in `Wall`; script: the file that ran; or "".
-        doubts: `Path.doubts`; of a checkpoint what the run said when it ended, as is failure: what ended it, or "".
+        findings: `Path.findings`; of a checkpoint those with which the run ended, as is failure: what ended it, or "".
         verdicts: of the n states, `State.verdict`.
     """
 
@@ -65,7 +66,7 @@ class Record:
     fields: list[dict[str, np.ndarray]]
     layers: dict[str, np.ndarray]
     script: str = ""
-    doubts: Sequence[tuple[str, str]] = ()
+    findings: Sequence[Finding] = ()
     failure: str = ""
     verdicts: Sequence[str] = ()
     heat: dict[str, tuple[float, str]] = field(default_factory=dict)
@@ -97,32 +98,34 @@ class Record:
         """Numbers of the drawn states that have a profile."""
         return [k for k in self.frames if self.profiles[k] is not None]
 
-    def findings(self) -> list[tuple[str, str]]:
-        """(how bad: "serious", "minor" or "note"; what) a reader should know before trusting the numbers."""
+    def all_findings(self) -> list[Finding]:
+        """Return what a reader should know before trusting the numbers, worst first."""
         found = []
         if self.until is not None and self.until[0] in self.measures:
             last, (name, value) = self.measures[self.until[0]][-1], self.until
             if abs(last - value) > 1e-6 * abs(value):
-                found.append(("serious", f"The path ended early: it aimed at {words(name)} {value:g}; its last state"
-                                         f" has {last:.6g}."))
+                found.append(Finding("serious", "target", f"The path ended early: it aimed at {words(name)} {value:g};"
+                                     f" its last state has {last:.6g}."))
         if "penetration" in self.measures:
             deep, thickness = self.measures["penetration"].max(), self._smallest_thickness()
             if thickness is not None and deep > PENETRATION * thickness:
                 begins = self._from(self.measures["penetration"] > PENETRATION * thickness)
-                found.append(("serious" if deep > 4 * PENETRATION * thickness else "minor",
-                              f"The body penetrates a tool by {deep:.3g}, {100 * deep / thickness:.2g} % of its"
-                              f" smallest thickness{begins}: a larger contact penalty makes that less."))
+                found.append(Finding("warning" if deep > 4 * PENETRATION * thickness else "note", "penetration",
+                                     f"The body penetrates a tool by {deep:.3g}, {100 * deep / thickness:.2g} % of its"
+                                     f" smallest thickness{begins}: a larger contact penalty makes that less."))
         worst = np.abs(self.measures["mass_error"]).max()
         if worst > MASS:
-            found.append(("serious" if worst > 10 * MASS else "minor",
-                          f"The mass changes by up to {100 * worst:.2g} %"
-                          f"{self._from(np.abs(self.measures['mass_error']) > MASS)}: a smaller eps, or a finer mesh,"
-                          f" keeps it."))
-        found += [*self._of_volume(), *self._of_verdict(), *self.doubts]
+            found.append(Finding("warning" if worst > 10 * MASS else "note", "mass",
+                                 f"The mass changes by up to {100 * worst:.2g} %"
+                                 f"{self._from(np.abs(self.measures['mass_error']) > MASS)}: a smaller eps, or a finer"
+                                 f" mesh, keeps it."))
+        found += [*self._of_volume(), *self._of_verdict()]
+        mine = {finding.about for finding in found}         # of all states, where the run looked at the last
+        found += [finding for finding in self.findings if finding.about not in mine]
         if self.counts.get("failures", 0) > len(self.kinds):
-            found.append(("note", f"{self.counts['failures']} attempts at a step failed and were repeated with a"
-                                  f" shorter step; that does not impair the results."))
-        return sorted(found, key=lambda one: ("serious", "minor", "note").index(one[0]))
+            found.append(Finding("note", "steps", f"{self.counts['failures']} attempts at a step failed and were"
+                                 f" repeated with a shorter step; that does not impair the results."))
+        return worst_first(found)
 
     @property
     def limits(self) -> dict[str, int]:
@@ -148,23 +151,23 @@ class Record:
         stage = f"{words(self.stages[k])!r}, " if self.stages[k] else ""
         return f", from state {k} on ({stage}{words(self.control)} = {self.measures[self.control][k]:.5g})"
 
-    def _of_volume(self) -> list[tuple[str, str]]:
+    def _of_volume(self) -> list[Finding]:
         errors = self.measures["volume_error"]
         k = int(np.argmax(errors))
         first = int(np.argmax(errors > volume.BOUND))
         begins = f"; more than {100 * volume.BOUND:g} % from state {first} on" if first < k else ""
         where = f"state {k}, {words(self.control)} = {self.measures[self.control][k]:.5g}{begins}"
-        return volume.doubts(errors[k], where)
+        return volume.findings(errors[k], where)
 
-    def _of_verdict(self) -> list[tuple[str, str]]:
+    def _of_verdict(self) -> list[Finding]:
         k = next((k for k, verdict in enumerate(self.verdicts) if verdict), None)
         return [] if k is None else [
-            ("serious", f"From{self._from(np.arange(len(self.kinds)) >= k)[6:]} the results must not be used:"
-                        f" {self.verdicts[k]}.")]
+            Finding("serious", "state", f"From{self._from(np.arange(len(self.kinds)) >= k)[6:]} the results must not be"
+                    f" used: {self.verdicts[k]}.")]
 
     def warnings(self) -> list[str]:
         """What a reader should know before trusting the numbers, without how bad it is."""
-        return [text for _, text in self.findings()]
+        return [finding.text for finding in self.all_findings()]
 
     def _smallest_thickness(self) -> float | None:
         last = self.profiles[-1]
@@ -200,14 +203,14 @@ def of_path(path: Any) -> Record:
                       kinds, stages, measures, [list(s.history) for s in states], profiles, vars(path.counts),
                       stepping.get("until"), tooling, [tooling.travels(s.setting, s.control) for s in states],
                       tool_forces(path), shown, dict(wall.layers) if wall else {}, sys.argv[0],
-                      path.doubts(), verdicts=[s.verdict for s in states],
+                      path.findings(), verdicts=[s.verdict for s in states],
                       space=problem.scene.kinematics.components == 3, **_heat(plain(problem.scene.heat)))
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:
     """The record of what `formingx.results.files.checkpoint.contents` gives."""
     stepping: dict = next((s["stepping"] for s in reversed(states) if s["stepping"]), {})
-    ended = about.get("ended") or {"doubts": (), "failure": ""}
+    ended = about.get("ended") or {"findings": (), "failure": ""}
     tooling = Tooling.of_description(about["scene"])
     measures = {c: np.array([s["measures"][c] for s in states]) for c in states[0]["measures"]}
     profiles = [s["profile"] and Profile(**{k: np.array(v) for k, v in s["profile"].items()}) for s in states]

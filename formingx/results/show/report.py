@@ -19,6 +19,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...errors import InputError, several
+from ...findings import Finding
 from ...units import NONE, Units
 from .. import files
 from ..evaluate.part import Part, part
@@ -146,16 +147,16 @@ def _warnings(record: Record, lead: str = "") -> str:
     """What a reader should know first: two lines of each, all of it when it is opened."""
     if record.space:
         lead = f"<p class=note>{html.escape(lead)}Curves and inputs alone: {_NO_MESH}.</p>"
-        return lead + "".join(_noted(*found) for found in record.findings())
-    if not record.findings():
+        return lead + "".join(map(_noted, record.all_findings()))
+    if not record.all_findings():
         return (f"<p class=good>{html.escape(lead)}No warnings: the target was met; mass, volume of the elements and"
                 f" penetration are within bounds, and no face crosses another or the axis.</p>")
-    return "".join(_noted(bad, lead + text) for bad, text in record.findings())
+    return "".join(_noted(found._replace(text=lead + found.text)) for found in record.all_findings())
 
 
-def _noted(bad: str, text: str) -> str:
-    return (f"<details class='note{' bad' if bad == 'serious' else ''}'><summary><b>{bad}</b>: {html.escape(text)}"
-            f"</summary></details>")
+def _noted(found: Finding) -> str:
+    return (f"<details class='note{' bad' if found.severity != 'note' else ''}'><summary><b>{found.severity}</b>:"
+            f" {html.escape(found.text)}</summary></details>")
 
 
 def _made(records: list[Record]) -> list[list[str]]:

@@ -1,0 +1,36 @@
+"""Checks of a run that has ended: its last state, its jumps, what its tools met."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from ..findings import Finding, register
+from ..results.evaluate import edges, snaps, tension, volume
+
+
+@register("end")
+def inadmissible(path: Any) -> Iterator[Finding]:
+    """The first state that a body cannot have (`State.verdict`)."""
+    bad = next((state for state in path.states if state.verdict), None)
+    if bad is not None:
+        yield Finding("serious", "state", f"from {path.describe(bad)} on the results must not be used: {bad.verdict}")
+
+
+@register("end")
+def volumes(path: Any) -> Iterator[Finding]:
+    """Elements of the last state that do not keep their volumes; collective."""
+    yield from volume.findings(path.last.measures["volume_error"], "the last state")
+    yield from volume.of_point(path.problem.furthest_volume_ratio(path.last))
+
+
+@register("end")
+def contact(path: Any) -> Iterator[Finding]:
+    """Penetration that changes forces, faces in tools between contact points, edges between them; collective."""
+    yield from path.admissibility.findings(path.last)
+    yield from edges.findings(edges.coarsest(path, path.last))
+
+
+@register("end")
+def equilibrium(path: Any) -> Iterator[Finding]:
+    """Membranes in compression, and jumps that change the wall; collective."""
+    yield from tension.findings(tension.first_compression(path))
+    yield from snaps.findings(snaps.largest(path))

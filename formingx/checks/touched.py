@@ -1,0 +1,75 @@
+"""Checks of a run's tools: those that the body never touched, and moulds from which it moved away."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ..contact import resultants
+from ..contact.tooling import Tooling
+from ..findings import Finding, register
+from .towards import moulds
+
+_AWAY = 1.1                # mean distance of the face from its mould at the end over that at the start
+
+
+@register("end")
+def untouched(path: Any) -> Iterator[Finding]:
+    """Tools that the body never touched in the stages that they took part in, and moulds that it left; collective."""
+    segment = path.segments[-1]
+    problem, states = segment.problem, segment.states
+    if len(path.segments) > 1 or len(states) < 2:            # a new mesh: its states do not show what was before
+        return
+    before = moulds(problem.scene)
+    names = Tooling.of_problem(problem).names
+    for name in dict.fromkeys(names):
+        contacts = [contact for contact, tool in zip(problem.contacts, names, strict=True) if tool == name]
+        there = [state for state in states if _with(problem, state, contacts)]
+        if len(there) < 2:
+            continue
+        touched = any(_touches(problem, state, contacts) for state in _looked_at(path, there[1:], name))
+        start, end = (_distances(problem, state, contacts) for state in (there[0], there[-1]))
+        law, tool = contacts[0].contact, contacts[0].contact.name or contacts[0].contact.on
+        gaps = f"the gap was {start.min():.4g} at first and {end.min():.4g} at the end"
+        if law.moves is None and any(one.contact in before for one in contacts) and \
+                end.mean() > _AWAY * start.mean() + contacts[0].thickness:
+            yield Finding("warning", tool, f"the body moved away from this mould: the mean distance of its face"
+                          f" {law.on!r} grew from {start.mean():.4g} to {end.mean():.4g}. Does the pressure act on the"
+                          f" other face, and has it the right sign?")
+        elif not touched and law.moves is not None:
+            column = problem.scene.column(law) if law in problem.scene.drivable else ""
+            travel = f" of {there[-1].measures[column]:.4g}" if column in there[-1].measures else ""
+            yield Finding("warning", tool, f"this tool met nothing on its travel{travel}: {gaps}. A travel above 0 is"
+                          f" along moves = ({', '.join(f'{m:g}' for m in law.moves)}); place the tool nearer, or turn"
+                          f" its direction")
+        elif not touched:
+            yield Finding("warning", tool, f"the body never touched this tool: {gaps}")
+
+
+def _looked_at(path: Any, states: list[Any], name: str) -> list[Any]:
+    """The states of some that can show a touch: with a force on the tool, else all, as side walls bear none along Z."""
+    column = Tooling.of_problem(path.problem).force_columns.get(name, "")
+    forced = [state for state in states if state.measures.get(column)]
+    touching = [state for state in states if state.measures.get("contact_length", state.measures.get("contact_area"))]
+    return forced[-1:] or touching
+
+
+def _with(problem: Any, state: Any, contacts: list[Any]) -> bool:
+    with problem.at(state):
+        return any(contact in problem.present for contact in contacts)
+
+
+def _touches(problem: Any, state: Any, contacts: list[Any]) -> bool:
+    with problem.at(state):
+        return any(resultants.length(contact, state.x, state.control) > 0 for contact in contacts
+                   if contact in problem.present)
+
+
+def _distances(problem: Any, state: Any, contacts: list[Any]) -> np.ndarray:
+    """Distances of the points of faces from their tools at a state, of all ranks, shape (n,), length."""
+    with problem.at(state):
+        found = [-contact.contact.tool.signed_distance(contact.positions(state.x, state.control))
+                 for contact in contacts]
+    return np.concatenate([part for parts in problem.comm.allgather(found) for part in parts])
