@@ -83,6 +83,8 @@ class Units:
     def mass(self, volume: float, density: float) -> float:
         """Grams of a volume (length^3) of a density in g/cm3; a length that is not said is taken for cm."""
         volume, density = finite("mass: volume", volume), finite("mass: density", density)
+        if density > _DENSEST:
+            raise InputError(f"density = {density:g}: must be in g/cm3 (water has 1), at most {_DENSEST:g}")
         return volume * (LENGTHS[self.length or "cm"] / LENGTHS["cm"]) ** 3 * density
 
     def of(self, column: str) -> str:
@@ -106,6 +108,9 @@ class Units:
         exact = (name for name, unit in names.items() if abs(unit / size - 1) < 1e-9)
         return next(exact, f"{self.stress} {self.length}{power}")
 
+
+_DENSEST = 25.0
+"""g/cm3: no body on Earth is denser."""
 
 NONE: Any = Units()
 """Units that are not said."""

@@ -101,8 +101,9 @@ def test_what_engineers_mistake(given, words):
     scene, stages = pot()
     assert fx.doctor(scene, stages=stages, units=MM).healthy and fx.doctor(scene).healthy
     scene, stages = pot(**given)
-    finding, = fx.doctor(scene, stages=stages, units=MM).findings
+    finding, *others = fx.doctor(scene, stages=stages, units=MM).findings
     assert re.search(words, str(finding)), str(finding)
+    assert [f.about for f in others] == (["materials['sheet']"] if "c10" in given else [])
 
 
 def test_the_table_of_a_stage_is_looked_at():
@@ -215,10 +216,10 @@ def test_findings(make, targets, severity, words):
     (lambda: thick(2, materials=fx.Gent(mu=1.0, Jm=10.0)), fx.pole_stretch(3.0), "must be less than 2.54"),
 ])
 def test_targets_that_cannot_be_met(make, target, words):
-    """What `doctor` calls an error, a run refuses, in the same words."""
+    """What `doctor` calls serious, a run refuses, in the same words."""
     scene = make()
     finding, = fx.doctor(scene, targets=[target]).findings
-    assert finding.severity == "error" and re.search(words, finding.text)
+    assert finding.severity == "serious" and re.search(words, finding.text)
     with pytest.raises(fx.InputError, match=re.escape(f"{target}: {finding.text}")):
         fx.trace(scene, until=target, progress=False)
     other = fx.pole_height(0.1) if scene.driven.quantity == "pressure" else fx.travel(0.1)
@@ -334,7 +335,8 @@ def test_a_path_is_judged_as_when_its_run_ended(caplog):
                      materials=fx.MooneyRivlin(c10=0.4, c01=0.04), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      contacts=[fx.Contact("top", plug, 0.2, moves=(0, -1), name="plug")])
     path = fx.trace(scene, until=fx.travel(4.0), progress=False)
-    said = [f.text for f in fx.doctor(path).findings if f.about == "run"]
-    assert said and all(text in caplog.text for text in said) and any("the tool turns by" in text for text in said)
+    said = [f.text for f in fx.doctor(path).findings if f.about == "plug"]
+    assert said == [f.text for f in path.findings() if f.severity != "note"]
+    assert all(text in caplog.text for text in said) and any("the tool turns by" in text for text in said)
     path.last.verdict = "the body folds"
-    assert [f.severity for f in fx.doctor(path).findings][0] == "error"
+    assert [f.severity for f in fx.doctor(path).findings][0] == "serious"

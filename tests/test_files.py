@@ -26,6 +26,7 @@ import formingx as fx
 from formingx import _compat
 from formingx.__main__ import main
 from formingx.contact.tooling import Tooling
+from formingx.findings import Finding
 from formingx.results.files import checkpoint
 from formingx.results.files.description import describe
 from formingx.results.files.fields import Fields
@@ -451,11 +452,11 @@ def test_warnings(formed, inflated):
     assert report.of_path(inflated).warnings() == []
     record = report.of_path(formed)
     worst = formed["volume_error"].max()                    # the corner of the clamped rim
-    assert worst > 0.02 and [bad for bad, _ in record.findings()] == ["serious"]
+    assert worst > 0.02 and [found.severity for found in record.all_findings()] == ["warning"]
     assert f"J - 1 is up to {100 * worst:.2g} %" in record.warnings()[0]
     n = len(formed)
     record.measures |= {"penetration": np.full(n, 0.1), "mass_error": np.full(n, -0.02), "volume_error": np.zeros(n)}
-    record.doubts = []
+    record.findings = []
     assert [w[:24] for w in record.warnings()] == ["The body penetrates a to", "The mass changes by up t"]
 
 
@@ -493,7 +494,8 @@ def test_report_of_a_warm_process(tmp_path, capsys):
     for command in (["status"], ["watch", "--patience", "0"]):
         assert main([*command, str(tmp_path / "run")]) == 0
     said, again = capsys.readouterr().out.split(f"{len(path)} states, stage 'hold': ")[1:]
-    assert said == again and "process time 1.5 of 1.5" in said and "the target is met" in said and "good" in said
+    assert said == again and "process time 1.5 of 1.5" in said and "the target is met" in said
+    assert "warning: temperature: The error" in said
     assert f"contact arriving ({limits['contact arriving']} times)" in said
     (tmp_path / "run" / "end.json").unlink()
     for k in range(len(path) - 2, len(path)):               # as it was two states earlier
@@ -508,7 +510,7 @@ def test_findings_say_where_they_begin(formed):
     n = len(formed)
     deep = np.where(np.arange(n) >= n // 2, 0.1, 0.0)
     record.measures |= {"penetration": deep, "mass_error": -deep, "volume_error": np.zeros(n)}
-    record.doubts = []
+    record.findings = []
     assert all(f"from state {n // 2} on (pressure = " in text for text in record.warnings())
     assert len(record.warnings()) == 2
 
@@ -516,8 +518,9 @@ def test_findings_say_where_they_begin(formed):
 def test_a_verdict_is_named(inflated):
     record = report.of_path(inflated)
     record.verdicts = ["the body folds" if k > 3 else "" for k in range(len(inflated))]
-    (bad, text), = record.findings()
-    assert bad == "serious" and "From state 4 on" in text and "must not be used: the body folds" in text
+    found, = record.all_findings()
+    assert found.severity == "serious" and "From state 4 on" in found.text
+    assert "must not be used: the body folds" in found.text
 
 
 def test_command_line(inflated, tmp_path, capsys):
@@ -626,13 +629,13 @@ def test_a_checkpoint_says_how_its_run_ended(tmp_path, capsys):
     path = fx.trace(body, until=fx.pole_height(0.1 + start.last.measures["pole_height"]), start=start, progress=False,
                     checkpoint=tmp_path / "run")
     (tmp_path / "run" / "end.json").unlink()
-    path.doubts = lambda: [("serious", "it snapped")]
+    path.findings = lambda: [Finding("warning", "snap-through", "it snapped")]
     path.save(tmp_path / "run")
     assert main(["status", str(tmp_path / "run")]) == 0
     said = capsys.readouterr().out
-    assert "the target is met" in said and "could not go on" not in said and "serious: it snapped" in said
+    assert "the target is met" in said and "could not go on" not in said and "warning: snap-through: it snapped" in said
     record = report.of_checkpoint(*checkpoint.contents(tmp_path / "run"))
-    assert ("serious", "it snapped") in map(tuple, record.findings())
+    assert Finding("warning", "snap-through", "it snapped") in record.all_findings()
 
 
 @pytest.mark.parametrize("words, there", [

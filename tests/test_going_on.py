@@ -125,4 +125,4 @@ def test_a_jump_of_what_has_no_wall_is_no_doubt_about_it():
     path = SimpleNamespace(states=[SimpleNamespace(kind=kind) for kind in ("start", "step", "jump")],
                            problem=SimpleNamespace(has_history=True),
                            profile=lambda state: SimpleNamespace(wall_ratio=next(wall), reference_radius=np.zeros(2)))
-    assert snaps.doubts(snaps.largest(path)) == []
+    assert snaps.findings(snaps.largest(path)) == []

@@ -147,9 +147,9 @@ def test_walls_that_a_jump_with_friction_changes_much_are_doubted(rough):
     ratios = [rough.profile(rough.states[n]).wall_ratio for n in (k - 1, k)]
     assert (snap.jumps, snap.state) == (len(rough.jumps), k)
     assert snap.change == pytest.approx(np.abs(ratios[1] / ratios[0] - 1).max(), rel=1e-12)
-    assert 0.005 < snap.change < 0.05 and snaps.doubts(snap) == []
-    ((bad, text),) = snaps.doubts(snap._replace(after=1.1 * snap.before))
-    assert bad == "serious" and f"state {k}" in text and "StepControl" in text
+    assert 0.005 < snap.change < 0.05 and snaps.findings(snap) == []
+    finding, = snaps.findings(snap._replace(after=1.1 * snap.before))
+    assert finding.severity == "warning" and f"state {k}" in finding.text and "StepControl" in finding.text
 
 
 def share_of_friction(path):

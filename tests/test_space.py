@@ -479,7 +479,7 @@ def test_report_says_where_a_membrane_is_crushed_unless_its_energy_is_relaxed(tm
     monkeypatch.setattr(shutil, "which", lambda program: None)
     monkeypatch.delenv("DISPLAY", raising=False)
     text = path.report(tmp_path / "report.html", density=1.0).read_text()
-    assert ("100 % of the sheet is in compression" in text) == (wrinkles is None) == bool(path.doubts())
+    assert ("100 % of the sheet is in compression" in text) == (wrinkles is None) == bool(path.findings())
     assert "No pictures: a 3-D view needs a screen" in text
 
 

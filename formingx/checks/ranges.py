@@ -15,6 +15,7 @@ from .towards import moulds, sign_towards
 
 _ROUGHEST = 5.0            # coefficient of friction: rubber on dry steel has 1 to 4
 _LARGE = 5.0               # length of a body that is no length in metres
+_HUGE = 1e3                # length of a body from which on it may be one in micrometres
 _STIFFEST = 1e5            # shear modulus with such a length: 100 GPa in MPa, 100 MPa in kPa, 690 MPa in psi
 _SOFTEST = 1e-7            # shear modulus: 0.1 Pa in MPa
 _HARDEST = 1e11            # shear modulus: 100 GPa in Pa
@@ -26,7 +27,7 @@ _LIGHTEST = 1e-10          # weight over shear modulus: it moves nothing
 def moduli(body: Body) -> Iterator[Finding]:
     """Shear moduli that no polymer has in any usual system of units, with a body of this length."""
     for layer, value in body.moduli.items():
-        most = _STIFFEST if body.length > _LARGE else _HARDEST
+        most = _STIFFEST if _LARGE < body.length < _HUGE else _HARDEST
         if not _SOFTEST < value < most:
             yield Finding("warning", f"materials[{layer!r}]",
                           f"its shear modulus is {body.say(value, 'stress')} and the body"

@@ -272,7 +272,7 @@ def _ways(body: Body) -> Found:
         meets = [c for c in (body.scene.things[k] for k in body.scene.together(i)) if isinstance(c, Contact)]
         aims = [aim.value for aim in body.aims if aim.thing is tool]
         if any(value < 0 for value in aims):                 # it is taken back, or pulls
-            if aims[0] < 0 and tool.separates:
+            if aims[0] < 0 and tool.separates and tool is not body.scene.driven:       # else the aim is refused
                 yield Finding("warning", repr(tool),
                               f"its first travel is {body.say(aims[0], 'travel')}: below 0 it moves away from"
                               f" {tool.on!r}. A tool comes in along moves ="

@@ -1,0 +1,116 @@
+"""Findings of one kind, before and after every run: what was meant by a scene, and what a run did instead."""
+
+import re
+
+import numpy as np
+import pytest
+
+import formingx as fx
+from formingx.checks.doctor import before_run
+from formingx.checks.towards import moulds
+from formingx.findings import SEVERITIES, Finding, found_at, register, worst_first
+
+ABOVE = fx.tools.plane(5.0)
+
+
+def sheet(*, load="bottom", c10=0.4, contacts=None, loads=(), **scene):
+    contacts = [fx.Contact("top", ABOVE, "none", name="mould")] if contacts is None else contacts
+    return fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(12, 1)), materials=fx.NeoHookean(c10=c10),
+                    supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure(load), *loads],
+                    contacts=contacts, **scene)
+
+
+def ball(friction="none"):
+    return fx.Contact("top", fx.tools.sphere(radius=4.0).moved(z=4.5), friction, moves=(0, -1), name="plug")
+
+
+def alarms(path, about):
+    return [found.text for found in path.findings() if found.about == about and found.severity == "warning"]
+
+
+def test_one_scale():
+    """Serious ones come first; those of one severity keep their order; a moment that is not known is refused."""
+    found = [Finding(*one, "") for one in (("note", "a"), ("serious", "b"), ("warning", "c"), ("note", "d"))]
+    assert [f.about for f in worst_first(found)] == ["b", "c", "a", "d"]
+    assert SEVERITIES == ("serious", "warning", "note")
+    with pytest.raises(fx.InputError, match="moment 'never' is not known"):
+        register("never")
+
+
+def test_checks_of_extensions_are_registered():
+    from formingx import findings
+    rooms = {check.__module__.split(".")[2] for checks in findings._registered.values() for check in checks
+             if ".extensions." in check.__module__}
+    assert rooms >= {"heat", "kbkz", "space"}
+
+
+@pytest.mark.parametrize("make, words", [
+    (lambda: sheet(c10=4e5), r"materials\['sheet'\]: its shear modulus is 8e\+05"),
+    (lambda: sheet(contacts=[ball(30.0)]), "its coefficient of friction is 30"),
+    (lambda: sheet(contacts=[ball(fx.table({20.0: 0.3, 100.0: 6.0}))], temperature=50.0), "of friction is 6"),
+    (lambda: sheet(loads=[fx.Gravity(1050.0, 9810.0)]), "tears the body apart"),
+    (lambda: sheet(loads=[fx.Gravity(1e-13, 9.81)]), "moves nothing"),
+    (lambda: sheet(loads=[fx.Spin(1050.0, 100.0)]), "tears the body apart"),
+])
+def test_quantities_of_no_polymer(make, words):
+    """Said before every run; not of scenes in mm and MPa, m and Pa, in and psi."""
+    found, = before_run(make())
+    assert found.severity == "warning" and re.search(words, str(found)), str(found)
+
+
+@pytest.mark.parametrize("length, stress", [(1.0, 1.0), (1e-3, 1e6), (1 / 25.4, 145.0)])
+def test_quantities_of_polymers(length, stress):
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0 * length, thickness=0.5 * length, elements=(12, 1)),
+                     materials=fx.NeoHookean(c10=0.4 * stress), loads=[fx.Pressure("bottom")],
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    assert before_run(scene) == []
+    assert before_run(sheet(contacts=[ball(1000.0)])) == []                      # sticks
+    assert before_run(sheet(loads=[fx.Gravity(1.05e-9, 9810.0)])) == []
+
+
+def test_a_density_is_in_grams():
+    with pytest.raises(fx.InputError, match="density = 1050.* g/cm3"):
+        fx.Units("mm", "MPa").mass(1000.0, 1050.0)
+
+
+@pytest.mark.parametrize("load, pressure, away", [
+    ("bottom", 0.01, False), ("bottom", -0.01, True), ("top", 0.01, True), ("top", -0.01, False)])
+def test_a_pressure_that_points_away_from_its_mould(load, pressure, away, caplog):
+    """Before the run, of the pressure; after it, of a body that has moved away (here it ends before its mould)."""
+    mould = fx.Contact("top", ABOVE, "none", name="mould")
+    plug = fx.Contact("bottom", fx.tools.sphere(radius=4.0).moved(z=-9.0), "none", moves=(0, 1), name="plug")
+    scene = sheet(load=load, contacts=[mould, plug])
+    stages = [fx.Stage("blow", drive=scene.loads[0], until=fx.pressure(pressure), without=[plug])]
+    path = fx.Process(scene).run(stages, progress=False)
+    assert [("away from the mould" in text) for text in alarms(path, f"pressure = {pressure:g}")] == [True] * away
+    moved, = alarms(path, "mould")
+    assert ("moved away from this mould" in moved) == away and ("never touched" in moved) == (not away)
+    for found in path.findings():
+        assert (caplog.text.count(found.text) == 1) == (found.severity != "note")
+
+
+def test_a_ring_is_no_mould():
+    """A sheet that is blown through a ring leaves it as it should."""
+    ring = fx.Contact("top", fx.tools.Tool([(8.0, 3.0), (8.0, 0.5), (12.0, 0.5)], [0.0, 0.0, 0.0]), "none")
+    assert moulds(sheet(contacts=[ring])) == [] and len(moulds(sheet())) == 1
+
+
+def test_a_tool_that_meets_nothing():
+    """A plug that is driven the wrong way; one that arrives is not spoken of, nor is a mould that is reached."""
+    scene = sheet(contacts=[ball()])
+    away = fx.Process(scene).run([fx.Stage("plug", drive="plug", until=fx.travel(-3.0))], progress=False)
+    assert "met nothing on its travel of -3: the gap was" in alarms(away, "plug")[0]
+    assert "its first travel is -3" in alarms(away, repr(scene.contacts[0]))[0]
+    stages = [fx.Stage("plug", drive="plug", until=fx.travel(1.0))]
+    near = fx.Contact("top", fx.tools.sphere(radius=4.0, z=0.5), "none", moves=(0, -1), name="plug")
+    assert alarms(fx.Process(sheet(contacts=[near])).run(stages, progress=False), "plug") == []
+    reached = fx.trace(sheet(contacts=[fx.Contact("top", fx.tools.plane(2.0), "none", name="mould")]),
+                       until=fx.enclosed_volume(500.0), progress=False)
+    assert reached["contact_length"][-1] > 0 and alarms(reached, "mould") == []
+
+
+def test_findings_of_a_scene_belong_to_its_path():
+    path = fx.trace(sheet(c10=4e5), until=fx.pole_height(0.1), progress=False)
+    assert path.findings()[0].about == "materials['sheet']" and "mould" in [f.about for f in path.findings()]
+    assert found_at("end", path) == [f for f in path.findings() if f not in path.record.findings]
+    assert np.isfinite(path["pole_height"]).all()
