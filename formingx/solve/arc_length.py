@@ -219,6 +219,10 @@ class Curve:
         """Distance from old to new along the tangent of old."""
         return self._inner(old.direction, old.slope, new.x - old.x, new.control - old.control)
 
+    def turned_at(self, old: State, new: State) -> bool:
+        """True if a run went back from a state: the way to the next one leads against its tangent."""
+        return self._inner(old.direction, old.slope, new.x - old.x, new.control - old.control) < 0
+
     def work_ahead(self, state: State) -> float:
         """Work of the driven load along the tangent of a state, per unit of control and of arc length.
 

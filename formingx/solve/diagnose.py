@@ -200,7 +200,7 @@ def _turns(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
             continue
         first = state.kind in ("start", "jump") or last is not None and last.setting != state.setting
         if last is not None and not first and last.orientation * state.orientation:
-            sense = 1 if curve.progress(last, state) > 0 else -1
+            sense = -1 if curve.turned_at(last, state) else 1
             if sense * last.orientation * state.orientation < 0:
                 found.append((last, state))
         smooth = state.kind in ("step", "target") or state.kind == "start" and not curve.problem.slack_at_rest
