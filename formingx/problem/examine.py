@@ -11,9 +11,8 @@ from mpi4py import MPI
 from .. import figures
 from ..contact.tooling import Tooling
 from ..errors import InputError
-from ..extensions.kbkz.past_states import PastStates
 from ..forms.elements import Body, body
-from ..mesh.nodes import COORDINATES, of_space
+from ..mesh.nodes import of_space
 from ..mesh.triangles import Place, place
 
 
@@ -41,7 +40,6 @@ class Examination:
                 sum(int(np.sum(touch)) for touch in _touching(problem, last.x, last.control)), MPI.SUM)
             if self._shape:
                 self._take_worst(self._shape)
-            self._take_rupture()
         if attempt is not None:
             self._take_attempt(x, attempt)
         x.destroy()
@@ -63,17 +61,6 @@ class Examination:
             facts["I1"] = float(near[at])
             facts["limit"] = place(problem.scene.mesh, shape.points[at], _layer(problem, shape.layers[at[0]]))
             self._marks.append(("nearest to the material's limit", shape.moved[at]))
-
-    def _take_rupture(self) -> None:
-        """How far the damped melt that is nearest to its rupture is drawn in the last good state."""
-        problem = self._problem
-        with problem.at(self._last):
-            for past in (h for h in problem.materials if isinstance(h, PastStates)):
-                melt = getattr(past.material, "base", past.material)
-                most, (least, point) = melt.rupture_stretch("equibiaxial"), past.thinnest()
-                if (drawn := least**-0.5) > max(most, self.facts.get("drawn", (0.0,))[0]):
-                    where = place(problem.scene.mesh, point[:COORDINATES])
-                    self.facts |= {"drawn": (drawn, most), "ruptures": where}
 
     def _take_attempt(self, x: Any, attempt: Any) -> None:
         problem, facts = self._problem, self.facts

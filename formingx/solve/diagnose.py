@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..findings import Finding, found_at, register
 from ..mesh.triangles import Place
 from .arc_length import Curve
-from .equations import Attempt, Examined
+from .equations import Attempt, Equations, Examined
 from .linear import DirectSolver, condition
 from .state import State
 
@@ -49,6 +50,23 @@ ANOTHER_PATH = ("between %s and %s another path branches off (a bifurcation, not
 
 
 @dataclass(frozen=True)
+class Failure:
+    """A run that could not go on, as its checks see it (`formingx.findings.register("failure")`).
+
+    Attributes:
+        facts: {field of a `Diagnosis`: its value}.
+        problem: the equations; last: the last good state, or None.
+        fixed_control: no limit point can be passed; target: the value of the control that was aimed at, or None.
+    """
+
+    facts: dict[str, Any]
+    problem: Equations
+    last: State | None
+    fixed_control: bool = False
+    target: float | None = None
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """What was found when a run could not go on. Numbers are None where they could not be had; a membrane has no J.
 
@@ -64,8 +82,6 @@ class Diagnosis:
         failed_J, at_failed_J: the same in the failed attempt.
         shape: the worst shape of a deformed element of the last good state, over its shape at rest.
         I1, limit: (I1 - 3) / (limit - 3) of the point nearest to its material's limit, and where; None: no limit.
-        drawn: (equibiaxial stretch of the thinnest place of a damped melt, the one at which its stress in a step of
-            strain is largest), if it is beyond that; ruptures: where.
         turned: [(control before, after)] between which the determinant of the tangent changed its sign.
         limit_points: controls of the limit points on the path.
         limit_ahead: the control at which a limit point lies ahead, as the last slopes tell; or None.
@@ -73,8 +89,7 @@ class Diagnosis:
         touching: nodes in contact in the last good state.
         condition, condition_before: 1-norm condition numbers (estimates) of the tangent of the last good state, and
             some states before it.
-        causes: what the numbers prove or make likely, in plain words, the strongest first.
-        advice: what to try.
+        findings: causes that the numbers prove ("serious") or make likely ("warning"), with what to try.
     """
 
     reason: str
@@ -90,8 +105,6 @@ class Diagnosis:
     shape: float | None = None
     I1: float | None = None
     limit: Place | None = None
-    drawn: tuple[float, float] | None = None
-    ruptures: Place | None = None
     turned: tuple[tuple[float, float], ...] = ()
     limit_points: tuple[float, ...] = ()
     limit_ahead: float | None = None
@@ -99,10 +112,19 @@ class Diagnosis:
     touching: int = 0
     condition: float | None = None
     condition_before: float | None = None
-    causes: tuple[str, ...] = ()
-    advice: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     what: str = "control"
     examined: Examined | None = field(default=None, repr=False)
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """The causes in words, the strongest first."""
+        return tuple(finding.text for finding in self.findings)
+
+    @property
+    def advice(self) -> tuple[str, ...]:
+        """What to try."""
+        return tuple(dict.fromkeys(finding.advice for finding in self.findings))
 
     def __str__(self) -> str:
         at = f", at {self.what} {self.aimed:.8g}" if self.aimed is not None else ""
@@ -159,8 +181,10 @@ def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attemp
         facts["aimed"] = equations.shown(attempt.control)[1]
     if last:
         facts |= _tangents(curve, states)
-    causes, advice = _verdict(facts, curve.fixed_control, pace, target)
-    return Diagnosis(**facts, causes=tuple(causes), advice=tuple(advice), examined=examined)
+    found = found_at("failure", Failure(facts, equations, last, curve.fixed_control, target))
+    if pace and not found:
+        found.append(Finding("note", "steps", pace, "more max_steps"))
+    return Diagnosis(**facts, findings=tuple(found), examined=examined)
 
 
 def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
@@ -279,84 +303,82 @@ def _changes(states: Sequence[State], usable: Sequence[State],
     return found
 
 
-def _verdict(facts: dict[str, Any], fixed_control: bool, pace: str,
-             target: float | None) -> tuple[list[str], list[str]]:
-    """What the numbers prove or make likely, and what to try."""
-    found = [*_of_rupture(facts), *_of_material(facts), *_of_elements(facts), *_of_limits(facts, fixed_control, target),
-             *_of_branches(facts), *_of_numbers(facts)]
-    if pace and not found:
-        found.append((pace, "more max_steps"))
-    return [cause for cause, _ in found], list(dict.fromkeys(advice for _, advice in found))
-
-
-def _of_material(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """(cause, advice) of a material near the end of its domain."""
+@register("failure")
+def _of_material(failure: Failure) -> Iterator[Finding]:
+    """A material near the end of its domain."""
+    facts = failure.facts
     if (facts.get("I1") or 0) > _LIMITS.material:
-        yield (f"a material is stretched nearly to its limit: I1 - 3 is {100 * facts['I1']:.3g} % of the largest that"
-               f" it allows, at {facts['limit']}",
-               "a target that needs less stretch there, a material with a higher limit, or shorter steps"
-               " (StepControl(largest=...))")
+        yield Finding("serious", "material",
+                      f"a material is stretched nearly to its limit: I1 - 3 is {100 * facts['I1']:.3g} % of the largest"
+                      f" that it allows, at {facts['limit']}",
+                      "a target that needs less stretch there, a material with a higher limit, or shorter steps"
+                      " (StepControl(largest=...))")
 
 
-def _of_rupture(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """(cause, advice) of a damped melt that thins without end."""
-    if facts.get("drawn"):
-        drawn, most = facts["drawn"]
-        yield (f"the sheet thins without end at {facts['ruptures']}: it is as thin there as at an equibiaxial stretch"
-               f" of {drawn:.3g}, and stretched suddenly this material carries its largest stress at {most:.3g}; beyond"
-               f" there is no equilibrium",
-               "a shallower draw, a slower or hotter process, or another damping function: one fitted to shear or"
-               " uniaxial data is often too strong in equibiaxial extension")
-
-
-def _of_elements(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """(cause, advice) of an element that turns inside out."""
+@register("failure")
+def _of_elements(failure: Failure) -> Iterator[Finding]:
+    """An element that turns inside out."""
+    facts = failure.facts
     J, failed_J = facts.get("smallest_J"), facts.get("failed_J")
     infinite = any(np.isinf(v) for v in facts.get("residual", {}).values())
     inverted = failed_J is not None and failed_J <= 0
     if J is not None and (_LIMITS.volume > J or facts["shape"] < _LIMITS.shape and (inverted or infinite)):
         now = f"J = {J:.3g}" if _LIMITS.volume > J else f"its shape quality is {facts['shape']:.2g} times that at rest"
         R, Z = facts["at_J"].R, facts["at_J"].Z
-        yield (f"an element is about to turn inside out: {now} in the last good state, at {facts['at_J']}"
-               + (f" (in the failed attempt J = {failed_J:.3g})" if inverted else ""),
-               f"smaller elements around (R, Z) = ({R:.4g}, {Z:.4g}), in a disc with concentrate={{{R:.4g}: 0.2}}, or"
-               f" elements that are long at the start in the direction in which they are compressed there")
+        yield Finding("serious", "element",
+                      f"an element is about to turn inside out: {now} in the last good state, at {facts['at_J']}"
+                      + (f" (in the failed attempt J = {failed_J:.3g})" if inverted else ""),
+                      f"smaller elements around (R, Z) = ({R:.4g}, {Z:.4g}), in a disc with"
+                      f" concentrate={{{R:.4g}: 0.2}}, or elements that are long at the start in the direction in which"
+                      f" they are compressed there")
 
 
-def _of_limits(facts: dict[str, Any], fixed_control: bool, target: float | None) -> Iterator[tuple[str, str]]:
-    """(cause, advice) of a limit point before the target."""
+@register("failure")
+def _of_limits(failure: Failure) -> Iterator[Finding]:
+    """A limit point before the target."""
+    facts, target = failure.facts, failure.target
     what, limits = facts["what"], facts.get("limit_points", ())
     if what == "process time" and facts["control"] in limits:
-        yield (f"what is driven has its maximum, a limit point, at process time {facts['control']:.6g}",
-               "a stage in which something goes on growing, such as follow={enclosed_volume: [(time, value), ...]}")
+        yield Finding("serious", "limit point",
+                      f"what is driven has its maximum, a limit point, at process time {facts['control']:.6g}",
+                      "a stage in which something goes on growing, such as"
+                      " follow={enclosed_volume: [(time, value), ...]}")
     elif target is not None and limits and abs(facts["control"]) <= max(map(abs, limits)) < abs(target):
-        yield (f"the {what} has its maximum, {max(limits, key=abs):.6g}, at a limit point that was passed, and the"
-               f" target {target:.6g} lies above it",
-               "a target that goes on growing past a limit point (pole_height, pole_stretch, enclosed_volume)")
+        yield Finding("serious", "limit point",
+                      f"the {what} has its maximum, {max(limits, key=abs):.6g}, at a limit point that was passed, and"
+                      f" the target {target:.6g} lies above it",
+                      "a target that goes on growing past a limit point (pole_height, pole_stretch, enclosed_volume)")
     ahead, aimed = facts.get("limit_ahead"), facts.get("aimed")
-    if ahead is not None and fixed_control:
-        yield (f"a limit point lies ahead: extrapolated from the last states, the {what} rises to about {ahead:.6g} and"
-               f" no further" + (f"; {aimed:.6g} was asked for" if aimed is not None else ""),
-               "`trace`, which passes limit points, or a lower target")
+    if ahead is not None and failure.fixed_control:
+        yield Finding("warning", "limit point",
+                      f"a limit point lies ahead: extrapolated from the last states, the {what} rises to about"
+                      f" {ahead:.6g} and no further" + (f"; {aimed:.6g} was asked for" if aimed is not None else ""),
+                      "`trace`, which passes limit points, or a lower target")
 
 
-def _of_branches(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """(cause, advice) of another branch, and of contact that does not settle."""
+@register("failure")
+def _of_branches(failure: Failure) -> Iterator[Finding]:
+    """Another branch, and contact that does not settle."""
+    facts = failure.facts
     what = facts["what"]
     for a, b in facts.get("turned", ()):
-        yield (f"the tangent stiffness became indefinite between {what} {a:.6g} and {b:.6g} without a limit point:"
-               f" another path branches off there (a bifurcation, such as buckling)",
-               f"a small imperfection in the load or the mesh, or a target before {what} {b:.6g}")
+        yield Finding("serious", "branch point",
+                      f"the tangent stiffness became indefinite between {what} {a:.6g} and {b:.6g} without a limit"
+                      f" point: another path branches off there (a bifurcation, such as buckling)",
+                      f"a small imperfection in the load or the mesh, or a target before {what} {b:.6g}")
     at_limit_point = facts.get("limit_ahead") is not None or facts.get("control") in facts.get("limit_points", ())
     if _singular(facts) and not facts.get("turned") and not at_limit_point:
-        yield ("the tangent stiffness becomes singular, and there is no limit point: its condition number has grown"
-               f" from {facts['condition_before']:.1g} to {facts['condition']:.1g} in {_LIMITS.before} states; the"
-               f" body buckles here, or a contact point is about to slip off its tool",
-               "smaller elements; Contact(..., points=4), where there is contact")
+        yield Finding("warning", "tangent",
+                      "the tangent stiffness becomes singular, and there is no limit point: its condition number has"
+                      f" grown from {facts['condition_before']:.1g} to {facts['condition']:.1g} in {_LIMITS.before}"
+                      f" states; the body buckles here, or a contact point is about to slip off its tool",
+                      "smaller elements; Contact(..., points=4), where there is contact")
     if facts.get("flipped"):
-        yield (f"contact does not settle: {facts['flipped']} nodes changed between open, sticking and sliding in the"
-               f" last iteration",
-               "smaller elements along the face in contact, or Contact with points=4, a wider ramp or a lower penalty")
+        yield Finding("warning", "contact",
+                      f"contact does not settle: {facts['flipped']} nodes changed between open, sticking and sliding in"
+                      f" the last iteration",
+                      "smaller elements along the face in contact, or Contact with points=4, a wider ramp or a lower"
+                      " penalty")
 
 
 def _singular(facts: dict[str, Any]) -> bool:
@@ -365,9 +387,12 @@ def _singular(facts: dict[str, Any]) -> bool:
     return bool(before and (facts.get("condition") or 0) > _LIMITS.singular * before)
 
 
-def _of_numbers(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """(cause, advice) of round-off."""
+@register("failure")
+def _of_numbers(failure: Failure) -> Iterator[Finding]:
+    """Round-off."""
+    facts = failure.facts
     if (facts.get("condition") or 0) > _LIMITS.round_off and not _singular(facts):
-        yield (f"round-off: the condition number of the tangent stiffness is {facts['condition']:.1g}, and hardly any"
-               f" of 16 digits are left",
-               "a larger eps, a lower contact penalty, or layers that differ less in stiffness")
+        yield Finding("warning", "round-off",
+                      f"round-off: the condition number of the tangent stiffness is {facts['condition']:.1g}, and"
+                      f" hardly any of 16 digits are left",
+                      "a larger eps, a lower contact penalty, or layers that differ less in stiffness")

@@ -6,6 +6,9 @@ from typing import Any
 import numpy as np
 
 from ...findings import Finding, register
+from ...mesh.nodes import COORDINATES
+from ...mesh.triangles import place
+from .past_states import PastStates
 
 
 @register("scene")
@@ -24,6 +27,28 @@ def ruptures(body: Any) -> Iterator[Finding]:
                               f" without end at its thinnest place. Draw less deep, slower or hotter, or check the"
                               f" damping: one fitted to shear or uniaxial data is often too strong in equibiaxial"
                               f" extension")
+
+
+@register("failure")
+def thins(failure: Any) -> Iterator[Finding]:
+    """A damped melt that thins without end in the last good state; collective."""
+    if failure.last is None:
+        return
+    problem, drawn = failure.problem, None
+    with problem.at(failure.last):
+        for past in (history for history in problem.materials if isinstance(history, PastStates)):
+            most = getattr(past.material, "base", past.material).rupture_stretch("equibiaxial")
+            least, point = past.thinnest()
+            if (stretch := least**-0.5) > max(most, drawn[0] if drawn else 0.0):
+                drawn = stretch, most, place(problem.scene.mesh, point[:COORDINATES])
+    if drawn is not None:
+        stretch, most, where = drawn
+        yield Finding("serious", "rupture",
+                      f"the sheet thins without end at {where}: it is as thin there as at an equibiaxial stretch of"
+                      f" {stretch:.3g}, and stretched suddenly this material carries its largest stress at {most:.3g};"
+                      f" beyond there is no equilibrium",
+                      "a shallower draw, a slower or hotter process, or another damping function: one fitted to shear"
+                      " or uniaxial data is often too strong in equibiaxial extension")
 
 
 def _draws(body: Any) -> Iterator[tuple[str, float]]:
