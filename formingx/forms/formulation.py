@@ -20,16 +20,15 @@ from ufl.algorithms.analysis import extract_constants
 
 from .. import _compat
 from ..errors import together
-from ..extensions.heat.free_stretch import FreeStretch
-from ..extensions.heat.temperature_field import Temperature
-from ..extensions.kbkz.past_states import PastStates
 from ..physics import kinematics as kin
 from .admissible import Admissible
+from .free_stretch import FreeStretch
 from .history import History
 from .loaded_body import LoadedBody
 from .material_history import MaterialHistory
 from .material_terms import MaterialTerms
 from .probes import Probe
+from .temperature import Temperature
 
 
 class Formulation(ABC):
@@ -148,7 +147,7 @@ class Formulation(ABC):
         self._terms = {name: terms for material, names in self._groups()
                        for terms in [MaterialTerms(self, material, names)] for name in names}
         self.terms = list(dict.fromkeys(self._terms.values()))
-        self._pasts = [PastStates(self, terms) for terms in self.terms if terms.held]
+        self._pasts = [terms.material.integral.history(self, terms) for terms in self.terms if terms.held]
         changing = [terms for terms in self.terms if terms.internal]
         self.histories: list[History] = [*self._pasts, *(MaterialHistory(self, terms) for terms in changing)]
         self.potential = self._energy(MaterialTerms.step_energy)

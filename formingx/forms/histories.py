@@ -6,9 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..extensions.kbkz.past_states import PastStates
-from .history import History, Start
-from .material_history import MaterialHistory
+from .history import ConstitutiveHistory, History, Start
 
 
 class Histories:
@@ -38,9 +36,9 @@ class Histories:
         return bool(self.histories)
 
     @property
-    def materials(self) -> list[MaterialHistory | PastStates]:
+    def materials(self) -> list[ConstitutiveHistory]:
         """The histories of materials."""
-        return [history for history in self.forms.histories if isinstance(history, (MaterialHistory, PastStates))]
+        return [history for history in self.forms.histories if isinstance(history, ConstitutiveHistory)]
 
     @property
     def body_has_history(self) -> bool:
@@ -50,7 +48,7 @@ class Histories:
     @property
     def relaxes(self) -> bool:
         """True if F depends on time: on histories other than those of rate-independent materials."""
-        return any(not isinstance(history, MaterialHistory) or history.rate_dependent
+        return any(not isinstance(history, ConstitutiveHistory) or history.rate_dependent
                    for history in self.forms.histories)
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -60,3 +60,17 @@ class History(Protocol):
             x, control: the state here that it belongs to (owned unknowns), at which the forms stand.
             there: says where reference points of the other mesh are in this one's, shape (n, coordinates) both.
         """
+
+
+@runtime_checkable
+class ConstitutiveHistory(History, Protocol):
+    """The history of one material of the body.
+
+    Attributes:
+        rate_dependent: False if the history follows the strain alone.
+    """
+
+    rate_dependent: bool
+
+    def forget_motion(self) -> None:
+        """Let the body come to rest: its motion so far predicts nothing of the next step."""

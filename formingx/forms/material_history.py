@@ -66,7 +66,7 @@ class MaterialHistory:
         return dict(zip(self._sizes, parts, strict=True))
 
     def forget_motion(self) -> None:
-        """The body comes to rest: how it moved tells nothing of the next step (`Material.of_motion`)."""
+        """See `ConstitutiveHistory`; `Material.of_motion` names the variables."""
         for name in self._terms.material.of_motion:
             self._now = None
             self._set(name, self._cells, np.asarray(self._terms.material.internal[name], dtype=float).ravel())

@@ -45,7 +45,7 @@ class Material:
         shapes: {name: 1 or -1} of internal variables that are positive tensors, as C or as its inverse, of entries 11,
             22, 12, 33: on another mesh the body as it is sees them as it did. (Others are carried as numbers.)
         rate_dependent: False: its history follows the strain alone, as damage does, and time is nothing to it.
-        integral: the stress that comes of all past states (`past.Integral`), or None.
+        integral: the law of a stress that depends on all past states (`IntegralLaw`), or None.
         stores_energy: True if `stored_energy` is one.
         symmetric: True if its tangent is.
     """

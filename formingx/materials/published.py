@@ -1,9 +1,8 @@
 """Published constants of materials, each with its source: to begin with, not to design with."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
-from ..extensions.kbkz.damping import PSM
-from ..extensions.kbkz.kbkz import KBKZ
 from .hyperelastic import MooneyRivlin, NeoHookean
 from .material import Material
 
@@ -32,7 +31,17 @@ _KG_PER_CM2 = 0.0980665                                                         
 _SONG = "W. Song, PhD thesis, McMaster University, 1993"
 _THRONE = f"J. L. Throne, Adv. Polym. Technol. 9 (1989) 309-320, quoted by {_SONG}, section 6.4"
 _NOT_STATED = "not stated where quoted"
-_LDPE = [(129000, 1e-4), (94800, 1e-3), (58600, 0.01), (26700, 0.1), (9800, 1), (1890, 10), (180, 100), (1, 1000)]
+_MORE: list[Callable[[], dict[str, Published]]] = []
+
+
+def register_published(constants: Callable[[], dict[str, Published]]) -> Callable[[], dict[str, Published]]:
+    """Add the published constants of an extension to those that `published` returns; usable as a decorator.
+
+    Args:
+        constants: a function without arguments, which returns {name: `Published`}.
+    """
+    _MORE.append(constants)
+    return constants
 
 
 def published() -> dict[str, Published]:
@@ -45,7 +54,7 @@ def published() -> dict[str, Published]:
     >>> acrylic.material, acrylic.temperature
     (NeoHookean(c10=0.44815922405594344), 160.0)
     """
-    return {
+    found = {
         "PMMA 160 C": Published(
             NeoHookean(c10=65 * _PSI), "MPa", "polymethyl methacrylate", 160.0, _NOT_STATED, _NOT_STATED,
             f"J. G. Williams, J. Strain Anal. 5 (1970) 49-57, quoted by {_SONG}, section 6.3"),
@@ -66,10 +75,7 @@ def published() -> dict[str, Published]:
         "natural rubber, 0.76 mm": Published(
             MooneyRivlin(c10=25.11 * _PSI, c01=0.581 * _PSI), "MPa", "sheet of natural rubber, room temperature", None,
             _NOT_STATED, _NOT_STATED, _THRONE),
-        "LDPE melt 150 C": Published(
-            KBKZ(_LDPE, PSM(alpha=14.38, beta=0.018)), "Pa", "low-density polyethylene, melt I", 150.0,
-            "relaxation times from 1e-4 to 1000 s",
-            "spectrum in small shear; damping in shear and uniaxial extension, not in equibiaxial",
-            "H. M. Laun, Rheol. Acta 17 (1978) 1-15 (spectrum); A. C. Papanastasiou, L. E. Scriven, C. W. Macosko,"
-            " J. Rheol. 27 (1983) 387-410 (damping); not read in the original"),
     }
+    for more in _MORE:
+        found |= more()
+    return found

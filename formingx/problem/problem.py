@@ -20,7 +20,6 @@ from ..contact.face import FaceContact
 from ..contact.resultants import penetration
 from ..contact.step_limit import StepLimit
 from ..errors import InputError, together
-from ..extensions.heat.temperature_field import Temperature
 from ..forms.admissible import Least
 from ..forms.constraints import Active, Constraints
 from ..forms.formulations import formulate
@@ -29,6 +28,7 @@ from ..forms.history import History
 from ..forms.schedule import Setting
 from ..forms.step_error import StepError
 from ..forms.tangent import Tangent
+from ..forms.temperature import Temperature
 from ..forms.viscosity import Viscosity
 from ..scene.scene import Scene
 from .examine import Examination

@@ -11,7 +11,6 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError, count, known, several, together
-from ..extensions.heat.expansion import ThermalExpansion
 from ..extensions.space import scene_checks as space
 from ..materials.constants import Sample
 from ..materials.hyperelastic import Material
@@ -27,7 +26,7 @@ from ..ranks import gathered
 from . import tool_width
 from .sampling import sample
 from .summary import summary
-from .temperature import GivenTemperature
+from .temperature import Expansion, GivenTemperature
 
 _HIGHEST = 30
 """Degree of a quadrature: more are asked for by mistake, and their points fill the memory."""
@@ -134,7 +133,7 @@ class Scene:
 
     temperature: GivenTemperature | None = None
     heat: Any = None
-    expansion: Mapping[str, ThermalExpansion] = MappingProxyType({})
+    expansion: Mapping[str, Expansion] = MappingProxyType({})
     thickness: Mapping[str, Any] = MappingProxyType({})
 
     @property
@@ -262,10 +261,10 @@ class Scene:
             raise InputError(f"Scene: layer {layer!r}: {message}")
         return max(modulus for _, modulus in found)
 
-    def _checked_expansion(self, given: Any) -> dict[str, ThermalExpansion]:
+    def _checked_expansion(self, given: Any) -> dict[str, Expansion]:
         """{layer: its expansion}, which is known at the temperature of every point."""
-        laws = dict.fromkeys(self.mesh.layers, given) if isinstance(given, ThermalExpansion) else given
-        if not isinstance(laws, Mapping) or not all(isinstance(law, ThermalExpansion) for law in laws.values()):
+        laws = dict.fromkeys(self.mesh.layers, given) if isinstance(given, Expansion) else given
+        if not isinstance(laws, Mapping) or not all(isinstance(law, Expansion) for law in laws.values()):
             raise InputError(f"Scene: expansion = {given!r}: must be ThermalExpansion(...), or {{layer: ...}}")
         if self.temperature is None:
             raise InputError("Scene: expansion: depends on the temperature: give Scene a temperature=...")

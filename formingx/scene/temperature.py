@@ -1,14 +1,27 @@
 """The temperature of a body as a scene gives it: a field on the mesh that constants may depend on."""
 
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from dolfinx import fem
+from numpy.typing import ArrayLike
 
 from ..mesh import Mesh
 from ..mesh.nodes import of_space
 from ..ranks import gathered
 from . import fields
+
+
+@runtime_checkable
+class Expansion(Protocol):
+    """A law of thermal expansion."""
+
+    def stretch(self, temperature: ArrayLike) -> np.ndarray:
+        """Return the stretch without stress at temperatures, of their shape.
+
+        Raises:
+            InputError: it is not above 0, or not known there.
+        """
 
 
 class GivenTemperature:

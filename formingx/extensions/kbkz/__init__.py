@@ -1,1 +1,5 @@
 """Integral constitutive laws of K-BKZ type."""
+
+from . import published
+
+__all__ = ["published"]

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...materials.tensors import cofactor, entries
+from .past_states import PastStates
 
 _COUNT = np.array([1.0, 1.0, 2.0, 1.0])[:, None]
 """How often an entry is in the tensor."""
@@ -37,6 +38,14 @@ class Integral:
     def __init__(self, spectrum: list[tuple[float, float]], damping: Any, irreversible: bool, shifted: bool):
         self.modulus, self.tau = np.array(spectrum).T
         self.damping, self.irreversible, self.shifted = damping, irreversible, shifted
+
+    def history(self, forms: Any, terms: Any) -> PastStates:
+        """Return the history of a material with this stress.
+
+        Args:
+            forms: the `Formulation`. terms: the `MaterialTerms` of the material.
+        """
+        return PastStates(forms, terms)
 
     def weights(self, ages: np.ndarray) -> np.ndarray:
         """w of the states at these falling ages, the last 0, shape (K,) or (K, n): of shape (K, modes[, n])."""

@@ -5,7 +5,7 @@
 tau the Kirchhoff stress up to a pressure, B(t, t') the Finger tensor of the deformation from t' to t, I1 = tr B,
 I2 = tr B^-1: Kaye (1962), Bernstein, Kearsley and Zapas (1963); factorised, without a term in B^-1, as by Wagner (1976)
 and Papanastasiou, Scriven and Macosko (1983). Without damping it is Lodge's (1956) network, `TransientNetwork`.
-In a scene its stress is computed at each quadrature point from the past states there (`discrete.past_states`).
+In a scene its stress is computed at each quadrature point from the past states there (`past_states`).
 """
 
 from __future__ import annotations

@@ -47,6 +47,8 @@ class PastStates:
         forms: the `Formulation`; terms: the `MaterialTerms`.
     """
 
+    rate_dependent = True
+
     def __init__(self, forms: Any, terms: Any):
         self._forms, self._terms, self._law = forms, terms, terms.material.integral
         self._own = terms.own_cells
@@ -68,7 +70,7 @@ class PastStates:
         self.put(Memory(0.0, (rest,), np.ones((1, self._n)) if self._law.irreversible else None))
 
     def forget_motion(self) -> None:
-        """See `MaterialHistory.forget_motion`."""
+        """See `ConstitutiveHistory`."""
         self._before = 0.0
         self._seen = None
 

@@ -9,14 +9,14 @@ import basix
 import basix.ufl
 from dolfinx import fem
 
-from ...forms.followed import Followed
+from .followed import Followed
 
 
 class FreeStretch:
     """J_T^(1/3) at the quadrature points of the energy; 1 in layers that do not expand.
 
     Args:
-        forms: the `Formulation`; expansion: {layer: `ThermalExpansion`}.
+        forms: the `Formulation`; expansion: {layer: its `Expansion`}.
 
     Attributes:
         stretch: UFL.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...scene import fields
-from ...scene.temperature import GivenTemperature
+from ..scene import fields
+from ..scene.temperature import GivenTemperature
 
 
 class Temperature:
