@@ -62,7 +62,7 @@ def test_what_a_table_refuses():
 
 def test_wlf():
     shift = WLF(17.44, 51.6, 100.0)                          # the "universal" constants, at the glass temperature
-    assert shift(100.0) == pytest.approx(1.0, rel=1e-14)
+    assert shift(100.0) == pytest.approx(1.0, rel=1e-14) and shift(shift.limits[0]) == pytest.approx(1e30, rel=1e-9)
     assert shift(110.0) == pytest.approx(10 ** (-17.44 * 10 / 61.6), rel=1e-13)
     # the same law from another reference: c1' c2' = c1 c2, c2' = c2 + T' - T (Ferry 1980, eq. 11-27)
     other = WLF(17.44 * 51.6 / 91.6, 91.6, 140.0)

@@ -84,10 +84,10 @@ class FaceContact:
         """The temperature has changed: friction follows it.
 
         Raises:
-            InputError: friction has no value at a temperature.
+            InputError: friction has no finite value at a temperature.
         """
         if self._warm is not None:
-            self.law = self.law.with_friction(self.contact.friction_at(self._temperatures()))
+            self.law = self.law.with_friction(self.contact.friction_at(self._temperatures(), clamped=True))
             self.increment = Increment(self.law, self.touch)
 
     def displacement(self, values: np.ndarray) -> np.ndarray:

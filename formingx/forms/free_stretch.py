@@ -29,7 +29,7 @@ class FreeStretch:
         stretch.x.array[:] = 1.0
         self._cells = [forms.cells_of([name]) for name in expansion]
         self._there = partial(forms.temperature.now_and_before, places=basix.make_quadrature(cell, degree)[0])
-        self._followed = Followed(forms, stretch, [(cells, law.stretch) for cells, law in
+        self._followed = Followed(forms, stretch, [(cells, partial(law.stretch, clamped=True)) for cells, law in
                                                    zip(self._cells, expansion.values())], map(self._there, self._cells))
         self.stretch = self._followed.at(forms.time)
 

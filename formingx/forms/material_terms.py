@@ -82,7 +82,8 @@ class MaterialTerms:
     def of_temperature(self, function: Any) -> Any:
         """f(T) at the quadrature points of the energy, exactly, at the end of a step, or in its middle."""
         forms, found = self.forms, self.quadrature_function()
-        followed = Followed(forms, found, [(self.cells, function)], [forms.temperatures(self)])
+        law = getattr(function, "clamped", function)          # that of a user's own constant may be any function
+        followed = Followed(forms, found, [(self.cells, law)], [forms.temperatures(self)])
         self._followed.append(followed)
         return followed.at(forms.time - (self._time_step / 2 if self._in_middle else 0))
 
@@ -90,7 +91,7 @@ class MaterialTerms:
         """The temperature has changed: constants follow it.
 
         Raises:
-            InputError: a constant has no value at a temperature.
+            InputError: a constant has no finite value at a temperature.
         """
         there = [self.forms.temperatures(self)] if self._followed else []
         for followed in self._followed:

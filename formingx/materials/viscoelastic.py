@@ -388,7 +388,7 @@ class TransientNetwork(RelaxingMaterial):
 def _shifted(name: str, tau: Any, shift: Any) -> OfTemperature:
     """aT(T) tau."""
     shift, tau = checked_shift(name, shift), positive(name, tau)
-    return OfTemperature(lambda T: tau * shift(T), f"{tau!r} * {shift!r}")
+    return OfTemperature(lambda T: tau * shift(T), f"{tau!r} * {shift!r}", getattr(shift, "limits", None))
 
 
 def _mean_decay(x: Any) -> Any:

@@ -171,8 +171,11 @@ class Contact(Part):
         """
         return mu * pressure, mu
 
-    def friction_at(self, temperature: np.ndarray | None) -> Any:
+    def friction_at(self, temperature: np.ndarray | None, clamped: bool = False) -> Any:
         """mu: a number, or at the temperatures of n points, shape (n,).
+
+        Args:
+            clamped: beyond the ends of a table it is that at the end, as in a run.
 
         Raises:
             InputError: it has no value there, or one below 0.
@@ -182,7 +185,7 @@ class Contact(Part):
         if temperature is None:
             raise InputError(f"{self!r}: friction depends on the temperature: give Scene a temperature=...")
         try:
-            mu = self.mu(temperature)
+            mu = (self.mu.clamped if clamped else self.mu)(temperature)
         except InputError as error:
             raise InputError(f"Contact({self.on!r}): friction: {error}") from None
         for i in np.flatnonzero(mu < 0)[:1]:
@@ -202,7 +205,7 @@ class Contact(Part):
                 self.tool, k, theta, _STEP * thickness)
         foot = (1 - _AT_FOOT * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)
-        return Law(self.tool, self.friction_at(temperature), k, theta, elastic_slip, shift,
+        return Law(self.tool, self.friction_at(temperature, clamped=True), k, theta, elastic_slip, shift,
                    not self.separates, self.shear_limit)
 
     def __repr__(self) -> str:

@@ -19,7 +19,7 @@ class Table:
     there; who accepts a state calls `check`.
 
     Attributes:
-        x, y: the points, sorted by x, shape (n,).
+        x, y: the points, sorted by x, shape (n,). limits: the first and the last x.
     """
 
     def __init__(self, points: Mapping[float, float]):
@@ -29,6 +29,7 @@ class Table:
         self.x, self.y = (np.array(column) for column in zip(*pairs))
         if np.any(np.diff(self.x) <= 0):
             raise InputError(f"table({points!r}): two points have the same x")
+        self.limits = float(self.x[0]), float(self.x[-1])
 
     def __call__(self, x: Any) -> Any:
         """The values at x: numbers, or an expression for an expression.

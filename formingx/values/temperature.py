@@ -12,6 +12,10 @@ from .table import Table
 
 ABSOLUTE_ZERO = {"C": -273.15, "K": 0.0}
 """By unit of temperature."""
+EVERYWHERE = (-np.inf, np.inf)
+"""Limits of what is known at all temperatures."""
+_FROZEN = 30.0
+"""log10 of a shift from which on a material is taken as one that does not relax at all."""
 GAS_CONSTANT = 8.31446261815324
 """J/(mol K)."""
 
@@ -21,10 +25,15 @@ class FunctionOfTemperature:
 
     Args:
         function: f. words: what it is called in messages.
+        limits: lowest and highest temperature at which it is known; None: those of f, if it has any.
+
+    Attributes:
+        limits: the same; infinite where there are none.
     """
 
-    def __init__(self, function: Callable, words: str | None = None):
+    def __init__(self, function: Callable, words: str | None = None, limits: tuple[float, float] | None = None):
         self.function = function
+        self.limits: tuple[float, float] = getattr(function, "limits", EVERYWHERE) if limits is None else limits
         self._words = words or (repr(function) if isinstance(function, Table)
                                 else f"of_temperature({getattr(function, '__qualname__', repr(function))})")
 
@@ -35,6 +44,14 @@ class FunctionOfTemperature:
             self.function.check(T, "temperature")
         return values(f"the constant {self!r}", self.function, {"temperature": T})
 
+    def clamped(self, temperature: ArrayLike) -> np.ndarray:
+        """Values at temperatures, of their shape; beyond `limits` those at the nearer limit.
+
+        A run uses them: the temperature of a body changes in it. A scene refuses a temperature beyond the limits, and
+        a check before the run names those to which its tools and its air may bring the body.
+        """
+        return self(np.clip(temperature, *self.limits))
+
     def __repr__(self) -> str:
         return self._words
 
@@ -43,7 +60,12 @@ class WLF:
     """log10 aT = -c1 (T - Tr)/(c2 + T - Tr) (Williams, Landel and Ferry 1955): relaxation times at T are aT times
     those at Tr.
 
-    Call it with numbers, shape (...), or a UFL expression of the temperature. It has a meaning above Tr - c2 only.
+    Call it with numbers, shape (...), or a UFL expression of the temperature. It has a meaning above Tr - c2 only,
+    where aT becomes infinite: in a run, a body that is colder than `limits` has the aT of 1e30 at the lower limit, with
+    which it does not relax.
+
+    Attributes:
+        limits: the temperature at which aT is 1e30, and infinity.
 
     Args:
         c1: number; c2: temperature difference; both above 0, for logarithms to the base 10.
@@ -57,6 +79,7 @@ class WLF:
     def __init__(self, c1: float, c2: float, reference: float):
         self.c1, self.c2 = positive("WLF: c1", c1), positive("WLF: c2", c2)
         self.reference = finite("WLF: reference", reference)
+        self.limits = self.reference - self.c2 + self.c1 * self.c2 / (_FROZEN + self.c1), np.inf
 
     def __call__(self, temperature: ArrayLike) -> Any:
         """aT.

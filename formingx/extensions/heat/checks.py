@@ -9,8 +9,10 @@ from ...errors import InputError
 from ...findings import Finding, register
 from ...materials.constants import OfTemperature
 from ...materials.sets import Sets
+from ...values.temperature import FunctionOfTemperature
 from .cooling import CoolingHistory
 
+_FROZEN = ", where the material does not relax any more: give Sets or a modulus that rises, if it turns into glass"
 _RISES = 2.0               # modulus of the coldest over that of the hottest body
 
 
@@ -33,7 +35,7 @@ def springs_back(body: Any) -> Iterator[Finding]:
             if not isinstance(value, OfTemperature):
                 continue
             try:
-                cold, hot = value(np.array([low, high]))
+                cold, hot = value.clamped(np.array([low, high]))
             except InputError:                              # it says so itself, if it comes to that
                 continue
             if cold > _RISES * hot > 0:
@@ -42,6 +44,48 @@ def springs_back(body: Any) -> Iterator[Finding]:
                               f" degrees as at {high:.4g}: as the stretched part cools, it pulls back with that much"
                               f" more force, instead of setting in its shape. For a material that sets see fx.Sets and"
                               f" docs/heat.md")
+
+
+@register("start")
+def beyond_limits(body: Any) -> Iterator[Finding]:
+    """Temperatures to which tools, air and heaters may bring the body, at which a constant is not known."""
+    if body.scene.heat is not None:
+        yield from _beyond(body.scene, *body.scene.heat.extremes(body.scene), "the tools and the air may bring it")
+
+
+@register("end")
+def were_beyond_limits(path: Any) -> Iterator[Finding]:
+    """Temperatures that the body had at which a constant is not known, unless its run began with saying so."""
+    said = {finding.about for finding in path.record.findings}
+    states = path.segments[-1].states
+    for k, history in enumerate(path.problem.histories):
+        if isinstance(history, CoolingHistory):
+            mine = [f(state.memory[k].temperature) for state in states if len(state.memory[k].temperature)
+                    for f in (np.min, np.max)]
+            ends = [value for part in path.problem.comm.allgather(mine) for value in part]
+            found = _beyond(path.problem.scene, min(ends), max(ends), "the run brought it")
+            yield from (finding for finding in found if finding.about not in said)
+
+
+def _beyond(scene: Any, low: float, high: float, who: str) -> Iterator[Finding]:
+    """Constants of materials, friction and expansion that are not known all the way from low to high."""
+    laws = [(f"materials[{layer!r}]", name, value) for layer, material in scene.materials.items()
+            for name, value in material.constants().items()]
+    laws += [(repr(contact), "friction", contact.mu) for contact in scene.contacts]
+    laws += [(f"expansion of {layer!r}", "volume", law.specific_volume) for layer, law in scene.expansion.items()]
+    told = set()
+    for about, name, law in laws:
+        if not isinstance(law, FunctionOfTemperature):
+            continue
+        span = 1e-9 * (high - low) if np.isfinite(high - low) else 0.0
+        for beyond, limit, words in ((low, law.limits[0], "below"), (high, law.limits[1], "above")):
+            outside = beyond < limit - span if words == "below" else beyond > limit + span
+            if np.isfinite(beyond) and outside and (about, words, limit) not in told:
+                told.add((about, words, limit))
+                yield Finding("warning", about,
+                              f"{name} = {law!r} is known {'down' if words == 'below' else 'up'} to {limit:.4g}"
+                              f" degrees, and {who} to {beyond:.4g}: {words} {limit:.4g} it is taken as it is there"
+                              f"{_FROZEN if words == 'below' and 'WLF' in repr(law) else ''}. Give values to there")
 
 
 @register("end")

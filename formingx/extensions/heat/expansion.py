@@ -43,8 +43,11 @@ class ThermalExpansion:
         """J_T at temperatures, of their shape."""
         return self.stretch(temperature) ** 3
 
-    def stretch(self, temperature: Any) -> np.ndarray:
+    def stretch(self, temperature: Any, clamped: bool = False) -> np.ndarray:
         """J_T^(1/3) at temperatures, of their shape.
+
+        Args:
+            clamped: beyond the ends of a table it is that at the end, as in a run.
 
         Raises:
             InputError: the volume is not above 0, or not known there.
@@ -53,7 +56,8 @@ class ThermalExpansion:
         if self.linear is not None:
             found = 1 + self.linear * (T - self.stress_free)
         else:
-            found = np.cbrt(self.specific_volume(T) / self.specific_volume(np.array([self.stress_free]))[0])
+            volume = self.specific_volume.clamped if clamped else self.specific_volume
+            found = np.cbrt(volume(T) / self.specific_volume(np.array([self.stress_free]))[0])
         wrong = ~(found > 0)
         if np.any(wrong):
             raise InputError(f"{self!r}: the stress-free stretch is {found[wrong].flat[0]:.6g} at a temperature of"
