@@ -1,6 +1,7 @@
 """Findings of one kind, before and after every run: what was meant by a scene, and what a run did instead."""
 
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import formingx as fx
 from formingx.checks.doctor import before_run
 from formingx.checks.towards import moulds
 from formingx.findings import SEVERITIES, Finding, found_at, register, worst_first
+from formingx.results.files import checkpoint, status
 
 ABOVE = fx.tools.plane(5.0)
 
@@ -87,6 +89,39 @@ def test_a_pressure_that_points_away_from_its_mould(load, pressure, away, caplog
     assert ("moved away from this mould" in moved) == away and ("never touched" in moved) == (not away)
     for found in path.findings():
         assert (caplog.text.count(found.text) == 1) == (found.severity != "note")
+
+
+def test_status_of_a_stage_with_a_named_pressure(tmp_path):
+    """The column of the target is that of the load that is driven; a stage without a step has just begun."""
+    air = fx.Pressure("bottom", name="air")
+    plug = fx.Contact("top", fx.tools.sphere(radius=4.0, z=0.5), "none", moves=(0, -1), name="plug")
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(12, 1)), loads=[air], contacts=[plug],
+                     materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    stages = [fx.Stage("push", drive=plug, until=fx.travel(0.5)),
+              fx.Stage("blow", drive=air, until=fx.pressure(0.01))]
+    path = fx.Process(scene).run(stages, progress=False, checkpoint=tmp_path / "run")
+    (tmp_path / "run" / "end.json").unlink()                                       # as while it goes on
+    said = {}
+    for k in reversed(range(len(path))):
+        said[k] = str(status.of_folder(tmp_path / "run"))
+        if k:
+            shutil.rmtree(tmp_path / "run" / f"{k:04d}")
+    blown = [k for k, state in enumerate(path.states) if state.stage == "blow"]
+    assert "air pressure 0.01 of 0.01" in said[len(path) - 1] and "the target is met" in said[len(path) - 1]
+    assert "the stage has just begun" in "".join(said[k] for k in blown[:3])
+    assert not any("no nearer" in text for text in said.values()) and "to the end of the stage" in said[blown[-2]]
+
+
+def test_status_of_a_body_that_goes_on_while_its_pressure_falls(tmp_path):
+    """Past the maximum of the pressure, towards a larger one, which a sheet of this material never comes to."""
+    with pytest.raises(fx.ConvergenceError):
+        fx.trace(sheet(contacts=[]), until=fx.pressure(0.2), max_steps=14, progress=False, checkpoint=tmp_path / "run")
+    (tmp_path / "run" / "end.json").unlink()
+    found = status.of_folder(tmp_path / "run")
+    states = checkpoint.contents(tmp_path / "run")[1]
+    falling = states[-1]["measures"]["pressure"] < max(state["measures"]["pressure"] for state in states)
+    assert falling and found.moved[0] in ("enclosed_volume", "pole_height", "strain_energy")
+    assert found.left is not None or "the body goes on" in str(found)
 
 
 def test_a_ring_is_no_mould():

@@ -56,7 +56,7 @@ _CRUSHED = 0.5
 _POCKET = 0.25
 """Of the size of an element: a pocket between the body and a tool that is not so deep is closed."""
 
-_OWN = "step", "counts", "until"
+_OWN = "step", "counts", "until", "column"
 """What `Record.complete_step` notes by itself."""
 
 _WORN = "the mesh is worn"

@@ -1,7 +1,7 @@
 """Where a run stands that writes a checkpoint: read from its last states, while it goes on."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +33,7 @@ class Status:
         age: seconds since the last state was written.
         ended: {"failure": what ended it, or "", "findings": [Finding]} of a run that has ended; None: it goes on, or
             was killed.
+        begun: the stage has no step yet.
         moved: the quantity that changed most over the last steps, with its values before and after them, or None: a
             body may go on while the pressure falls past a maximum.
     """
@@ -46,6 +47,7 @@ class Status:
     limits: dict[str, int]
     age: float
     ended: dict[str, Any] | None
+    begun: bool = False
     moved: tuple[str, float, float] | None = None
 
     @property
@@ -75,6 +77,10 @@ class Status:
 
     def _without_pace(self) -> str:
         """Why the time left is not known."""
+        if self.target is None:
+            return "the time left is not known, as no column holds what the stage aims at"
+        if self.begun:
+            return "the stage has just begun"
         if self.moved is None:
             return "no nearer to the target in the last steps"
         name, before, now = self.moved
@@ -93,7 +99,7 @@ def of_folder(folder: Any) -> Status:
     done = [s for s in states if s["stepping"] and s["stage"] == last["stage"]]
     kept: dict[str, Any] = done[-1]["stepping"] if done else {}
     counts = kept.get("counts", {})
-    name, goal = kept.get("until", ("", 0.0))
+    name, goal = aimed(kept, last["measures"]) or ("", 0.0)
     if name not in last["measures"]:
         return Status(n, last["stage"], last["verdict"], None, counts.get("seconds", 0.0), None,
                       counts.get("limits", {}), age, ended)
@@ -104,8 +110,17 @@ def of_folder(folder: Any) -> Status:
     took = counts["seconds"] - done[0]["stepping"]["counts"]["seconds"]
     left = 0.0 if abs(now - goal) <= _MET * abs(goal) else took * (1 - won) / won if won > 0 else None
     return Status(n, last["stage"], last["verdict"], (name, goal, now), counts["seconds"], left,
-                  counts.get("limits", {}), age, ended,
+                  counts.get("limits", {}), age, ended, len(done) == 1,
                   (most, *moved[most]) if most and not np.isclose(*moved[most], rtol=_STILL, atol=0.0) else None)
+
+
+def aimed(stepping: dict[str, Any], measures: Container[str]) -> tuple[str, float] | None:
+    """Return (column, value) of the target that a step aims at: of a pressure, that of the load that is driven."""
+    if "until" not in stepping:
+        return None
+    name, goal = stepping["until"]
+    driven = stepping.get("column", "")
+    return (driven if name not in measures and driven.endswith(f"_{name}") else name), goal
 
 
 def _words(seconds: float) -> str:

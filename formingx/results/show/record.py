@@ -17,6 +17,7 @@ from ..evaluate.filling import corners_of
 from ..evaluate.profile import Profile, distance_to_line, fine
 from ..files.description import plain
 from ..files.progress import progress as shown_progress
+from ..files.status import aimed
 
 PENETRATION = 0.05
 """Penetration over the smallest thickness above which a report warns."""
@@ -201,7 +202,7 @@ def of_path(path: Any) -> Record:
         wall = path.wall() if profiles[-1] is not None else None
         return Record(summary(problem.scene), files.versions(), problem.scene.kinematics.dimension_of_volume == 3,
                       kinds, stages, measures, [list(s.history) for s in states], profiles, vars(path.counts),
-                      stepping.get("until"), tooling, [tooling.travels(s.setting, s.control) for s in states],
+                      aimed(stepping, measures), tooling, [tooling.travels(s.setting, s.control) for s in states],
                       tool_forces(path), shown, dict(wall.layers) if wall else {}, sys.argv[0],
                       path.findings(), verdicts=[s.verdict for s in states],
                       space=problem.scene.kinematics.components == 3, **_heat(plain(problem.scene.heat)))
@@ -217,7 +218,7 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
     return Record(about["summary"], about["versions"], about["scene"]["kinematics"]["kind"] == "Axisymmetric",
                   [s["kind"] for s in states], [s["stage"] for s in states],
                   measures, [s["history"] for s in states], profiles, stepping.get("counts", {}),
-                  stepping.get("until"), tooling,
+                  aimed(stepping, measures), tooling,
                   [tooling.travels(s.get("setting", {}), s["control"]) for s in states],
                   {name: measures[column] for name, column in tooling.force_columns.items() if column in measures},
                   _temperatures(states, profiles[-1]), {}, verdicts=[s["verdict"] for s in states],
