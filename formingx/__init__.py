@@ -75,7 +75,7 @@ with _optional():
     from .extensions.heat.run import heat
 with _optional():
     from .extensions.kbkz import rupture as _kbkz_checks
-    from .extensions.kbkz.damping import PSM, Damping, DoubleWagner, LuoTanner, Wagner
+    from .extensions.kbkz.damping import PSM, Damping, DoubleWagner, LuoTanner, SoskeyWinter, Wagner
     from .extensions.kbkz.kbkz import KBKZ
 with _optional():
     from .extensions.fits.data import treloar1944

@@ -1,5 +1,7 @@
 """How much of a past state's stress is left, h(I1, I2), for `KBKZ`."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,9 @@ class Damping:
     def derivatives(self, I1: Any, I2: Any) -> tuple[Any, Any, Any]:
         """(h, dh/dI1, dh/dI2) at invariants of any shape."""
         raise NotImplementedError
+
+    bounds: Mapping[str, tuple[float, float]] = MappingProxyType({})
+    """{constant: (lowest, highest)} for those that `fit` varies; as the arguments of the class."""
 
     @property
     def of_I1_alone(self) -> bool:
@@ -48,6 +53,8 @@ class PSM(Damping):
     def __init__(self, alpha: float, beta: float):
         self.alpha, self.beta = positive("PSM: alpha", alpha), _share("PSM: beta", beta)
 
+    bounds = MappingProxyType({"alpha": (1e-3, 1e3), "beta": (0.0, 1.0)})
+
     def derivatives(self, I1, I2):
         h = self.alpha / (self.alpha - 3 + self.beta * I1 + (1 - self.beta) * I2)
         return h, -self.beta * h**2 / self.alpha, -(1 - self.beta) * h**2 / self.alpha
@@ -66,6 +73,8 @@ class Wagner(Damping):
 
     def __init__(self, alpha: float, beta: float):
         self.alpha, self.beta = _share("Wagner: alpha", alpha), positive("Wagner: beta", beta)
+
+    bounds = MappingProxyType({"alpha": (0.0, 1.0), "beta": (1e-4, 10.0)})
 
     def derivatives(self, I1, I2):
         return _exponential(self.alpha, [(1.0, self.beta)], I1, I2)
@@ -94,8 +103,44 @@ class DoubleWagner(Damping):
         self.alpha, self.f = _share("DoubleWagner: alpha", alpha), _share("DoubleWagner: f", f)
         self.n1, self.n2 = positive("DoubleWagner: n1", n1), positive("DoubleWagner: n2", n2)
 
+    bounds = MappingProxyType({"alpha": (0.0, 1.0), "f": (0.0, 1.0), "n1": (1e-4, 10.0), "n2": (1e-4, 10.0)})
+
     def derivatives(self, I1, I2):
         return _exponential(self.alpha, [(self.f, self.n1), (1 - self.f, self.n2)], I1, I2)
+
+
+class SoskeyWinter(Damping):
+    r"""Damping of Soskey and Winter, J. Rheol. 28 (1984) 625, with a mixed invariant in place of the squared shear.
+
+    .. math:: h = 1/(1 + a J^{b/2}), \quad J = \alpha I_1 + (1 - \alpha) I_2 - 3
+
+    In shear J is the square of the shear strain, so h = 1/(1 + a shear^b), whatever alpha is. With b = 2 it is `PSM`
+    with 1/a in place of alpha and alpha in place of beta.
+
+    Args:
+        alpha: share of I1, from 0 to 1.
+        a: above 0; the larger, the more is damped.
+        b: above 0; the power of the strain, 2 in `PSM`.
+
+    Raises:
+        InputError: a constant that is not allowed.
+
+    >>> round(float(fx.SoskeyWinter(alpha=0.1, a=0.3, b=1.5)(4.0, 4.0)), 4)                        # a shear of 1
+    0.7692
+    """
+
+    def __init__(self, alpha: float, a: float, b: float):
+        self.alpha = _share("SoskeyWinter: alpha", alpha)
+        self.a, self.b = positive("SoskeyWinter: a", a), positive("SoskeyWinter: b", b)
+
+    bounds = MappingProxyType({"alpha": (0.0, 1.0), "a": (1e-4, 10.0), "b": (0.2, 5.0)})
+
+    def derivatives(self, I1, I2):
+        J = self.alpha * I1 + (1 - self.alpha) * I2 - 3
+        power = self.a * np.maximum(J, 0) ** (self.b / 2)
+        h = 1 / (1 + power)
+        slope = -h**2 * self.b / 2 * self.a * np.maximum(J, _NEAR**2) ** (self.b / 2 - 1)
+        return h, self.alpha * slope, (1 - self.alpha) * slope
 
 
 def _exponential(alpha: float, terms: list[tuple[float, float]], I1: Any, I2: Any) -> tuple[Any, Any, Any]:
