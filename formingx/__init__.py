@@ -81,6 +81,9 @@ with _optional():
     from .extensions.fits.data import treloar1944
     from .extensions.fits.fit import Fit, fit
     from .extensions.fits.fit_in_time import TimedTest
+    from .extensions.fits.tested import Tested, with_tests
+with _optional():
+    from .extensions.fits.fit_damping import Spectrum, fit_spectrum
 with _optional():
     from .extensions.space import checks as _space_checks
     from .extensions.space.sheet import circle, rectangle, sheet

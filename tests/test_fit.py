@@ -54,7 +54,7 @@ def test_own_energy():
 
 def test_residuals_are_those_of_the_data():
     data = measured(fx.Gent(mu=0.3, Jm=50.0), modes=("uniaxial", "equibiaxial"), noise=0.02)
-    found = fx.fit(fx.MooneyRivlin, data)
+    found = fx.fit(fx.MooneyRivlin, data, relative=False)
     misfit = {mode: found.material.stress(mode, l) - P for mode, (l, P) in data.items()}
     assert found.rms == pytest.approx({mode: np.sqrt(np.mean(x**2)) for mode, x in misfit.items()})
     assert found.rms_total == pytest.approx(np.sqrt(np.mean(np.concatenate(list(misfit.values())) ** 2)))
@@ -81,11 +81,11 @@ def test_treloar():
     """Unweighted joint fits, made independently: Gent 0.2745, 84.3, rms 0.138; Yeoh, rms 0.138; neo-Hookean 0.63."""
     data = fx.treloar1944()
     assert [len(l) for l, _ in data.values()] == [24, 13, 16]
-    assert fx.fit(fx.NeoHookean, data).rms_total == pytest.approx(0.63, abs=5e-3)
-    gent = fx.fit(fx.Gent, data)
+    assert fx.fit(fx.NeoHookean, data, relative=False).rms_total == pytest.approx(0.63, abs=5e-3)
+    gent = fx.fit(fx.Gent, data, relative=False)
     assert gent.rms_total == pytest.approx(0.138, abs=5e-4)
     assert gent.material.parameters == pytest.approx({"mu": 0.2745, "Jm": 84.3}, rel=2e-4)
-    yeoh = fx.fit(fx.Yeoh, data)
+    yeoh = fx.fit(fx.Yeoh, data, relative=False)
     assert yeoh.rms_total == pytest.approx(0.138, abs=5e-4)
     assert yeoh.material.parameters == pytest.approx({"c10": 0.1847, "c20": -1.465e-3, "c30": 4.02e-5}, rel=1e-3)
     for l, P in data.values():
@@ -98,24 +98,37 @@ def test_ogden_on_treloar():
     data = fx.treloar1944()
     classic = fx.Ogden(mu=(0.63, 0.0012, -0.01), alpha=(1.3, 5.0, -2.0))
     misfit = np.concatenate([classic.stress(mode, l) - P for mode, (l, P) in data.items()])
-    found = fx.fit(fx.Ogden, data)
+    found = fx.fit(fx.Ogden, data, relative=False)
     assert found.rms_total < 0.065 < np.sqrt(np.mean(misfit**2))
-    assert fx.fit(classic, data).rms_total > 0.999 * found.rms_total
+    assert fx.fit(classic, data, relative=False).rms_total > 0.999 * found.rms_total
     assert found.material.check_stability((0.5, 7.6)).stable
 
 
-def test_standard_errors_are_the_scatter_of_the_fits():
-    """Of 60 fits to the same tests with other noise: the scatter of a constant is its standard error, and 95 % of the
-    intervals hold the true one."""
-    true, l = fx.MooneyRivlin(c10=0.3, c01=0.05), np.linspace(0.7, 3.0, 30)
+@pytest.mark.parametrize("relative", [False, True])
+def test_standard_errors_are_the_scatter_of_the_fits(relative):
+    """Of 60 fits to the same tests with other noise: the scatter of a constant is its standard error, the covariance
+    that of both, and 95 % of the intervals hold the true one."""
+    true, l = fx.MooneyRivlin(c10=0.3, c01=0.05), np.linspace(1.1, 3.0, 30)
     noise = 0.01 * np.random.default_rng(1).standard_normal((60, 2, len(l)))
-    fits = [fx.fit(true, {m: (l, true.stress(m, l) + x) for m, x in zip(("uniaxial", "equibiaxial"), each)})
+
+    def noisy(mode, x):
+        P = true.stress(mode, l)
+        return l, P * (1 + x) if relative else P + x
+    fits = [fx.fit(true, {m: noisy(m, x) for m, x in zip(("uniaxial", "equibiaxial"), each)}, relative=relative)
             for each in noise]
     for name, value in true.parameters.items():
         found = np.array([f.material.parameters[name] for f in fits])
         assert np.mean([f.errors[name] for f in fits]) == pytest.approx(found.std(), rel=0.25)      # 60 are few
         inside = [low < value < high for low, high in (f.intervals()[name] for f in fits)]
         assert 0.88 <= np.mean(inside) <= 1
+    # the stresses are linear in the constants: the covariance by hand
+    data = {m: noisy(m, x) for m, x in zip(("uniaxial", "equibiaxial"), noise[0])}
+    measured_, unit = (np.concatenate(x) for x in zip(*((P, P) for _, P in data.values())))
+    sizes = np.abs(unit) if relative else np.full(60, np.abs(unit).max())
+    J = np.stack([np.concatenate([fx.MooneyRivlin(c10=a, c01=b).stress(m, l) for m in data])
+                  for a, b in ((1.0, 1e-12), (1e-12, 1.0))], axis=1) / sizes[:, None]
+    left = J @ list(fits[0].constants.values()) - measured_ / sizes
+    assert fits[0].covariance == pytest.approx(left @ left / 58 * np.linalg.inv(J.T @ J), rel=1e-5)
     assert fits[0].undetermined == () and fits[0].points == 60
 
 

@@ -17,7 +17,8 @@ from ...materials import branches, homogeneous
 from ...materials.hyperelastic import NeoHookean
 from ...materials.material import Material
 from ...materials.viscoelastic import RelaxingMaterial
-from .uncertainty import uncertainty
+from .uncertainty import Uncertainty, uncertainty
+from .weights import in_range, scales
 
 _PER_DECADE = 16
 """Relaxation times a decade at which a branch's stress is computed; between them a cubic spline."""
@@ -59,11 +60,12 @@ class TimedTest(NamedTuple):
         return cls(mode, times, l, np.append(np.nan, stress), "strain")
 
 
-def fitted_in_time(material: type[RelaxingMaterial] | RelaxingMaterial, tests: Any,
-                   terms: int | None = None
-                   ) -> tuple[RelaxingMaterial, list[np.ndarray], dict[str, float], tuple[str, ...]]:
-    """(the material, the misfit of every test, standard errors, the names of the constants left open); see `fit`."""
-    data = _Data(tests, material if isinstance(material, type) else type(material))
+def fitted_in_time(material: type[RelaxingMaterial] | RelaxingMaterial, tests: Any, terms: int | None, relative: bool,
+                   weights: list[float], within: Any
+                   ) -> tuple[RelaxingMaterial, dict[str, float], list[TimedTest], Uncertainty]:
+    """(the material, its constants, the tests, their uncertainty); see `fit`."""
+    data = _Data(checked_tests(tests, within), material if isinstance(material, type) else type(material), relative,
+                 weights)
     if isinstance(material, RelaxingMaterial):
         if terms is not None:
             raise InputError(f"fit: terms = {terms!r}: {material} has its branches already")
@@ -74,12 +76,26 @@ def fitted_in_time(material: type[RelaxingMaterial] | RelaxingMaterial, tests: A
         best = _refined(data, _first(material), 1)
         for n in range(2, 11):                  # a branch more while the misfit falls and the data determine all
             more = _refined(data, _first(material), n)
-            if more[1] > 0.8 * best[1] or data.uncertainty(more[0])[1]:
+            if more[1] > 0.8 * best[1] or data.uncertainty(more[0]).undetermined:
                 break
             best = more
     found = best[0]
-    misfits = [found.stress(t.mode, t.stretches, times=t.times, between=t.between) - t.stress for t in data.tests]
-    return found, [m[np.isfinite(m)] for m in misfits], *data.uncertainty(found)
+    return found, dict(found.parameters), data.tests, data.uncertainty(found)
+
+
+def checked_tests(tests: Any, within: Any = None) -> list[TimedTest]:
+    """The tests as arrays; stresses at stretches that are not within are not numbers."""
+    found = []
+    for i, test in enumerate(several("fit: data", tests, "TimedTest (a material that relaxes needs the time)"), 1):
+        if not isinstance(test, TimedTest):
+            raise InputError(f"fit: data: number {i} is {test!r}: must be a TimedTest: a material that relaxes"
+                             f" needs the time")
+        test = test._replace(**_checked(f"fit: data: number {i}", test))
+        found.append(test._replace(stress=np.where(in_range(within, test.stretches), test.stress, np.nan)))
+    stress = np.concatenate([test.stress for test in found] or [np.zeros(0)])
+    if not np.any(np.isfinite(stress) & (stress != 0)):
+        raise InputError("fit: data: no stress is given, or all are 0")
+    return found
 
 
 def _first(kind: type[RelaxingMaterial]) -> RelaxingMaterial:
@@ -89,18 +105,12 @@ def _first(kind: type[RelaxingMaterial]) -> RelaxingMaterial:
 class _Data:
     """The tests, and the stresses of an equilibrium energy and of branches in them; all points in one row."""
 
-    def __init__(self, tests: Any, law: type[RelaxingMaterial]):
-        self.tests = []
-        for i, test in enumerate(several("fit: data", tests, "TimedTest (a material that relaxes needs the time)"), 1):
-            if not isinstance(test, TimedTest):
-                raise InputError(f"fit: data: number {i} is {test!r}: must be a TimedTest: a material that relaxes"
-                                 f" needs the time")
-            self.tests.append(test._replace(**_checked(f"fit: data: number {i}", test)))
+    def __init__(self, tests: list[TimedTest], law: type[RelaxingMaterial], relative: bool, weights: list[float]):
+        self.tests = tests
         measured = [np.isfinite(t.stress) for t in self.tests]
         self.stress = np.concatenate([t.stress[m] for t, m in zip(self.tests, measured)])
-        if not len(self.stress) or not np.any(self.stress):
-            raise InputError("fit: data: no stress is given, or all are 0")
         self.scale = np.abs(self.stress).max()
+        self.sizes = scales([t.stress[m] for t, m in zip(self.tests, measured)], relative, weights)
         steps = np.concatenate([np.diff(t.times) for t in self.tests])
         longest = max(t.times[-1] - t.times[0] for t in self.tests)
         if not longest > 0:
@@ -130,13 +140,13 @@ class _Data:
         log_tau = np.clip(np.log(tau), self.log_tau[0], self.log_tau[-1])
         return self.relaxed(material.equilibrium, constants[:n]) + self.branch(log_tau) @ mu
 
-    def uncertainty(self, material: RelaxingMaterial) -> tuple[dict[str, float], tuple[str, ...]]:
+    def uncertainty(self, material: RelaxingMaterial) -> Uncertainty:
         """See `uncertainty`."""
-        return uncertainty(lambda x: self.stresses(material, x), material.parameters, self.stress)
+        return uncertainty(lambda x: self.stresses(material, x), material.parameters, self.stress, self.sizes)
 
 
 def _refined(data: _Data, material: RelaxingMaterial, n: int) -> tuple[RelaxingMaterial, float]:
-    """(the material with its constants and so many branches fitted, root mean square over the largest stress)."""
+    """(the material with its constants and so many branches fitted, root mean square of the scaled misfit)."""
     from scipy.optimize import least_squares
     if len(data.stress) < (needed := len(material.parameters) - 2 * len(material.branches) + 2 * n):
         raise InputError(f"fit: {len(data.stress)} points cannot fix the {needed} constants of"
@@ -150,7 +160,7 @@ def _refined(data: _Data, material: RelaxingMaterial, n: int) -> tuple[RelaxingM
         x = np.clip(x, bounds[0] + 1e-9 * np.abs(x) + 1e-300, bounds[1] - 1e-9 * np.abs(x))
 
         def residual(x, start=start):
-            return (data.stresses(start, np.array(start.constants_at(x))) - data.stress) / data.scale
+            return (data.stresses(start, np.array(start.constants_at(x))) - data.stress) / data.sizes
 
         if not np.all(np.isfinite(residual(x))):                # beyond the limit of the equilibrium energy
             continue
@@ -172,17 +182,17 @@ def _guesses(data: _Data, material: RelaxingMaterial, n: int) -> list[RelaxingMa
     """Starts with so many branches: the material's own, and two from the best spectrum."""
     from scipy.optimize import nnls
     rest = material.equilibrium
-    shape = data.relaxed(rest)[:, None] / data.scale
+    shape = data.relaxed(rest)[:, None] / data.sizes[:, None]
     row = np.linspace(data.log_tau[0], data.log_tau[-1], len(data.log_tau) // 4)
-    columns = np.hstack([shape, data.branch(row) / data.scale])
-    weight, *spectrum = nnls(columns, data.stress / data.scale)[0]
+    columns = np.hstack([shape, data.branch(row) / data.sizes[:, None]])
+    weight, *spectrum = nnls(columns, data.stress / data.sizes)[0]
     spectrum = np.array(spectrum)
     used = np.flatnonzero(spectrum > 1e-3 * spectrum.max(initial=1e-300))
     share = np.cumsum(spectrum) / max(spectrum.sum(), 1e-300)
     ends = (row[used[0]], row[used[-1]]) if len(used) else (row[0], row[-1])
     found = []
     for log_tau in (np.interp((np.arange(n) + 0.5) / n, share, row), np.linspace(*ends, n + 2)[1:-1]):
-        mu = nnls(np.hstack([shape, data.branch(log_tau) / data.scale]), data.stress / data.scale)[0]
+        mu = nnls(np.hstack([shape, data.branch(log_tau) / data.sizes[:, None]]), data.stress / data.sizes)[0]
         pairs = [(max(m, 1e-3 * mu[1:].max(initial=1e-3 * data.scale)), t) for m, t in zip(mu[1:], np.exp(log_tau))]
         found.append(type(material)(_scaled(rest, max(mu[0], 1e-3, 1e-2 * weight), data.largest_I1), pairs))
     return found + [material] * (len(material.branches) == n)

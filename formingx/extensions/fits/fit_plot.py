@@ -31,10 +31,22 @@ def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -
 
 
 def _stretched(material: Any, data: dict, panel: Any) -> None:
-    for mode, (l, P) in data.items():
+    for mode, (l, *others, P) in data.items():
+        if others:                                          # two stretches, two stresses
+            _biaxial(material, (l, *others, P), panel)
+            continue
         points, = panel.plot(l, P, "o", ms=4, label=mode.replace("_", " "))
         fine = np.linspace(min(1, np.min(l)), np.max(l), 200)
         panel.plot(fine, material.stress(mode, fine), color=points.get_color())
+
+
+def _biaxial(material: Any, columns: Any, panel: Any) -> None:
+    """Both stresses over the first stretch; the material's as crosses at the same points."""
+    l1, l2, *stresses = (np.asarray(x, float) for x in columns)
+    computed = material.stress("biaxial", np.stack([l1, l2]))
+    for k, (P, found) in enumerate(zip(stresses, computed), 1):
+        points, = panel.plot(l1, P, "o", ms=4, label=f"biaxial, stress {k}")
+        panel.plot(l1, np.where(np.isfinite(P), found, np.nan), "x", ms=5, color=points.get_color())
 
 
 def _timed(material: Any, tests: Any, held: list[bool], panels: Any) -> None:

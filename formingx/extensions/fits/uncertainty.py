@@ -1,57 +1,80 @@
-"""How well tests fix the constants of a fit: standard errors, and which constants are left open."""
+"""Uncertainty of fitted constants: covariance, standard errors, and constants that the tests leave open."""
+
+from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 _NOISE = 0.01
-"""Share of the largest stress that a measurement is wrong by, where the misfit does not say more."""
+"""Relative noise of a measurement, where the misfit does not say more."""
 _OPEN = 0.5
-"""A constant that this leaves so far uncertain, relative, is open."""
+"""Standard error over its constant above which the constant counts as open."""
 _VISIBLE = 1e-6
-"""A change of a constant is made larger until the stress changes by this share of the largest."""
+"""Share of its scale by which some stress must change for a derivative."""
 
 
-def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndarray
-                ) -> tuple[dict[str, float], tuple[str, ...]]:
-    """({constant: standard error}, the names of those that are open) of a least-squares fit.
+class Uncertainty(NamedTuple):
+    """Uncertainty of a least-squares fit.
 
-    The covariance is s^2 (J^T J)^-1, J the derivatives of the stresses by the constants at the optimum, s^2 the sum of
-    the squared misfits over the points in excess of the constants (Seber and Wild 1989, chapter 5; not a number where
-    there are none in excess, infinite where a constant can be doubled unseen).
+    Attributes:
+        errors: {constant: standard error}.
+        undetermined: names of the constants that the tests leave open.
+        covariance: of the constants, shape (p, p), in their order.
+    """
+
+    errors: dict[str, float]
+    undetermined: tuple[str, ...]
+    covariance: np.ndarray
+
+
+def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndarray, sizes: np.ndarray) -> Uncertainty:
+    r"""Return the uncertainty of a fit that divides each misfit by a size.
+
+    .. math:: \mathrm{cov} = s^2 (J^T J)^{-1}
+
+    J holds the derivatives of the scaled stresses by the constants at the optimum, and s^2 is the sum of the squared
+    scaled misfits over the points in excess of the constants (Seber and Wild 1989, chapter 5). A standard error is not
+    a number where no points are in excess, and infinite where a constant can be doubled unseen.
 
     Args:
         stress: called with constants, shape (p,); the stresses at all points, shape (n,), not finite beyond a limit.
         constants: {name: value} of the fit, with p entries.
         measured: the measured stresses, shape (n,).
+        sizes: stress by which each misfit is divided, shape (n,).
     """
-    values, scale = np.array(list(constants.values()), float), np.abs(measured).max()
+    values = np.array(list(constants.values()), float)
     first = stress(values)
-    slopes = np.stack([_slope(stress, first, values, i, scale) for i in range(len(values))], axis=1)
-    sizes = np.linalg.norm(slopes, axis=0)
-    matter = sizes > 0
-    spread = np.full(len(values), np.inf)
+    slopes = np.stack([_slope(stress, first, values, i, sizes) for i in range(len(values))], axis=1)
+    lengths = np.linalg.norm(slopes, axis=0)
+    matter = lengths > 0
+    inverse = np.diag(np.where(matter, 0.0, np.inf)) if not matter.all() else np.zeros((len(values), len(values)))
     if matter.any():
-        _, s, V = np.linalg.svd(slopes[:, matter] / sizes[matter], full_matrices=False)
-        spread[matter] = np.sqrt(np.sum((V / np.maximum(s, 1e-8)[:, None]) ** 2, axis=0)) / sizes[matter]
-    squares, excess = float(np.sum((first - measured) ** 2)), len(measured) - len(values)
+        _, s, V = np.linalg.svd(slopes[:, matter] / lengths[matter], full_matrices=False)
+        half = (V / np.maximum(s, 1e-8)[:, None]) / lengths[matter]
+        inverse[np.ix_(matter, matter)] = half.T @ half
+    spread = np.sqrt(np.diag(inverse))
+    squares, excess = float(np.sum(((first - measured) / sizes) ** 2)), len(measured) - len(values)
     error = math.sqrt(squares / excess) if excess > 0 else math.nan
-    noise = max(_NOISE * scale, math.sqrt(squares / len(measured)))
+    noise = max(_NOISE, math.sqrt(squares / len(measured)))
     open_ = [name for name, value, each in zip(constants, values, spread) if noise * each > _OPEN * abs(value)]
-    return {name: float(error * each) for name, each in zip(constants, spread)}, tuple(open_)
+    with np.errstate(invalid="ignore"):
+        covariance = np.where(inverse == 0, 0.0, error**2 * inverse)
+    return Uncertainty({name: float(error * each) for name, each in zip(constants, spread)}, tuple(open_), covariance)
 
 
-def _slope(stress: Callable, first: np.ndarray, values: np.ndarray, i: int, scale: float) -> np.ndarray:
-    """Derivative of the stresses by a constant; 0 where no change of it can be seen."""
+def _slope(stress: Callable, first: np.ndarray, values: np.ndarray, i: int, sizes: np.ndarray) -> np.ndarray:
+    """Derivative of the scaled stresses by constant i, shape (n,); 0 where no change of it can be seen."""
     step = math.copysign(max(1e-4 * abs(values[i]), 1e-30), values[i])
     largest = abs(values[i]) or math.inf                    # further, a power that does not matter would come to
     for _ in range(50):
         if abs(step) > largest:
             break
         for change in (step, -step)[:1 + (abs(step) < abs(values[i]))]:             # it may be at the upper bound
-            moved = stress(values + change * np.eye(len(values))[i]) - first
-            if np.all(np.isfinite(moved)) and np.abs(moved).max() > _VISIBLE * scale:
+            moved = (stress(values + change * np.eye(len(values))[i]) - first) / sizes
+            if np.all(np.isfinite(moved)) and np.abs(moved).max() > _VISIBLE:
                 return moved / change
         step *= 10
     return np.zeros(len(first))

@@ -1,0 +1,106 @@
+"""Measured stresses of homogeneous tests, in one row."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError, known
+from ...materials import homogeneous
+from .weights import in_range, of_names, scales
+
+
+class Points:
+    """Measured stresses of all tests of a material without time, checked.
+
+    Args:
+        data, relative, weights, within: see `fit`.
+
+    Attributes:
+        data: the tests as given.
+        stretches_of: {test: stretches of its points}, shape (n,), of "biaxial" (2, n).
+        measured: nominal stresses, shape (m,).
+        sizes: stress by which each misfit is divided, shape (m,).
+        parts: {test: its slice of the stresses}.
+
+    Raises:
+        InputError: see `fit`.
+    """
+
+    def __init__(self, data: Any, relative: bool, weights: Any, within: Any):
+        if not isinstance(data, dict) or not data:
+            raise InputError(f"fit: data = {data!r}: must be {{test: (stretch, nominal stress)}}")
+        self.data = data
+        tests = {mode: _checked(mode, columns) for mode, columns in data.items()}
+        if all(np.all(l[0] == 1) and np.all(l[1] == 1) for l, _ in tests.values()):
+            raise InputError("fit: data: every stretch is 1: nothing is strained")
+        weight = of_names(weights, list(tests))
+        kept = {mode: _kept(mode, l, P, within) for mode, (l, P) in tests.items()}
+        stresses = [P[np.isfinite(P)] for _, P in kept.values()]
+        largest = max((np.abs(P).max() for P in stresses if len(P)), default=0.0)
+        if not any(len(P) for P in stresses):
+            raise InputError(f"fit: within = {within!r}: no point of the data lies there")
+        if not 1e-50 <= largest <= 1e50:
+            raise InputError(f"fit: data: the largest stress is {largest:g}: must be from 1e-50 to 1e50: use another"
+                             f" unit")
+        used = {mode: (l, P, w) for (mode, (l, P)), w in zip(kept.items(), weight) if np.any(np.isfinite(P))}
+        self.measured = np.concatenate([P[np.isfinite(P)] for _, P, _ in used.values()])
+        self.sizes = scales([P[np.isfinite(P)] for _, P, _ in used.values()], relative, [w for *_, w in used.values()])
+        self.stretches_of = {mode: l if mode == "biaxial" else l[0] for mode, (l, *_) in used.items()}
+        self.parts, n = {}, 0
+        for mode, (_, P, _) in used.items():
+            self.parts[mode] = slice(n, n := n + int(np.isfinite(P).sum()))
+        self._stretches = np.concatenate([l for l, *_ in used.values()], axis=1)
+        self._there = np.concatenate([np.isfinite(P) for _, P, _ in used.values()], axis=1)
+        self._rows = np.concatenate([np.full(P.shape[1], k) for k, (_, P, _) in enumerate(used.values())])
+        l1, l2 = self._stretches
+        self.largest_I1 = float((l1**2 + l2**2 + (l1 * l2) ** -2).max())
+
+    def stress(self, response: Any, constants: Any) -> np.ndarray:
+        """Return the nominal stress at every measured point, shape (m,), not finite beyond a limit."""
+        return self._in_order(response.stress(self._stretches, list(constants)))
+
+    def modulus(self) -> float:
+        """Return the median of the stresses over those of a neo-Hookean body of unit modulus, stress."""
+        l1, l2 = self._stretches
+        with np.errstate(divide="ignore"):
+            shape = self._in_order(np.stack([l1 - 1 / (l1**3 * l2**2), l2 - 1 / (l2**3 * l1**2)]))
+        return float(np.median(self.measured[shape != 0] / shape[shape != 0]))
+
+    def _in_order(self, both: np.ndarray) -> np.ndarray:
+        """Values of both directions, shape (2, n), where they were measured, test by test, shape (m,)."""
+        return np.concatenate([both[:, self._rows == k][self._there[:, self._rows == k]]
+                               for k in range(len(self.parts))])
+
+
+def _kept(mode: str, l: np.ndarray, P: np.ndarray, within: Any) -> tuple[np.ndarray, np.ndarray]:
+    inside = in_range(within, l).all(0) if mode == "biaxial" else in_range(within, l[0])
+    return l[:, inside], P[:, inside]
+
+
+def _checked(mode: str, columns: Any) -> tuple[np.ndarray, np.ndarray]:
+    """(stretches, stresses) of a test, each of shape (2, n); a stress that was not measured is not a number."""
+    known("fit: data: test", mode, [*homogeneous.MODES, "biaxial"])
+    biaxial = mode == "biaxial"
+    what = "(stretch 1, stretch 2, nominal stress 1, nominal stress 2)" if biaxial else "(stretch, nominal stress)"
+    try:
+        given = [np.asarray(x, float) for x in columns]
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"fit: data[{mode!r}]: must be {what}, numbers") from None
+    if len(given) != (4 if biaxial else 2):
+        raise InputError(f"fit: data[{mode!r}]: must be {what}, numbers")
+    first, P = given[0], given[-1]
+    if first.ndim != 1 or any(x.shape != first.shape for x in given) or not len(first):
+        raise InputError(f"fit: data[{mode!r}]: stretch has the shape {first.shape}, stress {P.shape}: must be (n,),"
+                         f" the same for both")
+    l = np.stack(given[:2]) if biaxial else homogeneous.along(mode, np.where(first > 0, first, 1.0))
+    stresses = np.stack(given[2:]) if biaxial else np.stack([P, np.full(len(P), np.nan)])
+    at = np.stack(given[:2]) if biaxial else first[None]
+    missing = np.isnan(stresses).all(0) | np.isinf(stresses).any(0)
+    for i in np.flatnonzero(missing | ~np.all(np.isfinite(at) & (at > 0), axis=0))[:1]:
+        raise InputError(f"fit: data[{mode!r}], point {i}: stretch = {first[i]}, stress = {P[i]}: must be finite,"
+                         f" and the stretch greater than 0")
+    for i in np.flatnonzero(np.any((at < 1e-3) | (at > 1e3), axis=0))[:1]:
+        raise InputError(f"fit: data[{mode!r}], point {i}: stretch = {first[i]}: must be from 0.001 to 1000")
+    return l, stresses

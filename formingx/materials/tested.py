@@ -1,0 +1,116 @@
+"""Deformations in which a material was tested, and how far others are from them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, finite_array, known
+from .homogeneous import MODES, along
+
+_NEAR = 0.1
+"""Distance from the tested strains, over the size of the strain, up to which a deformation counts as tested."""
+_SMALL = 0.02
+"""Logarithmic strain below which a deformation counts as tested whatever its mode."""
+
+
+@dataclass(frozen=True)
+class Tested:
+    """Tests that the constants of a material come from.
+
+    A deformation counts as tested if its logarithmic principal strains, in falling order, lie in the convex hull of
+    those of the tests, or within 10 % of their size from it. Between two tested modes it counts as tested.
+
+    Attributes:
+        ranges: {test: (lowest, highest stretch)}; the test is "uniaxial", "pure_shear", "equibiaxial" or "biaxial".
+        strains: largest and middle logarithmic strain of the measured points, shape (n, 2).
+        undetermined: names of the constants that these tests leave open.
+        rates: lowest and highest Hencky rate of tests in time, 1/time, or None.
+    """
+
+    ranges: dict[str, tuple[float, float]]
+    strains: np.ndarray
+    undetermined: tuple[str, ...] = ()
+    rates: tuple[float, float] | None = None
+
+    @classmethod
+    def of(cls, stretches: Mapping[str, Any], undetermined: tuple[str, ...] = (),
+           rates: tuple[float, float] | None = None) -> Tested:
+        """Return the record of tests.
+
+        Args:
+            stretches: {test: stretches, shape (n,)}; of "biaxial" shape (2, n).
+            undetermined, rates: see the class.
+
+        Raises:
+            InputError: unknown test, or a stretch that is not above 0.
+        """
+        ranges, strains = {}, []
+        for mode, given in stretches.items():
+            known("tests: test", mode, [*MODES, "biaxial"])
+            l = finite_array(f"tests: {mode}", given)
+            if l.size == 0 or not np.all(l > 0):
+                raise InputError(f"tests: {mode}: stretches must be above 0")
+            ranges[mode] = (float(l.min()), float(l.max()))
+            strains.append(principal(l.reshape(2, -1) if mode == "biaxial" else along(mode, l.ravel())))
+        return cls(ranges, np.concatenate(strains), undetermined, rates)
+
+    def distance(self, strains: np.ndarray) -> np.ndarray:
+        """Return how far strains (largest and middle), shape (m, 2), are from the tested ones, shape (m,)."""
+        corners = self._corners
+        after = np.roll(corners, -1, axis=0)
+        edges = after - corners
+        from_corner = strains[:, None] - corners
+        lengths = np.sum(edges**2, axis=1)
+        share = np.sum(from_corner * edges, axis=2) / np.where(lengths > 0, lengths, 1.0)
+        nearest = corners + np.clip(share, 0, 1)[..., None] * edges
+        found = np.sqrt(np.sum((strains[:, None] - nearest) ** 2, axis=2)).min(axis=1)
+        side = edges[:, 0] * from_corner[..., 1] - edges[:, 1] * from_corner[..., 0]
+        return np.where(np.all(side >= 0, axis=1) & (len(corners) > 2), 0.0, found)
+
+    def outside(self, strains: np.ndarray) -> np.ndarray:
+        """Return which strains, shape (m, 2), the tests do not cover, shape (m,)."""
+        size = np.hypot(*strains.T)
+        return self.distance(strains) > np.maximum(_NEAR * size, _SMALL)
+
+    @cached_property
+    def _corners(self) -> np.ndarray:
+        """Convex hull of the tested strains and rest, counter-clockwise, shape (k, 2)."""
+        return _hull(np.vstack([np.zeros(2), self.strains]))
+
+    def __str__(self) -> str:
+        return ", ".join(f"{mode.replace('_', ' ')} {low:.3g} to {high:.3g}" for mode, (low, high)
+                         in self.ranges.items())
+
+
+def principal(stretches: Any) -> np.ndarray:
+    """Return the largest and the middle logarithmic strain, shape (n, 2), of (l1, l2), shape (2, n)."""
+    e = np.log(np.asarray(stretches, float))
+    return -np.sort(-np.stack([*e, -e[0] - e[1]]), axis=0)[:2].T
+
+
+def mode_of(largest: float, middle: float) -> str:
+    """Return the name of the test that is nearest to these two logarithmic strains."""
+    share = middle / largest if largest > 0 else 0.0
+    return min(MODES, key=lambda mode: abs(MODES[mode] - share)).replace("_", " ")
+
+
+def _hull(points: np.ndarray) -> np.ndarray:
+    """Convex hull of points, shape (n, 2): its corners, counter-clockwise (Andrew's chain)."""
+    ordered = sorted(map(tuple, np.unique(points.round(12), axis=0)))
+    if len(ordered) < 3:
+        return np.array(ordered)
+
+    def half(chain: Any) -> list[tuple[float, float]]:
+        found: list[tuple[float, float]] = []
+        for x, y in chain:
+            while len(found) > 1 and ((found[-1][0] - found[-2][0]) * (y - found[-2][1])
+                                      - (found[-1][1] - found[-2][1]) * (x - found[-2][0])) <= 1e-14:
+                found.pop()
+            found.append((x, y))
+        return found[:-1]
+    return np.array(half(ordered) + half(reversed(ordered)))
