@@ -24,7 +24,6 @@ from ..figures import Axes, figure
 from . import homogeneous
 from .constants import OfTemperature, Sample, Varying, varying
 from .homogeneous import MODES, Response, Stability
-from .tested import Tested
 
 
 class Material:
@@ -49,7 +48,7 @@ class Material:
         integral: the law of a stress that depends on all past states (`IntegralLaw`), or None.
         stores_energy: True if `stored_energy` is one.
         symmetric: True if its tangent is.
-        tested: the tests that its constants come from (`with_tests`), or None: not known.
+        tested: the tests that its constants come from (a `Tested`), or None: not known.
     """
 
     parameters: dict[str, Any]
@@ -60,7 +59,7 @@ class Material:
     integral: Any = None
     stores_energy: Any = True
     symmetric: Any = True
-    tested: Tested | None = None
+    tested: Any = None
 
     def strain_energy(self, F: Any, *args: Any, **constants: Any) -> Any:
         """Energy per reference volume of F, shape (3, 3); a UFL scalar, zero at F = I.
@@ -304,24 +303,6 @@ class Material:
         other = copy.copy(self)                             # with its `response`, which holds for any constants
         other.parameters = dict(zip(self.parameters, map(float, constants), strict=True))
         other.check()
-        return other
-
-    def with_tests(self, **stretches: Any) -> Material:
-        """Return the same material with a record of its tests, from which runs warn where they leave them.
-
-        `fit` keeps this record by itself.
-
-        Args:
-            stretches: of each test, any shape, such as uniaxial=(1, 4), equibiaxial=(1, 2.5).
-
-        Raises:
-            InputError: unknown test, or a stretch that is not above 0.
-
-        >>> fx.NeoHookean(c10=0.4).with_tests(uniaxial=(1.0, 3.0)).tested.ranges
-        {'uniaxial': (1.0, 3.0)}
-        """
-        other = copy.copy(self)
-        other.tested = Tested.of(stretches)
         return other
 
     def at_temperature(self, temperature: float) -> Material:

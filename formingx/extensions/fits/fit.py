@@ -12,12 +12,12 @@ import numpy as np
 from ...errors import InputError, finite, place
 from ...figures import Axes
 from ...materials.material import Material
-from ...materials.tested import Tested
 from ...materials.viscoelastic import RelaxingMaterial
 from .fit_in_time import TimedTest, fitted_in_time
 from .fit_plot import plotted
 from .measured import read_tests
 from .points import Points
+from .tested import Tested
 from .uncertainty import Uncertainty, uncertainty
 from .weights import of_numbers
 

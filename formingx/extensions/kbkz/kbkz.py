@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...errors import InputError, instance, known, positive
+from ...errors import InputError, finite_array, instance, known, positive
 from ...materials import branches
 from ...materials.constants import OfTemperature, Sample
 from ...materials.homogeneous import MODES
@@ -130,6 +130,36 @@ class KBKZ(Relaxing):
         t, l = branches.checked(f"{self}: stress", mode, times, stretches, between)
         found = np.array([self._at(mode, t[:n + 1], l[:n + 1], between) for n in range(len(t))]) / l
         return (found + self._relaxed_stress(mode, l)) * (l if true else 1.0)
+
+    def shear(self, rate: float, times: ArrayLike) -> np.ndarray:
+        r"""Return the shear stress after a simple shear at a constant rate has begun, shape (n,), stress.
+
+        .. math:: \sigma_{12} = G(t)\, h(\gamma)\, \gamma + \int_0^t m(s)\, h(\dot\gamma s)\, \dot\gamma s\, ds
+
+        The equilibrium beside it, if any, is left out.
+
+        Args:
+            rate: shear rate, 1/time, above 0.
+            times: since the beginning, shape (n,), above 0.
+
+        >>> melt = fx.KBKZ([(1000.0, 1.0)])                                    # viscosity 1000 Pa s
+        >>> round(float(melt.shear(0.1, [50.0])[0]), 6)
+        100.0
+        """
+        rate, t = positive(f"{self}: shear: rate", rate), finite_array(f"{self}: shear: times", times)
+        modulus, tau = np.array(self.spectrum).T
+
+        def strained(strain: np.ndarray) -> np.ndarray:
+            return strain * (1.0 if self.damping is None else self.damping(3 + strain**2, 3 + strain**2))
+        found = []
+        for now in np.atleast_1d(t):
+            ends = np.append(0.0, np.geomspace(min(1e-3 * tau.min(), 0.5 * now), now, 60))
+            half = np.diff(ends)[:, None] / 2
+            age = ends[:-1, None] + half * (1 + _NODES)
+            memory = np.exp(-age[..., None] / tau) @ (modulus / tau)
+            found.append(np.sum(half * _WEIGHTS * memory * strained(rate * age))
+                         + self._modulus(now) * strained(rate * now))
+        return np.array(found)
 
     def _biaxial(self, l: np.ndarray) -> np.ndarray:
         """Nominal stresses of a step to (l1, l2), shape (2, ...)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, finite_array, known
-from .homogeneous import MODES, along
+from ...errors import InputError, finite_array, instance, known
+from ...materials.homogeneous import MODES, along
+from ...materials.material import Material
 
 _NEAR = 0.1
 """Distance from the tested strains, over the size of the strain, up to which a deformation counts as tested."""
@@ -82,9 +84,29 @@ class Tested:
         """Convex hull of the tested strains and rest, counter-clockwise, shape (k, 2)."""
         return _hull(np.vstack([np.zeros(2), self.strains]))
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return ", ".join(f"{mode.replace('_', ' ')} {low:.3g} to {high:.3g}" for mode, (low, high)
                          in self.ranges.items())
+
+
+def with_tests(material: Material, **stretches: Any) -> Material:
+    """Return the same material with a record of its tests, from which runs warn where they leave them.
+
+    `fit` keeps this record by itself.
+
+    Args:
+        material: any material.
+        stretches: of each test, any shape, such as uniaxial=(1, 4), equibiaxial=(1, 2.5); of "biaxial" shape (2, n).
+
+    Raises:
+        InputError: unknown test, or a stretch that is not above 0.
+
+    >>> fx.with_tests(fx.NeoHookean(c10=0.4), uniaxial=(1.0, 3.0)).tested
+    uniaxial 1 to 3
+    """
+    other = copy.copy(instance("with_tests: material", material, Material, "a material"))
+    other.tested = Tested.of(stretches)
+    return other
 
 
 def principal(stretches: Any) -> np.ndarray:
