@@ -1,8 +1,8 @@
 """Constants of every material from Treloar's (1944) tests of vulcanised rubber, and how well each fits.
 
 Uniaxial, pure-shear and equibiaxial tension, fitted together: least squares of the nominal stress (MPa), every point
-with the same weight (`relative=False`; `measured_treloar.py` compares both ways). The points were digitised from Treloar's published
-curves.
+with the same weight (`measured_treloar.py` compares that with relative misfits). The points were digitised from
+Treloar's published curves.
 With --quick, Ogden gets one term instead of three.
 """
 
@@ -27,8 +27,8 @@ def fits(quick):
     models = {"neo-Hookean": fx.NeoHookean, "Mooney-Rivlin": fx.MooneyRivlin, "Yeoh": fx.Yeoh, "Gent": fx.Gent,
               "Arruda-Boyce": fx.ArrudaBoyce, "own: Gent-Gent": fx.Hyperelastic(gent_gent, mu=0.3, Jm=100.0, c2=0.05)}
     found = {name: fx.fit(model, data, relative=False) for name, model in models.items()}
-    return found | {f"Ogden, {terms} term{'s' * (terms > 1)}": fx.fit(fx.Ogden, data, terms=terms,
-                                                                             relative=False)}
+    ogden = fx.fit(fx.Ogden, data, terms=terms, relative=False)
+    return found | {f"Ogden, {terms} term{'s' * (terms > 1)}": ogden}
 
 
 def constants(material):

@@ -130,3 +130,62 @@ def test_a_stretch_that_is_held_was_put_on_at_time_0(first):
     rising = np.linspace(1.5, 2.0, 12)
     with pytest.raises(fx.InputError, match="begins at time .* with a stretch of 1.5: since when"):
         fx.fit(fx.Viscoelastic, [fx.TimedTest("uniaxial", times, rising, stress)])
+
+
+def moduli(omega, spectrum):
+    x = omega[:, None] * np.array([tau for _, tau in spectrum])
+    G = np.array([G for G, _ in spectrum])
+    return (G * x**2 / (1 + x**2)).sum(1), (G * x / (1 + x**2)).sum(1)
+
+
+def test_a_spectrum_has_the_moduli_and_the_relaxation_of_the_melt():
+    """Its times are not those of the melt, but G', G'' and G(t) are, within what a relative noise of 1 % leaves."""
+    melt = [(1e4 * tau**-0.4 * np.exp(-tau / 30), tau) for tau in np.geomspace(1e-3, 100, 23)]
+    omega = np.geomspace(1e-3, 1e3, 60)
+    storage, loss = (m * (1 + 0.01 * np.random.default_rng(2).standard_normal(60)) for m in moduli(omega, melt))
+    found = fx.fit_spectrum(omega, storage, loss)
+    assert found.deviation < 0.012 and all(G > 0 for G, _ in found.pairs)
+    assert found.viscosity == pytest.approx(sum(G * tau for G, tau in melt), rel=0.01)
+    t = np.geomspace(0.002, 40, 12)
+    assert fx.KBKZ(found.pairs).relaxation_modulus(t) == pytest.approx(fx.KBKZ(melt).relaxation_modulus(t), rel=0.05)
+
+
+@pytest.mark.parametrize("damping", [fx.PSM(alpha=8.0, beta=0.2), fx.Wagner(alpha=0.1, beta=0.25),
+                                     fx.SoskeyWinter(alpha=0.1, a=0.3, b=1.5)], ids=str)
+def test_a_damping_is_recovered(damping):
+    melt = fx.KBKZ([(1e4, 0.3), (1e3, 8.0)], damping)
+    l = np.exp(np.linspace(0.2, 2.2, 8))
+    tests = [fx.TimedTest.constant_rate(mode, rate, l, melt.constant_rate(mode, rate, l))
+             for mode, rate in (("uniaxial", 0.2), ("equibiaxial", 0.5))]
+    first = type(damping)(**{name: 0.7 * getattr(damping, name) for name in damping.bounds})
+    found = fx.fit(fx.KBKZ(melt.spectrum, first), tests)
+    assert found.constants == pytest.approx({name: getattr(damping, name) for name in damping.bounds}, rel=1e-4)
+    assert vars(found.material.damping) == found.constants and found.undetermined == ()
+    assert found.material.tested.ranges["uniaxial"] == pytest.approx((l[0], l[-1]))
+    assert found.material.tested.rates == pytest.approx((0.2, 0.5))
+
+
+def test_one_mode_leaves_the_share_of_the_invariants_open():
+    """In shear and in uniaxial extension alone the share alpha is not, or hardly, seen."""
+    melt = fx.KBKZ([(1e4, 0.3), (1e3, 8.0)], fx.SoskeyWinter(alpha=0.02, a=0.3, b=1.5))
+    l = np.exp(np.linspace(0.2, 2.0, 10))
+    test = fx.TimedTest.constant_rate("uniaxial", 0.2, l, melt.constant_rate("uniaxial", 0.2, l))
+    assert "alpha" in fx.fit(melt, [test]).undetermined
+
+
+@pytest.mark.parametrize("arguments, words", [
+    ((fx.KBKZ, []), "give a card with a spectrum and a damping"),
+    ((fx.KBKZ([(1.0, 1.0)]), []), "give a card with a spectrum and a damping"),
+], ids=lambda x: str(x)[:30])
+def test_a_melt_without_damping_cannot_be_fitted(arguments, words):
+    with pytest.raises(fx.InputError, match=words):
+        fx.fit(*arguments)
+
+
+@pytest.mark.parametrize("arguments, words", [
+    (([1.0, 2.0], [1.0], [1.0, 2.0]), "must be \\(n,\\)"),
+    (([1.0, -2.0], [1.0, 1.0], [1.0, 2.0]), "must be above 0"),
+])
+def test_bad_moduli(arguments, words):
+    with pytest.raises(fx.InputError, match=words):
+        fx.fit_spectrum(*arguments)

@@ -7,7 +7,7 @@ from conftest import ROOT, run
 import formingx as fx
 
 SPECTRUM = [(0.3, 0.5), (0.4, 5.0), (0.2, 60.0)]
-DAMPINGS = [fx.PSM(alpha=12.0, beta=0.1), fx.Wagner(alpha=0.2, beta=0.15)]
+DAMPINGS = [fx.PSM(alpha=12.0, beta=0.1), fx.Wagner(alpha=0.2, beta=0.15), fx.SoskeyWinter(alpha=0.1, a=0.2, b=1.4)]
 MODES = {"uniaxial": -0.5, "pure_shear": 0.0, "equibiaxial": 1.0}
 L = np.array([1.1, 1.5, 2.0, 3.0, 5.0])
 
@@ -95,3 +95,27 @@ def test_tables_of_the_page(tmp_path):
 def test_bad_input(make, words):
     with pytest.raises(fx.InputError, match=words):
         make()
+
+
+def test_soskey_and_winter_with_the_power_2_is_psm():
+    I1, I2 = np.array([3.0, 5.0, 40.0]), np.array([3.0, 4.0, 12.0])
+    for found, expected in zip(fx.SoskeyWinter(alpha=0.3, a=0.125, b=2.0).derivatives(I1, I2),
+                               fx.PSM(alpha=8.0, beta=0.3).derivatives(I1, I2)):
+        assert found == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("damping", [None, *DAMPINGS], ids=str)
+def test_shear_at_a_constant_rate(damping):
+    """By another rule; without damping G tau rate (1 - exp(-t/tau)), which a damping lowers."""
+    from scipy.integrate import quad
+    rate, t = 3.0, 4.0
+    found = fx.KBKZ(SPECTRUM, damping).shear(rate, [t])[0]
+
+    def slope(s):                                           # by parts: the integral of G d(h strain)/dt
+        def strained(x):
+            return x * (1.0 if damping is None else damping(3 + x**2, 3 + x**2))
+        return sum(G * np.exp(-s / tau) for G, tau in SPECTRUM) * (strained(rate * s + 1e-5) - strained(
+            rate * s - 1e-5)) / 2e-5 * rate
+    assert found == pytest.approx(quad(slope, 0, t, limit=200)[0], rel=1e-6)
+    lodge = sum(G * tau * rate * -np.expm1(-t / tau) for G, tau in SPECTRUM)
+    assert found == pytest.approx(lodge, rel=1e-9) if damping is None else found < 0.9 * lodge

@@ -16,7 +16,8 @@ from formingx.extensions.kbkz.integral import Integral
 
 SPECTRUM = [(0.10, 0.01), (0.06, 0.1), (0.03, 1.0), (0.012, 10.0)]
 DAMPINGS = {"none": None, "psm": fx.PSM(alpha=10.0, beta=0.05), "wagner": fx.Wagner(alpha=0.1, beta=0.15),
-            "double": fx.DoubleWagner(alpha=0.1, f=0.6, n1=0.3, n2=0.1)}
+            "double": fx.DoubleWagner(alpha=0.1, f=0.6, n1=0.3, n2=0.1),
+            "soskey": fx.SoskeyWinter(alpha=0.1, a=0.2, b=1.4)}
 
 
 def block(material, mode="equibiaxial", **more):
