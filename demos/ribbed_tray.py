@@ -10,7 +10,7 @@ import numpy as np
 from common import COMM, parser, say, summarise
 
 import formingx as fx
-from formingx.extensions.space.solid_tool import write_stl
+from formingx.io.stl import write_stl
 from formingx.results import files
 
 HALF, CORNER, DEPTH, DRAFT = np.array([75.0, 45.0]), 20.0, 35.0, np.radians(10.0)

@@ -85,9 +85,8 @@ with _optional():
 with _optional():
     from .extensions.fits.fit_damping import Spectrum, fit_spectrum
 with _optional():
+    from .extensions.space import SolidTool, box, circle, extruded, rectangle, revolved, sheet, solid
     from .extensions.space import checks as _space_checks
-    from .extensions.space.sheet import circle, rectangle, sheet
-    from .extensions.space.solid_tool import SolidTool, box, extruded, revolved, solid
     _add(mesh, circle, rectangle, sheet)
     _add(tools, SolidTool, box, extruded, revolved, solid)
     del circle, rectangle, sheet, SolidTool, box, extruded, revolved, solid

@@ -13,7 +13,7 @@ from test_derivatives import assert_derivatives, difference, random_state
 import formingx as fx
 from formingx.__main__ import main
 from formingx.extensions.space.part import _beyond
-from formingx.extensions.space.solid_tool import write_stl
+from formingx.io.stl import write_stl
 from formingx.problem.problem import Problem
 from formingx.results.files.fields import Fields
 

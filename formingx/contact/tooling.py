@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..extensions.space.solid_tool import SolidTool, Swept
+from ..errors import InputError
 from ..forms.schedule import Setting
 from ..physics.contact import Contact
 from ..tools.shapes import Arc, Line, Tool
@@ -62,28 +63,29 @@ class Tooling(NamedTuple):
                 for contact, travel in zip(self.contacts, travels, strict=True) if travel is not None]
 
 
-class _OfFile(SolidTool):
-    """A tool from a file, of which a checkpoint holds the name alone."""
-
-    def __init__(self, name: str):
-        self.name = name
-
-    def __repr__(self) -> str:
-        return f"solid({self.name!r})"
+_three_dimensional: list[Callable[[dict[str, Any]], Any]] = []
 
 
-def _tool(shape: dict[str, Any]) -> Tool | SolidTool:
+def register_tools(make: Callable[[dict[str, Any]], Any]) -> None:
+    """Provide the function that makes a tool in three dimensions from its plain data."""
+    _three_dimensional[:] = [make]
+
+
+def tool_of(shape: dict[str, Any]) -> Any:
+    """Return the tool of plain data (`description.describe`).
+
+    Raises:
+        InputError: the tool is three-dimensional, and the extension is not installed.
+    """
     if "pieces" in shape:
         pieces: list[Line | Arc] = []
         for piece in shape["pieces"]:
             values: list[Any] = [np.array(v) if isinstance(v, list) else v for v in piece]
             pieces.append((Line if len(values) == 2 else Arc)(*values))
         return Tool.of_pieces(pieces, shape["closed"])
-    if "profile" not in shape:
-        return _OfFile(shape["name"])
-    profile = _tool(shape["profile"])
-    assert isinstance(profile, Tool)
-    return Swept(profile, shape["kind"], tuple(shape["half"]), shape["corner"], shape["along"])
+    if not _three_dimensional:
+        raise InputError("tools in three dimensions: the extension 'space' of formingx is not installed")
+    return _three_dimensional[0](shape)
 
 
 def _contact(data: dict[str, Any]) -> Contact:
@@ -91,6 +93,6 @@ def _contact(data: dict[str, Any]) -> Contact:
     names = ("penalty", "ramp", "elastic_slip", "separates", "nodes_per_step", "points", "name")
     more = {name: data[name] for name in names if name in data}
     words = isinstance(data["friction"], str) and data["friction"] not in ("stick", "none")
-    found = Contact(data["on"], _tool(data["tool"]), "stick" if words else data["friction"], moves=moves, **more)
+    found = Contact(data["on"], tool_of(data["tool"]), "stick" if words else data["friction"], moves=moves, **more)
     found.friction = data["friction"]                       # a function of the temperature can only be told
     return found

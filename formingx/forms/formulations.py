@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..extensions.space.surface import Surface
 from ..physics.models import DisplacementPenalty, Membrane, MixedPressure, Model
 from .formulation import Formulation
 from .membrane import MidSurface
@@ -17,6 +16,6 @@ FORMULATIONS: dict[type[Model], type[Formulation]] = {MixedPressure: Solid, Disp
 
 def formulate(scene: Any) -> Formulation:
     """The forms of a scene."""
-    if scene.kinematics.components == 3:
-        return Surface(scene)
+    if (formulation := scene.kinematics.formulation) is not None:
+        return formulation(scene)
     return next(FORMULATIONS[kind] for kind in type(scene.model).__mro__ if kind in FORMULATIONS)(scene)

@@ -31,9 +31,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, count, instance, non_negative, pair, positive, triple
-from ..extensions.space.lagged_stick import LaggedSlide, LaggedStick
-from ..extensions.space.solid_tool import SolidTool
-from ..tools.shapes import Nearest, Tool
+from ..tools.shapes import Nearest
 from ..tools.tool import PlaneTool
 from ..values.table import Table
 from ..values.temperature import FunctionOfTemperature
@@ -49,9 +47,6 @@ _ELASTIC_SLIP = 1e-3
 _SLIDES, _STICK, _HELD = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
 """Penalty and ramp of what slides, of what sticks until pulled off, and of what never lets go, where stiffer costs
 iterations."""
-
-_STEP = 1e-2
-"""Of differences of a distance in space, over thickness."""
 
 _MOST_POINTS = 100
 """Gauss points on a facet."""
@@ -102,12 +97,12 @@ class Contact(Part):
     tool: Any
     mu: Any
 
-    def __init__(self, on: str, tool: Tool | SolidTool, friction: Any = "stick", *, penalty: float | None = None,
+    def __init__(self, on: str, tool: Any, friction: Any = "stick", *, penalty: float | None = None,
                  ramp: float | None = None, elastic_slip: float = _ELASTIC_SLIP, separates: bool | None = None,
                  nodes_per_step: int | None = None, points: str | int = "nodes",
                  present_area: bool = False, moves: tuple[float, ...] | None = None, name: str | None = None):
         self.name, name = name, f"Contact({on!r})"
-        if not isinstance(tool, Tool | SolidTool):
+        if isinstance(tool, type) or not hasattr(tool, "signed_distance"):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
         self.on, self.tool, self.friction = instance("Contact: on", on, str, "the name of a boundary"), tool, friction
         self.mu = _coefficient(f"{name}: friction", friction)
@@ -201,8 +196,7 @@ class Contact(Part):
         """
         theta, elastic_slip = self.ramp * thickness, self.elastic_slip * thickness
         if self.lagged:
-            return LaggedStick(self.tool, k, theta, self.separates) if self.sticks else LaggedSlide(
-                self.tool, k, theta, _STEP * thickness)
+            return self.tool.contact_law(self, k, thickness)
         foot = (1 - _AT_FOOT * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)
         return Law(self.tool, self.friction_at(temperature, clamped=True), k, theta, elastic_slip, shift,

@@ -29,6 +29,8 @@ class Kinematics:
             at rest, by which tables and functions look it up.
         axisymmetric: True if the section turns about R = 0.
         dimension_of_volume: 3; of a volume per unit depth 2.
+        formulation: class of the forms, made from a scene; None: the formulation of the model. An extension sets it.
+        scene_checks: checks of a scene (`SceneChecks`); None: those of a section. An extension sets it.
     """
 
     axes: tuple[str, ...] = ("r", "z")
@@ -36,6 +38,8 @@ class Kinematics:
     coordinates = COORDINATES
     axisymmetric = False
     dimension_of_volume = 3
+    formulation: Any = None
+    scene_checks: Any = None
 
     def in_axes(self, support: Any, items: list[Any]) -> list[Any]:
         """What a support holds (`Held`, `MeanHeld`), its components as the coordinates are numbered.

@@ -11,7 +11,6 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError, count, known, several, together
-from ..extensions.space import scene_checks as space
 from ..materials.constants import Sample
 from ..materials.hyperelastic import Material
 from ..mesh.mesh import Mesh
@@ -109,8 +108,11 @@ class Scene:
         if expansion is not None:
             self.expansion = self._checked_expansion(expansion)
         if in_space:
-            self.thickness = space.thicknesses(self, thickness)
-            space.refuse(self, heat)
+            if self.kinematics.scene_checks is None:
+                raise InputError("Scene: mesh: is three-dimensional: the extension 'space' of formingx is not"
+                                 " installed")
+            self.thickness = self.kinematics.scene_checks.thicknesses(self, thickness)
+            self.kinematics.scene_checks.refuse(self, heat)
         elif thickness is not None:
             raise InputError(f"Scene: thickness = {thickness!r}: is for a sheet in space; a section has one already")
         self._check_names()
@@ -304,7 +306,7 @@ class Scene:
             raise InputError(f"{contact!r}: a section takes tools drawn in its plane, a sheet in space those of"
                              f" fx.tools.solid, box, revolved or extruded")
         if contact.tool.components == 3:
-            space.check_contact(self, contact)
+            self.kinematics.scene_checks.check_contact(self, contact)
             return
         if self.kinematics.axisymmetric and contact.moves and contact.moves[0] \
                 and contact.tool.bounds[0, 0] <= near:

@@ -1,1 +1,31 @@
 """Membranes in three dimensions and their tools."""
+
+from typing import Any
+
+from ...contact.tooling import register_tools, tool_of
+from ...physics.kinematics import ThreeD
+from . import scene_checks
+from .sheet import circle, rectangle, sheet
+from .solid_tool import SolidTool, Swept, box, extruded, revolved, solid
+from .surface import Surface
+
+
+class _OfFile(SolidTool):
+    """A tool from a file, of which a checkpoint holds only the name."""
+
+    def __init__(self, name: str):
+        self.name = name
+
+    def __repr__(self) -> str:
+        return f"solid({self.name!r})"
+
+
+def _tool(shape: dict[str, Any]) -> SolidTool:
+    if "profile" not in shape:
+        return _OfFile(shape["name"])
+    return Swept(tool_of(shape["profile"]), shape["kind"], tuple(shape["half"]), shape["corner"], shape["along"])
+
+
+ThreeD.formulation = Surface
+ThreeD.scene_checks = scene_checks
+register_tools(_tool)

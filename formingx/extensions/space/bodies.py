@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import InputError
+from ...io.stl import volume
 
 
 def apart(points: np.ndarray, triangles: np.ndarray, who: str) -> list[np.ndarray]:
@@ -37,12 +38,6 @@ def apart(points: np.ndarray, triangles: np.ndarray, who: str) -> list[np.ndarra
         else:
             groups.append([k])
     return [np.concatenate([part for k in group for part in whole[k]]) for group in groups]
-
-
-def volume(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Within closed surfaces of triangles that look outward."""
-    a, b, c = (points[triangles[:, k]] - points.mean(0) for k in range(3))
-    return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6)
 
 
 def _parts(triangles: np.ndarray) -> list[np.ndarray]:

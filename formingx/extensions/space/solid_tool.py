@@ -11,9 +11,15 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, as_points, direction, instance, known, non_negative, pair, place, positive, triple
-from ...io.output import replace
+from ...io.stl import volume, write_stl
+from ...physics.contact import Contact
+from ...physics.contact_law import ContactLaw
 from ...tools.profile import Tool
-from .bodies import apart, volume
+from .bodies import apart
+from .lagged_stick import LaggedSlide, LaggedStick
+
+_STEP = 1e-2
+"""Step of the differences of a distance, over the thickness of the sheet."""
 
 _PER_CORNER = 24           # straight pieces of a rounded corner in `surface`
 
@@ -47,6 +53,19 @@ class SolidTool:
         found = copy.copy(self)
         found.shift = tuple(a + b for a, b in zip(self.shift, triple("moved", (x, y, z))))
         return found
+
+    def contact_law(self, contact: Contact, k: np.ndarray | float, thickness: float) -> ContactLaw:
+        """Return the contact law of a sheet on this tool.
+
+        Args:
+            contact: its friction and regularisation.
+            k: penalty, stress/length, shape () or (n,).
+            thickness: of the sheet, length.
+        """
+        theta = contact.ramp * thickness
+        if contact.sticks:
+            return LaggedStick(self, k, theta, contact.separates)
+        return LaggedSlide(self, k, theta, _STEP * thickness)
 
     def _distance(self, x: np.ndarray) -> np.ndarray:
         raise NotImplementedError
@@ -271,16 +290,6 @@ def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.nd
     triangles = same.ravel()[triangles]
     a, b, c = triangles.T
     return points[first], triangles[(a != b) & (b != c) & (c != a)]
-
-
-def write_stl(points: np.ndarray, triangles: np.ndarray, file: Any) -> None:
-    """A surface as binary STL."""
-    corners = points[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    rows = np.zeros(len(triangles), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-    rows["normal"], rows["corners"] = normal, corners
-    replace(file, lambda f: f.write(b"formingx".ljust(80) + np.uint32(len(rows)).tobytes() + rows.tobytes()), "wb")
 
 
 def _read(name: str) -> tuple[np.ndarray, np.ndarray]:

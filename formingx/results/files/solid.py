@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...extensions.space.solid_tool import volume, write_stl
+from ...io.stl import volume, write_stl
 from ..evaluate.profile import fine
 from . import tabular
 
