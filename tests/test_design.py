@@ -144,7 +144,18 @@ def test_bad_input_is_told_in_words():
 def test_what_is_not_reached_is_said():
     """A wall, a volume and a least wall beyond the bounds."""
     design = fx.Design(programmed, {"h": fx.along(2, start=0.0, low=-0.3, high=0.3)})
-    assert "within the bounds, would be 0.9 % better" in design.fit(wall=1.0, volume=None).why
+    answer = design.fit(wall=1.0, volume=None)
+    assert "within the bounds, would be 0.9 % better" in answer.why
+    wall = answer.best.wall
+    assert f"the wanted wall was not reached: wanted 1, reached {wall.mean():.4g} on the mean" in str(answer)
+    assert f"the largest deviation is {100 * (wall.min() - 1):+.3g} %, at reference length" in str(answer)
+    assert "It is stopped by bounds: h" in str(answer) and "the volume" not in answer.lack
+    lines = {line.get_label(): line.get_ydata() for line in answer.plot_wall().lines}
+    assert np.all(lines["wanted"] == 1.0)
+    near = design.fit(wall=design.run().wall.mean(), runs=1)
+    assert near.wanted.mean() == pytest.approx(near.best.wall.mean())
+    held = design.fit(wall=1.2 * design.run().wall.mean(), runs=3)
+    assert "It is stopped by the volume, which is held at" in str(held)
     assert "the volume that was asked for, 99, was not reached" in str(design.fit(even=True, volume=99.0, runs=4))
     answer = design.least_weight(least_wall=1.0)
     assert "least wall that was asked for, 1, was not reached" in str(answer)

@@ -28,8 +28,9 @@ class Answer:
     Attributes:
         before, best: the first and the best `DesignRun`; runs: all that were taken, in order; failed: why others made
             no path, in words; inside: which places of the wall counted, shape (k,); why: the search ended; foretold:
-            the wall that the run before the best foretold for it, shape (k,), length; lack: a volume or a least wall
-            that was asked for and not reached, in words, or "".
+            the wall that the run before the best foretold for it, shape (k,), length; lack: a volume, a wall or a least
+            wall that was asked for and not reached, and what stops it, in words, or ""; wanted: the wall that was asked
+            for at the places that count, shape (m,), length, or None.
     """
 
     before: DesignRun
@@ -40,6 +41,7 @@ class Answer:
     why: str
     foretold: np.ndarray
     lack: str = ""
+    wanted: np.ndarray | None = None
 
     @property
     def values(self) -> dict[str, Any]:
@@ -88,6 +90,10 @@ class Answer:
                  f"{'least wall':24}{before.min():12.5g}{after.min():12.5g}",
                  f"{'mean wall':24}{before.mean():12.5g}{after.mean():12.5g}",
                  f"{'volume':24}{self.before.volume:12.5g}{self.best.volume:12.5g}"]
+        if self.wanted is not None:
+            lines.insert(3, f"{'wanted wall, mean':24}{'':12}{self.wanted.mean():12.5g}")
+            a, b = (np.abs(wall / self.wanted - 1).max() for wall in (before, after))
+            lines.insert(4, f"{'largest deviation, %':24}{100 * a:12.4g}{100 * b:12.4g}")
         p = self.best.parameters
         lines += [f"{name:24}{x:12.5g}{y:12.5g}" for name, x, y in zip(p.names, self.before.vector, self.best.vector)]
         lines += [f"the run before predicted the wall to {100 * off:.2g} %"]
@@ -99,12 +105,14 @@ class Answer:
     __repr__ = __str__
 
     def plot_wall(self, axes: Any = None) -> Any:
-        """Draw the wall before and after over the reference length; returns the matplotlib axes."""
+        """Draw the wall before, after and as wanted over the reference length; returns the matplotlib axes."""
         if axes is None:
             from ...figures import figure
             axes = figure(width=7)[1]
         for run, label, colour in ((self.before, "before", "0.6"), (self.best, "after", "C0")):
             axes.plot(run.profile.reference_length, run.wall, color=colour, label=label)
+        if self.wanted is not None:
+            axes.plot(self.best.profile.reference_length[self.inside], self.wanted, "k--", linewidth=1, label="wanted")
         axes.set_xlabel("reference length")
         axes.set_ylabel("wall")
         axes.set_ylim(bottom=0)

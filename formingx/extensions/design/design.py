@@ -6,47 +6,23 @@ import copy
 import inspect
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ...errors import ConvergenceError, InputError, count, finite, instance, pair, positive
+from ...errors import ConvergenceError, InputError, count, instance, positive
 from ...measures.targets import Target
 from ...runs import Process, trace
 from ...scene.scene import Scene
 from ...solve.newton import Tolerances
 from ...solve.stage import Stage
 from ...solve.stepping import StepControl
+from .aim import SEARCH, Aim, inside_of, lack
 from .answer import Answer
 from .parameters import Parameters
 from .run import DesignRun
 
 log = logging.getLogger("formingx")
-
-
-@dataclass(frozen=True)
-class Search:
-    """How searches weigh what they look for, and when they end.
-
-    Attributes:
-        held: weight of the volume that is held, relative, beside relative walls.
-        spare: part by which a volume that is to be kept is aimed lower, so that round-off does not exceed it.
-        kept: a volume or a least wall that is missed by more than this part is said.
-        damped: Levenberg's damping over the largest singular value of the sensitivities: less effect counts as none.
-        worth: the search ends after two runs that lower the sum of squares by less than this part of it.
-        shortest: a step is halved, where it is no better, down to this part of it.
-    """
-
-    held: float = 1e2
-    spare: float = 1e-6
-    kept: float = 5e-3
-    damped: float = 1e-6
-    worth: float = 0.02
-    shortest: float = 1 / 64
-
-
-_SEARCH = Search()
 
 
 class Design:
@@ -143,11 +119,11 @@ class Design:
             raise InputError(f"fit: volume = {volume!r}: must be 'kept', a number or None")
         first = start if isinstance(start, DesignRun) else self._run(self.parameters.vector(start or {}))
         held = None if volume is None else (
-            first.volume * (1 - _SEARCH.spare) if volume == "kept" else positive("fit: volume", volume))
-        aim = _Aim(first, wall, within, held)
+            first.volume * (1 - SEARCH.spare) if volume == "kept" else positive("fit: volume", volume))
+        aim = Aim(first, wall, within, held)
         return self._search(first, aim, most, good)
 
-    def _search(self, first: DesignRun, aim: _Aim, most: int, good: float) -> Answer:
+    def _search(self, first: DesignRun, aim: Aim, most: int, good: float) -> Answer:
         """Gauss-Newton steps from the best run so far, halved where a run is worse or fails."""
         from scipy.optimize import lsq_linear
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
@@ -164,17 +140,17 @@ class Design:
                 break
             if not np.any(np.abs(by * size) > 1e-9):
                 raise InputError("fit: no parameter has an effect on what is fitted")
-            held = _SEARCH.damped * np.linalg.norm(by * size, 2) * np.eye(len(size))     # what has no effect stays
+            held = SEARCH.damped * np.linalg.norm(by * size, 2) * np.eye(len(size))     # what has no effect stays
             step = lsq_linear(np.vstack([by * size, held]), np.append(-left, 0 * size), tol=1e-12,
                               bounds=((low - best.vector) / size, (high - best.vector) / size)).x * size
             gain = np.sqrt(np.mean((by @ step) ** 2))
             better = 1 - np.sum((left + by @ step) ** 2) / np.sum(left**2)
-            if gain < good or better < _SEARCH.worth:
+            if gain < good or better < SEARCH.worth:
                 why = f"the next step would change the wall by {gain:.1e}" if gain < good else (
                     f"the next step, within the bounds, would be {100 * max(better, 0.0):.1f} % better")
                 break
             share, new = 1.0, None
-            while share >= _SEARCH.shortest and len(taken) + len(notes) < most:
+            while share >= SEARCH.shortest and len(taken) + len(notes) < most:
                 try:
                     new = self._run(np.clip(best.vector + share * step, low, high))
                     taken.append(new)
@@ -184,17 +160,18 @@ class Design:
                     notes.append(str(error).splitlines()[0])
                 share, new = share / 2, None
             if new is None:
-                why = "no shorter step brings an improvement" if share < _SEARCH.shortest else why
+                why = "no shorter step brings an improvement" if share < SEARCH.shortest else why
                 break
             foretold = best.wall + share * (best.derivative("wall")[1] @ step)
             gained = 1 - aim.cost(new) / aim.cost(best)
             best = new
-            if max(gained, before) < _SEARCH.worth:     # a first step may lead beyond, to what is hardly better
+            if max(gained, before) < SEARCH.worth:     # a first step may lead beyond, to what is hardly better
                 why = f"the last run was {100 * gained:.1f} % better"
                 break
             before = gained
             log.info("design: run %d, cost %.3g", len(taken), aim.cost(best))
-        return Answer(first, best, taken, notes, aim.inside, why, foretold, _lack("volume", aim.held, best.volume))
+        lacks = [lack("volume", aim.held, best.volume), aim.shortfall(best)]
+        return Answer(first, best, taken, notes, aim.inside, why, foretold, "\n".join(filter(None, lacks)), aim.wanted)
 
     def least_weight(self, least_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
         """Search for the least volume of the body with a wall nowhere less than so much (successive linear programs).
@@ -213,7 +190,7 @@ class Design:
         least, most = positive("least_weight: least_wall", least_wall), count("least_weight: runs", runs)
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
         first = self._run(self.parameters.start.copy())
-        inside = _inside(first, within)
+        inside = inside_of(first, within)
         unit = min(least, first.wall[inside].min())
         best, taken, foretold, reach, why = first, [first], first.wall, 0.25, f"runs = {most} were used up"
         notes: list[str] = []
@@ -255,59 +232,4 @@ class Design:
                 break
         thinnest = best.wall[inside].min()
         return Answer(first, best, taken, notes, inside, why, foretold,
-                      _lack("least wall", least, min(thinnest, least)))
-
-
-def _lack(what: str, wanted: float | None, found: float) -> str:
-    """What was asked for and not reached, in words, or ""."""
-    if wanted is None or abs(found / wanted - 1) < _SEARCH.kept:
-        return ""
-    return f"the {what} that was asked for, {wanted:.5g}, was not reached: {found:.5g}"
-
-
-class _Aim:
-    """A wanted wall as least squares: relative deviations, and that of the volume where it is held."""
-
-    def __init__(self, run: DesignRun, wall: Any, within: tuple[float, float] | None, held: float | None):
-        self.inside, self.held = _inside(run, within), held
-        self._even = wall is None
-        if not self._even:
-            s = run.profile.reference_length[self.inside]
-            given = wall(s) if callable(wall) else np.full(len(s), finite("fit: wall", wall))
-            self._wanted = np.asarray(given, dtype=float)
-            if self._wanted.shape != s.shape or not np.all(self._wanted > 0):
-                raise InputError("fit: wall: must be greater than 0 at all reference lengths")
-
-    def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
-        """Shape (m,), and its derivatives, (m, n)."""
-        by = run.derivative("wall")[1][self.inside]
-        wall = run.wall[self.inside]
-        wanted = wall.mean() if self._even else self._wanted
-        left = wall / wanted - 1
-        slopes = by / np.reshape(wanted, (-1, 1))
-        if self._even:
-            slopes -= np.outer(wall / wanted**2, by.mean(0))
-        if self.held is not None:
-            grows = run.derivative("volume")[1][0] / self.held
-            weight = _SEARCH.held * np.sqrt(len(left))
-            left = np.append(left, weight * (run.volume / self.held - 1))
-            slopes = np.vstack([slopes, weight * grows])
-        return left, slopes
-
-    def cost(self, run: DesignRun) -> float:
-        """Mean square of the relative deviations, and of the volume's."""
-        wall = run.wall[self.inside]
-        left = np.mean((wall / (wall.mean() if self._even else self._wanted) - 1) ** 2)
-        return float(left + (0.0 if self.held is None else (run.volume / self.held - 1) ** 2))
-
-
-def _inside(run: DesignRun, within: tuple[float, float] | None) -> np.ndarray:
-    s = run.profile.reference_length
-    if within is None:
-        return np.ones(len(s), dtype=bool)
-    low, high = pair("within", within)
-    inside = (s >= low) & (s <= high)
-    if inside.sum() < 2:
-        raise InputError(f"within = {within!r}: has fewer than two places of the sheet, whose reference length goes"
-                         f" from 0 to {s[-1]:.6g}")
-    return inside
+                      lack("least wall", least, min(thinnest, least)))
