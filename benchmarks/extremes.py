@@ -112,7 +112,9 @@ def why():
     """Why the displacement-only penalty breaks: condition of the tangent at rest, and Newton's radius there.
 
     The radius is the longest first step, as deflection over the radius of the sheet, from which Newton converges.
+    Returns {name: {eps: {"condition", "negative_eigenvalues", "first_step"}}}.
     """
+    table: dict = {}
     say(f"{'10x1 elements, at rest':44}{'condition':>12}{'negative eigenvalues':>22}{'first step':>12}")
     for name, make in (("displacement only, 3 points", lambda e: fx.DisplacementPenalty(eps=e, points=3)),
                        ("displacement only, 4 points", lambda e: fx.DisplacementPenalty(eps=e, points=4)),
@@ -137,7 +139,11 @@ def why():
                     break
                 except Failure:
                     step /= 2
-            say(f"{name + f', eps {eps:g}':44}{np.linalg.cond(scaled):12.1e}{negative:22d}{step:12.1e}")
+            condition = float(np.linalg.cond(scaled))
+            table.setdefault(name, {})[f"{eps:g}"] = {"condition": condition, "negative_eigenvalues": negative,
+                                                      "first_step": step}
+            say(f"{name + f', eps {eps:g}':44}{condition:12.1e}{negative:22d}{step:12.1e}")
+    return table
 
 
 def run(group, name, options, read, reference, what):
@@ -173,9 +179,12 @@ def main():
             f"{r['iterations']:6d}{r['mass_error']:9.0e}{r['seconds']:6.1f}  {r['outcome']}")
     right = sum(r["outcome"] == "right" for r in found)
     say(f"{right} of {len(found)} rows end right; the others end with the error shown")
-    if not args.quick:
-        why()
-    files.write_summary(args.out / "summary.json", {"rows": found}, COMM)
+    penalty = [r for r in found if r["group"] == "displacement only"]
+    of_penalty = sum(r["outcome"] == "right" for r in penalty)
+    files.write_summary(args.out / "summary.json", {
+        "rows": found, "count": len(found), "right": right, "count_displacement_only": len(penalty),
+        "right_displacement_only": of_penalty, "count_default": len(found) - len(penalty),
+        "right_default": right - of_penalty, "tangent_at_rest": {} if args.quick else why()}, COMM)
 
 
 if __name__ == "__main__":

@@ -1,66 +1,102 @@
-"""The tables of the docs hold what the code that makes them gives today."""
+"""The page validation.md is what its script writes from stored numbers, and those are what the code gives today."""
 
-import re
+import json
 import sys
 
 import pytest
 from conftest import ROOT
 
-sys.path[:0] = [str(ROOT / "demos"), str(ROOT / "benchmarks")]
+sys.path[:0] = [str(ROOT / "demos"), str(ROOT / "benchmarks"), str(ROOT / "docs")]
 import compression_roll_over  # noqa: E402
+import make_validation  # noqa: E402
 import thick_cylinder  # noqa: E402
 import treloar_mesh  # noqa: E402
+from validation_rows import Row  # noqa: E402
 
 import formingx as fx  # noqa: E402
 
-DOCS = "\n".join((ROOT / "docs" / f"{page}.md").read_text() for page in ("verification", "forming"))
+TEMPLATE, STORED = make_validation.TEMPLATE.read_text(), json.loads(make_validation.STORED.read_text())
 
 
-def row(table, name):
-    """The cells after the first one of a table's row; the table is known by how its head begins."""
-    lines = DOCS[DOCS.index(f"\n| {table}") + 1:].split("\n\n")[0].splitlines()
-    found = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    return next(cells[1:] for cells in found if cells[0].startswith(name))
+def test_page_is_what_the_script_writes():
+    assert make_validation.PAGE.read_text() == make_validation.page(TEMPLATE, STORED), \
+        "run docs/make_validation.py: the page, its template, its rows or the stored numbers have changed"
 
 
-def printed(value, cell):
-    """A value with as many decimals as the cell has."""
-    return f"{value:.{len(cell.partition('.')[2])}f}"
+def test_stored_numbers_are_those_of_the_page():
+    """None is missing, none is left over."""
+    assert sorted(STORED) == sorted(set(make_validation.paths(TEMPLATE)))
 
 
-@pytest.mark.parametrize("elements, name", [((20, 1), "20 x 1"), ((40, 2), "40 x 2")])
-def test_treloar(elements, name):
-    *cells, states, iterations = row("simply supported", name)
+def test_scripts_of_all_numbers_are_there():
+    names = {path.split("/")[0] for path in STORED}
+    assert all((ROOT / "demos" / f"{n}.py").is_file() or (ROOT / "benchmarks" / f"{n}.py").is_file() for n in names)
+
+
+def test_a_page_from_summaries(tmp_path, monkeypatch):
+    """Numbers, quotients and deviations of summaries; a number that is nowhere is named."""
+    rows = [Row("pressure", "run/a/p", 2.0, "a book", "MPa", ".3f"),
+            Row("error", "run/list/1", 0.0, "theory", style=".1e", absolute=True),
+            Row("ratio", "run/a/p OVER run/a/q", "run/a/q", "exact"),
+            Row("near", "run/a/q", lambda: 2.0 * (1 - 1e-5), "x"),
+            Row("alone", "run/a/q", None, "a figure", note="undecided")]
+    monkeypatch.setattr(make_validation, "TABLES", {"all": rows})
+    template = "{{run/a/p .2f}} {{run/a/p OVER run/a/q +.1%}} {{run/none d}}\n{{TABLE all}}\n"
+    (tmp_path / "run").mkdir()
+    summary = {"a": {"p": 2.2, "q": 2.0}, "list": [1, -1e-3], "none": None}
+    (tmp_path / "run" / "summary.json").write_text(json.dumps(summary))
+    wanted = set(make_validation.paths(template))
+    numbers = make_validation.collect(tmp_path, wanted, {})
+    text = make_validation.page(template, numbers).splitlines()
+    assert text[1] == "2.20 +10.0 % none"
+    assert [line.split(" | ")[1:4] for line in text[4:]] == [
+        ["2.200 MPa", "2.000 MPa", "+10.0 %"], ["-1.0e-03", "0.0e+00", "-1.0e-03"], ["1.1", "2", "-45.0 %"],
+        ["2", "2", "+1.0e-05"], ["2", "", "undecided"]]
+    assert make_validation.collect(tmp_path / "no", wanted, numbers) == numbers
+    with pytest.raises(KeyError, match="no number for run/a/p"):
+        make_validation.collect(tmp_path / "no", wanted, {})
+
+
+@pytest.mark.parametrize("elements", [(20, 1), (40, 2)])
+def test_treloar(elements):
     found = treloar_mesh.pressures(elements, fx.SimplySupported("rim"))
-    assert [printed(v, c) for v, c in zip([found["limit"], *found["at"]], cells, strict=True)] == cells
-    assert (found["steps"], found["iterations"]) == (int(states), int(iterations))
+    name = f"treloar_mesh/simply supported {elements[0]}x{elements[1]}"
+    assert found["limit"] == pytest.approx(STORED[f"{name}/limit"], rel=1e-6)
+    assert found["at"] == pytest.approx([STORED[f"{name}/at/{k}"] for k in range(7)], rel=2e-5)
+    assert (found["steps"], found["iterations"]) == (STORED[f"{name}/steps"], STORED[f"{name}/iterations"])
 
 
 def test_thick_cylinder_and_sphere():
-    ours, exact = (re.findall(r"[\d.]+", cell) for cell in row("study", "`thick_cylinder`"))
+    def stored(kind, key):
+        return STORED[f"thick_cylinder/{kind}/{key}"]
     path, targets = thick_cylinder.inflate("tube", thick_cylinder.wall("tube", 16))
-    for mine, theirs, at in zip(ours, exact, ("10", "30", "50"), strict=True):
-        assert printed(path.met(targets[at]).measures["pressure"] * thick_cylinder.PSI, mine) == mine
-        assert printed(thick_cylinder.exact("tube", at).pressure * thick_cylinder.PSI, theirs) == theirs
+    for at in ("10", "30", "50"):
+        key = f"pressure_MPa_at_inner_displacement_cm/{at}"
+        found = path.met(targets[at]).measures["pressure"] * thick_cylinder.PSI
+        assert found == pytest.approx(stored("cylinder", key), rel=1e-7)
+        exact = thick_cylinder.exact("tube", at).pressure * thick_cylinder.PSI
+        assert exact == pytest.approx(stored("cylinder", f"exact_{key}"), rel=1e-7)
     path, targets = thick_cylinder.inflate("sphere", thick_cylinder.wall("sphere", 16))
     limit = path.limit_points[0]
-    found = (limit.measures["pressure"] * thick_cylinder.PSI,
-             path.value(targets["50"].bind(path.problem), limit) * thick_cylinder.INCH)
-    cells = re.findall(r"[\d.]+", row("study", "its thick sphere")[0])
-    assert [printed(v, c) for v, c in zip(found, cells, strict=True)] == cells
+    assert limit.measures["pressure"] * thick_cylinder.PSI == pytest.approx(
+        stored("sphere", "limit_pressure_MPa"), rel=1e-7)
+    assert path.value(targets["50"].bind(path.problem), limit) * thick_cylinder.INCH == pytest.approx(
+        stored("sphere", "inner_displacement_cm_at_limit"), rel=1e-4)
+
+
+def check_roll_over(elements):
+    name = f"compression_roll_over/grids/{elements[0]}x{elements[1]}/force_N_at_ratio"
+    _, met, end = compression_roll_over.compress(elements)
+    stored = [value for path, value in STORED.items() if path.startswith(f"{name}/")]
+    assert end == "done" and len(met) == len(stored)
+    assert sorted(map(compression_roll_over.force, met.values())) == pytest.approx(sorted(stored), rel=2e-5)
 
 
 def test_roll_over():
-    cells = row("force on one plate", "8 x 4")
-    _, met, end = compression_roll_over.compress((8, 4))
-    assert end == "done"
-    assert [printed(compression_roll_over.force(s), c) for s, c in zip(met.values(), cells, strict=True)] == cells
+    check_roll_over((8, 4))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("elements", compression_roll_over.GRIDS[1:])
 def test_roll_over_on_finer_grids(elements):
-    cells = row("force on one plate", f"{elements[0]} x {elements[1]}")
-    _, met, end = compression_roll_over.compress(elements)
-    assert end == "done"
-    assert [printed(compression_roll_over.force(s), c) for s, c in zip(met.values(), cells, strict=True)] == cells
+    check_roll_over(elements)

@@ -105,7 +105,7 @@ class Symmetry(_OneComponent):
 class Clamped(Support):
     """All displacements of a boundary are 0.
 
-    The corner of a clamped rim is singular: see docs/verification.md for the band that this leaves in a limit pressure.
+    The corner of a clamped rim is singular: see docs/validation.md for the band that this leaves in a limit pressure.
 
     >>> [(held.component, held.on) for held in fx.Clamped("rim").constraints()]          # u_r and u_z
     [(0, 'rim'), (1, 'rim')]

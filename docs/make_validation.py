@@ -1,0 +1,140 @@
+"""Write the page validation.md from the numbers of the demos' and benchmarks' summaries.
+
+    ./fx python3 docs/make_validation.py [--collect FOLDER] [--check]
+
+The text stands in `data/validation.template`, the comparisons in `validation_rows.py`; the numbers come from
+`data/summaries.json`. `--collect results` renews those numbers from the files FOLDER/NAME/summary.json that are there.
+`--check` writes nothing; the exit status is 1 if the page is not what it would write.
+
+In the template `{{NAME/KEY/KEY FORMAT}}` is a number of results/NAME/summary.json in Python's format, and
+`{{A OVER B FORMAT}}` a quotient of two, less 1 if the format is a percentage (`+.1%`). `{{TABLE NAME}}` is a table of
+comparisons.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+DOCS = Path(__file__).parent
+sys.path.insert(0, str(DOCS))
+from validation_rows import TABLES, Row  # noqa: E402
+
+TEMPLATE, STORED, PAGE = DOCS / "data" / "validation.template", DOCS / "data" / "summaries.json", DOCS / "validation.md"
+PLACE, OVER = re.compile(r"\{\{(.+?)\}\}"), " OVER "
+HEAD = "<!-- Written by docs/make_validation.py from data/validation.template: do not change this page. -->\n"
+DIGITS = 12                                                   # of a stored number
+
+
+def paths(template: str) -> Iterator[str]:
+    """Yield NAME/KEY/... of every number that the page needs."""
+    for place in PLACE.findall(template):
+        if not place.startswith("TABLE "):
+            yield from place.rsplit(" ", 1)[0].split(OVER)
+    for table in TABLES.values():
+        for row in table:
+            yield from (path for key in (row.ours, row.reference) if isinstance(key, str) for path in key.split(OVER))
+
+
+def found(summary: Any, path: str) -> Any:
+    """Return a summary's value at KEY/KEY/...; a key may be the index of a list. Raises a KeyError."""
+    for key in path.split("/"):
+        summary = summary[int(key)] if isinstance(summary, list) else summary[key]
+    return summary
+
+
+def collect(folder: Path, wanted: set[str], stored: dict[str, Any]) -> dict[str, Any]:
+    """Return {path: number} of all wanted paths: those of the folder's summaries, else the stored ones.
+
+    Raises:
+        KeyError: paths that neither has.
+    """
+    summaries: dict[str, Any] = {}
+    for name in {path.split("/")[0] for path in wanted}:
+        file = folder / name / "summary.json"
+        if file.is_file():
+            summaries[name] = json.loads(file.read_text())
+    result, missing = {}, []
+    for path in sorted(wanted):
+        name, _, rest = path.partition("/")
+        try:
+            value = found(summaries[name], rest) if name in summaries else stored[path]
+        except (KeyError, IndexError, ValueError):
+            missing.append(path)
+            continue
+        result[path] = float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
+    if missing:
+        raise KeyError(f"no number for {', '.join(missing)}: run the demo or benchmark, then collect its results")
+    return result
+
+
+def number(text: str, numbers: dict[str, Any]) -> Any:
+    """Return the number at `PATH`, or the quotient of those at `PATH OVER PATH`."""
+    one, *other = (numbers[path] for path in text.split(OVER))
+    return one / other[0] if other else one
+
+
+def cell(text: str, style: str, numbers: dict[str, Any]) -> str:
+    """Return `number(text)` in a format; a quotient as a percentage is less 1."""
+    value = number(text, numbers)
+    if style.endswith("%"):
+        return f"{100 * (value - (OVER in text)):{style.removesuffix('%')}f} %"
+    return "none" if value is None else format(value, style)
+
+
+def table(rows: list[Row], numbers: dict[str, Any]) -> str:
+    """Return the lines of a table of comparisons."""
+    lines = ["| what | ours | reference | deviation | reference from | script |", "|---|---|---|---|---|---|"]
+    for row in rows:
+        def shown(value: float, row: Row = row) -> str:
+            return f"{value:{row.style}} {row.unit}".rstrip()
+        ours, reference, deviation = number(row.ours, numbers), row.reference, row.note
+        if isinstance(reference, str):
+            reference = number(reference, numbers)
+        elif callable(reference):
+            reference = reference()
+        if reference is not None:
+            off = ours - reference if row.absolute else ours / reference - 1
+            exact = f"{off:+.1e}" if row.absolute or abs(off) < 1e-3 else f"{100 * off:+.1f} %"
+            deviation = "; ".join(filter(None, ("below 1e-9" if abs(off) < 1e-9 else exact, row.note)))
+        beside = "" if reference is None else shown(reference)
+        lines.append(f"| {row.what} | {shown(ours)} | {beside} | {deviation} | {row.source} |"
+                     f" `{row.ours.split('/')[0]}` |")
+    return "\n".join(lines)
+
+
+def page(template: str, numbers: dict[str, Any]) -> str:
+    """Return the whole page."""
+    def put(match: re.Match[str]) -> str:
+        place = match[1]
+        if place.startswith("TABLE "):
+            return table(TABLES[place.removeprefix("TABLE ")], numbers)
+        return cell(*place.rsplit(" ", 1), numbers)
+    return HEAD + PLACE.sub(put, template)
+
+
+def main() -> int:
+    """Run the command; return its exit status."""
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--collect", type=Path, metavar="FOLDER", help="renew the stored numbers from it")
+    options.add_argument("--check", action="store_true", help="write nothing; status 1 if the page is not up to date")
+    args = options.parse_args()
+    template = TEMPLATE.read_text()
+    numbers = json.loads(STORED.read_text()) if STORED.is_file() else {}
+    if args.collect:
+        numbers = collect(args.collect, set(paths(template)), numbers)
+        STORED.write_text(json.dumps(numbers, indent=1) + "\n")
+    text = page(template, numbers)
+    if args.check:
+        return int(not PAGE.is_file() or PAGE.read_text() != text)
+    PAGE.write_text(text)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
