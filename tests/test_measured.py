@@ -38,3 +38,39 @@ def test_ldpe(tmp_path):
     check_ldpe(found, 2e-4)
     fits = found["deviation_percent"]["at_the_fitted_rate_rms"]
     assert fits["Soskey-Winter"] < fits["Wagner"] < fits["PSM"] < 6
+
+
+def test_treloar_quick(tmp_path):
+    """The limit pressure within 10 % of the measured one, and nearer to it by relative than by absolute misfits."""
+    found = summary("measured_treloar", tmp_path, "--quick")
+    assert found["measured"]["limit_pressure_kg_per_cm2"]["hemisphere"] == pytest.approx(0.52, abs=0.01)
+    off = found["deviation_percent"]
+    for law in ("Mooney-Rivlin", "Ogden"):
+        assert found["predicted"]["limit_pressure_kg_per_cm2"]["relative"][law] == pytest.approx(0.52, rel=0.1)
+        assert abs(off["relative"][law]) < 0.5 * abs(off["absolute"][law])
+    alone = found["predicted"]["ogden_by_the_uniaxial_test_alone"]
+    assert len(alone["undetermined"]) >= 2
+    assert not 0.7 < alone["equibiaxial_MPa_at_stretch_2"] / alone["measured_MPa_at_stretch_2"] < 1.4
+    assert drawn(tmp_path / "measured_treloar.png")
+
+
+@pytest.mark.slow
+def test_treloar(tmp_path):
+    off = summary("measured_treloar", tmp_path)["deviation_percent"]
+    assert len(off["relative"]) == 6
+    for law, value in off["relative"].items():
+        assert abs(value) < 17 and abs(value) < abs(off["absolute"][law])
+
+
+def test_biaxial_quick(tmp_path):
+    """Across the larger stretch a law of I1 from a uniaxial test is worse than along it; biaxial tests help."""
+    off = summary("measured_biaxial", tmp_path, "--quick")["deviation_percent"]
+    yeoh, ogden = (off["James 1975"][law] for law in ("Yeoh", "Ogden"))
+    assert 10 < yeoh["uniaxial"]["along"] < 17 and 21 < yeoh["uniaxial"]["across"] < 30
+    assert ogden["biaxial"]["along"] < 2 and ogden["biaxial"]["across"] < 4
+    kawamura = off["Kawamura 2001"]["Yeoh"]["uniaxial"]
+    assert 3 < kawamura["along"] < 10 and 9 < kawamura["across"] < 21
+    for rubber in off.values():
+        for law in rubber.values():
+            assert law["biaxial"]["across"] < law["uniaxial"]["across"]
+    assert drawn(tmp_path / "measured_biaxial.png")

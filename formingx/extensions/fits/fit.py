@@ -93,8 +93,8 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
 
     From several first guesses the best result counts. The constants stay admissible, and no step leaves a material's
     limit (Gent, Arruda-Boyce). A misfit counts relative to the measured stress: of Treloar's rubber an absolute misfit
-    weighs the last points of the uniaxial test alone, and its constants miss the pressure of his inflated sheet by up
-    to 34 % where those of a relative one miss it by up to 18 % (`demos/measured_treloar.py`).
+    weighs the last points of the uniaxial test alone, and its constants miss the limit pressure of his sheet by 12 to
+    31 %, those of a relative misfit by 1 to 16 % (`demos/measured_treloar.py`).
 
     Args:
         material: a class (`MooneyRivlin`, `Ogden`, ...), or a material whose constants are the first guess: a
