@@ -7,6 +7,7 @@ argument's value may be, each function checks itself (`errors.py`).
 from __future__ import annotations
 
 import collections.abc
+import difflib
 import functools
 import inspect
 import os
@@ -101,7 +102,7 @@ def _wrong(call: Callable, name: str, skip: int, args: tuple, given: dict[str, A
         bound = signature.bind(*args, **given).arguments
     except TypeError as error:
         takes = ", ".join(map(_parameter, list(signature.parameters.values())[skip:]))
-        return f"{name}: {error}: must be {name}({takes})"
+        return f"{name}: {_typo(signature, given) or error}: must be {name}({takes})"
     try:
         kinds = typing.get_type_hints(call)
     except Exception:  # noqa: BLE001  of a user's own class: names that are known to a type checker alone
@@ -114,6 +115,14 @@ def _wrong(call: Callable, name: str, skip: int, args: tuple, given: dict[str, A
             if not _is(one, kind):
                 return f"{name}: {parameter} = {_short(one)}: must be {_said(kind)}"
     return None
+
+
+def _typo(signature: inspect.Signature, given: Mapping[str, Any]) -> str:
+    """The names of arguments that a function does not take, with what was meant, in words; or ""."""
+    kinds = {p.kind for p in signature.parameters.values()}
+    unknown = [] if inspect.Parameter.VAR_KEYWORD in kinds else [n for n in given if n not in signature.parameters]
+    close = {n: difflib.get_close_matches(n, [p for p in signature.parameters if p not in given], 1) for n in unknown}
+    return ", ".join(f"{n}= is not known" + (f": did you mean {close[n][0]}=?" if close[n] else "") for n in unknown)
 
 
 def _parameter(p: inspect.Parameter) -> str:

@@ -18,8 +18,9 @@ def inadmissible(path: Any) -> Iterator[Finding]:
 @register("end")
 def volumes(path: Any) -> Iterator[Finding]:
     """Elements of the last state that do not keep their volumes; collective."""
-    yield from volume.findings(path.last.measures["volume_error"], "the last state")
-    yield from volume.of_point(path.problem.furthest_volume_ratio(path.last))
+    error = path.last.measures["volume_error"]
+    yield from volume.findings(error, "the last state", error > volume.BOUND and volume.at_clamps(path))
+    yield from volume.of_point(path)
 
 
 @register("end")

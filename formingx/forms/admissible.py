@@ -49,7 +49,7 @@ class Admissible:
         self._has_hoop = forms.scene.kinematics.axisymmetric
         cell = basix.CellType[domain.topology.cell_name()]
         scene = forms.scene
-        inside: Any = basix.make_quadrature(cell, scene.quadrature_degree)[0]
+        inside, self._weights = basix.make_quadrature(cell, scene.quadrature_degree)
         beside: Any = basix.make_quadrature(cell, scene.quadrature_degree + 1)[0]
         self._n = len(inside)
         points = np.concatenate([inside, beside, np.array(_MIDDLES[cell], dtype=float)])
@@ -64,6 +64,7 @@ class Admissible:
         self._R = np.where(self._on_axis, 1.0, self._X[..., 0])
         if self._solid:
             jacobian = np.einsum("dpk,ckx->cpxd", map_shapes[1:], nodes)
+            self._sizes = np.abs(np.linalg.det(jacobian[:, : self._n])) * self._weights
             gradients = np.einsum("dpa,cpdx->cpxa", shapes[1:], np.linalg.inv(jacobian))
             self._gradients = gradients.reshape(n, -1, shapes.shape[2])            # (cells, points x 2, dofs)
 
@@ -90,6 +91,20 @@ class Admissible:
             k = np.unravel_index(np.argmax(np.abs(np.log(np.maximum(J, 1e-300)))), J.shape)
             found = Least("volume ratio", float(J[k]), tuple(self._X[k].tolist()))
         return max(self._forms.comm.allgather(found), key=lambda part: abs(np.log(max(part.value, 1e-300))))
+
+    def volume_error_away(self, places: np.ndarray, distance: float) -> float:
+        """Return the root mean square of J - 1 at the state last set over the elements away from places; collective.
+
+        Args:
+            places: reference points, shape (k, 2), length; distance: elements that come nearer do not count, length.
+        """
+        X, n = self._X[:, : self._n], self._n
+        J = np.prod(list(self.quantities().values()), axis=0)[:, :n]
+        near = np.min([np.hypot(*(X - place).transpose(2, 0, 1)).min(1) for place in places], axis=0) < distance
+        size = np.where(near[:, None], 0.0, self._sizes * (self._R[:, :n] if self._has_hoop else 1.0))
+        sums = self._forms.comm.allgather((float((size * (J - 1) ** 2).sum()), float(size.sum())))
+        squares, total = map(sum, zip(*sums))
+        return float(np.sqrt(squares / total)) if total else 0.0
 
     def volume_ratios(self) -> tuple[float, float]:
         """The least and the largest J at quadrature points of the energy, at the state last set; collective."""

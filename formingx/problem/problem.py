@@ -270,6 +270,11 @@ class Problem(Histories, Units):
         with self.at(state):
             return self.admissible.furthest_volume_ratio()
 
+    def volume_error_away(self, state: Any, places: np.ndarray, distance: float) -> float:
+        """See `Admissible.volume_error_away`, in a state; collective."""
+        with self.at(state):
+            return self.admissible.volume_error_away(places, distance)
+
     def inside_out(self) -> tuple[int, int, tuple[float, float]]:
         """See `Admissible.inside_out`; of the state last set."""
         return self.admissible.inside_out()

@@ -78,9 +78,9 @@ def bottle(*, radius: float, height: float, neck: float, shoulder: float, neck_h
         base: Z of the bottom.
         fillet, shoulder_fillet: radii of the bottom edge and of both shoulder edges.
 
-    >>> mould = fx.tools.bottle(radius=30.0, height=150.0, neck=12.0, shoulder=110.0, neck_height=130.0, fillet=5.0)
-    >>> mould.signed_distance([[0.0, 60.0]]).tolist()
-    [-30.0]
+    >>> mould = fx.tools.bottle(radius=30.0, height=110.0, neck=12.0, shoulder=20.0, neck_height=20.0, fillet=5.0)
+    >>> mould.signed_distance([[0.0, 60.0]]).tolist(), float(mould.bounds[1, 1])           # 150 mm high in all
+    ([-30.0], 150.0)
     """
     radius, height = positive("bottle: radius", radius), positive("bottle: height", height)
     neck, shoulder = positive("bottle: neck", neck), positive("bottle: shoulder", shoulder)

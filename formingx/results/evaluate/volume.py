@@ -4,30 +4,66 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from ...findings import Finding
+from ...physics.supports import Clamped
 
 BOUND = 5e-3
 """Root mean square of J - 1 above which a report warns, and above four times which a run does: elements have
 other volumes, though the mass is kept."""
 
+_NEAR = 2.0
+"""Lengths of a clamped face from it, within which its singular corner is felt."""
+
 _FURTHEST = 2.0
 """J, or 1/J, at a point beside the quadrature points above which a report warns."""
 
 
-def findings(error: float, where: str) -> list[Finding]:
-    """Return the findings on a root mean square of J - 1, in the state that `where` names."""
+def findings(error: float, where: str, at_clamp: bool = False) -> list[Finding]:
+    """Return the findings on a root mean square of J - 1, in the state that `where` names.
+
+    Args:
+        at_clamp: what `at_clamps` returns.
+    """
     if error <= BOUND:
         return []
+    if at_clamp:
+        return [Finding("note", "volume", f"The elements at the corner of a clamped face do not keep their volumes: the"
+                        f" root mean square of J - 1 is up to {100 * error:.2g} % ({where}), and below"
+                        f" {100 * BOUND:.2g} % from {_NEAR:g} lengths of that face on. The corner is singular: take no"
+                        f" stresses from there.")]
     return [Finding("warning" if error > 4 * BOUND else "note", "volume",
                     f"The elements do not keep their volumes: the root mean square of J - 1 is up to"
-                    f" {100 * error:.2g} % ({where}): use a finer mesh; the corner of a clamped rim is singular.")]
+                    f" {100 * error:.2g} % ({where}): use a finer mesh.")]
 
 
-def of_point(furthest: Any) -> list[Finding]:
-    """Return the findings on a `Least`, the point at which J is furthest from 1 in the last state, or None."""
+def at_clamps(path: Any) -> bool:
+    """Return True if elements lose their volumes next to clamped faces alone, whose corners are singular; collective.
+
+    Next to: within `_NEAR` lengths of the face, the wall of a sheet, over which its effect decays (Saint-Venant).
+    """
+    faces, reach = _clamped(path)
+    return bool(len(faces) and path.problem.volume_error_away(path.last, faces, reach) <= BOUND)
+
+
+def _clamped(path: Any) -> tuple[np.ndarray, float]:
+    """Nodes of the clamped faces of a solid, shape (n, 2), and `_NEAR` times the length of the longest one."""
+    scene = path.problem.scene
+    clamped = [support.on for support in scene.supports if isinstance(support, Clamped)] if scene.model.solid else []
+    faces = [scene.mesh.nodes_of(name) for name in clamped]
+    reach = max((float(np.hypot(*np.ptp(face, axis=0))) for face in faces), default=0.0)
+    return np.vstack([np.zeros((0, 2)), *faces]), _NEAR * reach
+
+
+def of_point(path: Any) -> list[Finding]:
+    """Return the findings on the point at which J is furthest from 1 in the last state of a path; collective."""
+    furthest = path.problem.furthest_volume_ratio(path.last)
     J = 1.0 if furthest is None else furthest.value
     if 1 / _FURTHEST < J < _FURTHEST:
         return []
-    return [Finding("note" if J > 0 else "warning", "element",
+    faces, reach = _clamped(path)
+    singular = len(faces) and np.hypot(*(faces - furthest.point).T).min() < reach
+    return [Finding("note" if J > 0 or singular else "warning", "element",
                     f"J is {J:.3g} in the last state at (R, Z) = ({furthest.point[0]:.5g}, {furthest.point[1]:.5g}):"
                     f" the stress in that element is meaningless.")]
