@@ -236,7 +236,7 @@ def _guesses(material: Any, points: Points, terms: int | None) -> list[Material]
     modulus = points.modulus()
     if not modulus > 0:
         raise InputError("fit: the stresses do not have the sign of the strains in most points: tension is positive,"
-                         " stretch is length over first length")
+                         " stretch is length over first length. A column of strain is given as 1 + strain")
     return material.guesses(modulus, points.largest_I1, terms)
 
 

@@ -79,6 +79,13 @@ def _kept(mode: str, l: np.ndarray, P: np.ndarray, within: Any) -> tuple[np.ndar
     return l[:, inside], P[:, inside]
 
 
+def strains(values: np.ndarray) -> str:
+    """Return the question whether stretches were meant as strains, or "" if they cannot be."""
+    if not np.all(np.isfinite(values)) or np.min(values) > 0 and np.max(values) > 1 or np.min(values) <= -1:
+        return ""
+    return ". Is it strain? The stretch is 1 + strain, of percent 1 + strain/100"
+
+
 def _checked(mode: str, columns: Any) -> tuple[np.ndarray, np.ndarray]:
     """(stretches, stresses) of a test, each of shape (2, n); a stress that was not measured is not a number."""
     known("fit: data: test", mode, [*homogeneous.MODES, "biaxial"])
@@ -100,7 +107,7 @@ def _checked(mode: str, columns: Any) -> tuple[np.ndarray, np.ndarray]:
     missing = np.isnan(stresses).all(0) | np.isinf(stresses).any(0)
     for i in np.flatnonzero(missing | ~np.all(np.isfinite(at) & (at > 0), axis=0))[:1]:
         raise InputError(f"fit: data[{mode!r}], point {i}: stretch = {first[i]}, stress = {P[i]}: must be finite,"
-                         f" and the stretch greater than 0")
+                         f" and the stretch greater than 0{strains(first)}")
     for i in np.flatnonzero(np.any((at < 1e-3) | (at > 1e3), axis=0))[:1]:
         raise InputError(f"fit: data[{mode!r}], point {i}: stretch = {first[i]}: must be from 0.001 to 1000")
     return l, stresses
