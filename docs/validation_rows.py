@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from formingx.exact.inflation import membrane_inflation, membrane_limit_point
 
+LAWS = ("neo-Hookean", "Mooney-Rivlin", "Yeoh", "Gent", "Arruda-Boyce", "Ogden")
 TRELOAR = {"radius": 1.25, "thickness": 0.082, "c10": 2.0}                # cm, kg/cm2
 
 
@@ -79,6 +80,8 @@ EXACT = [
     _disc("extrapolated", ", two sizes extrapolated"),
     Row("trough in space, error of its wall", "tray/trough/size_0.05/wall_error", 0.0, "power law of a membrane",
         style=".1e", absolute=True),
+    Row("block drawn hot, set and let go: stretch", "set_block/uniaxial/G_200/stretch",
+        "set_block/uniaxial/G_200/exact", "exact balance", style=".6f"),
     Row("thin sheet on a plug, edge of 0.18 plug radii, force over the membrane's",
         "throne_plug/force_over_membrane_at_fillet_over_rp/0.18", 1.0, "membrane, sharp edge", style=".3f"),
     Row("the same, 0.06 plug radii", "throne_plug/force_over_membrane_at_fillet_over_rp/0.06", 1.0,
@@ -156,4 +159,16 @@ PROGRAMS = [
              "its result, Poisson's ratio 0.49"),
 ]
 
-TABLES: dict[str, list[Row]] = {"exact": EXACT, "thesis": THESIS, "programs": PROGRAMS}
+MEASURED = [
+    Row(f"limit pressure of Treloar's sheet, {law}",
+        f"measured_treloar/predicted/limit_pressure_kg_per_cm2/relative/{law}",
+        "measured_treloar/measured/limit_pressure_kg_per_cm2/hemisphere", "equibiaxial test, 1944", "kg/cm²", ".3f")
+    for law in LAWS
+] + [
+    Row("equibiaxial stress at stretch 2, Ogden by the uniaxial test alone",
+        "measured_treloar/predicted/ogden_by_the_uniaxial_test_alone/equibiaxial_MPa_at_stretch_2",
+        "measured_treloar/predicted/ogden_by_the_uniaxial_test_alone/measured_MPa_at_stretch_2", "the same test", "MPa",
+        ".3f", note="the fit leaves constants undetermined, and says so"),
+]
+
+TABLES: dict[str, list[Row]] = {"exact": EXACT, "thesis": THESIS, "programs": PROGRAMS, "measured": MEASURED}
