@@ -14,6 +14,7 @@ html_static_path = ["static"]
 html_css_files = ["formingx.css"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
+napoleon_use_ivar = True                                      # fields are documented once, by their own lines
 
 
 def notebooks_as_pages(app):
