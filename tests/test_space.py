@@ -422,8 +422,10 @@ def test_moulds_from_files_fill(make, tmp_path):
 
 
 @pytest.mark.parametrize("make, words", [
-    (lambda: trough(friction=0.3), "in space a sheet sticks.*'stick'"),
-    (lambda: trough(friction="none", separates=False), "in space a sheet sticks.*'none' without separates=False"),
+    (lambda: disc(temperature=50.0, contacts=[fx.Contact("top", fx.tools.revolved(fx.tools.sphere(
+        radius=1.0, z=0.0)), fx.table({20.0: 0.2, 100.0: 0.3}))]), "friction does not depend on the temperature yet"),
+    (lambda: trough(friction="none", separates=False), "separates = False: in space a sheet that slides lets go"),
+    (lambda: trough(friction=0.3, separates=False), "separates = False: in space a sheet that slides lets go"),
     (lambda: disc(model=fx.MixedPressure()), "a sheet in space is a Membrane"),
     (lambda: disc(on="rim"), "a pressure on its 'bottom' or its 'top'"),
     (lambda: disc(thickness=None), "needs a thickness"),

@@ -26,6 +26,11 @@ class StepLimits:
             of face.
         cut_off: how deep the way of a point in a step may lead through a tool, over the length of face that is its own.
         places: at most, at which that way is looked at.
+        lag: change of the pressure in a step of lagged friction, over the pressure.
+        behind: difference that is allowed between the pressure at the end of the step and the one that limits friction,
+            over the pressure; corrections: solutions of a step, at most, that reduce it.
+        inaccurate: change of the pressure, over `lag`, at which a step is taken again.
+        weak: smallest force of which these are parts, over shear modulus, thickness and length of a sheet.
         shortest: lengths of steps (dimensionless) that are never too long for what comes into contact.
     """
 
@@ -37,6 +42,11 @@ class StepLimits:
     nearer: float = 0.7
     cut_off: float = 0.5
     places: int = 4000
+    lag: float = 0.2
+    behind: float = 5e-3
+    corrections: int = 3
+    inaccurate: float = 1.4
+    weak: float = 1e-2
     shortest: float = 1e-4
 
 
@@ -80,6 +90,7 @@ class Approach:
             speed = np.linalg.norm(velocity, axis=1)
             most = np.divide(most, speed, out=np.full(len(speed), length), where=free & (speed > 0))
             length = self._comm.allreduce(float(most.min(initial=length)), MPI.MIN)
+            length = self._within_lag(start, velocity, length)
         times = gap_closures(face.law, start, velocity, free, length)
         ahead = (times > LIMITS.as_good * length) & (times < length)
         times = np.sort(gathered(self._comm, times[ahead]))
@@ -105,9 +116,11 @@ class Approach:
         """
         face = self.face
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
-        if not face.contact.lagged:                         # that asks for no place of arrival
+        if not face.contact.lagged:                         # that asks for no place of arrival, but for its pressure
             at_end = ends & face.contact.sticks & (times >= LIMITS.at_end * length)
             face.expect_arrivals(np.where(at_end[:, None], np.nan, places), guessed)
+        elif ends and self.lags:
+            face.expect_arrivals(places)
 
     def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """More than twice the new points that a step is meant, or foreseen, to bring into contact.
@@ -123,6 +136,46 @@ class Approach:
             return bool(self._comm.allreduce(float(deep.max(initial=0.0)), MPI.MAX) > 0)
         found = int(np.sum((a <= -theta - LIMITS.near * face.thickness) & (b > -theta)))
         return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self.at_once, self._foreseen) + 2)
+
+    @property
+    def lags(self) -> bool:
+        """True if friction is limited by a pressure that is fixed in a step."""
+        return bool(self.face.contact.lagged and 0 < self.face.law.mu < np.inf)
+
+    def change_of_pressure(self, new: np.ndarray, control: float) -> float:
+        """Return the change of the pressure that limits lagged friction in a step, over the pressure."""
+        return self._part_of_pressure(self.face.tractions(new, control).normal) if self.lags else 0.0
+
+    def update_pressure(self, new: np.ndarray, control: float) -> bool:
+        """Limit lagged friction by the pressure at the end of the step; False if it is, as well as wanted."""
+        if not self.lags:
+            return False
+        face, law = self.face, self.face.law
+        now = face.tractions(new, control).normal
+        if self._part_of_pressure(now, law.pressure_ahead(face.touch)) <= LIMITS.behind:
+            return False
+        face.expect_arrivals(law.at_pressure(face.touch, now))
+        return True
+
+    def _within_lag(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
+        """A length, or as much of it as changes the pressure of lagged friction by what is allowed."""
+        if not self.lags:
+            return length
+        law, touch = self.face.law, self.face.touch
+        rate = law.k * np.einsum("ni,ni->n", law.motion(start, touch).normal, velocity)
+        change = self._part_of_pressure(law.pressure(touch) + length * rate)
+        return length * min(LIMITS.lag / change, 1.0) if change else length
+
+    def _part_of_pressure(self, normal: np.ndarray, other: np.ndarray | None = None) -> float:
+        """How far another pressure, by default that at the last state, is from `normal` (stress), over the pressure.
+
+        Of points that were pressed at the last state.
+        """
+        face, before = self.face, self.face.law.pressure(self.face.touch)
+        off = np.abs(np.maximum(normal, 0.0) - (before if other is None else other))
+        sums = np.array([face.rule.area @ np.where(before > 0, off, 0.0), face.rule.area @ before])
+        change, pressure = self._comm.allreduce(sums, MPI.SUM)
+        return float(change / (pressure + LIMITS.weak * face.force_scale))
 
     def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """True if a point's straight way from one state to another, seen from the tool, leads through the tool."""

@@ -292,6 +292,11 @@ class FaceContact:
                 np.where(late if a.ndim == 1 else late[:, None], b, a) for a, b in zip(old, new)))))
         return found
 
+    @property
+    def force_scale(self) -> float:
+        """Shear modulus times thickness times the largest extent of the body: a force of the size of the body's."""
+        return float(self._solid.stress * self.thickness * self._length)
+
     def get(self) -> Memory | None:
         """See `History`; None without friction."""
         return self._memory

@@ -140,6 +140,9 @@ class StepLimit:
             return Cut("too many points came into contact in one step")
         if self.passes_through(old, new):
             return Cut("a tool would pass through the face that it touches")
+        change = max([c.change_of_pressure(new.x[:n], new.control) for c in contacts], default=0.0)
+        if change > LIMITS.inaccurate * LIMITS.lag and length > LIMITS.shortest:
+            return Cut("the pressure that limits friction changes", LIMITS.lag / change)
         if ends and length > LIMITS.shortest:
             part = min([c.touches_by(new.x[:n], new.control, new.direction[:n], new.slope, length) for c in contacts],
                        default=1.0)
@@ -151,10 +154,16 @@ class StepLimit:
         """Let go of what pulls at a tool in space at a state that was found; False if nothing does."""
         return any([c.face.let_go(new.x[: self._n], new.control) for c in self.present])
 
-    def hold_late(self, new: Any) -> bool:
-        """Hold what came into a tool in space in the step to a state that was found; False if nothing did."""
-        return any([c.face.hold_late(new.x[: self._n], new.control, LIMITS.near * c.face.thickness)
-                    for c in self.present])
+    def hold_late(self, new: Any, at_target: bool, sweep: int) -> bool:
+        """Take up in a state that was found what its step brought into tools in space; False if nothing is left.
+
+        Points that came into a tool are held: at a target all, else on tools with friction, which begins then. That is
+        limited by the pressure of the state. sweep: how often it was done before.
+        """
+        n, again = self._n, sweep < LIMITS.corrections
+        late = [c.face.hold_late(new.x[:n], new.control, LIMITS.near * c.face.thickness)
+                for c in self.present if at_target or c.lags]
+        return any([*late, *(c.update_pressure(new.x[:n], new.control) for c in self.present if again)])
 
     def passes_through(self, old: Any, new: Any) -> bool:
         """True if a contact point goes through its tool on the straight way from one state to another."""

@@ -68,7 +68,7 @@ class Contact(Part):
         ramp: theta over thickness of the sheet; default 1e-7 where points slide, 1e-5 where they stick or are held.
         elastic_slip: g_s over thickness of the sheet: how far a point goes under Coulomb's law before it slides.
         separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
-            start); with "stick" or "none". Default True; in space, where it sticks, False: it is held until a stage
+            start); with "stick" or "none". Default True; in space, with "stick", False: it is held until a stage
             leaves the tool out, or, with True, until it pulls (of materials that do not relax).
         nodes_per_step: so many nodes are to come into contact in a step (two to an element edge); in space so many
             hundredths of all nodes, default 1. What sticks, slides under friction or gives off heat depends on when it
@@ -107,7 +107,7 @@ class Contact(Part):
         self.on, self.tool, self.friction = instance("Contact: on", on, str, "the name of a boundary"), tool, friction
         self.mu = _coefficient(f"{name}: friction", friction)
         held = tool.components == 3
-        usually = not held or isinstance(self.mu, float) and self.mu == 0
+        usually = not held or not self.sticks
         self.separates = instance(f"{name}: separates", usually if separates is None else separates, bool,
                                   "True or False")
         usual = _HELD if held or not self.separates else _STICK if self.sticks else _SLIDES

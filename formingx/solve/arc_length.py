@@ -297,21 +297,23 @@ class Curve:
         return found
 
     def hold_late(self, old: State, states: list[State], targets: Sequence[tuple[Target, Measure]]) -> list[State]:
-        """The states after `old`; where the first meets one of (target, its measure), without late contact.
+        """The states after `old`, the first of them solved for again with what came into a tool in space in the step.
 
-        What came into a tool in space in that step is held from where it met the tool, and the state solved for again.
+        That is held from where it met the tool: at a target, one of (target, its measure), all points are; in any other
+        state those of tools with friction, at the same control.
 
         Raises:
             Failure: no such state was found.
         """
         limit, (new, *rest) = self.problem.limit, states
         bound = next((bound for target, bound in targets if target is new.met), None)
-        if limit is None or new.met is None or bound is None:
+        if limit is None or new.kind == "limit point":
             return states
-        for _ in range(self.sweeps):
-            if not limit.hold_late(new):
+        equation = fixed(new.control) if bound is None or new.met is None else bound.equation(new.met.value)
+        for sweep in range(self.sweeps):
+            if not limit.hold_late(new, bound is not None, sweep):
                 return [new, *rest]
-            found = self.solve(new.x, new.control, bound.equation(new.met.value), new.kind, old)
+            found = self.solve(new.x, new.control, equation, new.kind, old)
             sense = float(np.sign(found.slope * new.slope)) or 1.0
             new = replace(found, direction=sense * found.direction, slope=sense * found.slope, met=new.met,
                           jump=new.jump)

@@ -28,7 +28,7 @@ _PULLS = 0.01
 """Part, out of the tool, of the way by which the penalty gives way, from which on a point pulls (sheared along a facet
 it goes out round its edges)."""
 
-_NONE = 1e-3
+SMALL_GAP = 1e-3
 """Such a way over theta that is as good as none."""
 
 
@@ -71,7 +71,7 @@ class LaggedStick:
     def pulling(self, x: np.ndarray, old: Touch) -> np.ndarray:
         """Which held points pull at a tool that separates, shape (n,): the penalty gives way, they are outside."""
         away = np.linalg.norm(x - old.position, axis=1)
-        most = np.maximum(_PULLS * away, _NONE * self.theta)
+        most = np.maximum(_PULLS * away, SMALL_GAP * self.theta)
         return self.separates & self.held(old) & (-self.distance(x) > most)
 
     def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
@@ -98,14 +98,14 @@ class LaggedStick:
         """See `ContactLaw`; `normal` says 1 of what is held: normals are not asked for."""
         assert old is not None
         held, zero, force = self.held(old), np.zeros(len(x)), np.zeros_like(x)
-        force[held] = self._force(x[held], old.position[held])
+        force[held] = self.k * (x[held] - old.position[held])
         return Tractions(force, held.astype(float), zero, zero, lambda: self.stiffness_ahead(x, old, held),
                          lambda: self._touch(x, old, held))
 
     def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
         assert old is not None
         held, stiffness = self.held(old), np.zeros((*x.shape, x.shape[1]))
-        stiffness[held] = self._stiffness(x[held])
+        stiffness[held] = self.k * np.eye(x.shape[1])
         return stiffness
 
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
@@ -128,14 +128,6 @@ class LaggedStick:
         """See `ContactLaw`; nothing is held by penetration."""
         return np.zeros(len(x))
 
-    def _force(self, x: np.ndarray, position: np.ndarray) -> np.ndarray:
-        """Of points that are held, shape (n, 3), stress."""
-        return np.asarray(self.k * (x - position))
-
-    def _stiffness(self, x: np.ndarray) -> np.ndarray:
-        """Its derivative, shape (n, 3, 3) or (3, 3), stress/length."""
-        return np.asarray(self.k * np.eye(x.shape[1]))
-
     def _touch(self, x: np.ndarray, old: Touch, held: np.ndarray) -> Touch:
         """What to remember of an accepted state."""
         d = self.distance(x)
@@ -153,50 +145,3 @@ class LaggedStick:
             position[rows] = a + high[:, None] * (b - a)
         free = np.minimum(d, -2 * self.theta)
         return Touch(position, np.where(held | new, 0.0, free), np.zeros(len(x)), x.copy())
-
-
-class LaggedSlide(LaggedStick):
-    """The `ContactLaw` without friction: which points touch is lagged as there, and they stay on the surface of a tool.
-
-    Of a point that touches the traction is k d grad d, d its signed distance: what the body does to the tool. In a step
-    it pulls as well as it pushes, so that Newton's method meets no kink; at its end what pulls lets go.
-
-    Args:
-        step: of the differences by which the distance has a gradient and a curvature, length.
-    """
-
-    def __init__(self, tool: RigidTool, k: Any, theta: float, step: float):
-        super().__init__(tool, k, theta, True)
-        self.step = step
-        self._last: tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
-
-    def part(self, points: np.ndarray | slice) -> LaggedSlide:
-        return LaggedSlide(self.tool, self.k, self.theta, self.step)
-
-    def pulling(self, x: np.ndarray, old: Touch) -> np.ndarray:
-        """Which points that touch pull, shape (n,): they are outside the tool."""
-        return self.held(old) & (self.distance(x) < -_NONE * self.theta)
-
-    def _force(self, x: np.ndarray, position: np.ndarray) -> np.ndarray:
-        d, gradient, _ = self._derivatives(x)
-        return np.asarray(self.k * d[:, None] * gradient)
-
-    def _stiffness(self, x: np.ndarray) -> np.ndarray:
-        d, gradient, curvature = self._derivatives(x)
-        return np.asarray(self.k * (gradient[:, :, None] * gradient[:, None] + d[:, None, None] * curvature))
-
-    def _derivatives(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Distances of points, shape (n,), their gradients, (n, 3), and second derivatives, (n, 3, 3)."""
-        if self._last is None or not np.array_equal(self._last[0], x):
-            e = self.step * np.eye(3)
-            pairs = [(0, 1), (0, 2), (1, 2)]
-            ways = np.array([0 * e[0], *e, *-e, *(e[i] + e[j] for i, j in pairs), *(-e[i] - e[j] for i, j in pairs)])
-            d = self.tool.signed_distance((x + ways[:, None]).reshape(-1, 3)).reshape(len(ways), -1)
-            gradient, second = ((d[1:4] - d[4:7]) / (2 * self.step)).T, d[1:4] + d[4:7] - 2 * d[0]
-            curvature = np.zeros((len(x), 3, 3))
-            for k, (i, j) in enumerate(pairs):
-                curvature[:, i, i], curvature[:, j, j] = second[i], second[j]
-                curvature[:, i, j] = curvature[:, j, i] = (d[7 + k] + d[10 + k] - 2 * d[0] - second[i] - second[j]) / 2
-            size = np.maximum(np.linalg.norm(gradient, axis=1, keepdims=True), 0.1)    # less where two sides meet
-            self._last = x.copy(), (d[0], gradient / size, curvature / self.step**2)
-        return self._last[1]

@@ -86,9 +86,12 @@ def check_contact(scene: Any, contact: Any) -> None:
     mesh, tool = scene.mesh, contact.tool
     if contact.on not in ("bottom", "top"):
         raise InputError(f"{contact!r}: a sheet in space touches with its 'bottom' or its 'top'")
-    if not contact.sticks and (contact.friction_by_temperature or contact.mu > 0 or not contact.separates):
-        raise InputError(f"{contact!r}: in space a sheet sticks where it touches, or slides without friction: must be"
-                         f" 'stick', or 'none' without separates=False; Coulomb friction is not available there")
+    if contact.friction_by_temperature:
+        raise InputError(f"{contact!r}: in space friction does not depend on the temperature yet: must be 'stick',"
+                         f" 'none' or one coefficient")
+    if not contact.sticks and not contact.separates:
+        raise InputError(f"{contact!r}: separates = False: in space a sheet that slides lets go of what it pulls at:"
+                         f" must be 'stick', or without separates=False")
     if not contact.sticks and not isinstance(tool, Swept):
         raise InputError(f"{contact!r}: sliding over a tool of flat triangles is not available, as their edges stop a"
                          f" sheet: must be 'stick', or a tool made by box, revolved or extruded")

@@ -16,11 +16,10 @@ from ...physics.contact import Contact
 from ...physics.contact_law import ContactLaw
 from ...tools.profile import Tool
 from .bodies import apart
-from .lagged_stick import LaggedSlide, LaggedStick
+from .lagged_friction import LaggedFriction, Near
+from .lagged_stick import LaggedStick
 
-_STEP = 1e-2
-"""Step of the differences of a distance, over the thickness of the sheet."""
-
+_ON_AXIS = 1e-9             # distances from the axis, over the size of a profile, that are none
 _PER_CORNER = 24           # straight pieces of a rounded corner in `surface`
 
 
@@ -65,7 +64,7 @@ class SolidTool:
         theta = contact.ramp * thickness
         if contact.sticks:
             return LaggedStick(self, k, theta, contact.separates)
-        return LaggedSlide(self, k, theta, _STEP * thickness)
+        return LaggedFriction(self, contact.mu, k, theta, contact.elastic_slip * thickness)
 
     def _distance(self, x: np.ndarray) -> np.ndarray:
         raise NotImplementedError
@@ -88,16 +87,47 @@ class Swept(SolidTool):
         self.profile, self.kind, self.half, self.corner, self.along = profile, kind, half, corner, along
         self.sized = len(profile.pieces) > 1
 
+    def near(self, x: np.ndarray) -> Near:
+        """Return the distance of points x, shape (n, 3), with its first and second derivatives, exactly.
+
+        >>> found = fx.tools.revolved(fx.tools.sphere(radius=10.0, z=-10.0)).near([[0.0, 0.0, -8.0]])
+        >>> found.distance.tolist(), found.normal.tolist()
+        ([2.0], [[0.0, 0.0, 1.0]])
+        """
+        x = as_points("near: x", x, 3) - self.shift
+        r, way, bend = self._across(x)
+        found = self.profile.nearest(np.column_stack([r, x[:, 2]]))
+        normal, tangent = (v[:, :1] * way + v[:, 1:] * [0.0, 0.0, 1.0] for v in (found.normal, found.tangent))
+        hessian = found.curvature[:, None, None] * tangent[:, :, None] * tangent[:, None]
+        across = np.column_stack([-way[:, 1], way[:, 0], np.zeros(len(x))])         # where the curve of `r` bends
+        turn = found.normal[:, 0] * bend
+        if self.kind == "revolved":                          # on the axis both curvatures are one
+            turn = np.where(r > _ON_AXIS * self._size, turn, found.curvature)
+        return Near(found.distance, normal, hessian + turn[:, None, None] * across[:, :, None] * across[:, None])
+
     def _distance(self, x):
-        if self.kind == "revolved":
-            r = np.hypot(x[:, 0], x[:, 1])
-        elif self.kind == "extruded":
-            r = x[:, "yx".index(self.along)]
-        else:
-            u = np.abs(x[:, :2]) - np.array(self.half) + self.corner
-            outside = np.hypot(*np.maximum(u, 0.0).T)
-            r = min(self.half) - self.corner + outside + np.minimum(u.max(1), 0.0)
-        return self.profile.signed_distance(np.column_stack([r, x[:, 2]]))
+        return self.profile.signed_distance(np.column_stack([self._across(x)[0], x[:, 2]]))
+
+    def _across(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """r of points, its gradient, shape (n, 3), and the curvature of the line of one r, shape (n,)."""
+        way = np.zeros((len(x), 3))
+        if self.kind == "extruded":
+            axis = "yx".index(self.along)
+            way[:, axis] = 1.0
+            return x[:, axis], way, np.zeros(len(x))
+        half = np.array(self.half) - self.corner if self.kind == "box" else np.zeros(2)
+        sign, u = np.where(x[:, :2] < 0, -1.0, 1.0), np.abs(x[:, :2]) - half
+        least = min(self.half) - self.corner if self.kind == "box" else 0.0
+        outside = np.hypot(*np.maximum(u, 0.0).T)
+        flat = (u.min(1) < 0) | (outside == 0)
+        way[:, :2] = sign * np.maximum(u, 0.0) / np.maximum(outside, 1e-300)[:, None]
+        way[flat, :2] = (sign * (np.arange(2) == u.argmax(1)[:, None]))[flat]
+        bend = np.where(flat, 0.0, 1 / np.maximum(outside, 1e-300))
+        return least + outside + np.minimum(u.max(1), 0.0), way, bend
+
+    @property
+    def _size(self) -> float:
+        return float(np.ptp(self.profile.bounds, axis=0).max()) if self.sized else 1.0
 
     def _surface(self):
         return self._swept(self.profile.outline())

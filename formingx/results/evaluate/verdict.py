@@ -89,8 +89,9 @@ class Verdict:
     def findings(self, state: State) -> list[Finding]:
         """Return the findings on the contact of a state that a body can have; collective."""
         if not self._solid:
-            return [("serious", f"{deep.words}: shorter steps (StepControl(length=...)), or a larger penalty.")
-                    for deep in self._deepest_points(state, lambda contact: CUT * contact.thickness)]
+            deepest = self._deepest_points(state, lambda contact: CUT * contact.thickness)
+            return [Finding("serious", deep.name, f"{deep.words}: shorter steps (StepControl(length=...)), or a larger"
+                                                  " penalty.") for deep in deepest]
         with self._problem.at(state):
             edges, found = self._outline.edges(), []
             for contact in self._problem.present:

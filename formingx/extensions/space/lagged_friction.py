@@ -1,0 +1,170 @@
+"""Friction in space, and sliding without it, lagged by a step: what touches stays on the surface of its tool.
+
+Which points touch is lagged as in `lagged_stick`. The traction of a point that touches, per unit reference area, is
+
+.. math:: t = k d n + T, \\qquad T = \\frac{\\mu N_0}{g_s} g, \\quad |g| \\le g_s,
+
+d being its signed distance to the tool, n = grad d, and g the elastic slip (Wriggers, Computational Contact Mechanics,
+2006, chapter 5.2): the slip at the last accepted state plus the motion since then, in the present tangent plane, no
+longer than g_s (return mapping). N_0 is fixed while Newton's method runs, which then converges: first the pressure at
+the last accepted state, changed as the tangent of the path predicts, then the pressure of the state that was found
+with it, until both agree (`StepLimits.behind`). It is 0 for a point that has touched since the last state: steps are
+short enough for the pressure to change little in each (`StepLimits.lag`).
+
+In a step a point pulls as well as it pushes, so that Newton's method meets no kink; at its end what pulls lets go.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...physics.contact_law import Motion, Touch, Tractions, outer
+from .lagged_stick import SMALL_GAP, LaggedStick
+
+_LEAST = 0.1               # pressure that limits friction, over the pressure at the last state, at least
+_MOST = 10.0               # and at most
+_SLIDES_ON = 1 + 1e-9      # kept slip of what slides, over g_s: it goes on sliding, whatever round-off says
+
+
+class Near(NamedTuple):
+    """Where n points stand to a tool in space.
+
+    Attributes:
+        distance: to its surface, positive inside the tool, shape (n,), length.
+        normal: gradient of the distance, shape (n, 3).
+        hessian: second derivatives of the distance, shape (n, 3, 3), 1/length.
+    """
+
+    distance: np.ndarray
+    normal: np.ndarray
+    hessian: np.ndarray
+
+
+class LaggedFriction(LaggedStick):
+    """The `ContactLaw` of this module.
+
+    `Touch.position` is the position at the last accepted state, and `slip` the elastic slip g, shape (n, 3), length. Of
+    points that touch `distance` is the pressure there over k, and the depth of `arrival` is N_0/k.
+
+    Args:
+        tool: gives its distance with first and second derivatives (`near`).
+        mu: coefficient of friction, 0 for none.
+        k: penalty, stress/length.
+        theta: distance from which on a point counts as touching, length.
+        elastic_slip: g_s, length.
+    """
+
+    def __init__(self, tool: Any, mu: float, k: Any, theta: float, elastic_slip: float):
+        super().__init__(tool, k, theta, True)
+        self.mu, self.elastic_slip = mu, elastic_slip
+        self._last: tuple[np.ndarray, Near] | None = None
+        self._ahead: tuple[Touch, np.ndarray] | None = None
+
+    def part(self, points: np.ndarray | slice) -> LaggedFriction:
+        return LaggedFriction(self.tool, self.mu, self.k, self.theta, self.elastic_slip)
+
+    def pulling(self, x: np.ndarray, old: Touch) -> np.ndarray:
+        """Which points that touch pull, shape (n,): they are outside the tool."""
+        return self.held(old) & (self.distance(x) < -SMALL_GAP * self.theta)
+
+    def start(self, x: np.ndarray) -> Touch:
+        return super().start(x)._replace(slip=np.zeros_like(x))
+
+    def pressure(self, touch: Touch) -> np.ndarray:
+        """Return N at the state that a `Touch` is of, shape (n,), stress."""
+        return np.asarray(self.k * np.maximum(touch.distance, 0.0))
+
+    def pressure_ahead(self, old: Touch) -> np.ndarray:
+        """Return N that limits the friction in the step ahead, shape (n,), stress."""
+        if self._ahead is None or self._ahead[0] is not old:
+            now, by = np.maximum(old.distance, 0.0), old.arrival - old.position
+            depth = now + np.einsum("ni,ni->n", self.tool.near(old.position).normal, by) if by.any() else now
+            self._ahead = old, self.k * np.clip(depth, _LEAST * now, _MOST * now)
+        return self._ahead[1]
+
+    def at_pressure(self, old: Touch, pressure: np.ndarray) -> np.ndarray:
+        """Return places, shape (n, 3), from which `pressure_ahead` has some values, shape (n,), stress."""
+        by = pressure / self.k - np.maximum(old.distance, 0.0)
+        return np.asarray(old.position + by[:, None] * self.tool.near(old.position).normal)
+
+    def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
+                  expected: Motion | None = None) -> Tractions:
+        """See `ContactLaw`; linearised where points are expected.
+
+        What turns back, by the `sense` of the iteration before, sticks for one iteration: else Newton's method would
+        send it to and fro over the narrow range of elastic slip.
+        """
+        assert old is not None
+        rows, at = np.flatnonzero(self.held(old)), x if expected is None else expected.position
+        near, zero = self._near(at[rows]), np.zeros(len(x))
+        d, n = near.distance, near.normal
+        moved = old.slip[rows] + at[rows] - old.position[rows]
+        along = np.einsum("ni,ni->n", n, moved)
+        g = moved - along[:, None] * n
+        size, basis = np.linalg.norm(g, axis=1), _basis(n)
+        slides = (size > self.elastic_slip) & (self.mu > 0)
+        if sense is not None:
+            before = np.cos(sense[rows, None]) * basis[0] + np.sin(sense[rows, None]) * basis[1]
+            slides &= (sense[rows] == 0) | (np.einsum("ni,ni->n", before, g) > 0)
+        way = np.where(slides[:, None], g, 0.0) / np.maximum(size, 1e-300)[:, None]
+        stiff = self.mu * self.pressure_ahead(old)[rows] / np.where(slides, size, self.elastic_slip)
+
+        def stiffness() -> np.ndarray:
+            bends = outer(n, np.einsum("nij,nj->ni", near.hessian, moved)) + along[:, None, None] * near.hessian
+            dg = np.eye(3) - outer(n, n) - bends
+            dg -= outer(way, np.einsum("ni,nij->nj", way, dg))
+            depth = d if expected is None else expected.distance[rows]
+            found = np.zeros((*x.shape, 3))
+            found[rows] = self.k * (outer(n, n) + depth[:, None, None] * near.hessian) + stiff[:, None, None] * dg
+            return found
+
+        def touch() -> Touch:
+            slip = np.zeros_like(x)
+            slip[rows] = np.where(slides[:, None], self.elastic_slip * _SLIDES_ON * way, g)
+            depth = self.distance(x)
+            depth = np.where(depth > -self.theta, 0.0, np.minimum(depth, -2 * self.theta))
+            depth[rows] = np.maximum(self.distance(x)[rows], 0.0)
+            return Touch(x.copy(), depth, slip, x.copy())
+        force, normal, tangential, sliding = np.zeros_like(x), zero.copy(), zero.copy(), zero.copy()
+        force[rows] = self.k * d[:, None] * n + stiff[:, None] * g
+        normal[rows], tangential[rows] = self.k * d, stiff * size
+        angle = np.arctan2(*(np.einsum("ni,ni->n", way, e) for e in basis[::-1]))
+        sliding[rows] = np.where(slides, np.where(angle == 0, 2 * np.pi, angle), 0.0)
+        found = _Tractions(force, normal, tangential, sliding, stiffness, touch)
+        if at is not x:
+            found.force = force + np.einsum("nij,nj->ni", found.stiffness, x - at)
+        return found
+
+    def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
+        assert old is not None
+        rows, d, n = np.flatnonzero(self.held(old)), np.zeros(len(x)), np.zeros_like(x)
+        near = self._near(x[rows])
+        d[rows], n[rows] = near.distance, near.normal
+        return Motion(x, d, n, np.zeros(len(x)), np.zeros_like(x))
+
+    def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
+        return self.tractions(x, old).stiffness
+
+    def _near(self, x: np.ndarray) -> Near:
+        """The tool at points, kept for the same points."""
+        if self._last is None or not np.array_equal(self._last[0], x):
+            self._last = x.copy(), self.tool.near(x)
+        return self._last[1]
+
+
+class _Tractions(Tractions):
+    """`Tractions` whose `sense` is the angle of sliding in the tangent plane, 0 of what does not slide."""
+
+    @property
+    def active(self) -> np.ndarray:
+        return ((self.sense != 0) + 4 * (self.normal != 0)).astype(np.int8)
+
+
+def _basis(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors across unit vectors, shape (n, 3), from which angles of sliding count."""
+    axis = np.eye(3)[np.abs(normal).argmin(1)]
+    first = np.cross(axis, normal)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return first, np.cross(normal, first)

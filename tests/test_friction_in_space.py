@@ -1,0 +1,182 @@
+"""Sheets in space that slide with friction: exact derivatives, capstans, plugs and cups of axisymmetric solids."""
+
+import numpy as np
+import pytest
+from conftest import run_json
+
+import formingx as fx
+
+HELD = [fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")]
+MATERIAL, THICKNESS, RADIUS = fx.NeoHookean(c10=1.0), 0.01, 0.5
+BALL = fx.tools.sphere(radius=RADIUS, z=0.0)
+CUP = fx.Tool([(3.0, 0.0), (1.0, 0.0), (0.9, -0.6), (0.0, -0.6)], [0.0, 0.05, 0.2, 0.0])
+TOOLS = {
+    "ball": fx.tools.revolved(BALL).moved(x=0.1), "cup": fx.tools.revolved(CUP), "roller": fx.tools.extruded(BALL),
+    "roller along x": fx.tools.extruded(BALL, along="x"), "tray": fx.tools.box(
+        half=(1.0, 1.5), depth=1.0, corner=0.3, fillet=0.2, lip=0.1),
+    "plug": fx.tools.box(half=(0.6, 1.0), depth=1.0, corner=0.3, fillet=0.25, draft=5.0, plug=True)}
+
+
+def pushed(mu, size=0.1, **contact):
+    """A quarter of a disc of radius 1 and a ball that is pushed into it."""
+    sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=size)
+    return fx.Scene(mesh=sheet, thickness=THICKNESS, materials=MATERIAL, supports=HELD, contacts=[
+        fx.Contact("top", fx.tools.revolved(BALL), mu, moves=(0, 0, -1), name="plug", **contact)])
+
+
+def pushed_solid(mu):
+    """The same as an axisymmetric solid."""
+    return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=THICKNESS, elements=(60, 1)), materials=MATERIAL,
+                    supports=[fx.SimplySupported("rim"), fx.Symmetry("axis")], contacts=[
+                        fx.Contact("top", BALL.moved(z=THICKNESS), mu, moves=(0, -1), name="plug")])
+
+
+def strip(mu, size, width):
+    """Half a strip under a roller."""
+    sheet = fx.mesh.sheet([(0, 0), (1, 0), (1, width), (0, width)], size, names=["y0", "rim", "y1", "x0"])
+    return fx.Scene(mesh=sheet, thickness=THICKNESS, materials=MATERIAL, supports=[*HELD, fx.Symmetry("y1", "y")],
+                    contacts=[fx.Contact("top", fx.tools.extruded(BALL), mu, moves=(0, 0, -1), name="roller")])
+
+
+def formed_in_cup(mu, size):
+    """A quarter of a disc under a pressure in a cup that it slides over, and the same as an axisymmetric solid."""
+    loads, name = [fx.Pressure("top")], {"name": "mould"}
+    sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=size)
+    solid = fx.mesh.disc(radius=1.0, thickness=THICKNESS, elements=(60, 1))
+    return [fx.Scene(mesh=sheet, thickness=THICKNESS, materials=MATERIAL, supports=HELD, loads=loads,
+                     contacts=[fx.Contact("bottom", fx.tools.revolved(CUP), mu, **name)]),
+            fx.Scene(mesh=solid, materials=MATERIAL, supports=[fx.SimplySupported("rim"), fx.Symmetry("axis")],
+                     loads=loads, contacts=[fx.Contact("bottom", CUP, mu, **name)])]
+
+
+@pytest.mark.parametrize("tool", TOOLS.values(), ids=TOOLS)
+def test_distances_have_their_derivatives(tool):
+    """Beside the planes and edges where they have none; on the axis and on planes of symmetry they have."""
+    x = np.random.default_rng(1).uniform(-1.3, 1.3, (4000, 3))
+    x = np.vstack([x, [(0.1, 0.0, 0.01), (0.2, 0.0, 0.01), (0.0, 0.0, -0.61), (0.0, 0.5, -0.61)]])
+    x = x[np.abs(tool.signed_distance(x)) < 0.05]
+    found, e = tool.near(x), 1e-6
+    np.testing.assert_allclose(found.distance, tool.signed_distance(x), atol=1e-14)
+    for k, way in enumerate(e * np.eye(3)):
+        ahead, behind = tool.near(x + way), tool.near(x - way)
+        np.testing.assert_allclose((ahead.distance - behind.distance) / (2 * e), found.normal[:, k], atol=1e-8)
+        np.testing.assert_allclose((ahead.normal - behind.normal) / (2 * e), found.hessian[:, :, k], atol=1e-7)
+
+
+def test_tractions_have_their_stiffness():
+    """Stuck and sliding points, pressed and pulled; |T| is at most mu N, N at the last state."""
+    law = fx.Contact("top", fx.tools.revolved(BALL), 0.3).law(100.0, 1.0, np.zeros((1, 3)))
+    rng = np.random.default_rng(0)
+    way = rng.normal(size=(6, 3))
+    x = 0.499 * way / np.linalg.norm(way, axis=1, keepdims=True) + [0, 0, RADIUS]
+    far = np.array([1e-4] * 3 + [1e-2] * 3)[:, None]
+    old = law.start(x)._replace(distance=np.full(6, 1e-3), position=x + far * rng.normal(size=(6, 3)),
+                                slip=1e-4 * rng.normal(size=(6, 3)))
+    old = old._replace(arrival=old.position)
+    found = law.tractions(x, old)
+    assert found.active.tolist() == [4, 4, 4, 5, 5, 5]
+    np.testing.assert_allclose(found.tangential[3:], 0.3 * 100 * 1e-3, rtol=1e-12)
+    assert (found.tangential[:3] < 0.9 * 0.03).all()
+    for k, e in enumerate(1e-7 * np.eye(3)):
+        quotient = (law.tractions(x + e, old).force - law.tractions(x - e, old).force) / 2e-7
+        np.testing.assert_allclose(found.stiffness[:, :, k], quotient, atol=1e-6)
+    np.testing.assert_allclose(law.pressure_ahead(old._replace(arrival=law.at_pressure(old, np.full(6, 0.12)))), 0.12)
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.3])
+def test_capstan(mu):
+    """ln T grows by mu an angle of 1 where the strip slides. (The chord at each end of the arc is left out.)"""
+    path = fx.trace(strip(mu, 0.025, 0.1), until=fx.travel(0.9), progress=False)
+    wall = path.wall()
+    (x, _, z), stretch = wall.middle.T, 1 / wall.ratio
+    angle, force = np.arctan2(x, RADIUS - 0.9 - z), stretch - stretch**-3                  # neo-Hookean, one width
+    on = np.hypot(x, RADIUS - 0.9 - z) < 1.002 * RADIUS
+    on &= (angle > 0.15) & (angle < angle[on].max() - 0.08)
+    slope = np.polyfit(angle[on], np.log(force[on]), 1, w=np.sqrt(wall.area[on]))[0]
+    assert slope == pytest.approx(mu, rel=5e-3)
+    assert path.counts.iterations < 450
+
+
+def test_force_of_a_rough_ball():
+    """Within 1.5 % of an axisymmetric solid; two counts of nodes to a step agree within 1 %."""
+    exact = fx.trace(pushed_solid(0.3), until=fx.travel(0.9), progress=False).last.measures["tool_force"]
+    forces = []
+    for nodes in (1, 3):
+        path = fx.trace(pushed(0.3, nodes_per_step=nodes), until=fx.travel(0.9), progress=False)
+        forces.append(4 * path.last.measures["tool_force"])
+        assert path.counts.iterations < 450 and path.last.measures["penetration"] < 1e-4 * THICKNESS
+    assert forces[0] == pytest.approx(exact, rel=0.015) and forces[1] == pytest.approx(forces[0], rel=0.01)
+
+
+def test_more_friction_takes_more_force():
+    """A smooth ball slides, at 0 as at next to no friction; no friction holds more than stick does."""
+    forces = {mu: fx.trace(pushed(mu, 0.2), until=fx.travel(0.9), progress=False).last.measures["tool_force"]
+              for mu in ("none", 1e-6, 0.2, 3.0, "stick")}
+    none, hardly, some, most, stick = forces.values()
+    assert hardly == pytest.approx(none, rel=1e-4) and none < 0.95 * some and some < 0.95 * most
+    assert most == pytest.approx(stick, rel=0.03)
+
+
+def test_work_of_the_plug_is_strain_energy_and_friction():
+    """Friction dissipates mu N times the way that points slide over the ball, in the trapezoidal rule."""
+    path = fx.trace(pushed(0.3), until=fx.travel(0.9), progress=False)
+    travel, force, energy = (path[name] for name in ("travel", "tool_force", "strain_energy"))
+    work, lost, before = np.trapezoid(force, travel), 0.0, None
+    for state in path.states:
+        with path.problem.at(state) as problem:
+            (face,) = problem.contacts
+            x = face.positions(state.x, state.control)
+            limit = face.rule.area * 0.3 * face.law.pressure(face.touch)
+        if before is not None:
+            way = x - before[0]
+            normal = face.law.tool.near(x).normal
+            way -= np.einsum("ni,ni->n", way, normal)[:, None] * normal
+            lost += (np.where(before[1] > 0, limit + before[1], 0.0) / 2) @ np.linalg.norm(way, axis=1)
+        before = x, limit
+    assert 0.02 * work < lost < 0.2 * work
+    assert work == pytest.approx(energy[-1] + lost, rel=0.01)
+
+
+def test_two_ranks_slide_alike():
+    script = """
+import json, sys
+sys.path.insert(0, "tests")
+import formingx as fx
+from test_friction_in_space import pushed
+path = fx.trace(pushed(0.3, 0.2), until=fx.travel(0.5), progress=False)
+wall = path.wall()
+if path.problem.comm.rank == 0:
+    print(json.dumps([wall.ratio.tolist(), path["tool_force"].tolist(), path["contact_area"].tolist()]))
+"""
+    for one, two in zip(*(run_json(script, ranks) for ranks in (1, 2))):
+        np.testing.assert_allclose(two, one, rtol=1e-7, atol=1e-10)
+
+
+def test_a_run_goes_on_from_a_checkpoint(tmp_path):
+    """What slides goes on as if the run had not been interrupted."""
+    whole = fx.trace(pushed(0.3, 0.2), until=fx.travel(0.6), through=[fx.travel(0.4)], progress=False)
+    fx.trace(pushed(0.3, 0.2), until=fx.travel(0.4), progress=False).save(tmp_path)
+    scene = pushed(0.3, 0.2)
+    path = fx.trace(scene, until=fx.travel(0.6), progress=False, start=fx.load(tmp_path, scene))
+    assert path.last.measures["tool_force"] == pytest.approx(whole.last.measures["tool_force"], rel=1e-8)
+
+
+@pytest.mark.slow
+def test_force_of_a_rough_ball_converges():
+    exact = fx.trace(pushed_solid(0.3), until=fx.travel(0.9), progress=False).last.measures["tool_force"]
+    path = fx.trace(pushed(0.3, 0.05), until=fx.travel(0.9), progress=False)
+    assert 4 * path.last.measures["tool_force"] == pytest.approx(exact, rel=5e-3)
+    assert path.counts.iterations < 900 and path.counts.failures < 5
+
+
+@pytest.mark.slow
+def test_walls_of_a_rough_cup():
+    """Rings of the cup have the walls of the axisymmetric one, within 1 %."""
+    sheet, solid = (fx.trace(scene, until=fx.pressure(0.4), progress=False) for scene in formed_in_cup(0.3, 0.05))
+    wall, profile = sheet.wall(), solid.profile()
+    R = np.hypot(*wall.rest[wall.triangles].mean(1)[:, :2].T)
+    exact = np.interp(R, profile.reference_radius, profile.thickness_ratio)
+    for begin in np.arange(0.0, 1.0, 0.1):
+        ring = (begin <= R) & (begin + 0.1 > R)
+        mean, should = (np.average(v[ring], weights=wall.area_at_rest[ring]) for v in (wall.ratio, exact))
+        assert mean == pytest.approx(should, rel=0.01)
