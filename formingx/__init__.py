@@ -78,10 +78,11 @@ with _optional():
     from .extensions.kbkz.damping import PSM, Damping, DoubleWagner, LuoTanner, SoskeyWinter, Wagner
     from .extensions.kbkz.kbkz import KBKZ
 with _optional():
+    from .extensions.fits import beyond_tests as _fits_checks
     from .extensions.fits.data import treloar1944
     from .extensions.fits.fit import Fit, fit
     from .extensions.fits.fit_in_time import TimedTest
-    from .extensions.fits.tested import Tested, with_tests
+    from .extensions.fits.tested import MeasuredRange, with_tests
 with _optional():
     from .extensions.fits.fit_damping import Spectrum, fit_spectrum
 with _optional():

@@ -33,6 +33,8 @@ def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequen
     rates = [positive(f"{who}: rates", rate) for rate in several(f"{who}: rates", rates, "rates")]
     parts = [_limits(name, one, shift, unit, unit_of_time) for name, one, shift in cases]
     picture = _picture(cases, rates if hasattr(material, "constant_rate") else [], unit, unit_of_time)
+    if (tested := getattr(material, "tested", None)) is not None:
+        parts.append(tested.rows())
     rows = "".join(f"<tr><td>{html.escape(a)}</td><td>{html.escape(b)}</td></tr>" for part in parts for a, b in part)
     path.write_text(_PAGE.format(title=html.escape(type(material).__name__), card=html.escape(str(material)), rows=rows,
                                  picture=picture), encoding="utf-8")

@@ -48,7 +48,7 @@ class Material:
         integral: the law of a stress that depends on all past states (`IntegralLaw`), or None.
         stores_energy: True if `stored_energy` is one.
         symmetric: True if its tangent is.
-        tested: the tests that its constants come from (a `Tested`), or None: not known.
+        tested: the tests that its constants come from (a `MeasuredRange`), or None: not known.
     """
 
     parameters: dict[str, Any]

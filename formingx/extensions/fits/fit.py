@@ -17,7 +17,7 @@ from .fit_in_time import TimedTest, fitted_in_time
 from .fit_plot import plotted
 from .measured import read_tests
 from .points import Points
-from .tested import Tested
+from .tested import MeasuredRange
 from .uncertainty import Uncertainty, uncertainty
 from .weights import of_numbers
 
@@ -132,7 +132,7 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
     best, found = _fitted(material, points, terms)
     misfit = points.stress(best.response, best.parameters.values()) - points.measured
     return _result(best, dict(best.parameters), points.parts, misfit, points.measured, found,
-                   Tested.of(points.stretches_of, found.undetermined), points.data)
+                   MeasuredRange.of(points.stretches_of, found.undetermined), points.data)
 
 
 def _of_time(fitted: Callable, material: Any, data: Any, terms: int | None, relative: bool, weights: Any,
@@ -155,13 +155,13 @@ def _of_time(fitted: Callable, material: Any, data: Any, terms: int | None, rela
         rates.append(np.abs(np.diff(np.log(test.stretches)))[steps > 0] / steps[steps > 0])
     moved = np.concatenate(rates)
     moved = moved[moved > 0]
-    tested = Tested.of({mode: np.concatenate(parts) for mode, parts in stretches.items()}, found.undetermined,
+    tested = MeasuredRange.of({mode: np.concatenate(parts) for mode, parts in stretches.items()}, found.undetermined,
                        (float(moved.min()), float(moved.max())) if len(moved) else None)
     return _result(relaxing, constants, parts, np.concatenate(misfits), np.concatenate(measured), found, tested, tests)
 
 
 def _result(material: Any, constants: dict[str, float], parts: dict[str, slice], misfit: np.ndarray,
-            measured: np.ndarray, found: Uncertainty, tested: Tested, data: Any) -> Fit:
+            measured: np.ndarray, found: Uncertainty, tested: MeasuredRange, data: Any) -> Fit:
     card = copy.copy(material)
     card.tested = tested
     deviations = {name: _rms(misfit[part] / np.maximum(abs(measured[part]), 0.02 * abs(measured[part]).max()))

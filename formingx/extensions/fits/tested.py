@@ -19,9 +19,12 @@ _NEAR = 0.1
 _SMALL = 0.02
 """Logarithmic strain below which a deformation counts as tested whatever its mode."""
 
+_STRAIGHT = 1e-8
+"""Area of a triangle of strains, doubled, below which its corners count as on a line."""
+
 
 @dataclass(frozen=True)
-class Tested:
+class MeasuredRange:
     """Tests that the constants of a material come from.
 
     A deformation counts as tested if its logarithmic principal strains, in falling order, lie in the convex hull of
@@ -41,7 +44,7 @@ class Tested:
 
     @classmethod
     def of(cls, stretches: Mapping[str, Any], undetermined: tuple[str, ...] = (),
-           rates: tuple[float, float] | None = None) -> Tested:
+           rates: tuple[float, float] | None = None) -> MeasuredRange:
         """Return the record of tests.
 
         Args:
@@ -79,6 +82,20 @@ class Tested:
         size = np.hypot(*strains.T)
         return self.distance(strains) > np.maximum(_NEAR * size, _SMALL)
 
+    def rows(self) -> list[tuple[str, str]]:
+        """Return (what, value) for the rows of a material's report."""
+        found = [("tested at stretches", str(self))]
+        if self.undetermined:
+            found.append(("not determined by these tests", ", ".join(self.undetermined)))
+        if self.rates is not None:
+            found.append(("tested at rates", f"{self.rates[0]:.3g} to {self.rates[1]:.3g}"))
+        return found
+
+    @property
+    def of_one_mode(self) -> bool:
+        """True if all tests are of one mode, so that another mode is not between tested ones."""
+        return len(self._corners) < 3
+
     @cached_property
     def _corners(self) -> np.ndarray:
         """Convex hull of the tested strains and rest, counter-clockwise, shape (k, 2)."""
@@ -105,7 +122,7 @@ def with_tests(material: Material, **stretches: Any) -> Material:
     uniaxial 1 to 3
     """
     other = copy.copy(instance("with_tests: material", material, Material, "a material"))
-    other.tested = Tested.of(stretches)
+    other.tested = MeasuredRange.of(stretches)
     return other
 
 
@@ -123,7 +140,7 @@ def mode_of(largest: float, middle: float) -> str:
 
 def _hull(points: np.ndarray) -> np.ndarray:
     """Convex hull of points, shape (n, 2): its corners, counter-clockwise (Andrew's chain)."""
-    ordered = sorted(map(tuple, np.unique(points.round(12), axis=0)))
+    ordered = sorted(map(tuple, np.unique(points.round(10), axis=0)))
     if len(ordered) < 3:
         return np.array(ordered)
 
@@ -131,7 +148,7 @@ def _hull(points: np.ndarray) -> np.ndarray:
         found: list[tuple[float, float]] = []
         for x, y in chain:
             while len(found) > 1 and ((found[-1][0] - found[-2][0]) * (y - found[-2][1])
-                                      - (found[-1][1] - found[-2][1]) * (x - found[-2][0])) <= 1e-14:
+                                      - (found[-1][1] - found[-2][1]) * (x - found[-2][0])) <= _STRAIGHT:
                 found.pop()
             found.append((x, y))
         return found[:-1]

@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-
+from ...checks.draws import draws
 from ...findings import Finding, register
 from ...mesh.nodes import COORDINATES
 from ...mesh.triangles import place
@@ -19,7 +18,7 @@ def ruptures(body: Any) -> Iterator[Finding]:
         if not hasattr(melt, "rupture_stretch"):
             continue
         most = melt.rupture_stretch("equibiaxial")
-        for about, stretch in _draws(body):
+        for about, stretch in draws(body):
             if stretch > most:
                 yield Finding("warning", f"materials[{name!r}]",
                               f"{about} stretches it about {stretch:.3g}-fold in all directions, but stretched suddenly"
@@ -49,37 +48,3 @@ def thins(failure: Any) -> Iterator[Finding]:
                       f" beyond there is no equilibrium",
                       "a shallower draw, a slower or hotter process, or another damping function: one fitted to shear"
                       " or uniaxial data is often too strong in equibiaxial extension")
-
-
-def _draws(body: Any) -> Iterator[tuple[str, float]]:
-    """(what, stretch) of a flat sheet: at the pole of a free dome; in a mould the root of the areal draw ratio."""
-    for pushed in body.pushed:
-        if not pushed.flat or not pushed.round:
-            continue
-        for target in (*body.targets, *body.highest):
-            if (stretch := _of_cap(target, pushed.radius)) is not None:
-                yield str(target), stretch
-        if pushed.tools:
-            points, ends = pushed.ways
-            if np.all(np.isfinite(ends)) and len(ends) > 1:
-                yield repr(pushed.tools[0]), float(np.sqrt(_area(ends) / _area(points)))
-
-
-def _of_cap(target: Any, radius: float) -> float | None:
-    """Stretch at the pole of a flat disc that is blown to a cap of height h radii, about 1 + h^2: what a thin disc has
-    whose points go at right angles to the caps that they pass through."""
-    if target.name == "pole_stretch":
-        return float(target.value)
-    height = abs(target.value) / radius
-    if target.name == "enclosed_volume":                     # pi h (3 + h^2)/6 for a unit radius
-        volume = height / radius**2
-        root = np.roots([1.0, 0.0, 3.0, -6 * volume / np.pi])
-        height = float(root[np.abs(root.imag) < 1e-9].real.max())
-    elif target.name != "pole_height":
-        return None
-    return 1 + height**2
-
-
-def _area(line: np.ndarray) -> float:
-    """That a line, shape (n, 2), sweeps about the axis."""
-    return float(np.sum((line[1:, 0] + line[:-1, 0]) * np.hypot(*np.diff(line, axis=0).T)))

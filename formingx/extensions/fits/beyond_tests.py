@@ -1,0 +1,94 @@
+"""Checks of a run against the tests that its materials' constants come from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import basix
+import numpy as np
+import ufl
+
+from ... import _compat
+from ...checks.draws import draws
+from ...findings import Finding, register
+from ...forms.carry import shapes_of
+from ...mesh.nodes import COORDINATES
+from ...mesh.triangles import place
+from ...ranks import gathered
+from .tested import MeasuredRange, mode_of, principal
+
+_SHARE = 0.005             # of a layer's volume that may lie outside the tests without a warning
+
+
+@register("scene")
+def draws_beyond_tests(body: Any) -> Iterator[Finding]:
+    """Constants that tests leave open, and expected stretches that they do not cover."""
+    for layer, tested in _tested(body.scene):
+        about = f"materials[{layer!r}]"
+        if tested.undetermined and tested.of_one_mode:
+            yield Finding("warning", about, f"its tests ({tested}) do not determine {', '.join(tested.undetermined)}:"
+                          f" in another mode of deformation its stress is a guess",
+                          "fit it to tests of another mode too, or choose a law with fewer constants")
+        for what, stretch in draws(body):
+            strain = principal(np.array([[stretch], [stretch]]))
+            if tested.outside(strain)[0]:
+                yield Finding("warning", about, f"{what} stretches it about {stretch:.3g}-fold in all directions;"
+                              f" {_tests_of(tested, *strain[0])}", "use tests that reach so far")
+
+
+@register("end")
+def ends_beyond_tests(path: Any) -> Iterator[Finding]:
+    """Parts of the body whose last deformation the tests of its material do not cover; collective."""
+    problem, scene = path.problem, path.problem.scene
+    known = dict(_tested(scene))
+    for terms in problem.forms.terms if known else ():
+        tested = known.get(terms.names[0])
+        if tested is None:
+            continue
+        with problem.at(path.last):
+            strains, points, volumes = _deformation(problem, terms)
+        outside = tested.outside(strains)
+        share = float(volumes[outside].sum() / volumes.sum())
+        if share < _SHARE:
+            continue
+        far = int(np.argmax(np.where(outside, tested.distance(strains), 0.0)))
+        largest, middle = strains[far]
+        where = place(scene.mesh, points[far]) if scene.kinematics.components == COORDINATES else tuple(points[far])
+        open_ = f"; they leave {', '.join(tested.undetermined)} open" if tested.undetermined else ""
+        yield Finding("warning", f"materials[{terms.names[0]!r}]",
+                      f"{100 * share:.3g} % of it is deformed as in none of its tests, furthest at {where}, where it is"
+                      f" stretched {np.exp(largest):.3g} and {np.exp(middle):.3g}-fold;"
+                      f" {_tests_of(tested, largest, middle)}{open_}: its stress there is extrapolated",
+                      "fit it to tests of this mode that reach so far")
+
+
+def _tests_of(tested: MeasuredRange, largest: float, middle: float) -> str:
+    """The nearest mode and how far it was tested, in words."""
+    mode = mode_of(largest, middle)
+    found = tested.ranges.get(mode.replace(" ", "_"))
+    if found is not None:
+        return f"that is nearest to {mode} tension, tested at stretches from {found[0]:.3g} to {found[1]:.3g}"
+    return f"that is nearest to {mode} tension, which was not tested (tests: {tested})"
+
+
+def _tested(scene: Any) -> list[tuple[str, MeasuredRange]]:
+    """(layer, tests) of each layer whose material tells of its tests."""
+    found = [(layer, getattr(getattr(material, "base", material), "tested", None))
+             for layer, material in scene.materials.items()]
+    return [(layer, tested) for layer, tested in found if tested is not None]
+
+
+def _deformation(problem: Any, terms: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(largest and middle logarithmic strain, (n, 2), reference points, reference volumes, (n,)) at the quadrature
+    points of all ranks."""
+    forms, cells = problem.forms, terms.own_cells
+    F = shapes_of(forms, cells, terms.places)
+    squares = np.linalg.eigvalsh(F.transpose(0, 2, 1) @ F)[:, ::-1]
+    rule = basix.make_quadrature(forms.domain.basix_cell(), forms.scene.quadrature_degree)[1]
+    size = len(forms.X)
+    where = _compat.compile_expression(ufl.as_vector([*forms.X, forms.weight * abs(ufl.JacobianDeterminant(
+        forms.domain))]), terms.places)
+    values = where.eval(forms.domain, cells).reshape(-1, size + 1) if len(cells) else np.zeros((0, size + 1))
+    volumes = values[:, size] * np.tile(np.abs(rule), len(cells))
+    return tuple(gathered(problem.comm, part) for part in (np.log(squares[:, :2]) / 2, values[:, :size], volumes))
