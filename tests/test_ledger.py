@@ -8,6 +8,7 @@ from test_contact import cup
 
 import formingx as fx
 from formingx import Stage, tools
+from formingx.results.evaluate import work as ledger
 
 RUBBER = fx.NeoHookean(c10=0.5)
 RELAXES = fx.Viscoelastic(RUBBER, [(1.0, 0.7), (0.5, 0.05)])
@@ -127,6 +128,28 @@ def rubbed(path):
 @pytest.fixture(scope="module")
 def done():
     return {}
+
+
+@pytest.mark.parametrize("increments", [1, 20])
+def test_books_of_runs_at_fixed_control_are_kept(increments):
+    """A sheet without stiffness at rest moves at first in no proportion to its pressure: it was 18 % off."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(12, 1)), loads=[fx.Pressure("bottom")],
+                     materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    work = fx.solve(scene, to=0.03, increments=increments).work()
+    assert np.abs(work["unbalanced"]).max() < 2e-4 * work["strain_energy"].max()
+
+
+def test_books_that_are_off_are_said(caplog, monkeypatch):
+    """By a run of few states when it ends, and by `work` itself."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(12, 1)), loads=[fx.Pressure("bottom")],
+                     materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    path = fx.trace(scene, until=fx.pole_height(2.0), progress=False)
+    assert len(path) <= 5 and path.findings() == [] and caplog.text == ""
+    whole = ledger.Ledger._by_loads
+    monkeypatch.setattr(ledger.Ledger, "_by_loads", lambda *given: {k: 1.02 * v for k, v in whole(*given).items()})
+    said, = path.findings()
+    assert said.about == "energy" and "off by 2 % of the largest part" in said.text
+    assert caplog.text == "" and len(path.work()) == 3 and caplog.text.count(said.text) == 1
 
 
 @pytest.mark.parametrize("name", RUNS)

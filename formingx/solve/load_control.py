@@ -95,6 +95,13 @@ class FixedControlCurve(Curve):
         """The same, to where an equation for the control holds."""
         return self._correct(old, length, kind)
 
+    def inside(self, a: State, b: State, fraction: float) -> State:
+        """The state at a fraction of the way between two, by the control; raises `Failure`."""
+        control = a.control + fraction * (b.control - a.control)
+        if self._at_rest(a):                                 # a slack body has no cubic from there
+            return self._correct(a, (control - a.control) / a.slope, "step")
+        return self.solve(self.interpolate(a, b, fraction)[0], control, _at(control), "step", a)
+
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
         super().destroy()
@@ -116,8 +123,8 @@ class FixedControlCurve(Curve):
 
     def _correct(self, old: State, length: float, kind: str) -> State:
         control = old.control + length * old.slope
-        rest = old.kind == "start" and not np.any(old.x)
-        self._x.array_w[:] = self.guess_from_rest(old, control) if rest else old.x + length * old.direction
+        self._x.array_w[:] = self.guess_from_rest(old, control) if self._at_rest(old) else (
+            old.x + length * old.direction)
         good = self._fixed.solve(self._x, control)
         history = self._fixed.history
         self._iterations += len(history) - 1
@@ -127,3 +134,15 @@ class FixedControlCurve(Curve):
             raise failure
         self.newton.tangent(self._x, control)
         return self._state(control, history, kind, old)
+
+    @staticmethod
+    def _at_rest(state: State) -> bool:
+        return state.kind == "start" and not np.any(state.x)
+
+
+def _at(value: float) -> Constraint:
+    """The constraint that the control has a value."""
+    def c(x: PETSc.Vec, control: float, gradient: PETSc.Vec) -> tuple[float, float]:
+        gradient.set(0.0)
+        return control - value, 1.0
+    return c

@@ -22,6 +22,7 @@ from ...contact import resultants
 from ...contact.step_limit import Way
 from ...contact.tooling import Tooling
 from ...errors import InputError
+from ...findings import Finding, tell
 from ...solve.newton import Failure
 
 _LOSSES = "friction", "jumps", "bonds"
@@ -29,6 +30,7 @@ _GAUSS = tuple((1 + s) / 2 for s in (-(0.6**0.5), 0.0, 0.6**0.5)), (5 / 18, 8 / 
 _FOOT = 0.06           # of half the width of the ramp: points nearer to its foot are at it
 _SMALL = 1e-5          # of the arc length of a state: half of a difference quotient
 _CLOSED = 2e-4         # of the largest energy: what a step may leave unbalanced
+_PROMISED = 5e-3       # of the largest part of a balance: what a run may leave unbalanced
 _HALVINGS = 6          # of a step, at most
 _PARTS = 0.5, 0.35, 0.65   # of a step at which it is halved
 
@@ -323,6 +325,30 @@ def _called(scene: Any, thing: Any) -> str:
 
 def work(path: Any) -> dict[str, np.ndarray]:
     """See `Path.work`."""
+    found = balance(path)
+    tell(findings(found), path.problem.comm.rank)
+    return found
+
+
+def findings(balanced: dict[str, np.ndarray]) -> list[Finding]:
+    """Return the finding on an energy balance that is off by more than `_PROMISED` of its largest part."""
+    size = max(float(np.abs(values).max()) for values in balanced.values())
+    off = np.abs(balanced["unbalanced"])
+    k = int(np.argmax(off))
+    if off[k] <= _PROMISED * size:
+        return []
+    return [Finding("warning", "energy", f"The energy balance is off by {100 * off[k] / size:.2g} % of the largest"
+                    f" part, up to state {k} ({100 * _PROMISED:g} % is usual): the states are too few for the work"
+                    f" between them, contact is too soft, or the run is off. Use shorter steps,"
+                    f" StepControl(largest=...), and see path.work().")]
+
+
+def balance(path: Any) -> dict[str, np.ndarray]:
+    """Return the parts of the energy balance, see `Path.work`.
+
+    Raises:
+        InputError: a melt of K-BKZ type, whose stored energy is no function of its state.
+    """
     if "strain_energy" not in path.columns:
         raise InputError("Path.work: is not available with K-BKZ: what it stores is no function of its state")
     ledgers = [Ledger(segment).rows() for segment in path.segments]
