@@ -17,6 +17,7 @@ import argparse
 import json
 import re
 import sys
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ from validation_rows import TABLES, Row  # noqa: E402
 TEMPLATE, STORED, PAGE = DOCS / "data" / "validation.template", DOCS / "data" / "summaries.json", DOCS / "validation.md"
 PLACE, OVER = re.compile(r"\{\{(.+?)\}\}"), " OVER "
 HEAD = "<!-- Written by docs/make_validation.py from data/validation.template: do not change this page. -->\n"
-DIGITS = 12                                                   # of a stored number
+WIDTH, DIGITS = 140, 12                                      # columns of the page, digits of a stored number
 
 
 def paths(template: str) -> Iterator[str]:
@@ -108,6 +109,19 @@ def table(rows: list[Row], numbers: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def wrapped(text: str) -> str:
+    """Return a page whose paragraphs and items are filled to `WIDTH` columns; tables and headings stay."""
+    blocks = []
+    for lines in (block.splitlines() for block in text.split("\n\n")):
+        if lines and not lines[0].startswith(("|", "#", "!", "<", "```")):
+            items = "\n".join(lines).replace("\n* ", "\n\n* ").split("\n\n")
+            lines = [line for item in items for line in textwrap.wrap(
+                " ".join(item.split()), WIDTH, subsequent_indent="  " * item.startswith("* "), break_long_words=False,
+                break_on_hyphens=False)]
+        blocks.append("\n".join(lines))
+    return "\n\n".join(blocks) + "\n"
+
+
 def page(template: str, numbers: dict[str, Any]) -> str:
     """Return the whole page."""
     def put(match: re.Match[str]) -> str:
@@ -115,7 +129,7 @@ def page(template: str, numbers: dict[str, Any]) -> str:
         if place.startswith("TABLE "):
             return table(TABLES[place.removeprefix("TABLE ")], numbers)
         return cell(*place.rsplit(" ", 1), numbers)
-    return HEAD + PLACE.sub(put, template)
+    return HEAD + wrapped(PLACE.sub(put, template))
 
 
 def main() -> int:

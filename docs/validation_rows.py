@@ -80,6 +80,8 @@ EXACT = [
     _disc("extrapolated", ", two sizes extrapolated"),
     Row("trough in space, error of its wall", "tray/trough/size_0.05/wall_error", 0.0, "power law of a membrane",
         style=".1e", absolute=True),
+    Row("K-BKZ blocks at constant rates, largest error", "kbkz/largest_error_of_blocks/psm", 0.0,
+        "homogeneous integration", style=".1e", absolute=True),
     Row("block drawn hot, set and let go: stretch", "set_block/uniaxial/G_200/stretch",
         "set_block/uniaxial/G_200/exact", "exact balance", style=".6f"),
     Row("thin sheet on a plug, edge of 0.18 plug radii, force over the membrane's",

@@ -41,7 +41,7 @@ def test_a_page_from_summaries(tmp_path, monkeypatch):
             Row("near", "run/a/q", lambda: 2.0 * (1 - 1e-5), "x"),
             Row("alone", "run/a/q", None, "a figure", note="undecided")]
     monkeypatch.setattr(make_validation, "TABLES", {"all": rows})
-    template = "{{run/a/p .2f}} {{run/a/p OVER run/a/q +.1%}} {{run/none d}}\n{{TABLE all}}\n"
+    template = "{{run/a/p .2f}} {{run/a/p OVER run/a/q +.1%}} {{run/none d}}\n\n{{TABLE all}}\n"
     (tmp_path / "run").mkdir()
     summary = {"a": {"p": 2.2, "q": 2.0}, "list": [1, -1e-3], "none": None}
     (tmp_path / "run" / "summary.json").write_text(json.dumps(summary))
@@ -49,12 +49,21 @@ def test_a_page_from_summaries(tmp_path, monkeypatch):
     numbers = make_validation.collect(tmp_path, wanted, {})
     text = make_validation.page(template, numbers).splitlines()
     assert text[1] == "2.20 +10.0 % none"
-    assert [line.split(" | ")[1:4] for line in text[4:]] == [
+    assert [line.split(" | ")[1:4] for line in text[5:]] == [
         ["2.200 MPa", "2.000 MPa", "+10.0 %"], ["-1.0e-03", "0.0e+00", "-1.0e-03"], ["1.1", "2", "-45.0 %"],
         ["2", "2", "+1.0e-05"], ["2", "", "undecided"]]
     assert make_validation.collect(tmp_path / "no", wanted, numbers) == numbers
     with pytest.raises(KeyError, match="no number for run/a/p"):
         make_validation.collect(tmp_path / "no", wanted, {})
+
+
+def test_paragraphs_are_filled():
+    """Items keep their marks, tables and headings their lines."""
+    text = "# A heading\n\nOne two\nthree.\n\n* An item\n  of two lines\n* more\n\n| a |\n|---|\n| " + "b " * 99 + "|"
+    lines = make_validation.wrapped(text + "\n\n" + "word " * 60).splitlines()
+    assert lines[:6] == ["# A heading", "", "One two three.", "", "* An item of two lines", "* more"]
+    assert lines[7:9] == ["| a |", "|---|"] and len(lines[9]) > 200
+    assert all(len(line) <= make_validation.WIDTH for line in lines[10:]) and len(lines) == 14
 
 
 @pytest.mark.parametrize("elements", [(20, 1), (40, 2)])
