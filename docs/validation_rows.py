@@ -103,6 +103,8 @@ THESIS = [
     Row("plate B at 26 psi, height", "material_constants/B/pole_height_in/26", 6.0, "section 4.4: about", "in", ".4g"),
     Row("plate A, its maximum", "material_constants/A/limit_pressure_psi", 26.0, "section 4.4: carries it at 9 in",
         "psi", ".5g", note="no such state"),
+    Row("plate A, height at its maximum", "material_constants/A/limit_pole_height_in", None,
+        "section 4.4: 9 in at 26 psi", "in", ".3g", note="membrane theory agrees with the maximum"),
     Row("block without friction, volume error", "compression_homogeneous/volume_error", None, "table 7.1: 3.6e-3",
         style=".0e"),
     Row("stuck block over Lindley's force at 0.1 cm", "compression_stick/stick_over_lindley/0.1", 1.0,
