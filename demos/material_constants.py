@@ -44,7 +44,7 @@ def inflate(sheet, elements, until, through=()):
 
 
 def power_law(modulus, index):
-    """A material whose shear modulus is modulus t^-index, within 0.3 % from 0.03 to 10 s: a branch each decade.
+    """Return a material whose shear modulus is modulus t^-index, within 0.3 % from 0.03 to 10 s: a branch each decade.
 
     t^-m is the integral of exp(-t/tau) tau^(-m - 1)/Gamma(m) over tau; trapezoids in ln tau, to 1000 s.
     """
@@ -57,7 +57,7 @@ def power_law(modulus, index):
 
 
 def relaxing_numbers(sheet, elements, elastic):
-    """Pressure and pole thickness of a relaxing sheet over those of its elastic path; its height grows steadily."""
+    """Return pressure and pole thickness of a relaxing sheet over the elastic ones; its height grows steadily."""
     radius, thickness, c10, _ = sheet
     end = float(HEIGHTS[-1]) * radius
     scene = fx.Scene(mesh=fx.mesh.disc(radius=radius, thickness=thickness, elements=elements),

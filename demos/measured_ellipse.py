@@ -23,7 +23,7 @@ PLACES = [(10, 0), (20, 0), (25, 0), (0, 20), (0, 40), (0, 50), (15, 20), (15, 3
 
 
 def softening(n):
-    """A law whose stress grows as strain^n, linear below an equivalent strain of about 0.1 %."""
+    """Return a law whose stress grows as strain^n, linear below an equivalent strain of about 0.1 %."""
     return fx.Hyperelastic(lambda I1, I2, c, n: c * ((I1 - 3 + 1e-6) / 1e-2) ** ((n + 1) / 2), c=1e-2, n=n)
 
 
@@ -32,7 +32,7 @@ LAWS = {"neo_hookean": fx.NeoHookean(c10=1.0), "mooney_0.3": fx.MooneyRivlin(c10
 
 
 def film(size):
-    """A quarter of the film, in triangles of a size (mm)."""
+    """Return a quarter of the film, in triangles of a size (mm)."""
     n = int(np.ceil(75 / size))                                # chords of the rim, a quarter of which is 72.7 mm long
     angle = np.linspace(0, np.pi / 2, n + 1)
     rim = np.column_stack([HALF_WIDTH * np.cos(angle), HALF_LENGTH * np.sin(angle)])
@@ -41,14 +41,14 @@ def film(size):
 
 
 def blow(law, size):
-    """The path to the given rise of the middle."""
+    """Return the path to the given rise of the middle."""
     scene = fx.Scene(mesh=film(size), thickness=THICKNESS, materials=law, loads=[fx.Pressure("bottom")],
                      supports=[fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")])
     return fx.trace(scene, until=fx.displacement(RISE, at=(0, 0)), progress=False)
 
 
 def at(place, points, values, signs, count):
-    """Values at a place (x, y), shape (k,): quadratic polynomials through the values of the nearest points.
+    """Return values at a place (x, y), shape (k,), of quadratic polynomials fitted to the nearest points.
 
     The points, shape (n, 2), and values, shape (n, k), are those of the quarter; signs, shape (k,): -1 where a value
     changes its sign across a line of symmetry.
@@ -62,7 +62,7 @@ def at(place, points, values, signs, count):
 
 
 def predicted(path):
-    """{"x_y": {W_mm, e1, e2, wall_ratio}} at the places; e1: the principal Hencky strain nearest x.
+    """Return {"x_y": {W_mm, e1, e2, wall_ratio}} at the places; e1: the principal Hencky strain nearest x.
 
     The directions are those of the right stretch tensor; nowhere are the two strains alike.
     """
@@ -82,12 +82,12 @@ def predicted(path):
 
 
 def largest_change(one, other):
-    """{quantity: its largest difference over all places}."""
+    """Return {quantity: its largest difference over all places}."""
     return {name: max(abs(one[place][name] - other[place][name]) for place in one) for name in ("W_mm", "e1", "e2")}
 
 
 def draw(path, rows, file):
-    """The film's rise as lines of equal height; the strains at the places under every law."""
+    """Draw the film's rise as lines of equal height, and the strains at the places under every law."""
     figure, axes = plots.figure(2, width=5)
     wall = path.wall()
     lines = axes[0].tricontourf(*wall.now[:, :2].T, wall.triangles, wall.now[:, 2], levels=np.arange(0, 13))

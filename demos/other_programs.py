@@ -24,12 +24,12 @@ PLATE = {"radius": 7.5, "thickness": 0.5, "c10": 80.0, "c01": 20.0}             
 
 
 def row(ours, theirs, unit):
-    """One row of the summary: a number of ours and theirs, and ours over theirs less 1."""
+    """Return one row of the summary: a number of ours and theirs, and ours over theirs less 1."""
     return {"ours": float(ours), "theirs": theirs, "deviation": float(ours) / theirs - 1, "unit": unit}
 
 
 def tube(inner, outer, material, pressure, n):
-    """The path of a long tube in plane strain to an inner pressure; n elements through its wall."""
+    """Return the path of a long tube in plane strain to an inner pressure; n elements through its wall."""
     mesh = fx.mesh.disc(radius=outer, inner_radius=inner, thickness=2 * (outer - inner) / n, elements=(n, 2))
     scene = fx.Scene(mesh=mesh, materials=material, loads=[fx.Pressure("inner")],
                      supports=[fx.Symmetry("bottom", normal="z"), fx.Symmetry("top", normal="z")])
@@ -37,7 +37,7 @@ def tube(inner, outer, material, pressure, n):
 
 
 def in_wall(path, R):
-    """(displacement, radial stress, hoop stress) of a tube at reference radius R."""
+    """Return (displacement, radial stress, hoop stress) of a tube at reference radius R."""
     Z = path.problem.scene.mesh.nodes_of("top")[0, 1]
     bound = fx.displacement(0.0, at=(R, Z), component="r").bind(path.problem)
     stress = path.stress().at([(R, Z / 2)]).cauchy[0]
@@ -45,9 +45,9 @@ def in_wall(path, R):
 
 
 def vm56(fine):
-    """Ansys VM56: a thick tube, Mooney 80 and 20 psi, 7 to 18.625 in, 150 psi; stress in the middle of the inner fifth.
+    """Solve Ansys VM56: a thick tube, Mooney 80 and 20 psi, 7 to 18.625 in, under 150 psi.
 
-    Its target is Oden (1972), pages 325 to 331.
+    The stress is taken in the middle of the inner fifth of the wall. The target is from Oden (1972), pages 325 to 331.
     """
     path = tube(7.0, 18.625, fx.MooneyRivlin(c10=80.0, c01=20.0), 150.0, fine)
     inner, middle = in_wall(path, 7.0), in_wall(path, 7.0 + 11.625 / 10)
@@ -55,10 +55,10 @@ def vm56(fine):
 
 
 def solids4foam(fine):
-    """solids4foam's tubes at 100 MPa: neo-Hookean 8 to 16 m, exact; Mooney 7 to 18.625 m, with Poisson's ratio .49.
+    """Solve solids4foam's tubes at 100 MPa: neo-Hookean, 8 to 16 m, and Mooney, 7 to 18.625 m.
 
-    E = 1000 MPa of an incompressible solid is c10 = 500/3 MPa. The second is its finite-volume result in the innermost
-    cell, whose middle is at R = 7.1527 m.
+    E = 1000 MPa of an incompressible solid is c10 = 500/3 MPa; the program has its exact solution. Of the second it has
+    a finite-volume result with Poisson's ratio 0.49, here in the innermost cell, whose middle is at R = 7.1527 m.
     """
     path = tube(8.0, 16.0, fx.NeoHookean(c10=500 / 3), 100.0, fine)
     exact = in_wall(path, 8.0), in_wall(path, 12.0)
@@ -72,7 +72,7 @@ def solids4foam(fine):
 
 
 def quarter(radius, size, file):
-    """A quarter of a round bar: six-node triangles of a size, half of it at the top."""
+    """Return a quarter of a round bar: six-node triangles of a size, half of it at the top."""
     if COMM.rank == 0:
         import gmsh
         gmsh.initialize()
@@ -96,7 +96,7 @@ def quarter(radius, size, file):
 
 
 def vm201(size, out):
-    """Ansys VM201: a rubber bar, radius 200 mm, between plates without friction: force per mm of length.
+    """Solve Ansys VM201: a rubber bar, radius 200 mm, between plates without friction: force per mm of length.
 
     The plates approach by 0.1 and 0.2 m. A quarter is meshed: its plate moves half of that, and the force is on two
     quarters. The targets are read from a graph of Sussman and Bathe (1987).
@@ -110,7 +110,7 @@ def vm201(size, out):
 
 
 def vm218(elements, out):
-    """Ansys VM218: a hinged circular plate, Mooney 80 and 20 psi: height of the pole at 4, 24 and 38 psi.
+    """Solve Ansys VM218: a hinged circular plate, Mooney 80 and 20 psi: height of the pole at 4, 24 and 38 psi.
 
     Its targets are read from a graph. Membrane theory is beside them, for the graph is off it.
     """
@@ -137,7 +137,7 @@ def vm218(elements, out):
 
 
 def ssnv187a(n):
-    """code_aster SSNV187A: a unit square in plane strain under a dead pressure of .876 on top: its displacement.
+    """Solve code_aster SSNV187A: a unit square in plane strain under a dead pressure of .876 on top: its displacement.
 
     Its reference is exact for an incompressible square; the run of half of it is homogeneous.
     """
