@@ -21,7 +21,7 @@ def inadmissible(path: Any) -> Iterator[Finding]:
 def volumes(path: Any) -> Iterator[Finding]:
     """Elements of the last state that do not keep their volumes; collective."""
     error = path.last.measures["volume_error"]
-    yield from volume.findings(error, "the last state", error > volume.BOUND and volume.at_clamps(path))
+    yield from volume.findings(error, "the last state", volume.away_from_clamps(path) if error > volume.BOUND else None)
     yield from volume.of_point(path)
 
 

@@ -20,31 +20,31 @@ _FURTHEST = 2.0
 """J, or 1/J, at a point beside the quadrature points above which a report warns."""
 
 
-def findings(error: float, where: str, at_clamp: bool = False) -> list[Finding]:
+def findings(error: float, where: str, away: float | None = None) -> list[Finding]:
     """Return the findings on a root mean square of J - 1, in the state that `where` names.
 
     Args:
-        at_clamp: what `at_clamps` returns.
+        away: the same away from clamped faces, see `away_from_clamps`; None: not known, or there are none.
     """
     if error <= BOUND:
         return []
-    if at_clamp:
+    if away is not None and away <= 4 * BOUND:
         return [Finding("note", "volume", f"The elements at the corner of a clamped face do not keep their volumes: the"
-                        f" root mean square of J - 1 is up to {100 * error:.2g} % ({where}), and below"
-                        f" {100 * BOUND:.2g} % from {_NEAR:g} lengths of that face on. The corner is singular: take no"
-                        f" stresses from there.")]
+                        f" root mean square of J - 1 is {100 * error:.2g} % ({where}), and {100 * away:.2g} % from"
+                        f" {_NEAR:g} lengths of that face on. The corner is singular: take no stresses from there.")]
     return [Finding("warning" if error > 4 * BOUND else "note", "volume",
                     f"The elements do not keep their volumes: the root mean square of J - 1 is up to"
                     f" {100 * error:.2g} % ({where}): use a finer mesh.")]
 
 
-def at_clamps(path: Any) -> bool:
-    """Return True if elements lose their volumes next to clamped faces alone, whose corners are singular; collective.
+def away_from_clamps(path: Any) -> float | None:
+    """Return the root mean square of J - 1 in the last state away from clamped faces, or None; collective.
 
-    Next to: within `_NEAR` lengths of the face, the wall of a sheet, over which its effect decays (Saint-Venant).
+    Away: farther than `_NEAR` lengths of the face, the wall of a sheet, over which the effect of its singular corners
+    decays (Saint-Venant).
     """
     faces, reach = _clamped(path)
-    return bool(len(faces) and path.problem.volume_error_away(path.last, faces, reach) <= BOUND)
+    return path.problem.volume_error_away(path.last, faces, reach) if len(faces) else None
 
 
 def _clamped(path: Any) -> tuple[np.ndarray, float]:

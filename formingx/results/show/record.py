@@ -158,8 +158,8 @@ class Record:
         first = int(np.argmax(errors > volume.BOUND))
         begins = f"; more than {100 * volume.BOUND:g} % from state {first} on" if first < k else ""
         where = f"state {k}, {words(self.control)} = {self.measures[self.control][k]:.5g}{begins}"
-        told = next((found for found in self.findings if found.about == "volume"), None)
-        return volume.findings(errors[k], where, told is not None and "clamped" in told.text)
+        told = [found for found in self.findings if found.about == "volume" and "clamped" in found.text]
+        return told or volume.findings(errors[k], where)
 
     def _of_verdict(self) -> list[Finding]:
         k = next((k for k, verdict in enumerate(self.verdicts) if verdict), None)
