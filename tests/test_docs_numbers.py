@@ -4,13 +4,14 @@ import json
 import sys
 
 import pytest
-from conftest import ROOT
+from conftest import ROOT, run
 
 sys.path[:0] = [str(ROOT / "demos"), str(ROOT / "benchmarks"), str(ROOT / "docs")]
 import compression_roll_over  # noqa: E402
 import make_validation  # noqa: E402
 import thick_cylinder  # noqa: E402
 import treloar_mesh  # noqa: E402
+from all_demos import differs  # noqa: E402
 from validation_rows import Row  # noqa: E402
 
 import formingx as fx  # noqa: E402
@@ -109,3 +110,15 @@ def test_roll_over():
 @pytest.mark.parametrize("elements", compression_roll_over.GRIDS[1:])
 def test_roll_over_on_finer_grids(elements):
     check_roll_over(elements)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("demo", ["clamp_ring", "compression_homogeneous", "measured_ellipse", "other_programs",
+                                  "plug_stress", "thick_plate", "treloar", "two_layer"])
+def test_stored_numbers_are_those_of_today(demo, tmp_path):
+    run(f"demos/{demo}.py", "--out", tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    stored = {path: value for path, value in STORED.items() if path.startswith(f"{demo}/")}
+    today = {path: make_validation.found(summary, path.partition("/")[2]) for path in stored}
+    assert today and not {path: (stored[path], now) for path, now in today.items()
+                          if differs(path, stored[path], now, 1e-3)}
