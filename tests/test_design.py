@@ -277,6 +277,42 @@ def test_spread_and_table():
         run.spread({"mu": 0.1})
 
 
+def test_covariance_of_a_fit():
+    """Of a membrane at a given height the pressure is in proportion to the modulus and to the thickness; correlated
+    constants count with their covariance, and a fit beside a thickness of its own."""
+    def inflated(c10, c01, h):
+        return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=h, elements=(8, 1)), loads=[fx.Pressure("bottom")],
+                        materials=fx.MooneyRivlin(c10=c10, c01=c01), model=fx.Membrane(),
+                        supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")]), fx.pole_height(0.6)
+    fit = fx.fit(fx.MooneyRivlin, fx.treloar1944(), within=(1, 3))
+    run = fx.Design(inflated, {**fit.constants, "h": 0.01}).run()
+    by = run.derivative("pressure")[1][0]
+    expected = np.sqrt(by[:2] @ fit.covariance @ by[:2])
+    assert run.spread(fit, "pressure")[0] == pytest.approx(expected, rel=1e-12)
+    independent = np.hypot(*(by[:2] * list(fit.errors.values())))
+    assert expected < 0.8 * independent                                  # the constants make up for each other
+    assert run.spread(fit.errors, "pressure")[0] == pytest.approx(independent, rel=1e-12)
+    band = run.band([fit, {"h": 2e-4}], "pressure")
+    pressure = run.path["pressure"][-1]
+    assert band.deviation[0] == pytest.approx(np.hypot(expected, 0.02 * pressure), rel=1e-4)
+    assert band.high[0] - pressure == pytest.approx(1.96 * band.deviation[0], rel=1e-3)
+    assert "deviation" in str(band) and run.band(fit).plot().get_ylabel() == "wall"
+    with pytest.raises(fx.InputError, match="parameter 'c10' is not known; known: c01, h"):
+        fx.Design(lambda c01, h: inflated(0.2, c01, h), {"c01": 0.01, "h": 0.01}).run().spread(fit)
+    bare = fx.fit(fx.MooneyRivlin, {"uniaxial": ([1.5, 2.0], [0.3, 0.5])})       # as many points as constants
+    with pytest.raises(fx.InputError, match="leave c10, c01 open"):
+        run.spread(bare)
+    with pytest.raises(fx.InputError, match="must be .parameter: standard deviation., a Fit"):
+        run.spread([0.1])
+
+
+def test_report_says_how_sure(tmp_path):
+    run = fx.Design(disc, {"c": (0.0, -1, 1), "h": (0.05, 0.01, 0.1)}).run()
+    text = run.report(tmp_path / "run.html", deviations={"h": 0.002}).read_text()
+    assert "How sure" in text and "volume" in text and "pressure" in text
+    assert "How sure" not in run.report(tmp_path / "run.html").read_text()
+
+
 def test_least_weight():
     """The wall is nowhere thinner than asked, and somewhere as thin; a thicker one than needed is made thinner."""
     design = fx.Design(programmed, {"h": fx.along(4, start=0.0, low=-1, high=1)})

@@ -74,3 +74,16 @@ def test_biaxial_quick(tmp_path):
         for law in rubber.values():
             assert law["biaxial"]["across"] < law["uniaxial"]["across"]
     assert drawn(tmp_path / "measured_biaxial.png")
+
+
+@pytest.mark.slow
+def test_uncertain_wall(tmp_path):
+    """The band of one run is that of 40 samples of whole runs, within what 40 leave (11 % of a deviation, standard)."""
+    found = summary("uncertain_wall", tmp_path, "--quick")
+    for name, ratio in found["deviation_over_sampled"].items():
+        assert ratio == pytest.approx(1, abs=0.3), name
+    assert max(found["linear_misfit"].values()) < 0.05
+    assert 0.85 < found["walls_inside_the_95_percent_band"] <= 1
+    assert found["band"]["volume"]["deviation_percent"] == pytest.approx(2, rel=1e-4)
+    page = (tmp_path / "report.html").read_text()
+    assert "How sure" in page and "contact force" in page and drawn(tmp_path / "uncertain_wall.png")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
@@ -119,13 +118,12 @@ class Answer:
         axes.legend()
         return axes
 
-    def report(self, file: Any = "design.html", title: str = "", *,
-               deviations: Mapping[str, float] | None = None) -> FilePath:
+    def report(self, file: Any = "design.html", title: str = "", *, deviations: Any = None) -> FilePath:
         """Write one HTML file: what was found, how sure it is, walls before and after, the pattern, and which parameter
         changes the wall where (rank 0 writes); returns where it is.
 
-        deviations: {parameter: its standard deviation}, as of constants that were fitted: the wall is drawn with its
-            `spread`.
+        deviations: as of `DesignRun.spread`: the wall is drawn with its standard deviation, and a table has those of
+            the wall, the volume, pressures and forces.
 
         Raises:
             InputError: the best run has no derivative. OSError: the file cannot be written.

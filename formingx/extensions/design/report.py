@@ -2,7 +2,6 @@
 
 import datetime
 import html
-from collections.abc import Mapping
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -13,9 +12,11 @@ from ...figures import figure, tools
 from ...findings import alarming
 from ...results import files
 from ...results.show import page, plots
+from .scatter import covariance_of
+from .scatter import deviations as deviations_of
 
 
-def of_answer(answer: Any, file: Any, title: str, deviations: Mapping[str, float] | None) -> FilePath:
+def of_answer(answer: Any, file: Any, title: str, deviations: Any) -> FilePath:
     """See `Answer.report`."""
     before, best, (a, b) = answer.before, answer.best, answer.cv
     effects, spread = best.sensitivities("wall"), best.spread(deviations) if deviations else None
@@ -42,12 +43,12 @@ def of_answer(answer: Any, file: Any, title: str, deviations: Mapping[str, float
     def pictures() -> list[str]:
         return [_sections([before, best], ["before", "after"]), _walls(answer, spread, deviations),
                 _patterns(before, best), _heat_map(effects)]
-    tail = ["<h2>Runs of the search</h2>", runs]
+    tail = [*_sure(best, deviations), "<h2>Runs of the search</h2>", runs]
     return _write(file, title or "Report of a design", how, cards, said, pictures, _effects(best, effects, before),
                   tail, best.path.problem.comm)
 
 
-def of_run(run: Any, file: Any, title: str, deviations: Mapping[str, float] | None) -> FilePath:
+def of_run(run: Any, file: Any, title: str, deviations: Any) -> FilePath:
     """See `DesignRun.report`."""
     effects, spread = run.sensitivities("wall"), run.spread(deviations) if deviations else None
     wall = run.wall
@@ -61,7 +62,7 @@ def of_run(run: Any, file: Any, title: str, deviations: Mapping[str, float] | No
         return [_sections([run], ["the part"]), page.figure(drawing, "Wall over the reference length."),
                 _heat_map(effects)]
     return _write(file, title or "Report of a run", ["One run and what changes it."], cards, said, pictures,
-                  _effects(run, effects), [], run.path.problem.comm)
+                  _effects(run, effects), _sure(run, deviations), run.path.problem.comm)
 
 
 def _write(file: Any, title: str, how: list[str], cards: list, said: list, pictures: Any, table: str, tail: list[str],
@@ -104,7 +105,8 @@ def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations:
     s = run.profile.reference_length
     axes.plot(s, run.wall, color=colour, label=label)
     if spread is not None:
-        said = ", ".join(f"{name} ± {size:g}" for name, size in deviations.items())
+        sizes = np.sqrt(np.diag(covariance_of("report", run.parameters, deviations)))
+        said = ", ".join(f"{name} ± {size:.3g}" for name, size in zip(run.parameters.names, sizes) if size)
         axes.fill_between(s, run.wall - spread, run.wall + spread, color=colour, alpha=0.2, linewidth=0,
                           label=f"± standard deviation, of {said}")
     axes.set(xlabel="reference length", ylabel="wall", ylim=(0, None))
@@ -149,6 +151,27 @@ def _heat_map(effects: Any) -> str:
     effects.plot(axes)
     return "<h2>What changes the wall, and where</h2>" + page.figure(
         drawing, "Change of the wall that the derivatives predict where a parameter changes by a tenth of its range.")
+
+
+def _sure(run: Any, deviations: Any) -> list[str]:
+    """A table of the standard deviations of walls, volume, pressures and forces, where parameters are uncertain."""
+    if not deviations:
+        return []
+    covariance = covariance_of("report", run.parameters, deviations)
+    wall, by = run.derivative("wall")
+    thin = int(np.argmin(wall))
+    rows = [("mean wall", wall.mean(), by.mean(0)), ("least wall", wall[thin], by[thin])]
+    names = [name for name in run.path.columns if name.endswith(("force", "pressure"))]
+    for name in ("volume", *names):
+        value, slope = run.derivative(name)
+        if np.all(np.isfinite([value[0], *slope[0]])):
+            rows.append((name.replace("_", " "), value[0], slope[0]))
+    table = [[name, page.number(value), f"{size:.3g}", f"{100 * size / abs(value):.2g} %" if value else ""]
+             for name, value, slope in rows for size in [deviations_of(slope[None], covariance)[0]]]
+    return ["<h2>How sure</h2>", page.table(["", "value", "standard deviation", ""], table),
+            "<p class=lead>To first order in the uncertain parameters. The volume times the density is the weight. The"
+            " covariance of a fit is that of scattered measurements: where a law misses the tests, it is off by more."
+            "</p>"]
 
 
 def _effects(run: Any, effects: Any, before: Any = None) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path as FilePath
@@ -11,15 +11,17 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ...errors import InputError, non_negative
+from ...errors import InputError
 from ...results.evaluate.profile import Profile, Profiles
 from ...results.path import Path
 from ...solve.arc_length import Curve
 from ...solve.newton import Failure, Tolerances
 from ...solve.record import Record
+from . import scatter
 from .carry import carry
 from .neighbours import Apart, Neighbour
 from .parameters import Parameters
+from .scatter import Band
 
 _SMOOTH = 1e-5
 """Change of a parameter, over its size, to the neighbours of a scene without contact, one above and one below."""
@@ -157,26 +159,37 @@ class DesignRun:
         name = measure if isinstance(measure, str) else getattr(measure, "__name__", "measure")
         return Effects(name, self.parameters.names, self.parameters.size, places, value, by)
 
-    def spread(self, deviations: Mapping[str, float], measure: Any = "wall") -> np.ndarray:
-        """Standard deviation of a measure, to first order, where parameters scatter independently, shape (m,).
+    def spread(self, deviations: Any, measure: Any = "wall") -> np.ndarray:
+        """Return the standard deviation of a measure, to first order, shape (m,).
 
-        deviations: {parameter: its standard deviation}; of a profile that of every knot.
+        Args:
+            deviations: {parameter: standard deviation}, of a profile that of every knot, independent of each other; or
+                a `Fit` whose constants are parameters under the same names: its covariance counts; or a list of such.
+            measure: as of `derivative`.
+
+        Raises:
+            InputError: the run has no derivative, a name that is no parameter, or a fit that leaves constants open.
         """
-        by = self.derivative(measure)[1]
-        sizes = np.zeros(len(self.parameters))
-        for name, size in deviations.items():
-            mine = [k for k, one in enumerate(self.parameters.names) if one == name or one.startswith(f"{name}[")]
-            if not mine:
-                raise InputError(f"spread: parameter {name!r} is not known; known: {', '.join(self.values)}")
-            sizes[mine] = non_negative(f"spread: {name}", size)
-        return np.sqrt((by**2) @ sizes**2)
+        return scatter.deviations(self.derivative(measure)[1],
+                                  scatter.covariance_of("spread", self.parameters, deviations))
 
-    def report(self, file: Any = "design.html", title: str = "", *,
-               deviations: Mapping[str, float] | None = None) -> FilePath:
+    def band(self, deviations: Any, measure: Any = "wall", confidence: float = 0.95) -> Band:
+        """Return a measure with its uncertainty, to first order and without further runs: print it, `.plot()`.
+
+        Args:
+            deviations, measure: as of `spread`.
+            confidence: of the band, as of a normal distribution.
+
+        Raises:
+            InputError: as `spread`.
+        """
+        return scatter.band(self, deviations, measure, confidence)
+
+    def report(self, file: Any = "design.html", title: str = "", *, deviations: Any = None) -> FilePath:
         """Write one HTML file: the part, its wall, and what changes it (rank 0 writes); returns where it is.
 
-        deviations: {parameter: its standard deviation}, as of constants that were fitted: the wall is drawn with its
-            `spread`.
+        deviations: as of `spread`: the wall is drawn with its standard deviation, and a table has those of the wall,
+            the volume, pressures and forces.
 
         Raises:
             InputError: the run has no derivative. OSError: the file cannot be written.

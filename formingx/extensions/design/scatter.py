@@ -1,0 +1,132 @@
+"""Uncertain parameters of a design: their covariance, and the band that it gives a measure, to first order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError, finite, non_negative
+from .parameters import Parameters
+
+
+@dataclass(frozen=True)
+class Band:
+    """Uncertainty of a measure of a run, to first order in the parameters.
+
+    Attributes:
+        measure: its name.
+        places: reference lengths of the wall, or numbers, shape (m,).
+        value: of the run, shape (m,).
+        deviation: standard deviation, shape (m,).
+        confidence: of the band between `low` and `high`, as of a normal distribution.
+
+    >>> band = fx.Design(lambda c10: (fx.Scene(
+    ...     mesh=sheet, materials=fx.NeoHookean(c10=c10), loads=[fx.Pressure("bottom")],
+    ...     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")]), fx.pole_height(4.0)),
+    ...     {"c10": 0.4}).run().band({"c10": 0.02}, "pressure")
+    >>> round(float(band.deviation[0] / band.value[0]), 6)                              # of a pressure in proportion
+    0.05
+    """
+
+    measure: str
+    places: np.ndarray
+    value: np.ndarray
+    deviation: np.ndarray
+    confidence: float = 0.95
+
+    @property
+    def low(self) -> np.ndarray:
+        """Lower edge of the band, shape (m,)."""
+        return self.value - self._width
+
+    @property
+    def high(self) -> np.ndarray:
+        """Upper edge of the band, shape (m,)."""
+        return self.value + self._width
+
+    @property
+    def _width(self) -> np.ndarray:
+        from scipy.stats import norm
+        return norm.ppf((1 + self.confidence) / 2) * self.deviation
+
+    def plot(self, axes: Any = None, **options: Any) -> Any:
+        """Draw the value and its band over the places; returns the matplotlib axes.
+
+        Args:
+            axes: where to draw; default a new figure.
+            options: of the line, as of matplotlib's `plot`.
+        """
+        if axes is None:
+            from ...figures import figure
+            axes = figure(width=7)[1]
+        line, = axes.plot(self.places, self.value, **options)
+        axes.fill_between(self.places, self.low, self.high, color=line.get_color(), alpha=0.2, linewidth=0,
+                          label=f"{100 * self.confidence:g} % band")
+        axes.set(xlabel="reference length" if self.measure == "wall" else "", ylabel=self.measure)
+        axes.legend()
+        return axes
+
+    def __str__(self) -> str:
+        rows = np.unique(np.linspace(0, len(self.value) - 1, min(len(self.value), 12)).round().astype(int))
+        lines = [f"{'at':>10}{self.measure[:11]:>12}{'deviation':>12}{'lowest':>12}{'highest':>12}"]
+        lines += [f"{self.places[k]:10.4g}{self.value[k]:12.5g}{self.deviation[k]:12.3g}{self.low[k]:12.5g}"
+                  f"{self.high[k]:12.5g}" for k in rows]
+        return "\n".join(lines)
+
+    __repr__ = __str__
+
+
+def covariance_of(who: str, parameters: Parameters, given: Any) -> np.ndarray:
+    """Return the covariance of the n numbers of a design, shape (n, n).
+
+    Args:
+        given: {parameter: standard deviation}, of a profile that of every knot, independent of each other; or a fit
+            (`Fit`), whose constants are parameters under the same names; or a list of such, independent of each other.
+
+    Raises:
+        InputError: a name that is no parameter, or constants that the tests of a fit leave open.
+    """
+    found = np.zeros((len(parameters), len(parameters)))
+    for part in given if isinstance(given, list | tuple) and not hasattr(given, "covariance") else [given]:
+        if isinstance(part, Mapping):
+            for name, size in part.items():
+                mine = [k for k, one in enumerate(parameters.names) if one == name or one.startswith(f"{name}[")]
+                if not mine:
+                    raise _unknown(who, name, parameters)
+                found[mine, mine] += non_negative(f"{who}: {name}", size) ** 2
+        elif hasattr(part, "covariance") and hasattr(part, "constants"):
+            names = list(part.constants)
+            for name in names:
+                if name not in parameters.names:
+                    raise _unknown(who, name, parameters)
+            open_ = [name for name, row in zip(names, part.covariance) if not np.all(np.isfinite(row))]
+            if open_:
+                raise InputError(f"{who}: the tests of this fit leave {', '.join(open_)} open: no deviation is known;"
+                                 f" fit it to more points than it has constants, or a law with fewer constants")
+            at = [parameters.names.index(name) for name in names]
+            found[np.ix_(at, at)] += part.covariance
+        else:
+            raise InputError(f"{who}: {part!r}: must be {{parameter: standard deviation}}, a Fit, or a list of these")
+    return found
+
+
+def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
+    """See `DesignRun.band`."""
+    if not 0 < finite("band: confidence", confidence) < 1:
+        raise InputError(f"band: confidence = {confidence!r}: must be between 0 and 1")
+    effects = run.sensitivities(measure)
+    deviation = deviations(effects.by, covariance_of("band", run.parameters, given))
+    return Band(effects.measure, effects.places, effects.value, deviation, confidence)
+
+
+def deviations(by: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Return the standard deviations of m measures with derivatives `by`, shape (m, n)."""
+    return np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", by, covariance, by), 0.0))
+
+
+def _unknown(who: str, name: Any, parameters: Parameters) -> InputError:
+    known = dict.fromkeys(one.partition("[")[0] for one in parameters.names)
+    return InputError(f"{who}: parameter {name!r} is not known; known: {', '.join(known)}")
