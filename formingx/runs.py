@@ -6,6 +6,7 @@ The solvers emit states; a `Path` and, if asked for, a `Checkpoint` are told of 
 from __future__ import annotations
 
 import contextlib
+import copy
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
@@ -404,6 +405,8 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
         error.path = path = so_far()
         if path is not None and isinstance(error, ConvergenceError):       # on all ranks
             _end(path, str(error), path.findings() if path.record.on_end else [])
+        if getattr(error, "diagnosis", None) is not None:
+            raise copy.copy(error) from None                # it tells the cause: no lines of the solver before it
         raise
     except KeyboardInterrupt:
         path = so_far()

@@ -20,7 +20,8 @@ class Body(NamedTuple):
     """A solid in one state, all ranks: m elements with k quadrature points each.
 
     points, moved: reference and deformed, shape (m, k, 2), length; J, I1: det F and tr F^T F there, shape (m, k);
-    layers: tag of each element, shape (m,); outline: deformed nodes around each, shape (m, 6, 2), length; quality,
+    section: F within the section, shape (m, k, 2, 2); layers: tag of each element, shape (m,);
+    outline: deformed nodes around each, shape (m, 6, 2), length; quality,
     at_rest: shape of its corner triangle deformed and at rest (`shape_quality`), shape (m,).
     """
 
@@ -28,6 +29,7 @@ class Body(NamedTuple):
     moved: np.ndarray
     J: np.ndarray
     I1: np.ndarray
+    section: np.ndarray
     layers: np.ndarray
     outline: np.ndarray
     quality: np.ndarray
@@ -53,6 +55,7 @@ def body(problem: Any, x: Any, control: float) -> Body | None:
         tags[found[found < len(tags)]] = tag
     J = (F[..., 0] * F[..., 3] - F[..., 1] * F[..., 2]) * F[..., 4]
     turned = np.sign(shape_quality(rest[:, :3]))                     # cells may be numbered clockwise
-    local = (X, points, J, (F**2).sum(-1), tags, moved[:, _OUTLINE], turned * shape_quality(moved[:, :3]),
+    section = F[..., :4].reshape(*F.shape[:-1], 2, 2)
+    local = (X, points, J, (F**2).sum(-1), section, tags, moved[:, _OUTLINE], turned * shape_quality(moved[:, :3]),
              turned * shape_quality(rest[:, :3]))
     return Body(*(gathered(problem.comm, part) for part in local))

@@ -15,6 +15,9 @@ from ..forms.elements import Body, body
 from ..mesh.nodes import of_space
 from ..mesh.triangles import Place, place
 
+_SHORTENED, _COLUMNS = 0.9, 3
+"""Stretch along the section below which a sheet is compressed, and columns of elements that make a piece of it."""
+
 
 class Examination:
     """The last good state and a failed attempt, looked at; collective.
@@ -40,6 +43,7 @@ class Examination:
                 sum(int(np.sum(touch)) for touch in _touching(problem, last.x, last.control)), MPI.SUM)
             if self._shape:
                 self._take_worst(self._shape)
+                self._take_shortened(self._shape)
         if attempt is not None:
             self._take_attempt(x, attempt)
         x.destroy()
@@ -61,6 +65,25 @@ class Examination:
             facts["I1"] = float(near[at])
             facts["limit"] = place(problem.scene.mesh, shape.points[at], _layer(problem, shape.layers[at[0]]))
             self._marks.append(("nearest to the material's limit", shape.moved[at]))
+
+    def _take_shortened(self, shape: Body) -> None:
+        """Longest piece of a sheet that is compressed along its section in the last good state."""
+        columns = self._problem.scene.mesh.columns
+        if columns is None:
+            return
+        line = columns.place(columns.ends).mean(0)           # through the middles of the rows' nodes
+        middles, tangents = (line[1:] + line[:-1]) / 2, np.diff(line, axis=0)
+        lengths = np.linalg.norm(tangents, axis=1)
+        tangents /= lengths[:, None]
+        near = np.array([np.argmin(np.hypot(*(middles - centre).T)) for centre in shape.points.mean(1)])
+        stretch = np.linalg.norm(np.einsum("mkij,mj->mki", shape.section, tangents[near]), axis=-1).mean(1)
+        found = np.bincount(near, stretch, len(middles)) / np.maximum(np.bincount(near, minlength=len(middles)), 1)
+        short = np.flatnonzero((found > 0) & (found < _SHORTENED))
+        pieces = [k for k in np.split(short, np.flatnonzero(np.diff(short) > 1) + 1) if len(k) >= _COLUMNS]
+        if pieces:
+            piece = max(pieces, key=lambda k: lengths[k].sum())
+            self.facts["shortened"] = (float(found[piece] @ lengths[piece] / lengths[piece].sum()),
+                                       tuple(line[piece[0]].tolist()), tuple(line[piece[-1] + 1].tolist()))
 
     def _take_attempt(self, x: Any, attempt: Any) -> None:
         problem, facts = self._problem, self.facts

@@ -13,7 +13,7 @@ from .scene import Scene
 _NEAR = 1e-5           # of the body's length: a point is on a boundary
 _MOST = 1e9            # of the largest shear modulus, or of the body's length
 _SQUARES = 200         # along a mould's larger side
-_ROOMY = 1.05          # by how much its volume by them may be wrong
+_ROOMY = 1.05, 1.005   # by how much its volume by them may be wrong, over a flat body and around a tube
 
 
 def check(scene: Scene, targets: Iterable[Any], off: Collection[int] | None = None) -> None:
@@ -57,8 +57,8 @@ def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -
                 return f"it lies inside the tool of {contact!r}"
     if name == "enclosed_volume" and driven is not None and driven.quantity == "pressure":
         for contact in moulds:
-            room = _room(scene, contact)
-            if value > _ROOMY * room:
+            room, wrong = _room(scene, contact)
+            if value > wrong * room:
                 return f"the tool of {contact!r} has room for {room:.4g}"
     return None
 
@@ -98,17 +98,22 @@ def _beyond(scene: Scene, contact: Any, height: float) -> bool:
     return float(depth) > Triangles(scene.mesh).thickness
 
 
-def _room(scene: Scene, contact: Any) -> float:
-    """Volume between the lower face of a flat body at rest and the mould over it; infinite if the mould is not closed.
+def _room(scene: Scene, contact: Any) -> tuple[float, float]:
+    """(volume, how many times as much it may be): between the lower face of a flat body at rest and the mould over it.
 
-    Counted in squares: the connected ones outside the tool, from where the body is.
+    Infinite if the mould is not closed.
+
+    Counted in squares: the connected ones outside the tool, from where the body is. Of a closed tube: `_room_of_tube`.
     """
     from scipy.ndimage import label
-    face, low = scene.mesh.nodes_of(contact.on), scene.mesh.nodes_of(scene.driven.on)[:, 1].min()
+    face = scene.mesh.nodes_of(contact.on)
+    if getattr(scene.mesh, "columns", None) is not None and np.ptp(face[:, 1]) > np.ptp(face[:, 0]):
+        return _room_of_tube(scene, contact, scene.mesh.line_of(contact.on)), _ROOMY[1]
+    low = scene.mesh.nodes_of(scene.driven.on)[:, 1].min()
     edge, top = face.max(0)
     outline = contact.tool.bounds[1]
     if np.ptp(face[:, 1]) > _NEAR * edge or face[:, 0].min() > 0 or outline[1] <= top:
-        return np.inf
+        return np.inf, 1.0
     corner = np.maximum(outline, face.max(0))
     size = max(corner[0], corner[1] - low) / _SQUARES
     r, z = (start + (np.arange(np.ceil((end - start) / size) + 1) + 0.5) * size
@@ -119,5 +124,32 @@ def _room(scene: Scene, contact: Any) -> float:
     regions, _ = label(free)
     inside = (regions == regions[0, 0]) & free
     if inside[-1].any() or inside[:, -1].any():
+        return np.inf, 1.0
+    volume = float(size**2 * sum(n * scene.kinematics.weight((R, 0.0)) for R, n in zip(r, inside.sum(1))))
+    return volume, _ROOMY[0]
+
+
+def _room_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
+    """Volume that a tube, closed below, can sweep in its mould, up to its upper end; infinite if that is not closed.
+
+    line: its outer face at rest, from one end to the other, shape (n, 2), length. What lies within keeps its volume.
+    """
+    from scipy.ndimage import label
+    line = line if line[0, 1] < line[-1, 1] else line[::-1]
+    (r, top), (low, width) = line[-1], (contact.tool.bounds[0, 1], contact.tool.bounds[1, 0])
+    if line[0, 0] > _NEAR * width or width < r or low > line[0, 1]:
         return np.inf
-    return float(size**2 * sum(n * scene.kinematics.weight((R, 0.0)) for R, n in zip(r, inside.sum(1))))
+    n = int(np.ceil(_SQUARES * (top - low) / max(width, top - low)))
+    size = (top - low) / n
+    R, Z = (np.arange(np.ceil(width / size) + 2) + 0.5) * size, low + (np.arange(-2, n) + 0.5) * size
+    points = np.stack(np.meshgrid(R, Z, indexing="ij"), -1)
+    part = np.clip(0.5 - contact.tool.signed_distance(points.reshape(-1, 2)) / size, 0, 1).reshape(points.shape[:2])
+    regions, _ = label(part > 0)
+    part[regions != regions[0, np.argmin(np.abs(Z - line[0, 1]))]] = 0
+    if part[-1].any() or part[:, 0].any():
+        return np.inf
+    weight = np.array([scene.kinematics.weight((r, 0.0)) for r in R])
+    disc = lambda r: r * scene.kinematics.weight((r / 2, 0.0))             # noqa: E731  between the axis and r, by height
+    within = sum((b[1] - a[1]) / 6 * (disc(a[0]) + 4 * disc((a[0] + b[0]) / 2) + disc(b[0]))
+                 for a, b in zip(line, line[1:]))
+    return float(size**2 * (weight * part.sum(1)).sum() - within)

@@ -233,6 +233,19 @@ class Curve:
         self.problem.control_derivative(self._x, state.control, self.newton.F_control)
         return -float(self.newton.F_control.dot(self._b))
 
+    def work(self, a: State, b: State) -> float:
+        """Work of the driven load from a to b, per unit of control, by the trapezoidal rule.
+
+        Of a pressure that is the growth of the enclosed volume (dimensionless).
+        """
+        done = 0.0
+        for state in (a, b):
+            self._x.array_w[:] = state.x
+            self._b.array_w[:] = b.x - a.x
+            self.problem.control_derivative(self._x, state.control, self.newton.F_control)
+            done -= float(self.newton.F_control.dot(self._b)) / 2
+        return done
+
     def value(self, bound: Measure, x: Array, control: float) -> float:
         """A bound measure at (x, control)."""
         self._b.array_w[:] = x

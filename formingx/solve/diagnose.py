@@ -81,6 +81,7 @@ class Diagnosis:
         smallest_J, at_J: det F at the quadrature points of the last good state, its smallest, and where.
         failed_J, at_failed_J: the same in the failed attempt.
         shape: the worst shape of a deformed element of the last good state, over its shape at rest.
+        shortened: (mean stretch, (R, Z) of both ends) of the longest piece of a sheet compressed along its section.
         I1, limit: (I1 - 3) / (limit - 3) of the point nearest to its material's limit, and where; None: no limit.
         turned: [(control before, after)] between which the determinant of the tangent changed its sign.
         limit_points: controls of the limit points on the path.
@@ -103,6 +104,7 @@ class Diagnosis:
     failed_J: float | None = None
     at_failed_J: Place | None = None
     shape: float | None = None
+    shortened: tuple[float, tuple[float, float], tuple[float, float]] | None = None
     I1: float | None = None
     limit: Place | None = None
     turned: tuple[tuple[float, float], ...] = ()
@@ -185,6 +187,15 @@ def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attemp
     if pace and not found:
         found.append(Finding("note", "steps", pace, "more max_steps"))
     return Diagnosis(**facts, findings=tuple(found), examined=examined)
+
+
+def limits_passed(problem: Equations, states: Sequence[State]) -> str:
+    """A sentence, with a space before it, that tells at which controls limit points were passed; "" without any."""
+    shown = [problem.shown(state.control) for state in states if state.kind == "limit point"]
+    if not shown:
+        return ""
+    many = f"{len(shown)} limit points were" if shown[1:] else "A limit point was"
+    return f" {many} passed, at {shown[0][0]} {', '.join(f'{value:.6g}' for _, value in shown)}."
 
 
 def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
@@ -334,9 +345,30 @@ def _of_elements(failure: Failure) -> Iterator[Finding]:
 
 
 @register("failure")
+def _of_compression(failure: Failure) -> Iterator[Finding]:
+    """A sheet in contact that is compressed along its section: it buckles."""
+    if _buckles(failure.facts):
+        stretch, first, last = failure.facts["shortened"]
+        yield Finding("serious", "wall",
+                      f"the wall buckles: between (R, Z) = ({first[0]:.4g}, {first[1]:.4g}) and ({last[0]:.4g},"
+                      f" {last[1]:.4g}) it is compressed along its section, to {stretch:.3g} of its length, as supports"
+                      f" and tools hold both its ends",
+                      "more room for the free end of the body: where it comes to stand on its tool early, as a"
+                      " parison's bottom on the base of its mould, the blown part presses on the wall above; or a"
+                      " support that lets the other end move")
+
+
+def _buckles(facts: dict[str, Any]) -> bool:
+    """True if a piece of a sheet in contact is compressed along its section."""
+    return bool(facts.get("shortened") and facts["touching"])
+
+
+@register("failure")
 def _of_limits(failure: Failure) -> Iterator[Finding]:
     """A limit point before the target."""
     facts, target = failure.facts, failure.target
+    if _buckles(facts):                                      # then the limit point is no more than its effect
+        return
     what, limits = facts["what"], facts.get("limit_points", ())
     if what == "process time" and facts["control"] in limits:
         yield Finding("serious", "limit point",

@@ -20,7 +20,7 @@ from ..errors import ConvergenceError
 from ..measures.targets import Amplitude, Target
 from . import predictor
 from .arc_length import Predictor
-from .diagnose import Diagnosis, diagnose, warn_of_branches
+from .diagnose import Diagnosis, diagnose, limits_passed, warn_of_branches
 from .equations import Array, Attempt, Measure
 from .newton import Failure, fixed, tangents
 from .progress import Aim, Progress
@@ -252,8 +252,7 @@ class Run:
 
     def _limited(self, why: str, length: float) -> None:
         """A step is made shorter, or was not taken; `length` is tried next."""
-        limits = self.record.counts.limits
-        limits[why] = limits.get(why, 0) + 1
+        self.record.counts.limits[why] = self.record.counts.limits.get(why, 0) + 1
         self._progress.limited(why, length)
 
     def _take(self, old: State, length: float, target: Target | None, bound: Measure | None,
@@ -319,21 +318,23 @@ class Run:
 
     def _snap(self, old: State) -> list[State]:
         """The state that the body jumps to from a fold; none if there is none: a body left alone has snapped."""
+        onward = self._sense * (self._at_fold == "follow volume")
         if old.kind != "limit point":
             with contextlib.suppress(Failure):
-                return [self._jump(old, self.settings.snap_through.lengths[-1])]
+                return [self._jump(old, self.settings.snap_through.lengths[-1], onward=onward)]
         try:
-            return [self._jump(old, 0.0)]
+            return [self._jump(old, 0.0, onward=onward)]
         except Failure as failure:
             if not self.problem.setting.rests:              # what is driven was to go on
-                self._give_up(f"what is driven has a limit point here, and {failure.reason}", failure.attempt)
+                what = "the enclosed volume" if onward else "what is driven"
+                self._give_up(f"{what} has a limit point here, and {failure.reason}", failure.attempt)
             self.record.ended = f"the body snaps at {self.record.describe(old)}, and no equilibrium follows"
             return []
 
-    def _jump(self, old: State, length: float, step: float = 0.0) -> State:
+    def _jump(self, old: State, length: float, step: float = 0.0, onward: float = 0.0) -> State:
         """The state that the body snaps to from a step of this length ahead, or from where it is; raises `Failure`.
 
-        step: the length of the last step that went well.
+        step: the length of the last step that went well; onward: see `snap_through`.
 
         From where the body is, contact that remembers may settle at one control and not at another next to it: others
         are tried, too. What fades is let go of at once: on the way it is a load of its own, which no process has.
@@ -346,7 +347,7 @@ class Run:
                 by = self._sense * max(ahead, length * abs(old.slope))
                 by = 1 - old.control if fading else self.aim.short_of_targets(old, by)
                 new = snap_through(self.curve, old, by, length > 0 and not fading, settings, self._solutions(old),
-                                   lambda: self._progress.limited("a jump", self.step.length))
+                                   lambda: self._progress.limited("a jump", self.step.length), onward, self.states)
                 break
             except Failure as last:
                 failure = last
@@ -418,7 +419,8 @@ class Run:
         except Unusable as unusable:
             if not self.states:
                 raise
-            self._give_up(f"at {record.describe(state)}: {unusable}; beyond=True goes on, to see what follows", hint="")
+            self._give_up("at {} {:.6g}: {}; beyond=True goes on, to see what follows".format(
+                *self.problem.shown(state.control), unusable), hint="")
         if self.problem.has_kinks:
             self.curve.look_ahead(state)
         self.aim.accept(state)
@@ -436,13 +438,12 @@ class Run:
         """What happened, what was met, what to try: the diagnosis' advice, or a hint."""
         record, states, values = self.record, self.states, self.aim.values
         best = int(np.argmin([abs(v - self.aim.until.value) for v in values]))
-        limits = "".join(f" A limit point was passed at {record.describe(s)}." for s in states
-                         if s.kind == "limit point")
+        at = f", at {record.describe(states[best])}" * (states[best] is not record.last)
         return ConvergenceError(
             f"{f'Stage {record.stage!r}: ' * bool(record.stage)}{self.aim.until} was not reached: {why} The nearest"
-            f" value was {values[best]:.6g}, at {record.describe(states[best])}.{limits} The last good state is"
-            f" {record.describe(record.last)}; it is kept in the error's `path`."
-            + ("" if diagnosis.advice else hint), diagnosis=diagnosis)
+            f" value was {values[best]:.6g}{at}.{limits_passed(self.problem, states)} The last good state is"
+            f" {record.describe(record.last)}; it is kept in the error's `path`.{hint * (not diagnosis.advice)}",
+            diagnosis=diagnosis)
 
 
 class _Astray(Failure):

@@ -107,8 +107,10 @@ class ViscousDrag:
 class _Motion:
     """From a state to the next: where the body is on the way, and what was lost."""
 
-    def __init__(self, curve: Curve, old: State, control: float, settings: SnapThrough):
+    def __init__(self, curve: Curve, old: State, control: float, settings: SnapThrough, onward: float = 0.0,
+                 passed: Sequence[State] = ()):
         self.curve, self.problem, self._old, self.control = curve, curve.problem, old, control
+        self._onward, self._passed = onward, passed
         self._settings, self._drag = settings, ViscousDrag(curve.problem.viscosity())
         self._newton = BorderedNewton(curve.problem, settings.tolerances, curve.norm, drag=self._drag)
         self._x = curve.problem.x.duplicate()
@@ -137,6 +139,8 @@ class _Motion:
         x, limit = self._x.array_r.copy(), self.problem.limit
         last, new = self.at, replace(self.at, x=x, control=self.control)
         if self.problem.folded(self._x, self.control) or limit and limit.passes_through(last, new):
+            return self._hold_back()
+        if self._goes_back(last, new):                      # to the unstable state that it comes from
             return self._hold_back()
         pull = self._drag.forces(x)
         most = np.clip(settings.share * self.curve.moved(self._old, last), settings.nearest, settings.farthest)
@@ -172,10 +176,17 @@ class _Motion:
                 raise
             state = self.curve.resume(self.at.x, self.control)
             state.kind, state.history = "jump", [Iteration(self.rest, 0.0, 0.0)]
+        if self._goes_back(self._old, state) or was_passed(self.curve, self._passed, self._old, state):
+            self.settles, self.near = False, 0.3 * self.rest
+            return None
         self._lose(self.at.x, state.x, np.zeros(len(state.x)))
         energy, length = self.problem.units
         state.jump = {"dissipated": self.lost * energy, "moved": self.curve.moved(self._old, state) * length}
         return state
+
+    def _goes_back(self, a: State, b: State) -> bool:
+        """True if the driven load does negative work from a to b though it must not."""
+        return bool(self._onward) and self.curve.work(a, b) * self._onward < 0
 
     def _lose(self, a: Array, x: Array, pull: Array) -> None:
         """Work of what is out of balance from a to x (trapezoidal rule: half way there the chord cuts into tools).
@@ -196,20 +207,24 @@ class _Motion:
 
 
 def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: SnapThrough,
-                 solutions: int | None = None, told: Callable[[], None] = lambda: None) -> State:
+                 solutions: int | None = None, told: Callable[[], None] = lambda: None, onward: float = 0.0,
+                 passed: Sequence[State] = ()) -> State:
     """The state that the body comes to from `old` when the control goes on; of kind "jump".
 
     Args:
         by: change of the control, dimensionless; its sign is the way that the process drives.
         ahead: start where the tangent leads to, not where the body is.
         solutions: viscous ones, at most; `told` is called before each.
+        onward: 1 or -1, the sign of the work that the driven load does on the way, as where a volume has its maximum;
+            0: either.
+        passed: states before, to whose path the body does not go back.
 
     Raises:
         Failure: none was found, `NoEquilibrium` if the body comes to rest nowhere. The problem's histories are then
             those of `old`.
     """
     problem, kept = curve.problem, curve.problem.memory
-    motion = _Motion(curve, old, old.control + by, settings)
+    motion = _Motion(curve, old, old.control + by, settings, onward, passed)
     origin = old.x + by / old.slope * old.direction if ahead else old.x
     eta, solutions = settings.eta, solutions or settings.solutions
     try:
