@@ -15,8 +15,8 @@ from ..forms.elements import Body, body
 from ..mesh.nodes import of_space
 from ..mesh.triangles import Place, place
 
-_SHORTENED, _COLUMNS = 0.9, 3
-"""Stretch along the section below which a sheet is compressed, and columns of elements that make a piece of it."""
+_SHORTENED = 0.9       # stretch along the section below which a sheet is compressed
+_COLUMNS = 3           # of elements that make a piece of it
 
 
 class Examination:
