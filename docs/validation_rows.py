@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+from formingx.exact import stability
 from formingx.exact.inflation import membrane_inflation, membrane_limit_point
 
 LAWS = ("neo-Hookean", "Mooney-Rivlin", "Yeoh", "Gent", "Arruda-Boyce", "Ogden")
@@ -84,6 +85,17 @@ EXACT = [
         "homogeneous integration", style=".1e", absolute=True),
     Row("block drawn hot, set and let go: stretch", "set_block/uniaxial/G_200/stretch",
         "set_block/uniaxial/G_200/exact", "exact balance", style=".6f"),
+    Row("cylinder between plates, height pi radii: stretch at which it bends", "stability/cylinder/nu_1/n_1",
+        lambda: stability.cylinder(1, 1), "exact bifurcation", style=".6f"),
+    Row("tube under outer pressure, radii 0.8 : 1, two waves: pressure over modulus",
+        "stability/tube/0.8/n_2/pressure_over_mu", lambda: stability.tube(0.8, 2)[0], "exact bifurcation", style=".6f"),
+    Row("tube blown up at its length pi outer radii, radii 0.5 : 1: inner radius at which it bulges",
+        "stability/inflated_tube/0.5/kB_1/n_0/inner_radius_ratio", lambda: stability.inflated_tube(0.5, 1.0, 0),
+        "exact bifurcation", style=".5f"),
+    Row("block in plane strain, length pi/2 thicknesses: stretch at which it bends", "stability/block/nu_1/flexure",
+        lambda: stability.block(1, "flexure"), "exact bifurcation", style=".6f"),
+    Row("clamped plate, without waves round it: load", "stability/plate/clamped/n_0",
+        lambda: stability.clamped_plate(0), "thin plate, without shear", style=".4f"),
     Row("thin sheet on a plug, edge of 0.18 plug radii, force over the membrane's",
         "throne_plug/force_over_membrane_at_fillet_over_rp/0.18", 1.0, "membrane, sharp edge", style=".3f"),
     Row("the same, 0.06 plug radii", "throne_plug/force_over_membrane_at_fillet_over_rp/0.06", 1.0,
