@@ -1,7 +1,8 @@
 """Public calls with arguments of another kind, or number, than they take: an InputError that says what they take.
 
 A call that fails is explained: its arguments are held against its signature, and against its annotations. What an
-argument's value may be, each function checks itself (`errors.py`).
+argument's value may be, each function checks itself (`errors.py`). Calls that a user makes are explained, those inside
+a run are not: methods by which the solver asks its objects stay plain functions.
 """
 
 from __future__ import annotations
@@ -23,10 +24,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .errors import ConvergenceError, InputError
+from .tools.tool import PlaneTool, RigidTool
 
 _SAID = (InputError, ConvergenceError, OSError)              # in words already
 _WORDS = {float: "a number", int: "a whole number", str: "a word", bool: "True or False", type(None): "None"}
 _PACKAGE = __name__.partition(".")[0]
+_SOLVER = {"physics", "contact", "forms", "problem", "measures", "solve"}
+"""Rooms of objects whose methods the solver calls: of what a user makes of them the making alone is explained."""
+_ASKED = {name for protocol in (RigidTool, PlaneTool) for name in vars(protocol) if not name.startswith("_")}
+"""Methods of tools that the solver calls in every iteration."""
 _seen: set[type] = set()     # classes whose methods are explained
 
 
@@ -57,10 +63,15 @@ def _explain_class(cls: type) -> None:
             _explain_methods(base)
 
 
+def _in_solver(cls: type) -> bool:
+    return not _SOLVER.isdisjoint(cls.__module__.split(".")[1:2])
+
+
 def _explain_methods(cls: type) -> None:
+    asked = _in_solver(cls)
     for name, method in list(vars(cls).items()):
         makes = name in ("__init__", "__new__")
-        if name.startswith("_") and not makes and name != "__call__":
+        if not makes and (asked or name in _ASKED or name.startswith("_") and name != "__call__"):
             continue
         known = cls.__name__ if makes else name
         if isinstance(method, types.FunctionType):
@@ -88,8 +99,8 @@ def _explained(call: Callable, name: str, skip: int) -> Callable:
             if why is None:
                 raise
             raise _WrongCall(why) from error
-        if type(result) not in _seen:
-            _explain_class(type(result))
+        if (made := type(result)) not in _seen and made.__module__.startswith(_PACKAGE) and not _in_solver(made):
+            _explain_class(made)
         return result
     explained._is_explained = True                           # type: ignore[attr-defined]
     return explained

@@ -278,6 +278,7 @@ class Scene:
 
     def sample(self, layer: str) -> Sample:
         """The quadrature points of the energy in a layer, as they are on the first mesh."""
+        known("Scene.sample: layer", layer, self.mesh.layers)
         found = sample(self.mesh, layer, self.quadrature_degree, self.temperature)
         return found if self.preformed is None else found._replace(points=self.preformed.first_places(found.points))
 
