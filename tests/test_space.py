@@ -248,6 +248,10 @@ def test_tool_files_are_looked_over(tmp_path):
         fx.tools.solid(tmp_path / "turned.stl")
     with pytest.raises(fx.InputError, match="units of length the same"):
         disc(contacts=[fx.Contact("bottom", fx.tools.solid(tmp_path / "box.stl", scale=25.4).moved(z=-30))])
+    large = fx.tools.solid(tmp_path / "box.stl", scale=1.25).moved(z=-0.1)
+    for tool, told in ((large, True), (solid, False)):
+        report = str(fx.doctor(disc(contacts=[fx.Contact("bottom", tool)])))
+        assert ("times as wide as the sheet: is its file in another unit of length?" in report) == told
     assert r"Symmetry('y0', 'y')" in str(fx.doctor(disc(supports=HELD[:2]))) and fx.doctor(disc()).healthy
     floor = fx.tools.revolved(fx.tools.plane(-1.0).reversed())                   # a plane is 1 long in drawings
     fx.Scene(mesh=fx.mesh.sheet(fx.mesh.circle(50.0, part="quarter"), 20.0), thickness=0.5, materials=MATERIALS[0],
@@ -270,8 +274,8 @@ def solid_of(file, *blocks):
 
 @pytest.mark.parametrize("low, high", [
     ((1, 0.5, 0.5), (2, 1.5, 3)), ((2, 0, 0), (6, 2, 1)), ((1, 0.8, -2), (1.4, 1.2, 3)), ((1, 0.5, 1), (2, 1.5, 2)),
-    ((1, 0.5, 2), (2, 1.5, 3)), ((1, 0.5, 0.2), (2, 1.5, 0.8))],
-    ids=["corner", "as wide", "bar", "upon", "apart", "within"])
+    ((1, 0.5, 2), (2, 1.5, 3)), ((1, 0.5, 0.2), (2, 1.5, 0.8)), ((4, 0, 0), (6, 2, 1)), ((4, 2, 0), (5, 3, 1))],
+    ids=["corner", "as wide", "bar", "upon", "apart", "within", "beside", "at an edge"])
 def test_bodies_of_a_file_are_one_tool(low, high, tmp_path):
     """The distance to the union of two blocks, as exact as to one."""
     ends = np.array([[(0, 0, 0), low], [(4, 2, 1), high]], float)
@@ -426,6 +430,8 @@ def test_moulds_from_files_fill(make, tmp_path):
         radius=1.0, z=0.0)), fx.table({20.0: 0.2, 100.0: 0.3}))]), "friction does not depend on the temperature yet"),
     (lambda: trough(friction="none", separates=False), "separates = False: in space a sheet that slides lets go"),
     (lambda: trough(friction=0.3, separates=False), "separates = False: in space a sheet that slides lets go"),
+    (lambda: disc(contacts=[fx.Contact("bottom", fx.tools.revolved(fx.tools.plane(-1.0).reversed()), "none",
+                                       present_area=True)]), "present_area = True: is for sections"),
     (lambda: disc(model=fx.MixedPressure()), "a sheet in space is a Membrane"),
     (lambda: disc(on="rim"), "a pressure on its 'bottom' or its 'top'"),
     (lambda: disc(thickness=None), "needs a thickness"),

@@ -18,7 +18,7 @@ def apart(points: np.ndarray, triangles: np.ndarray, who: str) -> list[np.ndarra
     Raises:
         InputError: a body is inside out: a hollow that is in no other body.
     """
-    bodies = [triangles[part] for part in _parts(triangles)]
+    bodies = [triangles[part] for part in _parts(points, triangles)]
     boxes = np.array([[points[body].min((0, 1)), points[body].max((0, 1))] for body in bodies])
     volumes = np.array([volume(points, body) for body in bodies])
     full = [k for k in np.argsort(-volumes) if volumes[k] > 0]
@@ -40,17 +40,41 @@ def apart(points: np.ndarray, triangles: np.ndarray, who: str) -> list[np.ndarra
     return [np.concatenate([part for k in group for part in whole[k]]) for group in groups]
 
 
-def _parts(triangles: np.ndarray) -> list[np.ndarray]:
-    """Numbers of the triangles of each body: what hangs together by edges."""
+def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
+    """Numbers of the triangles of each body: those that hang together by edges, around an edge those of one wedge."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     n = len(triangles)
-    ends = np.sort(np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
-    edges, edge = np.unique(ends, axis=0, return_inverse=True)
-    graph = coo_array((np.ones(3 * n), (np.tile(np.arange(n), 3), n + edge.ravel())), shape=(n + len(edges),) * 2)
+    directed = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
+    edges, edge, times = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True)
+    link, count = edge.ravel().copy(), len(edges)
+    for k in np.flatnonzero(times > 2):
+        sides = np.flatnonzero(edge.ravel() == k)
+        for wedge in _wedges(points, triangles[sides % n], directed[sides], edges[k]):
+            link[sides[wedge]], count = count, count + 1
+    graph = coo_array((np.ones(3 * n), (np.tile(np.arange(n), 3), n + link)), shape=(n + count,) * 2)
     number, body = connected_components(graph, directed=False)
     order = np.argsort(body[:n], kind="stable")
-    return np.split(order, np.searchsorted(body[order], np.arange(1, number)))
+    return [part for part in np.split(order, np.searchsorted(body[order], np.arange(1, number))) if len(part)]
+
+
+def _wedges(points: np.ndarray, triangles: np.ndarray, directed: np.ndarray, edge: np.ndarray) -> list[np.ndarray]:
+    """Pairs of an edge's triangles, shape (m, 3), between which the solid lies; `directed`: the edge as each has it.
+
+    About the edge, from edge[0] to edge[1], the solid begins at a triangle that has it backward and ends at the next
+    one that has it forward. Where two wedges meet in a face, the one that ends there comes first.
+    """
+    forward = directed[:, 0] == edge[0]
+    along = points[edge[1]] - points[edge[0]]
+    along /= np.linalg.norm(along)
+    tips = points[triangles.sum(1) - edge.sum()] - points[edge[0]]
+    tips -= np.outer(tips @ along, along)
+    across = tips[0] / np.linalg.norm(tips[0])
+    angle = np.round(np.arctan2(tips @ np.cross(along, across), tips @ across) % (2 * np.pi), 6)
+    order = np.lexsort((~forward, np.where(angle > 6.283185, 0.0, angle)))
+    begin = int(np.argmin(forward[order]))                   # the first that begins a wedge
+    order = np.roll(order, -begin)
+    return [order[k:k + 2] for k in range(0, len(order) - 1, 2)]
 
 
 def _overlap(one: np.ndarray, other: np.ndarray) -> bool:

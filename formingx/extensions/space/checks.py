@@ -6,8 +6,11 @@ from typing import Any
 import numpy as np
 
 from ...findings import Finding, register
+from ...physics.supports import Symmetry
+from .solid_tool import Triangulated
 
 _SHARE = 1e-3              # of the sheet's area in compression
+_LARGER = 4.0              # a file's tool over the sheet: one in another unit of length
 
 
 @register("end")
@@ -23,3 +26,17 @@ def compressed(path: Any) -> Iterator[Finding]:
         yield Finding("serious", "membrane", f"{100 * share:.3g} % of the sheet is in compression in the last state,"
                       f" one place at (x, y, z) = ({at}): it wrinkles there, and its wall depends on the mesh: use"
                       f" Membrane(wrinkles=0.01), and look at path.wall().wrinkled.")
+
+
+@register("start")
+def too_large(body: Any) -> Iterator[Finding]:
+    """A tool from a file that is many times as wide as the sheet: a file has no unit of length."""
+    scene = body.scene
+    for contact in scene.contacts:
+        if scene.kinematics.components == 3 and isinstance(contact.tool, Triangulated) and contact.moves is None:
+            cut = [any(isinstance(s, Symmetry) and s.component == k for s in scene.supports) for k in (0, 1)]
+            sheet = max((1 + half) * float(length) for half, length in zip(cut, scene.extent))
+            ratio = float(np.ptp(contact.tool.bounds, axis=0)[:2].max() / sheet)
+            if ratio > _LARGER:
+                yield Finding("warning", repr(contact), f"the tool is {ratio:.3g} times as wide as the sheet: is its"
+                              f" file in another unit of length? Give solid a scale=...")

@@ -98,6 +98,9 @@ def check_contact(scene: Any, contact: Any) -> None:
     if contact.separates and any(material.internal or material.integral for material in scene.materials.values()):
         raise InputError(f"{contact!r}: separates = True: in space a sheet that relaxes is held where it touches, until"
                          f" a stage leaves the tool out (without=[...]): must be 'stick', with separates left out")
+    if contact.present_area:
+        raise InputError(f"{contact!r}: present_area = True: is for sections: in space the penalty is per area at rest:"
+                         f" leave it out")
     if contact.points != "nodes":
         raise InputError(f"{contact!r}: points = {contact.points!r}: in space contact acts at 'nodes'")
     size, length = float(np.ptp(tool.bounds, axis=0).max()), float(max(scene.extent))
