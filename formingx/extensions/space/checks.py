@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ...findings import Finding, register
-from ...physics.supports import Symmetry
+from ...physics.supports import NAMES, Symmetry
 from .solid_tool import Triangulated
 
 _SHARE = 1e-3              # of the sheet's area in compression
@@ -34,7 +34,7 @@ def too_large(body: Any) -> Iterator[Finding]:
     scene = body.scene
     for contact in scene.contacts:
         if scene.kinematics.components == 3 and isinstance(contact.tool, Triangulated) and contact.moves is None:
-            cut = [any(isinstance(s, Symmetry) and s.component == k for s in scene.supports) for k in (0, 1)]
+            cut = [any(isinstance(s, Symmetry) and NAMES[s.component] == axis for s in scene.supports) for axis in "xy"]
             sheet = max((1 + half) * float(length) for half, length in zip(cut, scene.extent))
             ratio = float(np.ptp(contact.tool.bounds, axis=0)[:2].max() / sheet)
             if ratio > _LARGER:
