@@ -103,7 +103,7 @@ def table(rows: list[Row], numbers: dict[str, Any]) -> str:
             off = ours - reference if row.absolute else ours / reference - 1
             exact = f"{off:+.1e}" if row.absolute or abs(off) < 1e-3 else f"{100 * off:+.1f} %"
             deviation = "; ".join(filter(None, ("below 1e-9" if abs(off) < 1e-9 else exact, row.note)))
-        beside = "" if reference is None else shown(reference)
+        beside = "" if reference is None else shown(reference) if reference else "0"
         lines.append(f"| {row.what} | {shown(ours)} | {beside} | {deviation} | {row.source} |"
                      f" `{row.ours.split('/')[0]}` |")
     return "\n".join(lines)

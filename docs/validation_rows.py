@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 from formingx.exact import stability
 from formingx.exact.inflation import membrane_inflation, membrane_limit_point
+from formingx.exact.time import balloon
 
 LAWS = ("neo-Hookean", "Mooney-Rivlin", "Yeoh", "Gent", "Arruda-Boyce", "Ogden")
 TRELOAR = {"radius": 1.25, "thickness": 0.082, "c10": 2.0}                # cm, kg/cm2
@@ -47,6 +49,12 @@ def _disc(case: str, words: str) -> Row:
                f"disc_in_space/{case}/pressure_over_axisymmetric/3", 1.0, "membrane of revolution", style=".5f")
 
 
+def _blown_balloon() -> float:
+    """Return p R0/H0 of the balloon of demos/balloon.py at stretch 2, blown by 2.6 of its volume a second, MPa."""
+    body = balloon(c10=0.05, branches=[(0.3, 0.5), (0.4, 5.0)])
+    return float(body.drive(lambda t: (math.log1p(2.6 * t) / 3, 2.6 / 3 / (1 + 2.6 * t)), [7 / 2.6])[0])
+
+
 def _program(problem: str, key: str, what: str, unit: str, source: str) -> Row:
     path = f"other_programs/{problem}/{key}"
     return Row(what, f"{path}/ours", f"{path}/theirs", source, unit, ".6g")
@@ -81,6 +89,13 @@ EXACT = [
     _disc("extrapolated", ", two sizes extrapolated"),
     Row("trough in space, error of its wall", "tray/trough/size_0.05/wall_error", 0.0, "power law of a membrane",
         style=".1e", absolute=True),
+    Row("relaxing balloon at stretch 2, p R0/H0", "balloon/flow_2.6/p_R0_over_H0_at_stretch/2", _blown_balloon,
+        "exact, thin wall", "MPa", ".5f"),
+    *(Row(f"{what}, largest error over the span", f"{path}", 0.0, reference, style=".1e", absolute=True)
+      for what, path, reference in (
+          ("sheet in warm air, temperature", "heating/largest_error_over_span/convection", "series"),
+          ("sheet between heaters, temperature", "heating/largest_error_over_span/radiation_400_400", "line method"),
+          ("sheet laid on cold steel, temperature", "chilling/largest_error_over_span/steel", "Laplace transform"))),
     Row("K-BKZ blocks at constant rates, largest error", "kbkz/largest_error_of_blocks/psm", 0.0,
         "homogeneous integration", style=".1e", absolute=True),
     Row("block drawn hot, set and let go: stretch", "set_block/uniaxial/G_200/stretch",

@@ -51,7 +51,7 @@ def test_a_page_from_summaries(tmp_path, monkeypatch):
     text = make_validation.page(template, numbers).splitlines()
     assert text[1] == "2.20 +10.0 % none"
     assert [line.split(" | ")[1:4] for line in text[5:]] == [
-        ["2.200 MPa", "2.000 MPa", "+10.0 %"], ["-1.0e-03", "0.0e+00", "-1.0e-03"], ["1.1", "2", "-45.0 %"],
+        ["2.200 MPa", "2.000 MPa", "+10.0 %"], ["-1.0e-03", "0", "-1.0e-03"], ["1.1", "2", "-45.0 %"],
         ["2", "2", "+1.0e-05"], ["2", "", "undecided"]]
     assert make_validation.collect(tmp_path / "no", wanted, numbers) == numbers
     with pytest.raises(KeyError, match="no number for run/a/p"):
