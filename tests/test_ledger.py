@@ -140,16 +140,19 @@ def test_books_of_runs_at_fixed_control_are_kept(increments):
 
 
 def test_books_that_are_off_are_said(caplog, monkeypatch):
-    """By a run of few states when it ends, and by `work` itself."""
+    """Once, and it is a finding of the path from then on."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(12, 1)), loads=[fx.Pressure("bottom")],
                      materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
     path = fx.trace(scene, until=fx.pole_height(2.0), progress=False)
-    assert len(path) <= 5 and path.findings() == [] and caplog.text == ""
+    path.work()
+    assert path.findings() == [] and caplog.text == ""
     whole = ledger.Ledger._by_loads
     monkeypatch.setattr(ledger.Ledger, "_by_loads", lambda *given: {k: 1.02 * v for k, v in whole(*given).items()})
-    said, = path.findings()
-    assert said.about == "energy" and "off by 2 % of the largest part" in said.text
-    assert caplog.text == "" and len(path.work()) == 3 and caplog.text.count(said.text) == 1
+    for _ in range(2):
+        path.work()
+        said, = path.findings()
+        assert said.about == "energy" and "off by 2 % of the largest part" in said.text
+        assert caplog.text.count(said.text) == 1
 
 
 @pytest.mark.parametrize("name", RUNS)

@@ -4,9 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..findings import Finding, register
-from ..results.evaluate import edges, snaps, tension, volume, work
-
-_FEW = 5                   # states; `Path.work` says it of longer runs
+from ..results.evaluate import edges, snaps, tension, volume
 
 
 @register("end")
@@ -30,14 +28,6 @@ def contact(path: Any) -> Iterator[Finding]:
     """Penetration that changes forces, faces in tools between contact points, edges between them; collective."""
     yield from path.admissibility.findings(path.last)
     yield from edges.findings(edges.coarsest(path, path.last))
-
-
-@register("end")
-def energy(path: Any) -> Iterator[Finding]:
-    """An energy balance that is off, of a run of so few states that it costs nothing; collective."""
-    section = path.problem.scene.kinematics.components == 2
-    if section and 1 < len(path.states) <= _FEW and "strain_energy" in path.columns:
-        yield from work.findings(work.balance(path))
 
 
 @register("end")

@@ -275,8 +275,8 @@ class Path(States):
         name, or "support") and each tool that moves; by forces that a stage leaves without balance, as they fade
         ("change"); what new meshes have added ("new_meshes"). Energy of changes of temperature ("heat"). Where it went:
         "strain_energy", above that at first; "dissipated_energy" in materials; "friction"; "jumps"; "bonds" to tools
-        that the body may pull at, above that at first. "unbalanced": the error of the integrals, and of the run; a
-        warning tells of more than 0.5 % of the largest part.
+        that the body may pull at, above that at first. "unbalanced": the error of the integrals, and of the run; of
+        more than 0.5 % of the largest part a warning tells, which is one of the `findings` from then on.
         """
         self.section_only("work")
         from .evaluate.work import work

@@ -326,7 +326,9 @@ def _called(scene: Any, thing: Any) -> str:
 def work(path: Any) -> dict[str, np.ndarray]:
     """See `Path.work`."""
     found = balance(path)
-    tell(findings(found), path.problem.comm.rank)
+    off = [finding for finding in findings(found) if finding not in path.record.findings]
+    tell(off, path.problem.comm.rank)
+    path.record.findings += off
     return found
 
 
