@@ -50,7 +50,8 @@ def springs_back(body: Any) -> Iterator[Finding]:
 def beyond_limits(body: Any) -> Iterator[Finding]:
     """Temperatures to which tools, air and heaters may bring the body, at which a constant is not known."""
     if body.scene.heat is not None:
-        yield from _beyond(body.scene, *body.scene.heat.extremes(body.scene), "the tools and the air may bring it")
+        low, high = body.scene.heat.extremes(body.scene)
+        yield from _beyond(body.scene, low, high, "the tools and the air may bring it")
 
 
 @register("end")
