@@ -78,6 +78,8 @@ with _optional():
     from .extensions.kbkz.damping import PSM, Damping, DoubleWagner, LuoTanner, SoskeyWinter, Wagner
     from .extensions.kbkz.kbkz import KBKZ
 with _optional():
+    from .extensions import release as _release
+with _optional():
     from .extensions.fits import beyond_tests as _fits_checks
     from .extensions.fits.data import treloar1944
     from .extensions.fits.fit import Fit, fit

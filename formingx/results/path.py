@@ -158,16 +158,6 @@ class Path(States):
         (views.revolved if axisymmetric else views.extruded)(self.profile(state), file, self.problem.comm)
         return Picture(file)
 
-    def formed(self, state: State | None = None, *, size: float | None = None) -> Any:
-        """The body of a state (default: the last) as a new `Mesh`, free of stress; an InputError if it is none.
-
-        size: of new elements, length, in place of the deformed ones: for a body of one layer without holes, on one
-        rank. (With the stresses that it has a body is let go by `released`.)
-        """
-        self.section_only("formed", "use to_stl, or shell_model")
-        from ..extensions.release.formed import formed
-        return formed(self.segment(state).problem, state or self.last, size)
-
     def wall(self, state: State | None = None) -> Any:
         """The wall of the part at a state (default: the last), place by place: to_csv, to_excel.
 
@@ -202,32 +192,6 @@ class Path(States):
         from .evaluate.part import part
         axisymmetric = self.problem.scene.kinematics.axisymmetric
         return part(self.wall(state), axisymmetric, density, trim, heights, units or NONE)
-
-    def released(self, temperature: float | None = None, *, trim: Any = None, boundaries: Any = None,
-                 duration: float | None = None, state: State | None = None, accuracy: str | float = "standard",
-                 units: Any = None) -> Any:
-        """The part let go (`Released`; print it): springback, shrinkage, warpage; its own run is `Released.path`.
-
-        Tools and loads are away; it is trimmed; of supports only `Symmetry` is left; then, where heat or materials take
-        time, it cools. At first it is in balance with what held it, which then fades.
-
-        Args:
-            temperature: to which its two faces are brought, at once; of a scene with `heat=Cooling(...)` only.
-            trim: as in `part`: it is cut along the line of nodes next to that.
-            boundaries: instead of a temperature, where it loses heat, as those of `Cooling`, for a duration.
-            duration: time that it is given; default with a temperature wall^2/diffusivity, else none.
-            state: of which the part is; default the last. accuracy: see `Process.run`. units: a `formingx.Units`.
-
-        Raises:
-            InputError: a membrane; arguments that do not fit the scene; the part does not reach the trim.
-            ConvergenceError: no state of the free part was found; it carries the path so far.
-        """
-        self.section_only("released")
-        from ..extensions.release.released import released
-        state = state or self.last
-        make = lambda record: Path(record, True)                           # noqa: E731
-        return released(self, self.segment(state).problem, make, state, temperature, trim, boundaries, duration,
-                        accuracy, units)
 
     def filling(self, tool: Any = None) -> Any:
         """The gap that is left in each corner of a tool, state by state (`Filling`), and the pressure to fill it.
@@ -286,11 +250,6 @@ class Path(States):
         """Write the part at a state (default: the last) as a solid of triangles, STL (rank 0 writes)."""
         from .files.solid import to_stl
         to_stl(self._solid(state), file, self.problem.comm)
-
-    def to_msh(self, file: Any, state: State | None = None) -> None:
-        """Write `formed()` of a state (default: the last) as a gmsh file, with its names; on one rank."""
-        from ..mesh.files import write
-        write(self.formed(state), file)
 
     def to_inp(self, file: Any, state: State | None = None, parts: int = 60) -> None:
         """Write the part as shells, walls their section, for CalculiX (.inp), `parts` round the axis (rank 0 writes).

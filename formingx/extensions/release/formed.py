@@ -10,24 +10,40 @@ from dolfinx import fem
 from ... import _compat
 from ...errors import InputError, positive
 from ...forms.outline import Outline
+from ...mesh.files import write
 from ...mesh.grid import Grid, counter_clockwise, to_mesh
 from ...mesh.mesh import Mesh
 from ...mesh.nodes import own_cells
-from ..remeshing.remeshed import remeshed
+from ...results.extend import method_of
+from ...results.path import Path
+from ...solve.state import State
 
 _NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
 _TO_GRID = [0, 1, 2, 5, 3, 4]                               # middles of the edges 01, 12, 20
 
 
-def formed(problem: Any, state: Any, size: float | None = None) -> Mesh:
-    """The deformed elements of a state, with the names of layers and boundaries; second-order geometry; collective.
+@method_of(Path)
+def formed(path: Path, state: State | None = None, *, size: float | None = None) -> Mesh:
+    """Make a new mesh of the body of a state, free of stress; collective.
 
-    size: of new elements in their place, length.
+    (`Path.released` releases the body with the stresses that it has.)
+
+    Args:
+        path: the path of a solid.
+        state: default the last.
+        size: edge length of new elements, length; None: the deformed elements stay. New ones are available for a body
+            of one layer without holes, on one rank.
+
+    Returns:
+        The mesh, with the names of layers and boundaries and with second-order geometry.
 
     Raises:
-        InputError: a membrane, or deformed elements that are no mesh (inside out, or one over another); new ones of
-            several layers, on several ranks, or round a hole.
+        InputError: a membrane, a sheet in three dimensions, or deformed elements that are no mesh (inside out, or one
+            over another); new elements of several layers, on several ranks, or round a hole.
     """
+    path.section_only("formed", "use to_stl, or shell_model")
+    state = state or path.last
+    problem = path.segment(state).problem
     forms, mesh = problem.forms, problem.scene.mesh
     domain, comm = mesh.domain, mesh.comm
     if forms.domain is not domain:
@@ -70,8 +86,21 @@ def formed(problem: Any, state: Any, size: float | None = None) -> Mesh:
     return to_mesh(grid, comm, "Path.formed: the deformed mesh")
 
 
+@method_of(Path)
+def to_msh(path: Path, file: Any, state: State | None = None) -> None:
+    """Write the mesh that `formed` makes of a state as a gmsh file, with its names; on one rank.
+
+    Args:
+        path: the path of a solid.
+        file: name of the file.
+        state: default the last.
+    """
+    write(formed(path, state), file)
+
+
 def _of_size(problem: Any, state: Any, size: float) -> Mesh:
     """The deformed outline, with new elements inside."""
+    from ..remeshing.remeshed import remeshed
     mesh, outline = problem.scene.mesh, Outline(problem.forms)
     if len(mesh.layers) > 1 or mesh.comm.size > 1:
         raise InputError(f"Path.formed: size = {size:g}: new elements are made of one layer, on one rank: leave it out")

@@ -16,13 +16,16 @@ from ...problem.problem import Problem
 from ...results.evaluate.part import strips_within
 from ...results.evaluate.profile import FACES
 from ...results.evaluate.wall import Wall
+from ...results.extend import method_of
 from ...results.numbers import KeyNumbers
+from ...results.path import Path
 from ...scene.scene import Scene
 from ...solve.arc_length import Curve
 from ...solve.newton import Tolerances
 from ...solve.process import Execution
 from ...solve.record import Record
 from ...solve.stage import Stage, plan
+from ...solve.state import State
 from ...solve.stepping import allowed as allowed_error
 from ...units import NONE, Units
 from .part import part_along
@@ -42,7 +45,7 @@ class Released(KeyNumbers):
         units: of the labels.
     """
 
-    path: Any
+    path: Path
     before: Wall
     after: Wall
     trimmed: float
@@ -106,9 +109,36 @@ def _end(wall: Wall) -> float:
     return float(np.degrees(np.arctan2(z, r)))
 
 
-def released(path: Any, source: Any, make_path: Any, state: Any, temperature: Any, trim: Any, boundaries: Any,
-             duration: Any, accuracy: Any, units: Any) -> Released:
-    """See `Path.released`; make_path: of a record."""
+@method_of(Path)
+def released(path: Path, temperature: float | None = None, *, trim: Any = None, boundaries: Any = None,
+             duration: float | None = None, state: State | None = None, accuracy: str | float = "standard",
+             units: Any = None) -> Released:
+    """Release a formed part: compute its springback, shrinkage and warpage.
+
+    Tools and loads are removed; the part is trimmed; of supports only `Symmetry` is left; then, where heat or materials
+    take time, it cools. At first the forces that held the part keep it in equilibrium; then they fade.
+
+    Args:
+        path: the path of a solid.
+        temperature: of the two faces of the part from the release on; of a scene with `heat=Cooling(...)` only. It acts
+            through a conductance of 1e4 conductivity/wall.
+        trim: as in `Path.part`: the part is cut along the line of nodes next to that.
+        boundaries: instead of a temperature, laws of the faces, as those of `Cooling`, for a duration.
+        duration: time for which the part is followed; default with a temperature wall^2/diffusivity, else none.
+        state: of the part in its tools; default the last.
+        accuracy: see `Process.run`.
+        units: a `formingx.Units`, of the labels.
+
+    Returns:
+        The `Released`, which prints a table; its own run is `Released.path`.
+
+    Raises:
+        InputError: a membrane; arguments that do not fit the scene; the part does not reach the trim.
+        ConvergenceError: no state of the free part was found; it carries the path so far.
+    """
+    path.section_only("released")
+    state = state or path.last
+    source = path.segment(state).problem
     mesh, trimmed = source.scene.mesh, float(path.wall(state).r[-1])
     if source.forms.domain is not mesh.domain:
         raise InputError("Path.released: a membrane has no bending stiffness to keep a shape: form a solid,"
@@ -122,15 +152,15 @@ def released(path: Any, source: Any, make_path: Any, state: Any, temperature: An
     x = _carried(source, state, problem)
     problem.enter(Setting([0.0] * len(problem.scene.things) + [state.time], [0.0] * (1 + len(problem.scene.things)),
                           [], fading=True), x, 0.0)
-    return _run(problem, x, make_path, cools, allowed_error("Path.released", accuracy), trimmed, units or NONE)
+    return _run(problem, x, cools, allowed_error("Path.released", accuracy), trimmed, units or NONE)
 
 
-def _run(problem: Problem, x: np.ndarray, make_path: Any, cools: float, accuracy: float, trimmed: float,
+def _run(problem: Problem, x: np.ndarray, cools: float, accuracy: float, trimmed: float,
          units: Units) -> Released:
     """Let the body go, and let time go by."""
     stages = [Stage("let go"), *([Stage("cool", duration=cools)] if cools else [])]
     record = Record(problem, Curve(problem, Tolerances()))
-    path = make_path(record)
+    path = Path(record, True)
     record.stage = stages[0].name
     try:
         record.accept(record.curve.resume(x, 0.0))
