@@ -57,7 +57,7 @@ from .values.temperature import WLF, Arrhenius
 
 # Each extension adds its names and takes part by the interfaces of the core; its folder may be taken out.
 with _optional():
-    from .extensions import contact_events as _contact_events
+    from .extensions.contact_events import prediction as _contact_events
 with _optional():
     from .extensions.heat import checks as _heat_checks
     from .extensions.heat.boundaries import (
@@ -78,7 +78,7 @@ with _optional():
     from .extensions.kbkz.damping import PSM, Damping, DoubleWagner, LuoTanner, SoskeyWinter, Wagner
     from .extensions.kbkz.kbkz import KBKZ
 with _optional():
-    from .extensions import release as _release
+    from .extensions.release import released as _released
 with _optional():
     from .extensions.fits import beyond_tests as _fits_checks
     from .extensions.fits.data import treloar1944

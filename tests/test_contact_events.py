@@ -1,17 +1,13 @@
 """Contact events: several gap closures in one step, predicted; the core without this extension."""
 
-import os
-import shutil
-import subprocess
-import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from conftest import ROOT
 from mpi4py import MPI
 from test_contact import cup, form
+from without import run_without
 
 import formingx as fx
 from formingx.contact.step_limit import Way
@@ -20,7 +16,6 @@ from formingx.extensions.contact_events.reduced_contact import FREE, STICKS, Nea
 from formingx.extensions.contact_events.response import Response
 
 tools = fx.tools
-IMPORT = "from .extensions import contact_events as _contact_events\n"
 WITHOUT = """
 import formingx as fx
 mould = fx.tools.cup(radius=10.0, depth=5.0, mouth=0.3, fillet=1.0)
@@ -167,15 +162,7 @@ def test_no_events_are_predicted_without_stick(friction):
 
 def test_the_core_without_contact_events(tmp_path):
     """Without the folder the package is imported, and a stuck cup takes a step a gap closure to the same walls."""
-    shutil.copytree(ROOT / "formingx", tmp_path / "formingx", ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.rmtree(tmp_path / "formingx" / "extensions" / "contact_events")
-    names = tmp_path / "formingx" / "__init__.py"
-    assert IMPORT in names.read_text()
-    names.write_text(names.read_text().replace(IMPORT, ""))
-    done = subprocess.run([sys.executable, "-c", WITHOUT], env=os.environ | {"PYTHONPATH": str(tmp_path)}, cwd=tmp_path,
-                          capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    file, steps, *walls = done.stdout.split()
+    file, steps, *walls = run_without(tmp_path, ["contact_events"], "-c", WITHOUT).split()
     path = form(cup("stick", (20, 1)), 30.0)
     assert file.startswith(str(tmp_path)) and int(steps) > 2 * path.counts.steps
     np.testing.assert_allclose(path.profile().thickness, [float(t) for t in walls], rtol=4e-3)
