@@ -23,7 +23,7 @@ class IntegralLaw(Protocol):
         """
 
     def unsymmetric_work(self, C: Sequence[object], dC: Sequence[object], coefficients: Mapping[str, object]) -> object:
-        """Return the virtual work beside that of the potential, per reference volume (UFL, stress), or None.
+        """Return the virtual work in addition to the potential, per reference volume (UFL, stress), or None.
 
         Args:
             C: entries 11, 22, 12, 33 of the isochoric right Cauchy-Green tensor (UFL). dC: their virtual changes.

@@ -45,7 +45,12 @@ class ThermalProperties:
 
 
 class _Boundary:
-    """A law of a face. parameters: {name: number or Table over R}; temperatures: names of those that are some."""
+    """Law of a face.
+
+    Attributes:
+        parameters: {name: number or Table over R}.
+        temperatures: names of the parameters that are temperatures.
+    """
 
     parameters: dict[str, float | Table]
     temperatures: tuple[str, ...] = ()

@@ -13,7 +13,7 @@ from ...values.temperature import FunctionOfTemperature
 from .cooling import CoolingHistory
 
 _FROZEN = ", where the material does not relax any more: give Sets or a modulus that rises, if it turns into glass"
-_RISES = 2.0               # modulus of the coldest over that of the hottest body
+_RISES = 2.0               # modulus of the coldest over the modulus of the hottest body
 
 
 @register("scene")

@@ -71,8 +71,8 @@ class Cooling:
         unit: of all temperatures, "C" or "K".
         tolerance: the largest estimated error of one step in time of the heat equation, degrees.
         work_to_heat: heat that comes of a unit of the work that materials dissipate, in the units of the two: 1 in
-            SI, 1e-3 for MPa, mm and W, less where a part of it is stored. None: work does not heat. (That of friction
-            on tools never does.)
+            SI, 1e-3 for MPa, mm and W, less where a part of it is stored. None: work does not heat. (The work of
+            friction on tools never does.)
 
     >>> air = fx.Convection("top", h=2e-5, air=20.0)
     >>> polymer = fx.ThermalProperties(conductivity=0.2e-3, density=1e-3, heat_capacity=2.0)
@@ -221,7 +221,7 @@ class CoolingHistory:
         looked = sorted({*np.linspace(0, len(states) - 1, _LOOKS).astype(int).tolist(), *(k - 1 for k in begun)})
         looked = [k for j, k in enumerate(looked) if not j or states[k].time > states[looked[j - 1]].time]
         errors = self.errors_in_space([states[k] for k in looked])
-        temperatures = [states[k].memory[-1].temperature for k in looked]          # that of the heat is last
+        temperatures = [states[k].memory[-1].temperature for k in looked]          # the memory of heat is the last one
         scene, comm = self._problem.scene, self._problem.comm
         ends = comm.allgather([float(f(T)) for T in temperatures for f in (np.min, np.max) if len(T)])
         worst, span = int(np.argmax(errors)), np.ptp(np.concatenate(ends))

@@ -1,4 +1,4 @@
-"""Elements for heat: where heat passes a face, those of a body are cut into layers that are thin enough for it.
+"""Elements for heat: where heat passes a face, the elements of a body are cut into layers that are thin enough for it.
 
 Heat has gone sqrt(a t) deep by a time t (a: diffusivity), and elements must be smaller than that there. A layer at a
 depth y below such a face is a given part of max(that depth at the first time of interest, y/3) thick, so that later

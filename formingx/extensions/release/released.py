@@ -123,7 +123,7 @@ def released(path: Path, temperature: float | None = None, *, trim: Any = None, 
         temperature: of the two faces of the part from the release on; of a scene with `heat=Cooling(...)` only. It acts
             through a conductance of 1e4 conductivity/wall.
         trim: as in `Path.part`: the part is cut along the line of nodes next to that.
-        boundaries: instead of a temperature, laws of the faces, as those of `Cooling`, for a duration.
+        boundaries: instead of a temperature, laws of the faces, as for `Cooling`, for a duration.
         duration: time for which the part is followed; default with a temperature wall^2/diffusivity, else none.
         state: of the part in its tools; default the last.
         accuracy: see `Process.run`.
@@ -229,7 +229,7 @@ def _trimmed(mesh: Mesh, wall: Wall, trim: Any) -> tuple[Mesh, float]:
 
 
 def _carried(source: Any, state: Any, problem: Problem) -> np.ndarray:
-    """The unknowns of the part, own part; its histories remember what those of the whole body do."""
+    """The unknowns of the part, own part; its histories remember the same as the histories of the whole body."""
     take_fields(source, state, problem)
     x = np.zeros(problem.x.getLocalSize())
     x[: problem.n_owned] = problem.forms.w.x.array[: problem.n_owned]
