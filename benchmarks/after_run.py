@@ -20,7 +20,8 @@ def scene(elements: int) -> fx.Scene:
     return fx.Scene(mesh=fx.mesh.disc(radius=2.0, thickness=0.1, elements=(elements, 1)),
                     materials=fx.Viscoelastic(fx.NeoHookean(c10=0.1), branches=[(0.3, 0.1), (0.2, 1.0)]),
                     temperature=100.0, heat=heat, supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                    contacts=[fx.Contact("top", fx.tools.sphere(radius=1.0, z=0.1), 0.3, moves=(0, -1), name="plug")])
+                    contacts=[fx.Contact("top", fx.tools.sphere(radius=1.0, z=0.1), 0.3, direction=(0, -1),
+                                         name="plug")])
 
 
 def main() -> None:
@@ -31,7 +32,7 @@ def main() -> None:
     options.add_argument("--json", type=Path)
     given = options.parse_args()
     body = scene(given.elements)
-    path = fx.Process(body).run([fx.Stage("down", drive="plug", until=fx.travel(0.6), speed=1.0),
+    path = fx.Process(body).run([fx.Stage("down", control="plug", until=fx.travel(0.6), speed=1.0),
                                  fx.Stage("hold", duration=0.4)], accuracy="draft", progress=False)
     states = path.record.segments[-1].states
     states[:] = [replace(states[k * len(states) // given.states]) for k in range(given.states)]

@@ -27,7 +27,8 @@ def run(elements, *, layers=2, pressures=None, thickness=0.3, depth=5.0, fillet=
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      contacts=[fx.Contact("top", cup, friction, **options)])
     try:
-        return fx.trace(scene, until=targets[-1], through=targets[:-1], step=fx.StepControl(target=8), max_steps=400,
+        return fx.trace(scene, until=targets[-1], intermediate=targets[:-1], step=fx.StepControl(target=8),
+                        max_steps=400,
                         progress=False), "done"
     except fx.ConvergenceError as error:
         return error.path, str(error).split(" The nearest")[0]

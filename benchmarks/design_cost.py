@@ -26,8 +26,8 @@ def cup(constant, elements=(30, 1)):
     return scene, fx.pressure(0.25)
 
 
-CASES = {"cup": lambda knots: fx.Design(cup, {"constant": fx.along(knots, start=1.0)}),
-         "bottle": lambda knots: fx.Design(bottle, {"wall": fx.along(knots, start=WALL, low=0.1, high=0.39)},
+CASES = {"cup": lambda knots: fx.Design(cup, {"constant": fx.spline(knots, start=1.0)}),
+         "bottle": lambda knots: fx.Design(bottle, {"wall": fx.spline(knots, start=WALL, low=0.1, high=0.39)},
                                            step=fx.StepControl(target=8))}
 
 

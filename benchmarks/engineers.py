@@ -45,8 +45,8 @@ def disc(radius, thickness, elements, material, contacts, **more):
 
 
 def plug_then_air(scene, travel, pressure, finest):
-    return fx.Process(scene).run([fx.Stage("plug", drive="plug", until=fx.travel(travel)),
-                                  fx.Stage("air", drive="air", until=fx.pressure(pressure))],
+    return fx.Process(scene).run([fx.Stage("plug", control="plug", until=fx.travel(travel)),
+                                  fx.Stage("air", control="air", until=fx.pressure(pressure))],
                                  step=step(finest), progress=False)
 
 
@@ -55,7 +55,7 @@ def pot(finest):
     tools = fx.tools.pot(mouth=38.0, base=28.0, depth=40.0, sheet=1.2, fillet=8.0, lip=3.0, nose=20.0)
     return plug_then_air(disc(40.0, 1.2, (30, 1), fx.NeoHookean(c10=0.4), [
         contact(finest, "top", tools.mould, "stick", separates=False, name="mould"),
-        contact(finest, "bottom", tools.plug, "none", moves=(0, 1), name="plug")]), 22.0, 0.09, finest)
+        contact(finest, "bottom", tools.plug, "none", direction=(0, 1), name="plug")]), 22.0, 0.09, finest)
 
 
 def study(finest):
@@ -64,7 +64,7 @@ def study(finest):
     plug = fx.tools.male(radius=22.0, height=120.0, base=-120.0, draft=3.0, fillet=6.0)
     return plug_then_air(disc(40.0, 1.2, (30, 1), fx.MooneyRivlin(c10=0.35, c01=0.05), [
         contact(finest, "top", mould, "stick", separates=False, name="mould"),
-        contact(finest, "bottom", plug, 0.3, moves=(0, 1), name="plug")]), 48.0, 0.4, finest)
+        contact(finest, "bottom", plug, 0.3, direction=(0, 1), name="plug")]), 48.0, 0.4, finest)
 
 
 def relaxing_pot(finest):
@@ -73,11 +73,11 @@ def relaxing_pot(finest):
     plug = fx.tools.male(radius=5.0, height=40.0, base=-40.0, fillet=1.5)
     scene = disc(10.0, 0.3, (30, 1), fx.Viscoelastic(fx.NeoHookean(c10=6.5), branches=[(117.0, 1.0)]), [
         contact(finest, "top", mould, "stick", name="mould"),
-        contact(finest, "bottom", plug, 0.3, moves=(0, 1), name="plug")])
+        contact(finest, "bottom", plug, 0.3, direction=(0, 1), name="plug")])
     return fx.Process(scene).run([
-        fx.Stage("plug", drive="plug", until=fx.travel(6.0), speed=6.0), fx.Stage("hold", duration=1.0),
-        fx.Stage("vacuum", drive="air", until=fx.pressure(160.0), step=step(finest)),
-        fx.Stage("in the mould", duration=5.0, without=["plug"])], accuracy=1e-2, progress=False,
+        fx.Stage("plug", control="plug", until=fx.travel(6.0), speed=6.0), fx.Stage("hold", duration=1.0),
+        fx.Stage("vacuum", control="air", until=fx.pressure(160.0), step=step(finest)),
+        fx.Stage("in the mould", duration=5.0, inactive=["plug"])], accuracy=1e-2, progress=False,
         step=step(True) if finest else None)
 
 
@@ -120,7 +120,7 @@ def williams(finest):
     tool = fx.tools.male(radius=1.905, height=60.0, base=-60.0, fillet=0.35).mirrored().moved(z=0.6985)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=8.89, thickness=0.6985, elements=(120, 2), concentrate={1.23825: 0.2}),
                      materials=fx.NeoHookean(c10=0.448), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                     contacts=[contact(finest, "top", tool, 0.3, moves=(0, -1))])
+                     contacts=[contact(finest, "top", tool, 0.3, direction=(0, -1))])
     return fx.trace(scene, until=fx.travel(8.0), step=step(finest, 6), progress=False)
 
 
@@ -138,10 +138,10 @@ def blister(finest, target=None):
     heat = fx.Cooling(fx.ThermalProperties(conductivity=0.17e-3, density=1.38e-3, heat_capacity=1.6), [], unit="C",
                       tools={"plug": (0.4e-3, 60.0), "mould": (0.5e-3, 40.0)})
     scene = disc(5.0, 0.25, (36, 1), film, [contact(finest, "top", tools.mould, "stick", name="mould"),
-                                            contact(finest, "bottom", tools.plug, 0.3, moves=(0, 1), name="plug")],
+                                            contact(finest, "bottom", tools.plug, 0.3, direction=(0, 1), name="plug")],
                  temperature=120.0, heat=heat)
-    return fx.Process(scene).run([fx.Stage("plug", drive="plug", until=fx.travel(3.0), speed=30.0),
-                                  fx.Stage("air", drive="air", until=fx.pressure(0.3), duration=0.2),
+    return fx.Process(scene).run([fx.Stage("plug", control="plug", until=fx.travel(3.0), speed=30.0),
+                                  fx.Stage("air", control="air", until=fx.pressure(0.3), duration=0.2),
                                   fx.Stage("hold", duration=1.0)], accuracy="draft", progress=False,
                                  step=step(finest, target or 8) if finest or target else None)
 

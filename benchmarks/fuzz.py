@@ -225,7 +225,7 @@ def cases(folder: Path) -> dict[str, Callable[[random.Random], Any]]:
     found = {}
     for call in reliability.calls(made, str(folder / "run")):
         good = {k: v for k, (_, v) in call.arguments.items()}
-        if call.name in ("trace", "Process.run", "solve", "doctor", "load"):
+        if call.name in ("trace", "Process.run", "solve", "check", "load"):
             found[f"runs {call.name}"] = lambda rng, c=call, g=good: c.make(**_required(c, g, rng))
         elif call.name != "mesh.read":
             found[f"{_kind(call.name)} {call.name}"] = lambda rng, c=call, g=good: _used(c, _required(c, g, rng))
@@ -334,19 +334,19 @@ def _of_answers() -> dict[str, Callable]:
         str(fx.compare(side(rng), side(rng), columns=columns,
                        units=rng.choice([None, {"a": near(2.0, rng)}, {"b": "mm"}, anything(rng)])))
 
-    def doctor(rng):
+    def check(rng):
         scene = rng.choice([reliability._scene, reliability._named])()
         target = rng.choice([fx.pressure, fx.travel, fx.pole_height])
-        stage = fx.Stage("on", drive=rng.choice(scene.drivable), until=target(near(0.1, rng) * rng.choice([1, -1])))
+        stage = fx.Stage("on", control=rng.choice(scene.drivable), until=target(near(0.1, rng) * rng.choice([1, -1])))
         mixed = rng.choice([[stage], [], anything(rng)])
-        str(fx.doctor(scene, targets=rng.choice([[], [fx.pole_stretch(2.0)], anything(rng)]), stages=mixed,
+        str(fx.check(scene, targets=rng.choice([[], [fx.pole_stretch(2.0)], anything(rng)]), stages=mixed,
                       units=rng.choice([fx.Units(length="mm", stress="MPa"), fx.Units(), anything(rng)])))
 
     def made(rng):
         kind = rng.choice([fx.NeoHookean, fx.MooneyRivlin, fx.Gent, fx.Yeoh, fx.Ogden, fx.Viscoelastic])
         kind(*[rng.choice([1.0, [1.0], anything(rng)]) for _ in range(rng.randint(0, 3))],
              **{name: near(1.0, rng) for name in rng.sample(["c10", "c01", "mu", "alpha", "Jm", "branches"], 2)})
-    return {"answers compare": compare, "answers doctor": doctor, "answers material": made}
+    return {"answers compare": compare, "answers check": check, "answers material": made}
 
 
 # what laws give the package: of UFL expressions, of a problem
@@ -460,7 +460,7 @@ def _of_runs(folder: Path, made: Any) -> dict[str, Callable]:
                  else 0.02 * k) for k in range(rng.randint(0, 4))]
         if rng.random() < 0.3:
             rows.append(anything(rng))
-        stage = fx.Stage("on", follow=rng.choice([{"air": rows}, {"plug": rows}, {"air": rows, "plug": rows}]))
+        stage = fx.Stage("on", amplitudes=rng.choice([{"air": rows}, {"plug": rows}, {"air": rows, "plug": rows}]))
         fx.Process(reliability._named()).run([stage], progress=False, max_steps=20)
     return {"runs damaged checkpoint": load, "runs table": table}
 

@@ -70,7 +70,7 @@ def _ball(rng: random.Random) -> Callable:
             radius=size, height=10 * radius, base=-10 * radius, fillet=size * rng.uniform(0.1, 0.9)).mirrored().moved(
                 z=thickness))
         friction = rng.choice(["none", "stick", rng.uniform(0.05, 1.5)])
-        return fx.Contact("top", shape, friction, separates=True, moves=(0, -1), name="plug")
+        return fx.Contact("top", shape, friction, separates=True, direction=(0, -1), name="plug")
     return contact
 
 
@@ -84,9 +84,9 @@ def _blown(rng: random.Random) -> None:
 def _plugged(rng: random.Random) -> None:
     import formingx as fx
     scene, radius, _ = _scene(rng, _ball(rng))
-    stages = [fx.Stage("down", drive="plug", until=fx.travel(radius * rng.uniform(0.1, 0.8)))]
+    stages = [fx.Stage("down", control="plug", until=fx.travel(radius * rng.uniform(0.1, 0.8)))]
     if rng.random() < 0.4:
-        stages.append(fx.Stage("up", drive="plug", until=fx.travel(0.0)))
+        stages.append(fx.Stage("up", control="plug", until=fx.travel(0.0)))
     _judge(lambda **options: fx.Process(scene).run(stages, progress=False, **options))
 
 
@@ -96,11 +96,11 @@ def _in_time(rng: random.Random) -> None:
     if rng.random() < 0.5:
         scene, radius, _ = _scene(rng, _ball(rng), relaxes=True)
         table = _table(rng, radius * rng.uniform(0.1, 0.6))
-        stages = [fx.Stage("follow", follow={"plug": table})]
+        stages = [fx.Stage("follow", amplitudes={"plug": table})]
     else:
         scene, radius, _ = _scene(rng, relaxes=True)
         table = _table(rng, radius**3 * rng.uniform(0.2, 3.0))
-        stages = [fx.Stage("flow", drive="air", follow={fx.enclosed_volume: table})]
+        stages = [fx.Stage("flow", control="air", amplitudes={fx.enclosed_volume: table})]
     _judge(lambda **options: fx.Process(scene).run(stages, progress=False, accuracy="draft", **options))
 
 
@@ -120,7 +120,7 @@ def _moulded(rng: random.Random) -> None:
     import formingx as fx
     scene, _, thickness = _scene(rng, _cup(rng), pressed=True)
     stiff = max(scene.shear_modulus(layer) for layer in scene.mesh.layers) * thickness / scene.extent[0]
-    stages = [fx.Stage("blow", drive="air", until=fx.pressure(stiff * rng.uniform(0.5, 6)))]
+    stages = [fx.Stage("blow", control="air", until=fx.pressure(stiff * rng.uniform(0.5, 6)))]
     _judge(lambda **options: fx.Process(scene).run(stages, progress=False, **options))
 
 
@@ -133,7 +133,7 @@ def _cooled(rng: random.Random) -> None:
     scene, radius, _ = _scene(rng, contact, temperature=rng.uniform(100, 200), heat=heat)
     table = _table(rng, radius * rng.uniform(0.1, 0.5) if contact else radius**3 * rng.uniform(0.2, 1.0))
     follow = {"plug": table} if contact else {fx.enclosed_volume: table}
-    stage = fx.Stage("form", follow=follow, **({} if contact else {"drive": "air"}))
+    stage = fx.Stage("form", amplitudes=follow, **({} if contact else {"drive": "air"}))
     _judge(lambda **options: fx.Process(scene).run([stage], progress=False, accuracy="draft", **options))
 
 
@@ -177,7 +177,7 @@ def _look_at(path: Any) -> None:
     thickness = path.profile(path.states[0]).original_thickness.min()
     for state in path.states:
         profile = path.profile(state)
-        with path.problem.at(state) as problem:
+        with path.problem.state_context(state) as problem:
             travels = [contact.travelled(state.control) for contact in problem.contacts]
         for contact, travel in zip(scene.contacts, travels):
             inside = float(contact.tool.signed_distance(profile.top - travel).max())

@@ -36,10 +36,11 @@ def press(fillet, friction, refinement, travels=TRAVELS):
                         concentrate={edge: 0.08, RADIUS: 0.3})
     plug = fx.tools.male(radius=PLUG, height=4.0, base=-4.0, fillet=fillet).mirrored().moved(z=THICKNESS)
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=C10), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                     contacts=[fx.Contact("top", plug, friction, moves=(0, -1), penalty=2e4, ramp=1e-5)])
+                     contacts=[fx.Contact("top", plug, friction, direction=(0, -1), penalty=2e4, ramp=1e-5)])
     targets = [fx.travel(t) for t in travels]
     try:
-        return fx.trace(scene, until=targets[-1], through=targets[:-1], step=fx.StepControl(target=8), max_steps=300,
+        return fx.trace(scene, until=targets[-1], intermediate=targets[:-1], step=fx.StepControl(target=8),
+                        max_steps=300,
                         progress=False), "done"
     except fx.ConvergenceError as error:
         return error.path, str(error).split(". The last")[0]

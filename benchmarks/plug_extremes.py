@@ -98,14 +98,15 @@ def run(plug, max_steps=None, through=(), **options):
     elements = mesh.domain.topology.index_map(2).size_global
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=0.4, c01=0.04),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                     contacts=[fx.Contact("top", plug.tool, friction, separates=separates, moves=(0, -1),
+                     contacts=[fx.Contact("top", plug.tool, friction, separates=separates, direction=(0, -1),
                                           name="plug", **options)])
     travel = TRAVEL * radius
-    stages = [fx.Stage("push", drive="plug", until=fx.travel(travel), at_fold="jump",      # a plug goes one way
-                       through=[fx.travel(t * radius) for t in through])]
+    # a plug goes one way
+    stages = [fx.Stage("push", control="plug", until=fx.travel(travel), at_limit_point="snap_through",
+                       intermediate=[fx.travel(t * radius) for t in through])]
     if plug.back:
-        stages += [fx.Stage("hold", follow={"plug": [(0, travel), (1, travel)]}),
-                   fx.Stage("withdraw", drive="plug", until=fx.travel(0.0))]
+        stages += [fx.Stage("hold", amplitudes={"plug": [(0, travel), (1, travel)]}),
+                   fx.Stage("withdraw", control="plug", until=fx.travel(0.0))]
     try:
         return fx.Process(scene).run(stages, step=fx.StepControl(target=6), max_steps=max_steps,
                                      progress=False), "arrived", elements
@@ -126,7 +127,7 @@ def ended(error) -> str:
 
 def smallest_J(path, state) -> float:
     """det F where it is smallest."""
-    with path.problem.at(state) as problem:
+    with path.problem.state_context(state) as problem:
         return float(body(problem, problem.x, state.control).J.min())
 
 

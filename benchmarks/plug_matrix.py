@@ -52,7 +52,7 @@ def row(key, seconds) -> list:
     signal.signal(signal.SIGPROF, late)
     signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
-        path, end, _ = run(made, through=AT[:-1])
+        path, end, _ = run(made, intermediate=AT[:-1])
     except fx.Interrupted as error:
         path, end = error.path, f"not done in {seconds} s of CPU time"
     finally:

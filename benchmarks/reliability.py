@@ -100,7 +100,7 @@ def _run(scene: Any, until: Any = None) -> None:
 
 def _named() -> fx.Scene:
     """A scene for a process: a pressure and a plug, with names."""
-    plug = fx.Contact("top", fx.tools.sphere(radius=0.5, z=0.1), "none", moves=(0, -1), name="plug")
+    plug = fx.Contact("top", fx.tools.sphere(radius=0.5, z=0.1), "none", direction=(0, -1), name="plug")
     return _scene(loads=[fx.Pressure("bottom", name="air")], contacts=[plug])
 
 
@@ -109,7 +109,7 @@ def _processed(stages: Any) -> None:
 
 
 def _staged(**stage: Any) -> None:
-    _processed([fx.Stage("on", **({"drive": "plug"} if "follow" not in stage else {}), **stage)])
+    _processed([fx.Stage("on", **({"control": "plug"} if "amplitudes" not in stage else {}), **stage)])
 
 
 def calls(made: fx.Scene, saved: str) -> list[Call]:
@@ -153,10 +153,10 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
     stage = {"name": ("label", "up"), "drive": ("optional thing", "air"), "until": ("optional thing", fx.pressure(0.1)),
              "through": ("several", ()), "without": ("several", ()), "step": ("optional thing", None),
              "speed": optional, "duration": optional, "hold": ("optional table", None),
-             "at_fold": ("optional word", None)}
-    table = {"follow": {"air": [(0.0, 0.0), (1.0, 0.1)]}}
+             "at_limit_point": ("optional word", None)}
+    table = {"amplitudes": {"air": [(0.0, 0.0), (1.0, 0.1)]}}
     kept = {"record": ("optional thing", None), "resume": ("flag", False), "beyond": ("flag", False)}
-    process = {"stages": ("several", [fx.Stage("up", drive="air", until=fx.pressure(0.1))]),
+    process = {"stages": ("several", [fx.Stage("up", control="air", until=fx.pressure(0.1))]),
                "step": ("optional thing", None), "tolerances": ("optional thing", None),
                "max_steps": ("count or None", 200), "progress": ("flag", False), "start": ("optional thing", None),
                "checkpoint": ("folder", None), **kept, "accuracy": ("accuracy", "standard"), "pilot": ("flag", False),
@@ -168,7 +168,8 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
              lambda m: _scene(materials=m)),
         Call("Symmetry", fx.Symmetry, {"on": ("word", "axis"), "normal": ("word", "r"), "mirror": ("flag", False)},
              lambda s: _run(_scene(supports=[s, fx.Clamped("rim")]))),
-        Call("Displaced", fx.Displaced, {"on": word, "component": ("word", "z"), "name": name},
+        Call("PrescribedDisplacement", fx.PrescribedDisplacement,
+             {"on": word, "component": ("word", "z"), "name": name},
              lambda s: _run(_scene(loads=[], supports=[fx.Symmetry("axis"), fx.Clamped("rim"), s]))),
         Call("PinnedNode", fx.PinnedNode, {"r": ("number", 1.0), "z": ("number", 0.0)}),
         Call("Pressure", fx.Pressure, {"on": word, "value": ("optional number", None), "name": name},
@@ -177,9 +178,10 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
                                                "component": ("word", "z")}, lambda t: _run(_scene(), t)),
         Call("travel", fx.travel, {"value": number, "of": name}, lambda t: _staged(until=t)),
         Call("process_time", fx.process_time, {"value": number}, lambda t: _staged(until=t, **table)),
-        Call("Stage", fx.Stage, stage | {"follow": ("optional thing", None)}, lambda s: _processed([s])),
+        Call("Stage", fx.Stage, stage | {"amplitudes": ("optional thing", None)}, lambda s: _processed([s])),
         Call("Stage.follow", fx.Stage, stage | {"drive": ("optional thing", None), "until": ("optional thing", None),
-                                                "follow": ("table", table["follow"])}, lambda s: _processed([s])),
+                                                "amplitudes": ("table", table["amplitudes"])},
+                                                lambda s: _processed([s])),
         Call("Process", fx.Process, {"scene": ("thing", _scene())}),
         Call("Process.run", lambda **given: fx.Process(_named()).run(**given), process),
         Call("Mesh.with_part", _mesh().with_part, part),
@@ -212,14 +214,14 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
             "scene": ("thing", _scene()), "until": ("thing", fx.pole_height(0.1)), "through": ("several", ()),
             "step": ("optional thing", None), "tolerances": ("optional thing", None),
             "max_steps": ("count or None", 200), "progress": ("flag", False), "start": ("optional thing", None),
-            "checkpoint": ("folder", None), **kept, "at_fold": ("optional word", None), "pilot": ("flag", False),
+            "checkpoint": ("folder", None), **kept, "at_limit_point": ("optional word", None), "pilot": ("flag", False),
             "remesh": ("optional thing", None), "stop_at": ("optional thing", None)}),
         Call("load", fx.load, {"folder": ("file", saved), "scene": ("thing", made), "state": ("state", None)}),
         Call("solve", fx.solve, {"scene": ("thing", _scene()), "to": number, "increments": ("count", 1),
                                  "tolerances": ("optional thing", None), "record": ("optional thing", None),
                                  "max_steps": ("count", 1000), "beyond": ("flag", False)}),
         *_time_and_heat(),
-        Call("doctor", fx.doctor, {"scene": ("thing", _scene()), "targets": ("several", ()), "stages": ("several", ()),
+        Call("check", fx.check, {"scene": ("thing", _scene()), "targets": ("several", ()), "stages": ("several", ()),
                                    "units": ("thing", fx.Units())}),
     ]
 

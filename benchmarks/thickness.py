@@ -60,7 +60,7 @@ def inflate(ratio, c01=0.0, space="P1dg", stretches=STRETCHES, heights=None, **m
     targets = [fx.pole_stretch(s) for s in stretches] if heights is None else [fx.pole_height(z) for z in heights]
     began = time.perf_counter()
     try:
-        path = fx.trace(scene, until=targets[-1], through=targets[:-1], progress=False)
+        path = fx.trace(scene, until=targets[-1], intermediate=targets[:-1], progress=False)
     except fx.ConvergenceError as failure:
         path = failure.path
         say(f"  {str(failure).split('. ')[0]} (r0/h0 {ratio:g}, {space}, {mesh})")

@@ -35,18 +35,18 @@ def block(material, elements):
     side = round((elements[0] * elements[1]) ** 0.5)
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(side, side)), materials=material,
                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
-                              fx.Displaced("top", "z", name="pull")])
+                              fx.PrescribedDisplacement("top", "z", name="pull")])
 
 
 def stages(body):
     """(at once, in time) for a body."""
     if body is block:
-        once = fx.Stage("at once", drive="pull", until=fx.travel(STRETCH - 1))
+        once = fx.Stage("at once", control="pull", until=fx.travel(STRETCH - 1))
         return [once], [once, fx.Stage("hold", duration=20.0)]
     table = [(0, 0), (4, VOLUME), (24, VOLUME)]
-    return ([fx.Stage("at once", drive="air", until=fx.enclosed_volume(VOLUME))],
-            [fx.Stage("blow", drive="air", follow={fx.enclosed_volume: table[:2]}),
-             fx.Stage("hold", drive="air", follow={fx.enclosed_volume: table[1:]})])
+    return ([fx.Stage("at once", control="air", until=fx.enclosed_volume(VOLUME))],
+            [fx.Stage("blow", control="air", amplitudes={fx.enclosed_volume: table[:2]}),
+             fx.Stage("hold", control="air", amplitudes={fx.enclosed_volume: table[1:]})])
 
 
 def cost(body, material, schedule, elements, accuracy):

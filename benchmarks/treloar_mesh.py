@@ -24,7 +24,7 @@ def pressures(elements, support, model=None, grading=1.0, until=8.5, max_steps=2
                      loads=[fx.Pressure("bottom")], model=model)
     targets = [fx.pole_stretch(s) for s in STRETCHES if s <= until]
     try:
-        path = fx.trace(scene, until=targets[-1], through=targets[:-1], max_steps=max_steps, progress=False)
+        path = fx.trace(scene, until=targets[-1], intermediate=targets[:-1], max_steps=max_steps, progress=False)
         stopped = None
     except fx.ConvergenceError as error:
         path, stopped = error.path, f"stopped at stretch {error.path.last.measures['pole_stretch']:.2f}"

@@ -33,9 +33,9 @@ def blow(q, n, accuracy):
     full = STRETCHES[-1] ** 3 - 1
     at = [(stretch**3 - 1) / q for stretch in STRETCHES]     # volume grows with the middle of the wall
     end = at[-1]
-    stage = fx.Stage("blow", drive="air",
-                     follow={fx.enclosed_volume: [(0, 0), (end, full * HALF), (end + HELD[-1], full * HALF)]},
-                     through=times(0.0, at) + times(end, HELD[:-1]))
+    stage = fx.Stage("blow", control="air",
+                     amplitudes={fx.enclosed_volume: [(0, 0), (end, full * HALF), (end + HELD[-1], full * HALF)]},
+                     intermediate=times(0.0, at) + times(end, HELD[:-1]))
     path = fx.Process(balloon(n)).run([stage], accuracy=accuracy, max_steps=100_000)
 
     def scaled(time):
@@ -47,8 +47,8 @@ def blow(q, n, accuracy):
 def creep(p, n, accuracy):
     """The path under a held pressure, and its numbers."""
     through = [fx.pole_stretch(s) for s in CREPT]
-    stages = [fx.Stage("put on", drive="air", until=fx.pressure(p * H0 / R0), through=through),
-              fx.Stage("creep", duration=LONG, through=through, at_fold="stop")]
+    stages = [fx.Stage("put on", control="air", until=fx.pressure(p * H0 / R0), intermediate=through),
+              fx.Stage("creep", duration=LONG, intermediate=through, at_limit_point="stop")]
     path = fx.Process(balloon(n)).run(stages, accuracy=accuracy, max_steps=100_000)
     met = {f"{s:g}": path.met(target) for s, target in zip(CREPT, through)}
     found: dict = {"time_at_stretch": {s: float(state.time) for s, state in met.items() if state is not None}}

@@ -47,7 +47,8 @@ def scene(held, n):
 def inflate(held, n):
     """The path beyond the maximum of the pressure, or what there is of it: a clamped corner may crease."""
     try:
-        return fx.trace(scene(held, n), until=fx.pole_stretch(END), through=[fx.pole_stretch(STRETCH)], progress=False)
+        return fx.trace(scene(held, n), until=fx.pole_stretch(END), intermediate=[fx.pole_stretch(STRETCH)],
+                        progress=False)
     except fx.ConvergenceError as error:
         if error.path.met(fx.pole_stretch(STRETCH)) is None:
             raise

@@ -52,14 +52,14 @@ def scene(relaxes, plug, friction, elements, comm):
     return fx.Scene(mesh=mesh, materials=sheet, temperature=HOT, heat=heat if conductance else None,
                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="vacuum")],
                     contacts=[fx.Contact("top", POT.mould, "stick", name="mould"),
-                              fx.Contact("bottom", POT.plug, FRICTION[friction], moves=(0, 1), name="plug")])
+                              fx.Contact("bottom", POT.plug, FRICTION[friction], direction=(0, 1), name="plug")])
 
 
 def process(assisted):
     """The stages; without a plug: vacuum alone."""
-    suck = fx.Stage("vacuum", drive="vacuum", until=fx.pressure(VACUUM), duration=SUCTION,
-                    step=fx.StepControl(target=8), without=[] if assisted else ["plug"])
-    return [fx.Stage("plug", drive="plug", until=fx.travel(TRAVEL), duration=STROKE), suck] if assisted else [suck]
+    suck = fx.Stage("vacuum", control="vacuum", until=fx.pressure(VACUUM), duration=SUCTION,
+                    step=fx.StepControl(target=8), inactive=[] if assisted else ["plug"])
+    return [fx.Stage("plug", control="plug", until=fx.travel(TRAVEL), duration=STROKE), suck] if assisted else [suck]
 
 
 def form(case):

@@ -25,7 +25,7 @@ def plate_stress(path, state):
     """(r, normal stress on the plate) of both faces that touch it, sorted by r."""
     found = []
     for contact in path.problem.contacts:
-        with path.problem.at(state):
+        with path.problem.state_context(state):
             points, traction = resultants.traction(contact, state.x, state.control)
         moved = where(path, state, points)
         order = np.argsort(points @ (1, -1))                 # along the top outwards, then down the side

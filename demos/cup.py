@@ -25,7 +25,7 @@ def form(friction, elements, pressures=PRESSURES, kinematics=None, step=None, **
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")],
                      contacts=[fx.Contact("top", mould, friction, **options)], kinematics=kinematics)
     targets = [fx.pressure(p) for p in pressures]
-    path = fx.trace(scene, until=targets[-1], through=targets[:-1], step=step or fx.StepControl(target=8),
+    path = fx.trace(scene, until=targets[-1], intermediate=targets[:-1], step=step or fx.StepControl(target=8),
                     max_steps=1000)
     return path, mould
 

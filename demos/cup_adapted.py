@@ -28,7 +28,7 @@ def form(mesh, pressures):
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")],
                      contacts=[fx.Contact("top", mould, "stick")])
     targets = [fx.pressure(p) for p in pressures]
-    return fx.trace(scene, until=targets[-1], through=targets[:-1], step=fx.StepControl(target=8), progress=False)
+    return fx.trace(scene, until=targets[-1], intermediate=targets[:-1], step=fx.StepControl(target=8), progress=False)
 
 
 def disc(columns):

@@ -25,7 +25,7 @@ def form(friction, elements, depth, draft, fillet):
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")],
                      contacts=[fx.Contact("top", mould, friction)])
     targets = [fx.pressure(p) for p in PRESSURES]
-    path = fx.trace(scene, until=targets[-1], through=targets[:-1], step=fx.StepControl(target=8), max_steps=1500)
+    path = fx.trace(scene, until=targets[-1], intermediate=targets[:-1], step=fx.StepControl(target=8), max_steps=1500)
     return path, mould
 
 
@@ -35,7 +35,7 @@ def key_numbers(path, mould):
     angles = corner.start + corner.sweep * np.linspace(0, 1, 41)
     fillet = corner.centre + corner.radius * np.column_stack([np.cos(angles), np.sin(angles)])
     touch = first_touch(path)
-    with path.problem.at(touch) as problem:
+    with path.problem.state_context(touch) as problem:
         points, traction = resultants.traction(problem.contacts[0], touch.x, touch.control)
     touching = np.flatnonzero(traction[:-1, 0] > 0)
     return {

@@ -23,7 +23,7 @@ def inflate(size):
     scene = fx.Scene(mesh=sheet, thickness=THICKNESS, materials=fx.NeoHookean(c10=C10), loads=[fx.Pressure("bottom")],
                      supports=[fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")])
     targets = [fx.displacement(EXACT[s].height, at=(0, 0)) for s in STRETCHES]
-    return fx.trace(scene, until=targets[-1], through=targets[:-1]), targets
+    return fx.trace(scene, until=targets[-1], intermediate=targets[:-1]), targets
 
 
 def key_numbers(path, targets):

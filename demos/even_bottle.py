@@ -42,7 +42,7 @@ def main():
     args = options.parse_args()
     elements = (24 if args.quick else args.elements, 1)
     design = fx.Design(lambda wall: bottle(wall, elements),
-                       {"wall": fx.along(KNOTS, start=WALL, low=0.1, high=0.39)}, step=fx.StepControl(target=8))
+                       {"wall": fx.spline(KNOTS, start=WALL, low=0.1, high=0.39)}, step=fx.StepControl(target=8))
     first = design.run()
     end = PART * first.profile.reference_length[-1]
     answer = design.fit(even=True, within=(0.0, end), runs=2 if args.quick else args.runs, good=2e-3,

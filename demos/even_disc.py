@@ -37,7 +37,7 @@ def sheet(model, elements, stretch, h0=None, c=None):
 def search(model, elements, knots, stretch, of):
     """The answer of one case: `of` is "h0" or "c"."""
     design = fx.Design(lambda profile: sheet(model, elements, stretch, **{of: profile}),
-                       {"profile": fx.along(knots, start=0.0, low=-4.0, high=4.0, smooth=True)})
+                       {"profile": fx.spline(knots, start=0.0, low=-4.0, high=4.0, smooth=True)})
     return design.fit(even=True, volume=None, runs=6, good=2e-4)
 
 

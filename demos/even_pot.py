@@ -31,9 +31,9 @@ def pot(travel, nose, mu, heat, elements=(24, 1)):
     scene = fx.Scene(mesh=mesh, materials=sheet, temperature=lambda R, Z: heat(R / RADIUS),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")],
                      contacts=[fx.Contact("top", mould, "stick", separates=False, name="mould"),
-                               fx.Contact("bottom", plug, mu, moves=(0, 1), name="plug")])
-    return scene, [fx.Stage("plug", drive="plug", until=fx.travel(travel), duration=0.5),
-                   fx.Stage("air", drive="air", until=fx.pressure(PRESSURE), duration=0.5)]
+                               fx.Contact("bottom", plug, mu, direction=(0, 1), name="plug")])
+    return scene, [fx.Stage("plug", control="plug", until=fx.travel(travel), duration=0.5),
+                   fx.Stage("air", control="air", until=fx.pressure(PRESSURE), duration=0.5)]
 
 
 def run(travel, nose, mu, elements=(24, 1), **heat):
@@ -57,7 +57,7 @@ def main():
     args = options.parse_args()
     elements, runs, search = ((12, 1), 2, 2) if args.quick else ((24, 1), args.runs, args.search)
     design = fx.Design(lambda **values: pot(**values, elements=elements),
-                       {**PLUG, "heat": fx.along(KNOTS, start=HEAT[0], low=HEAT[1], high=HEAT[2])}, step=STEP)
+                       {**PLUG, "heat": fx.spline(KNOTS, start=HEAT[0], low=HEAT[1], high=HEAT[2])}, step=STEP)
     answer = design.fit(even=True, within=(0.0, PART), volume=None, runs=runs, good=2e-3)
     say(str(answer))
     heats = {f"heat_{k}": HEAT for k in range(KNOTS)}

@@ -19,9 +19,9 @@ def draw(thickness, elements):
     ball = fx.tools.sphere(radius=4.0, z=thickness)
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0),
                      supports=[fx.Symmetry("axis"), fx.Symmetry("rim", normal="z")],
-                     contacts=[fx.Contact("top", ball, "none", moves=(0, -1), points=4)])
+                     contacts=[fx.Contact("top", ball, "none", direction=(0, -1), points=4)])
     through = [fx.travel(t) for t in np.arange(0.2, TRAVEL, 0.2)]          # short enough steps to solve between them
-    return fx.trace(scene, until=fx.travel(TRAVEL), through=through, progress=False)
+    return fx.trace(scene, until=fx.travel(TRAVEL), intermediate=through, progress=False)
 
 
 def watch(path, thickness):
@@ -43,7 +43,7 @@ def main():
         at, hoop = watch(path, thickness)
         compressed = path["travel"][1:][hoop[1:].min(1) < -1e-3]
         ends = at[hoop[-1] < 0]
-        numbers = summary[f"h_{thickness:g}"] = {"alarms": len(found.alarms)}
+        numbers = summary[f"h_{thickness:g}"] = {"alarms": len(found.bifurcations)}
         if first is not None:
             numbers |= {"first_n": int(first.number), "first_travel": first.control}
             last, picture = first, thickness

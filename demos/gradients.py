@@ -63,9 +63,9 @@ def pot(mu, travel, nose, c10, relaxing=False, elements=(24, 1)):
     scene = fx.Scene(mesh=mesh, materials=sheet, supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      loads=[fx.Pressure("bottom", name="air")],
                      contacts=[fx.Contact("top", mould, "stick", separates=False, name="mould"),
-                               fx.Contact("bottom", plug, mu, moves=(0, 1), name="plug")])
-    return scene, [fx.Stage("plug", drive="plug", until=fx.travel(travel), speed=4.0 if relaxing else None),
-                   fx.Stage("air", drive="air", until=fx.pressure(0.05), duration=0.5 if relaxing else None)]
+                               fx.Contact("bottom", plug, mu, direction=(0, 1), name="plug")])
+    return scene, [fx.Stage("plug", control="plug", until=fx.travel(travel), speed=4.0 if relaxing else None),
+                   fx.Stage("air", control="air", until=fx.pressure(0.05), duration=0.5 if relaxing else None)]
 
 
 def beside(design, values, name, step, radii, thickness):

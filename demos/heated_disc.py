@@ -32,7 +32,7 @@ def inflate(model, modulus, elements=None):
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=lambda R, Z: modulus(R)), loads=[fx.Pressure("bottom")],
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], model=MODELS[model])
     *through, last = (fx.pole_stretch(float(s)) for s in STRETCHES)
-    return fx.trace(scene, until=last, through=through, progress=False)
+    return fx.trace(scene, until=last, intermediate=through, progress=False)
 
 
 def key_numbers(path, modulus):

@@ -31,14 +31,14 @@ def block(melt, mode):
     face, direction = PULLED[mode]
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)), materials=MELTS[melt],
                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
-                              fx.Displaced(face, direction, name="pull")])
+                              fx.PrescribedDisplacement(face, direction, name="pull")])
 
 
 def pull(melt, mode, rate, accuracy):
     """(the path, {stretch: sigma1 - sigma3}) at a constant Hencky rate."""
     at = [np.log(stretch) / rate for stretch in STRETCHES]
-    stage = fx.Stage("pull", drive="pull", follow={fx.travel: lambda t: np.expm1(rate * t)},
-                     until=fx.process_time(at[-1]), through=times(0.0, at[:-1]))
+    stage = fx.Stage("pull", control="pull", amplitudes={fx.travel: lambda t: np.expm1(rate * t)},
+                     until=fx.process_time(at[-1]), intermediate=times(0.0, at[:-1]))
     path = fx.Process(block(melt, mode)).run([stage], accuracy=accuracy, progress=False)
     found = {}
     for stretch, t in zip(STRETCHES, at):
@@ -54,9 +54,9 @@ def blow(damping, elements, accuracy):
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
                      loads=[fx.Pressure("bottom", name="air")])
     return fx.Process(scene).run([
-        fx.Stage("blow", drive="air", follow={fx.enclosed_volume: [(0.0, 0.0), (1.0, VOLUME)]},
-                 through=times(0.0, MET[:1])),
-        fx.Stage("hold", drive="air", hold=fx.enclosed_volume(VOLUME), duration=MET[-1] - 1)],
+        fx.Stage("blow", control="air", amplitudes={fx.enclosed_volume: [(0.0, 0.0), (1.0, VOLUME)]},
+                 intermediate=times(0.0, MET[:1])),
+        fx.Stage("hold", control="air", constant=fx.enclosed_volume(VOLUME), duration=MET[-1] - 1)],
         accuracy=accuracy, progress=False)
 
 

@@ -34,9 +34,9 @@ def form(process, friction, elements):
     targets = [fx.travel(d) for d in TRAVELS] if drape else [fx.pressure(p) for p in PRESSURES]
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[] if drape else [fx.Pressure("top")],
-                     contacts=[fx.Contact("bottom", mould, friction, moves=(0, 1) if drape else None)])
+                     contacts=[fx.Contact("bottom", mould, friction, direction=(0, 1) if drape else None)])
     step = fx.StepControl(target=8, length=0.02 if drape else 0.1)       # short enough to end at the first touch
-    path = fx.trace(scene, until=targets[-1], through=targets[:-1], step=step, max_steps=1500)
+    path = fx.trace(scene, until=targets[-1], intermediate=targets[:-1], step=step, max_steps=1500)
     return path, targets, mould.moved(z=TRAVELS[-1]) if drape else mould
 
 

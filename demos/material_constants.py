@@ -40,7 +40,7 @@ def inflate(sheet, elements, until, through=()):
     mesh = fx.mesh.disc(radius=radius, thickness=thickness, elements=elements)
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=c10, c01=c01), loads=[fx.Pressure("bottom")],
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
-    return fx.trace(scene, until=until, through=through)
+    return fx.trace(scene, until=until, intermediate=through)
 
 
 def power_law(modulus, index):
@@ -64,8 +64,8 @@ def relaxing_numbers(sheet, elements, elastic):
                      materials=power_law(2 * c10, RELAXATION), loads=[fx.Pressure("bottom")],
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
     times = {h: fx.process_time(FORMING * float(h) / float(HEIGHTS[-1])) for h in HEIGHTS}
-    blow = fx.Stage("blow", drive=scene.loads[0], follow={fx.pole_height: [(0.0, 0.0), (FORMING, end)]},
-                    until=times[HEIGHTS[-1]], through=list(times.values())[:-1])
+    blow = fx.Stage("blow", control=scene.loads[0], amplitudes={fx.pole_height: [(0.0, 0.0), (FORMING, end)]},
+                    until=times[HEIGHTS[-1]], intermediate=list(times.values())[:-1])
     path = fx.Process(scene).run([blow])
     pairs = {h: (path.met(times[h]).measures, elastic.met(fx.pole_height(float(h) * radius)).measures)
              for h in HEIGHTS}

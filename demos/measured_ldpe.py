@@ -42,10 +42,10 @@ def scene_extension(card, rate, accuracy):
     """The same in a block of one element whose top is pulled."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)), materials=card,
                      supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
-                               fx.Displaced("top", "z", name="pull")])
+                               fx.PrescribedDisplacement("top", "z", name="pull")])
     at = [strain / rate for strain in STRAINS]
-    stage = fx.Stage("pull", drive="pull", follow={fx.travel: lambda t: np.expm1(rate * t)},
-                     until=fx.process_time(at[-1]), through=times(0.0, at[:-1]))
+    stage = fx.Stage("pull", control="pull", amplitudes={fx.travel: lambda t: np.expm1(rate * t)},
+                     until=fx.process_time(at[-1]), intermediate=times(0.0, at[:-1]))
     path = fx.Process(scene).run([stage], accuracy=accuracy, progress=False)
     sigma = [path.stress(at_time(path, "pull", t)).at_quadrature_points().cauchy.mean(axis=0) for t in at]
     return np.array([s[1, 1] - s[0, 0] for s in sigma])

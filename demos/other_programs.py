@@ -103,8 +103,8 @@ def vm201(size, out):
     """
     scene = fx.Scene(mesh=quarter(200.0, size, out / "bar.msh"), materials=fx.MooneyRivlin(c10=0.293, c01=0.177),
                      kinematics=fx.PlaneStrain(), supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")],
-                     contacts=[fx.Contact("outer", fx.tools.plane(200.0), "none", moves=(0, -1))])
-    path = fx.trace(scene, until=fx.travel(100.0), through=[fx.travel(50.0)], progress=False)
+                     contacts=[fx.Contact("outer", fx.tools.plane(200.0), "none", direction=(0, -1))])
+    path = fx.trace(scene, until=fx.travel(100.0), intermediate=[fx.travel(50.0)], progress=False)
     force = [2 * path.met(fx.travel(half)).measures["tool_force"] for half in (50.0, 100.0)]
     return {"force_at_0.1": row(force[0], 250.0, "N"), "force_at_0.2": row(force[1], 1400.0, "N")}
 
@@ -150,7 +150,7 @@ def ssnv187a(n):
     for name, (law, theirs) in laws.items():
         scene = fx.Scene(mesh=fx.mesh.disc(radius=0.5, thickness=1.0, elements=(n, n)), materials=law,
                          kinematics=fx.PlaneStrain(), supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
-                                                                fx.Displaced("top", name="press")])
+                                                                fx.PrescribedDisplacement("top", name="press")])
         path = fx.trace(scene, until=fx.force(0.876 / 2), progress=False)
         found[name] = row(-path.last.measures["travel"], theirs, "")
     return found

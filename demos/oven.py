@@ -33,11 +33,11 @@ def form(thickness, elements, accuracy, time=None):
     """The path through oven and forming; time: in the oven, of a sheet without weight."""
     process = fx.Process(scene(thickness, elements, weight=time is None))
     heat = fx.Stage("heat", duration=time) if time else fx.Stage(
-        "heat", until=fx.sag(LIMIT), duration=300.0, through=[fx.process_time(t) for t in TIMES[thickness]])
+        "heat", until=fx.sag(LIMIT), duration=300.0, intermediate=[fx.process_time(t) for t in TIMES[thickness]])
     path = process.run([heat], accuracy=accuracy, progress=False)
     now = path.last
     dome = [(now.time, now.measures["pole_height"]), (now.time + FORMING, DOME)]
-    blow = fx.Stage("blow", drive="air", follow={fx.pole_height: dome})
+    blow = fx.Stage("blow", control="air", amplitudes={fx.pole_height: dome})
     return process.run([heat, blow], start=path, accuracy=accuracy, progress=False)
 
 

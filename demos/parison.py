@@ -28,7 +28,8 @@ def blow(friction, elements):
                      supports=[fx.Symmetry("axis"), fx.Clamped("neck")], loads=[fx.Pressure("inner")],
                      contacts=[fx.Contact("outer", mould, friction)])
     room = content(mould.outline(200)) - content(mesh.line_of("outer"))
-    path = fx.trace(scene, until=fx.pressure(PRESSURE), through=[fx.enclosed_volume(part * room) for part in FILLED],
+    path = fx.trace(scene, until=fx.pressure(PRESSURE),
+                    intermediate=[fx.enclosed_volume(part * room) for part in FILLED],
                     step=fx.StepControl(target=8), max_steps=1000)
     return path, mould, room
 
@@ -66,7 +67,7 @@ def key_numbers(path, mould, room):
 
 def touching(path, state):
     """Reference Z of the nodes that touch."""
-    with path.problem.at(state) as problem:
+    with path.problem.state_context(state) as problem:
         points, traction = resultants.traction(problem.contacts[0], state.x, state.control)
     found = points[traction[:, 0] > 0, 1]
     return found if len(found) else [None]

@@ -23,7 +23,7 @@ def block(materials, friction, elements, *, roll_over=False, layers=HALF_HEIGHT,
     faces = ("top", "rim") if roll_over else ("top",)
     return fx.Scene(mesh=mesh, materials=materials, kinematics=kinematics, model=model,
                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")],
-                    contacts=[fx.Contact(face, fx.tools.plane(height), friction, moves=(0, -1), **options)
+                    contacts=[fx.Contact(face, fx.tools.plane(height), friction, direction=(0, -1), **options)
                               for face in faces])
 
 
@@ -32,7 +32,7 @@ def press(scene, travels, **options):
     targets = [fx.travel(t) for t in travels]
     options["step"] = fx.StepControl(target=8)
     try:
-        return fx.trace(scene, until=targets[-1], through=targets[:-1], **options), "done"
+        return fx.trace(scene, until=targets[-1], intermediate=targets[:-1], **options), "done"
     except fx.ConvergenceError as error:
         return error.path, str(error)
 

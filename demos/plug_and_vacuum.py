@@ -41,23 +41,23 @@ def plug_then_vacuum(way, radius, share, elements, comm=COMM, progress=True):
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="vacuum")],
                      contacts=[fx.Contact("top", MOULD, "stick", separates=lifts, name="mould"),
-                               fx.Contact("bottom", plug, 0.3 if lifts else "stick", separates=lifts, moves=(0, 1),
+                               fx.Contact("bottom", plug, 0.3 if lifts else "stick", separates=lifts, direction=(0, 1),
                                           name="plug")])
     full = [fx.pressure(p) for p in PRESSURES]
-    stages = [fx.Stage("plug", drive="plug", until=fx.travel(share * DEPTH))]
+    stages = [fx.Stage("plug", control="plug", until=fx.travel(share * DEPTH))]
     if lifts:
-        stages += [fx.Stage("vacuum", drive="vacuum", until=full[-1], through=full[:-1]),
-                   fx.Stage("plug out", drive="plug", until=fx.travel(0.0))]
+        stages += [fx.Stage("vacuum", control="vacuum", until=full[-1], intermediate=full[:-1]),
+                   fx.Stage("plug out", control="plug", until=fx.travel(0.0))]
         return fx.Process(scene).run(stages, step=STEP, max_steps=800, progress=progress)
-    stages += [fx.Stage("wall", drive="vacuum", until=fx.pressure(SEAL)),
-               fx.Stage("relax", drive="vacuum", until=fx.pressure(LOW))]
+    stages += [fx.Stage("wall", control="vacuum", until=fx.pressure(SEAL)),
+               fx.Stage("relax", control="vacuum", until=fx.pressure(LOW))]
     process = fx.Process(scene)
     path = process.run(stages, step=STEP, progress=progress)
     if way == "carries":                                     # the base is pressed to the bottom by h0/100
         bottom = DEPTH + 1.01 * THICKNESS - path.profile().thickness[0]
-        stages += [fx.Stage("plug on", drive="plug", until=fx.travel(bottom))]
-    stages += [fx.Stage("plug off", without=["plug"]),
-               fx.Stage("vacuum", drive="vacuum", until=full[-1], through=full[2:-1], without=["plug"])]
+        stages += [fx.Stage("plug on", control="plug", until=fx.travel(bottom))]
+    stages += [fx.Stage("plug off", inactive=["plug"]),
+               fx.Stage("vacuum", control="vacuum", until=full[-1], intermediate=full[2:-1], inactive=["plug"])]
     return process.run(stages, step=STEP, max_steps=800, start=path, progress=progress)
 
 

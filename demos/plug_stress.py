@@ -57,7 +57,7 @@ def press(law, elements, fillet, travels):
     """The path through the travels."""
     made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), law, elements)
     *through, until = [fx.travel(t) for t in sorted(travels)]
-    return fx.trace(made, until=until, through=through, step=fx.StepControl(target=6), max_steps=400)
+    return fx.trace(made, until=until, intermediate=through, step=fx.StepControl(target=6), max_steps=400)
 
 
 def key_numbers(path, state, corners) -> dict:

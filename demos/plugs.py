@@ -46,7 +46,7 @@ def scene(radius, thickness, plug_radius, fillet, material, law, elements, suppo
     return fx.Scene(mesh=mesh, materials=material, supports=[fx.Symmetry("axis"), support or fx.Clamped("rim")],
                     model=model,
                     contacts=[fx.Contact("top", plug(plug_radius, thickness, fillet), friction, separates=separates,
-                                         moves=(0, -1), **options)])
+                                         direction=(0, -1), **options)])
 
 
 def sliding(radius, thickness, plug_radius, fillet, material, mu, face_stretch, refine=1, through=(1,), **options):
@@ -76,7 +76,7 @@ def push(made, travels, pole_stretch=None, smallest=1e-6, **options):
     targets = [fx.travel(t) for t in travels]
     until = targets.pop() if pole_stretch is None else fx.pole_stretch(pole_stretch)
     try:
-        return fx.trace(made, until=until, through=targets, step=fx.StepControl(target=6, smallest=smallest),
+        return fx.trace(made, until=until, intermediate=targets, step=fx.StepControl(target=6, smallest=smallest),
                         **options), "done"
     except fx.ConvergenceError as error:
         return error.path, str(error)
@@ -89,7 +89,8 @@ def driven_nodes(radius, thickness, plug_radius, material, elements):
     """
     mesh = fx.mesh.disc(radius=radius, thickness=thickness, elements=elements, concentrate={plug_radius: 0.2})
     return fx.Scene(mesh=mesh.with_part("plug", "bottom", (0, plug_radius)), materials=material, supports=[
-        fx.Symmetry("axis"), fx.Clamped("rim"), fx.Symmetry("plug", normal="r"), fx.Displaced("plug", "z")])
+        fx.Symmetry("axis"), fx.Clamped("rim"), fx.Symmetry("plug", normal="r"),
+        fx.PrescribedDisplacement("plug", "z")])
 
 
 def force(state) -> float:

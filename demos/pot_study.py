@@ -32,20 +32,20 @@ def pot(travel, radius, friction, elements=(30, 1)):
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=0.35, c01=0.05),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="vacuum")],
                      contacts=[fx.Contact("top", mould, "stick", separates=False, name="mould"),
-                               fx.Contact("bottom", plug, friction, moves=(0, 1), name="plug")])
-    stages = [fx.Stage("plug", drive="plug", until=fx.travel(travel)),
-              fx.Stage("vacuum", drive="vacuum", until=fx.pressure(PRESSURE))]
+                               fx.Contact("bottom", plug, friction, direction=(0, 1), name="plug")])
+    stages = [fx.Stage("plug", control="plug", until=fx.travel(travel)),
+              fx.Stage("vacuum", control="vacuum", until=fx.pressure(PRESSURE))]
     return fx.Process(scene).run(stages, step=fx.StepControl(target=8), max_steps=600, progress=False)
 
 
-def evenness(path):
+def uniformity(path):
     """Least wall over mean wall of the trimmed part."""
-    return path.part(trim=TRIM).evenness
+    return path.part(trim=TRIM).uniformity
 
 
-def least_wall(path):
+def min_wall(path):
     """Of the trimmed part, mm."""
-    return path.part(trim=TRIM).least_wall
+    return path.part(trim=TRIM).min_wall
 
 
 def plug_force(path):
@@ -53,7 +53,7 @@ def plug_force(path):
     return path.tool_forces()["plug"].max()
 
 
-MEASURES = {"evenness": evenness, "least_wall": least_wall, "plug_force": plug_force}
+MEASURES = {"evenness": uniformity, "least_wall": min_wall, "plug_force": plug_force}
 
 
 def main():

@@ -27,7 +27,7 @@ def block(material, mode):
     face, direction, _ = PULLED[mode]
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)), materials=material,
                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
-                              fx.Displaced(face, direction, name="pull")])
+                              fx.PrescribedDisplacement(face, direction, name="pull")])
 
 
 def run(scene, stages, accuracy):
@@ -41,16 +41,16 @@ def true_stress(state, mode):
 
 def relax(mode, stretch, accuracy):
     """Stretched at once and held: the path, and {time: stress}."""
-    path = run(block(P0, mode), [fx.Stage("pull", drive="pull", until=fx.travel(stretch - 1.0)),
-                                 fx.Stage("hold", duration=TIMES[-1], through=times(0.0, TIMES[:-1]))], accuracy)
+    path = run(block(P0, mode), [fx.Stage("pull", control="pull", until=fx.travel(stretch - 1.0)),
+                                 fx.Stage("hold", duration=TIMES[-1], intermediate=times(0.0, TIMES[:-1]))], accuracy)
     return path, {f"{t:g}": true_stress(at_time(path, "hold", t), mode) for t in (0, *TIMES)}
 
 
 def pull(mode, rate, accuracy):
     """At a constant Hencky rate: the path, and {stretch: stress}."""
     at = [np.log(stretch) / rate for stretch in MET]
-    stage = fx.Stage("pull", drive="pull", follow={fx.travel: lambda t: np.expm1(rate * t)},
-                     until=fx.process_time(at[-1]), through=times(0.0, at[:-1]))
+    stage = fx.Stage("pull", control="pull", amplitudes={fx.travel: lambda t: np.expm1(rate * t)},
+                     until=fx.process_time(at[-1]), intermediate=times(0.0, at[:-1]))
     path = run(block(P1, mode), [stage], accuracy)
     return path, {f"{s:g}": true_stress(at_time(path, "pull", t), mode) for s, t in zip(MET, at)}
 
@@ -59,11 +59,11 @@ def creep(accuracy):
     """A dead force put on at once, held, taken off at once: the path, {time: stretch} under it and {} without."""
     force, end = fx.force(-FORCE * np.pi), CREEP[-1]
     path = run(block(P1, "uniaxial"), [
-        fx.Stage("load", drive="pull", until=force),
-        fx.Stage("creep", drive="pull", hold=force, duration=end, through=times(0.0, CREEP[:-1])),
-        fx.Stage("unload", drive="pull", until=fx.force(0.0)),
-        fx.Stage("recovery", drive="pull", hold=fx.force(0.0), duration=RECOVERY[-1],
-                 through=times(end, RECOVERY[:-1]))], accuracy)
+        fx.Stage("load", control="pull", until=force),
+        fx.Stage("creep", control="pull", constant=force, duration=end, intermediate=times(0.0, CREEP[:-1])),
+        fx.Stage("unload", control="pull", until=fx.force(0.0)),
+        fx.Stage("recovery", control="pull", constant=fx.force(0.0), duration=RECOVERY[-1],
+                 intermediate=times(end, RECOVERY[:-1]))], accuracy)
 
     def stretch(stage, begin, after):
         return {f"{t:g}": float(1 + at_time(path, stage, begin + t).measures["travel"]) for t in after}

@@ -32,19 +32,19 @@ def scene(sheet, elements):
     return fx.Scene(mesh=fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=elements), materials=SHEETS[sheet],
                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="vacuum")],
                     contacts=[fx.Contact("top", MOULD, "stick", name="mould"),
-                              fx.Contact("bottom", plug, 0.3, moves=(0, 1), name="plug")])
+                              fx.Contact("bottom", plug, 0.3, direction=(0, 1), name="plug")])
 
 
 def process(speed, hold):
     """The stages; speed None: no plug."""
-    vacuum = {"drive": "vacuum", "until": fx.pressure(PRESSURES[-1]), "through": [fx.pressure(PRESSURES[0])]}
-    stages = [fx.Stage("vacuum", without=["plug"], step=STEP, **vacuum)]
+    vacuum = {"control": "vacuum", "until": fx.pressure(PRESSURES[-1]), "intermediate": [fx.pressure(PRESSURES[0])]}
+    stages = [fx.Stage("vacuum", inactive=["plug"], step=STEP, **vacuum)]
     if speed is not None:
-        stages = [fx.Stage("plug", drive="plug", until=fx.travel(TRAVEL), speed=speed)]
+        stages = [fx.Stage("plug", control="plug", until=fx.travel(TRAVEL), speed=speed)]
         stages += [fx.Stage("hold", duration=hold)] if hold else []
         stages += [fx.Stage("vacuum", step=STEP, **vacuum)]
-    return [*stages, fx.Stage("in the mould", duration=IN_MOULD, without=["plug"]),
-            fx.Stage("out of the mould", without=AWAY), fx.Stage("recovery", duration=RECOVERY, without=AWAY)]
+    return [*stages, fx.Stage("in the mould", duration=IN_MOULD, inactive=["plug"]),
+            fx.Stage("out of the mould", inactive=AWAY), fx.Stage("recovery", duration=RECOVERY, inactive=AWAY)]
 
 
 def form(sheet, speed, hold, elements, accuracy):

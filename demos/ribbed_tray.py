@@ -70,19 +70,20 @@ def form(sheet, mould):
     """The path of plug and vacuum."""
     plug = fx.tools.box(half=(52, 27), depth=30, corner=15, fillet=8, draft=5, mouth=30.5, plug=True)
     contacts = [fx.Contact("bottom", mould, "stick", name="mould", nodes_per_step=2),
-                fx.Contact("top", plug, "stick", moves=(0, 0, -1), name="plug", nodes_per_step=2)]
+                fx.Contact("top", plug, "stick", direction=(0, 0, -1), name="plug", nodes_per_step=2)]
     scene = fx.Scene(mesh=sheet, thickness=THICKNESS, materials=MATERIAL, supports=[fx.SimplySupported("rim")],
                      loads=[fx.Pressure("top", name="vacuum")], contacts=contacts, model=fx.Membrane(wrinkles=0.01))
-    stages = [fx.Stage("plug", drive="plug", until=fx.travel(PLUG_TRAVEL), speed=60.0), fx.Stage("hold", duration=0.3),
-              fx.Stage("seal", drive="vacuum", until=fx.pressure(SEAL)), fx.Stage("plug off", without=["plug"]),
-              fx.Stage("vacuum", drive="vacuum", until=fx.pressure(VACUUM), without=["plug"])]
+    stages = [fx.Stage("plug", control="plug", until=fx.travel(PLUG_TRAVEL), speed=60.0),
+              fx.Stage("hold", duration=0.3),
+              fx.Stage("seal", control="vacuum", until=fx.pressure(SEAL)), fx.Stage("plug off", inactive=["plug"]),
+              fx.Stage("vacuum", control="vacuum", until=fx.pressure(VACUUM), inactive=["plug"])]
     return fx.Process(scene).run(stages)
 
 
 def numbers(path):
     """What the summary holds of one path."""
     part, wall = path.part(density=DENSITY, trim=-0.5, units=UNITS), path.wall()
-    return {"least_wall_mm": part.least_wall, "least_at_mm": list(part.least_at), "weight_g": part.weight,
+    return {"least_wall_mm": part.min_wall, "least_at_mm": list(part.min_wall_at), "weight_g": part.weight,
             "draw_ratio": part.draw_ratio, "touching": path.filling("mould").touching[-1],
             "plug_force_N": float(np.abs(path["plug_force"]).max()), "states": len(path),
             "iterations": path.counts.iterations, "failures": path.counts.failures, "triangles": len(wall.wall),

@@ -1,9 +1,9 @@
 """A block drawn hot to 1.5, chilled in its grip, and let go: what has set keeps its shape, against the exact balance.
 
 A neo-Hookean block (c10 = 1, shear modulus mu = 2) is drawn along one or two directions, chilled from 150 C to 20 C,
-and let go. Between 85 and 75 C it sets (`Sets`): the glass, of shear modulus G, is free of stress at the stretch L at
-which it was held, the rubber at 1. Where both balance, mu (l^2 - l^-k) + G ((l/L)^2 - (l/L)^-k) = 0, with k = 1 in
-uniaxial and 4 in equibiaxial extension. mm, s, MPa, C; heat in SI.
+and let go. Between 85 and 75 C it sets (`Solidification`): the glass, of shear modulus G, is free of stress at the
+stretch L at which it was held, the rubber at 1. Where both balance, mu (l^2 - l^-k) + G ((l/L)^2 - (l/L)^-k) = 0,
+with k = 1 in uniaxial and 4 in equibiaxial extension. mm, s, MPa, C; heat in SI.
 """
 
 import numpy as np
@@ -25,12 +25,12 @@ def form(mode, modulus):
     on, component, _ = MODES[mode]
     air = [fx.Convection(face, h=500.0, air=COLD) for face in ("top", "bottom")]
     scene = fx.Scene(mesh=fx.mesh.disc(radius=SIZE, thickness=SIZE, elements=(2, 2)), temperature=HOT,
-                     materials=fx.Sets(fx.NeoHookean(c10=C10), modulus=modulus, between=(75, 85)),
+                     materials=fx.Solidification(fx.NeoHookean(c10=C10), modulus=modulus, between=(75, 85)),
                      heat=fx.Cooling(HEAT, air, unit="C", tolerance=0.5),
                      supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
-                               fx.Displaced(on, component, name="grip")])
-    return fx.Process(scene).run([fx.Stage("draw", drive="grip", until=fx.travel((DRAWN - 1) * SIZE)),
-                                  fx.Stage("chill", duration=20.0), fx.Stage("let go", without=["grip"])],
+                               fx.PrescribedDisplacement(on, component, name="grip")])
+    return fx.Process(scene).run([fx.Stage("draw", control="grip", until=fx.travel((DRAWN - 1) * SIZE)),
+                                  fx.Stage("chill", duration=20.0), fx.Stage("let go", inactive=["grip"])],
                                  progress=False)
 
 

@@ -3,9 +3,10 @@
 The sheet, plug and mould of demos/relaxing_pot.py at 150 C: instantaneous modulus 130 psi; 90 % of it relax with 1 s.
 The plug waits 1 s, vacuum fills the mould, which is steel at 20 C, and the part stays in it for 30 s. It is let go,
 trimmed next to its flange, and cooled to 20 C. Three materials: "sets" (between 85 and 75 C a glass of shear modulus
-10000 psi is born in the shape of that moment, `Sets`), "glassy_branch" (a branch of that modulus whose relaxation time
-goes from 1e-4 s at 150 C to endless, `Arrhenius`), "neither" (the rubber and its branch alone). All shrink by
-7e-5 per degree. Lengths in cm, stresses in psi, times in s, heat in J, g, W. Shrinkage is that of the largest diameter.
+10000 psi is born in the shape of that moment, `Solidification`), "glassy_branch" (a branch of that modulus whose
+relaxation time goes from 1e-4 s at 150 C to endless, `Arrhenius`), "neither" (the rubber and its branch alone). All
+shrink by 7e-5 per degree. Lengths in cm, stresses in psi, times in s, heat in J, g, W. Shrinkage is that of the
+largest diameter.
 """
 
 import numpy as np
@@ -23,7 +24,7 @@ from formingx.results.show import plots
 HOT, COLD, GLASS, SETS = 150.0, 20.0, 10e3, (75, 85)
 RUBBER, RELAXING = fx.NeoHookean(c10=0.05 * INSTANT), (0.9 * INSTANT, 1.0)
 BASE = fx.Viscoelastic(RUBBER, [RELAXING])
-MATERIALS = {"sets": fx.Sets(BASE, modulus=GLASS, between=SETS),
+MATERIALS = {"sets": fx.Solidification(BASE, modulus=GLASS, between=SETS),
              "glassy_branch": fx.Viscoelastic(RUBBER, [RELAXING, (GLASS, 1e-4)],
                                               shift=fx.Arrhenius(250e3, HOT, unit="C")),
              "neither": BASE}
@@ -41,12 +42,12 @@ def form(material, elements, accuracy):
                      heat=fx.Cooling(HEAT, unit="C", tools={"mould": (0.05, COLD)}, tolerance=1.0),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="vacuum")],
                      contacts=[fx.Contact("top", MOULD, "stick", name="mould"),
-                               fx.Contact("bottom", plug, 0.3, moves=(0, 1), name="plug")])
+                               fx.Contact("bottom", plug, 0.3, direction=(0, 1), name="plug")])
     step = fx.StepControl(target=8)
     return fx.Process(scene).run([
-        fx.Stage("plug", drive="plug", until=fx.travel(TRAVEL), speed=6.0), fx.Stage("hold", duration=HOLD),
-        fx.Stage("vacuum", drive="vacuum", until=fx.pressure(PRESSURES[-1]), step=step),
-        fx.Stage("in the mould", duration=IN_MOULD, without=["plug"])],
+        fx.Stage("plug", control="plug", until=fx.travel(TRAVEL), speed=6.0), fx.Stage("hold", duration=HOLD),
+        fx.Stage("vacuum", control="vacuum", until=fx.pressure(PRESSURES[-1]), step=step),
+        fx.Stage("in the mould", duration=IN_MOULD, inactive=["plug"])],
         accuracy=accuracy, max_steps=2000, progress=False)
 
 
@@ -68,8 +69,8 @@ def main():
         if args.quick and name == "glassy_branch":
             continue
         path = form(name, elements, accuracy)
-        part = path.released(COLD, trim=TRIM, accuracy=accuracy, duration=1.0 if args.quick else None)
-        summary[name] = {"height": part.height, "least_wall": part.least_wall,
+        part = path.springback(COLD, trim=TRIM, accuracy=accuracy, duration=1.0 if args.quick else None)
+        summary[name] = {"height": part.height, "least_wall": part.min_wall,
                          "shrinkage_percent": 100 * part.shrinkage, "springback": part.springback,
                          "flange_angle_degrees": part.flange_angle, "forming": cost(path), "release": cost(part.path)}
         say(f"{name}:", str(part), f"{len(path)} states to the chilled part, {len(part.path)} of its release")

@@ -16,7 +16,7 @@ TUBES, WAVES = (0.5, 0.8, 0.95), (2, 3, 4)
 INFLATED, LENGTHS = (0.5, 0.8), (0.25, 1, 2)
 BLOCKS = {0.25: ["flexure"], 0.5: ["flexure"], 1: ["flexure", "barrelling"], 2: ["flexure", "barrelling"]}
 MATERIAL = fx.NeoHookean(c10=0.5)
-ENDS = [fx.Symmetry("bottom", "z"), fx.Displaced("top", "z")]
+ENDS = [fx.Symmetry("bottom", "z"), fx.PrescribedDisplacement("top", "z")]
 STRETCHES = (0.95, 0.85, 0.7, 0.6, 0.5, 0.42, 0.38)
 RATIOS = (1.5, 2.0, 2.5, 3.0, 3.5)
 
@@ -113,7 +113,7 @@ def plate(fine):
     thickness = 0.02
     mesh = fx.mesh.disc(radius=1.0, thickness=thickness, elements=(32 * fine, 2 * fine))
     scene = fx.Scene(mesh=mesh, materials=MATERIAL,
-                     supports=[fx.Symmetry("axis"), fx.Symmetry("rim", "z"), fx.Displaced("rim", "r")])
+                     supports=[fx.Symmetry("axis"), fx.Symmetry("rim", "z"), fx.PrescribedDisplacement("rim", "r")])
     path = fx.trace(scene, until=fx.travel(-4 * thickness**2), progress=False)
     found = path.stability(range(4), states="all")
     return {n: -18 * found.first_of(n).control / thickness**2 for n in range(4)}
@@ -137,7 +137,7 @@ def switched(ratio, kB, fine):
     for sense, one in ends.items():
         state = one.last if sense == 1 or abs(one.last.measures["pressure"] / target.value - 1) < 1e-9 else one.at(
             target, after=one.states[-2])
-        with one.problem.at(state) as problem:
+        with one.problem.state_context(state) as problem:
             moved.append(probe(problem, np.column_stack([np.full(41, ratio), z])).displacement(problem.x)[:, 0])
     return float(np.abs(moved[0] - moved[1][::-1]).max() / np.abs(moved[0]).max()), loss, ends[1]
 
@@ -190,7 +190,7 @@ def main():
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
     path = fx.trace(scene, until=fx.pole_stretch(8.5), progress=False)
     summary["sheet"] = {
-        "alarms": len(path.stability(range(1, 7)).alarms),
+        "alarms": len(path.stability(range(1, 7)).bifurcations),
         "n_0_lost_at_pole_stretch": path.stability([0]).losses[0].state.measures["pole_stretch"]}
     error, loss, bulge = switched(0.8, 1, fine)
     summary["switched"] = {"mirror_error": error}
@@ -212,7 +212,7 @@ def main():
 def _radial(path, state, ratio):
     """Radial displacement of the inner face at its lower end."""
     from formingx.forms.probes import probe
-    with path.problem.at(state) as problem:
+    with path.problem.state_context(state) as problem:
         return float(probe(problem, [(ratio, 0.0)]).displacement(problem.x)[0, 0])
 
 

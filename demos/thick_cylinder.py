@@ -52,7 +52,7 @@ def inflate(kind, mesh, **scene):
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(**{"c01": 0.0, **CONSTANTS[kind]}), supports=supports,
                      loads=[fx.Pressure("inner")], **scene)
     targets = {d: inner(d, mesh) for d in DISPLACEMENTS}
-    path = fx.trace(scene, until=targets["50"], through=list(targets.values())[:-1],
+    path = fx.trace(scene, until=targets["50"], intermediate=list(targets.values())[:-1],
                     step=fx.StepControl(largest=0.15))         # for the picture
     return path, targets
 

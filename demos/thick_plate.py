@@ -45,7 +45,7 @@ def inflate(elements, support):
                      supports=[fx.Symmetry("axis"), support])
     targets = [fx.pressure(float(p)) for p in PRESSURES]
     try:
-        return fx.trace(scene, until=targets[-1], through=targets[:-1])
+        return fx.trace(scene, until=targets[-1], intermediate=targets[:-1])
     except fx.ConvergenceError as error:
         say(f"WARNING, {support!r}: {error}", "")
         return error.path

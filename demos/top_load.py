@@ -29,7 +29,7 @@ def blow(elements, mould):
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0), loads=[fx.Pressure("inner")],
                      supports=[fx.Symmetry("axis"), fx.Clamped("neck")],
                      contacts=[fx.Contact("outer", mould, "stick")])
-    return fx.trace(scene, until=fx.pressure(100.0), progress=False).formed()
+    return fx.trace(scene, until=fx.pressure(100.0), progress=False).deformed_mesh()
 
 
 def numbers(found):

@@ -24,7 +24,7 @@ def inflate(mesh, support):
                      supports=[fx.Symmetry("axis"), support], loads=[fx.Pressure("bottom")])
     targets = [fx.pole_stretch(float(s)) for s in STRETCHES]
     try:
-        return fx.trace(scene, until=targets[-1], through=targets[:-1])
+        return fx.trace(scene, until=targets[-1], intermediate=targets[:-1])
     except fx.ConvergenceError as error:      # a clamped corner on a fine mesh: what was reached is still of use
         if not error.path.limit_points:
             raise

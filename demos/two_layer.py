@@ -29,7 +29,7 @@ def inflate(stack, elements):
     materials = {m: fx.MooneyRivlin(c10=CONSTANTS[m][0], c01=CONSTANTS[m][1]) for m in set(stack)}
     scene = fx.Scene(mesh=mesh, materials=dict(zip(layers, (materials[m] for m in stack))),
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")])
-    return fx.trace(scene, until=fx.pole_height(LAST), through=[fx.pole_height(HEIGHT)])
+    return fx.trace(scene, until=fx.pole_height(LAST), intermediate=[fx.pole_height(HEIGHT)])
 
 
 def levels(path):

@@ -23,9 +23,9 @@ def inflate(model, T, n, accuracy):
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
                      loads=[fx.Pressure("bottom", name="air")])
     volume, held = CASES[T][0] * R0**3, CASES[T][1]
-    stage = fx.Stage("blow", drive="air",
-                     follow={fx.enclosed_volume: [(0, 0), (T, volume), (T + held[-1], volume)]},
-                     through=times(0.0, [T * k / 8 for k in range(1, 9)]) + times(T, held[:-1]))
+    stage = fx.Stage("blow", control="air",
+                     amplitudes={fx.enclosed_volume: [(0, 0), (T, volume), (T + held[-1], volume)]},
+                     intermediate=times(0.0, [T * k / 8 for k in range(1, 9)]) + times(T, held[:-1]))
     return fx.Process(scene).run([stage], accuracy=accuracy, max_steps=100_000)
 
 

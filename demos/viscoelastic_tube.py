@@ -38,10 +38,10 @@ def inflate(kind, speed, n, accuracy):
         return fx.displacement(value, at=at, component="r")
     end = full + HELD[-1]
     return fx.Process(scene).run([
-        fx.Stage("inflate", drive="air", follow={moved: [(0, 0), (full, OUTER - INNER), (end, OUTER - INNER)]},
-                 through=times(0.0, [(r - INNER) / speed for r in RADII]) + times(full, HELD[1:-1])),
-        fx.Stage("release", drive="air", until=fx.pressure(0.0)),
-        fx.Stage("recovery", duration=AFTER[-1], through=times(end, AFTER[1:-1]))],
+        fx.Stage("inflate", control="air", amplitudes={moved: [(0, 0), (full, OUTER - INNER), (end, OUTER - INNER)]},
+                 intermediate=times(0.0, [(r - INNER) / speed for r in RADII]) + times(full, HELD[1:-1])),
+        fx.Stage("release", control="air", until=fx.pressure(0.0)),
+        fx.Stage("recovery", duration=AFTER[-1], intermediate=times(end, AFTER[1:-1]))],
         accuracy=accuracy, max_steps=100_000, record={"moved": moved(0.0)})
 
 

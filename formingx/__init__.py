@@ -15,13 +15,13 @@ import sys as _sys
 from . import _calls, _interrupts, mesh, tools
 from ._extensions import add as _add
 from ._extensions import optional as _optional
-from .checks.doctor import doctor
+from .checks.check import check
 from .errors import ConvergenceError, InputError, Interrupted
 from .materials.constants import entropic, of_temperature
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from .materials.material import Material
 from .materials.published import Published, published
-from .materials.sets import Sets
+from .materials.solidification import Solidification
 from .materials.viscoelastic import TransientNetwork, Viscoelastic
 from .measures.forces import force
 from .measures.targets import (
@@ -36,9 +36,9 @@ from .measures.targets import (
 )
 from .physics.contact import Contact
 from .physics.kinematics import Axisymmetric, PlaneStrain, ThreeD
-from .physics.loads import Gravity, Load, Pressure, Spin
+from .physics.loads import CentrifugalLoad, Gravity, Load, Pressure
 from .physics.models import DisplacementPenalty, Membrane, MixedPressure
-from .physics.supports import Clamped, Displaced, PinnedNode, SimplySupported, Support, Symmetry
+from .physics.supports import Clamped, PinnedNode, PrescribedDisplacement, SimplySupported, Support, Symmetry
 from .results.evaluate.profile import Profile
 from .results.evaluate.stress import Stress, StressField
 from .results.path import Path
@@ -51,7 +51,7 @@ from .solve.state import State
 from .solve.stepping import StepControl
 from .tools import Tool
 from .units import Units
-from .values.course import course
+from .values.amplitude import amplitude
 from .values.table import table
 from .values.temperature import WLF, Arrhenius
 
@@ -78,7 +78,7 @@ with _optional():
     from .extensions.kbkz.damping import PSM, Damping, DoubleWagner, LuoTanner, SoskeyWinter, Wagner
     from .extensions.kbkz.kbkz import KBKZ
 with _optional():
-    from .extensions.release import released as _released
+    from .extensions.release import springback as _springback
 with _optional():
     from .extensions.fits import beyond_tests as _fits_checks
     from .extensions.fits.data import treloar1944
@@ -98,7 +98,7 @@ with _optional():
     _add(mesh, adapted)
     del adapted
 with _optional():
-    from .extensions.stability import TopLoad, imperfect, top_load, unstable
+    from .extensions.stability import TopLoad, instability, top_load, with_imperfection
 with _optional():
     from .extensions.remeshing import Remesh
 with _optional():
@@ -108,7 +108,7 @@ with _optional():
     from .extensions.study.study import Study, StudyRun, study
 with _optional():
     from .extensions.design.design import Design
-    from .extensions.design.parameters import along
+    from .extensions.design.parameters import spline
 
 __version__ = "0.1.0"
 

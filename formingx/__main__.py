@@ -1,4 +1,4 @@
-"""The command line: python -m formingx [demo NAME | doctor SCRIPT | compare OURS THEIRS | COMMAND FOLDER]."""
+"""The command line: python -m formingx [demo NAME | check SCRIPT | compare OURS THEIRS | COMMAND FOLDER]."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def main(arguments: list[str] | None = None) -> int:
             _demo(words[1:])
         else:
             options = _parser().parse_args(words)
-            {"compare": _compare, "doctor": _doctor, "open": _open, "report": _report, "status": _status,
+            {"compare": _compare, "check": _doctor, "open": _open, "report": _report, "status": _status,
              "watch": _watch, None: lambda _: _say(_overview())}[options.command](options)
     except BrokenPipeError:                                 # a reader, such as head, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -46,7 +46,7 @@ def _parser() -> argparse.ArgumentParser:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     commands.add_parser("demo", help="run a demo: demo NAME [its options]")
-    check = commands.add_parser("doctor", help="look over the scene of a script", description="Look over the first"
+    check = commands.add_parser("check", help="look over the scene of a script", description="Look over the first"
                                 " scene that a script runs, and its targets: the script is executed up to there, and"
                                 " nothing is solved.")
     check.add_argument("script", metavar="SCRIPT", help="a Python file")
@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
 def _overview() -> str:
     lines = ["formingx: how polymers are formed, simulated with finite elements.", "", "Commands:",
              "  demo NAME [OPTIONS]        run a demo (demo NAME --help: its options)",
-             "  doctor SCRIPT              look over the scene of a script before it runs",
+             "  check SCRIPT              look over the scene of a script before it runs",
              "  compare OURS THEIRS        compare two curves (compare --help)",
              "  open FOLDER                show what is in a checkpoint",
              "  status, watch FOLDER       show how far a run with a checkpoint has come, once or again and again",

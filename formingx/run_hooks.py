@@ -15,7 +15,7 @@ from .solve.newton import Tolerances
 
 @runtime_checkable
 class StopCondition(Protocol):
-    """Condition that ends a run as a result, for `trace(stop_at=...)`, such as `formingx.unstable`."""
+    """Condition that ends a run as a result, for `trace(stop_at=...)`, such as `formingx.instability`."""
 
     def watch(self, path: Path) -> None:
         """Add a function to `path.record.on_step` that sets `path.record.ended` (text) to end the run."""
@@ -40,7 +40,7 @@ class MeshRenewal(Protocol):
 
 
 class MeshAdaptation(Protocol):
-    """A mesh for the second run of a scene, made from the states of the first, for `trace(pilot=...)`."""
+    """A mesh for the second run of a scene, made from the states of the first, for `trace(adapt_mesh=...)`."""
 
     def check(self, mesh: Mesh) -> None:
         """Raise an InputError if the mesh cannot be adapted."""
@@ -53,7 +53,7 @@ _adaptation: list[MeshAdaptation] = []
 
 
 def register_adaptation(adaptation: MeshAdaptation) -> None:
-    """Provide the mesh adaptation of `trace(pilot=...)`; the last one that was registered is used."""
+    """Provide the mesh adaptation of `trace(adapt_mesh=...)`; the last one that was registered is used."""
     _adaptation[:] = [adaptation]
 
 
@@ -64,5 +64,5 @@ def adaptation(caller: str) -> MeshAdaptation:
         InputError: none is registered, since the extension is not installed.
     """
     if not _adaptation:
-        raise InputError(f"{caller}: pilot: the extension 'adapt' of formingx is not installed")
+        raise InputError(f"{caller}: adapt_mesh: the extension 'adapt' of formingx is not installed")
     return _adaptation[0]

@@ -11,7 +11,7 @@ import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-from .checks.doctor import before_run
+from .checks.check import before_run
 from .errors import ConvergenceError, InputError, Interrupted, count, finite, instance, known, several
 from .findings import Finding, tell
 from .measures.columns import Measure
@@ -29,7 +29,7 @@ from .solve.newton import Tolerances
 from .solve.path_following import Run
 from .solve.process import Execution, begin, is_done
 from .solve.record import Record
-from .solve.stage import AT_FOLD, Plan, Stage, plan
+from .solve.stage import AT_LIMIT_POINT, Plan, Stage, plan
 from .solve.state import State
 from .solve.stepping import StepControl
 from .solve.stepping import allowed as allowed_error
@@ -37,18 +37,18 @@ from .solve.stepping import allowed as allowed_error
 log = logging.getLogger("formingx")
 
 
-def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: StepControl | None = None,
+def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), step: StepControl | None = None,
           tolerances: Tolerances | None = None, max_steps: int | None = None, progress: bool = True,
           start: Path | None = None, checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
-          at_fold: str | None = None, resume: bool = False, beyond: bool = False,
-          pilot: bool | Mapping[str, float] = False, remesh: MeshRenewal | None = None,
+          at_limit_point: str | None = None, resume: bool = False, allow_inadmissible: bool = False,
+          adapt_mesh: bool | Mapping[str, float] = False, remesh: MeshRenewal | None = None,
           stop_at: StopCondition | None = None) -> Path:
     """Follow the equilibrium path from the unloaded body until a target is reached, through limit points.
 
     Args:
         scene: with one driven load or support.
         until: the target that ends the run, e.g. `pole_stretch(8.5)`; hit exactly.
-        through: more targets to hit exactly on the way; those that are not met are left out.
+        intermediate: more targets to hit exactly on the way; those that are not met are left out.
         step: step control; default `StepControl()`.
         tolerances: when a state counts as converged; default `Tolerances()`.
         max_steps: accepted states before the run gives up; None: it gives up when it comes no nearer to its target.
@@ -59,18 +59,18 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
         checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
         record: {name: measure} of columns of your own: a function of the `Problem`, called while it stands at the
             state, that returns a number; or a target such as `displacement(0, at=(1, 0))`, whose measure is recorded.
-        at_fold: what to do at a limit point of what is driven. "follow": go on along the path, on which it turns back
-            (in contact, or with a history, the body jumps where no state is left on it).
-            "jump": it goes on, and the body snaps to its next equilibrium, see `Path.jumps`; also where no other state
-            is near. "stop": end there. None: "jump" where it can go one way only: it is time, or there is a history
-            (friction); but a pressure is followed, for what an air supply makes grow is the volume (in contact, or
-            with a history: as long as the volume grows).
+        at_limit_point: what to do at a limit point of what is driven. "continue": go on along the path, on which it
+            turns back (in contact, or with a history, the body jumps where no state is left on it).
+            "snap_through": it goes on, and the body snaps to its next equilibrium, see `Path.jumps`; also where no
+            other state is near. "stop": end there. None: "snap_through" where it can go one way only: it is time, or
+            there is a history (friction); but a pressure is followed, for what an air supply makes grow is the
+            volume (in contact, or with a history: as long as the volume grows).
         resume: go on from what the checkpoint holds, which must be of this scene; if it holds nothing, begin.
-        beyond: go on, with a warning, where a state is none that a body can have: folded, inside a tool, elements
-            inside out. (`State.verdict` says so; by default the run ends there.)
-        pilot: run twice: on the scene's mesh, which may be coarse, and from rest again on `mesh.adapted(path)`, which
-            has columns of elements as the first run asks for. True, or arguments of that, such as {"error": 0.02}.
-            `Path.pilot` is the first run; a first run that did not reach the target counts as far as it came.
+        allow_inadmissible: go on, with a warning, where a state is none that a body can have: folded, inside a tool,
+            elements inside out. (`State.verdict` says so; by default the run ends there.)
+        adapt_mesh: run twice: on the scene's mesh, which may be coarse, and from rest again on `mesh.adapted(path)`,
+            which has columns of elements as the first run asks for. True, or arguments of that, such as {"error":
+            0.02}. `Path.pilot` is the first run; a first run that did not reach the target counts as far as it came.
         remesh: a `Remesh`: the mesh is made again, of the body as it is, where elements are crushed; states of kind
             "remesh", whose `jump` says by how much force, energy and volume changed. For solids of one layer, on one
             rank.
@@ -91,42 +91,43 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
     instance("trace: scene", scene, Scene, "a formingx.Scene")
     if remesh is not None:
         instance("trace: remesh", remesh, MeshRenewal, "a formingx.Remesh")
-        remesh.check("trace", scene, [*through, until])
-        if pilot is not False or stop_at is not None:
-            raise InputError("trace: remesh: cannot be combined with pilot or stop_at")
-    if pilot is not False:
-        return _after_pilot("trace", pilot, start, resume, scene, checkpoint, lambda scene, checkpoint: trace(
-            scene, until=until, through=through, step=step, tolerances=tolerances, max_steps=max_steps,
-            progress=progress, checkpoint=checkpoint, record=record, at_fold=at_fold, beyond=beyond, stop_at=stop_at))
-    through = several("trace: through", through, "targets, such as pole_stretch(3)")
-    for target in (until, *through):
+        remesh.check("trace", scene, [*intermediate, until])
+        if adapt_mesh is not False or stop_at is not None:
+            raise InputError("trace: remesh: cannot be combined with adapt_mesh or stop_at")
+    if adapt_mesh is not False:
+        return _after_pilot("trace", adapt_mesh, start, resume, scene, checkpoint, lambda scene, checkpoint: trace(
+            scene, until=until, intermediate=intermediate, step=step, tolerances=tolerances, max_steps=max_steps,
+            progress=progress, checkpoint=checkpoint, record=record, at_limit_point=at_limit_point,
+            allow_inadmissible=allow_inadmissible, stop_at=stop_at))
+    intermediate = several("trace: intermediate", intermediate, "targets, such as pole_stretch(3)")
+    for target in (until, *intermediate):
         instance("trace: target", target, Target, "a target, such as pole_stretch(3)")
         if target.name == "travel" and isinstance(scene.driven, Contact):
             scene.check_travel(scene.driven, target.value)
     instance("trace: step", step, StepControl | None, "a StepControl or None")
     instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     instance("trace: progress", progress, bool, "True or False")
-    instance("trace: stop_at", stop_at, StopCondition | None, "fx.unstable(modes=...) or None")
+    instance("trace: stop_at", stop_at, StopCondition | None, "fx.instability(modes=...) or None")
     max_steps = None if max_steps is None else count("trace: max_steps", max_steps)
-    known("trace: at_fold =", at_fold, AT_FOLD)
+    known("trace: at_limit_point =", at_limit_point, AT_LIMIT_POINT)
     scene.only_driven("trace")
-    aims.check(scene, [until, *through])
+    aims.check(scene, [until, *intermediate])
     if start is not None and (not isinstance(start, Path) or start.scene is not scene or not start.states):
         raise InputError("trace: start: must be a path of this very scene: fx.load(folder, scene), or what trace gave"
                          " back")
     start = _from_checkpoint("trace", resume, checkpoint, scene, start)
     with _carried(checkpoint) as carried:
         problem = Problem(scene) if start is None else start.problem
-        path = carried(_path(Curve(problem, tolerances or Tolerances()), start, record, beyond,
-                             before_run(scene, [*through, until])))
+        path = carried(_path(Curve(problem, tolerances or Tolerances()), start, record, allow_inadmissible,
+                             before_run(scene, [*intermediate, until])))
         _keep(path, checkpoint)
         if stop_at is not None:
             stop_at.watch(path)
 
         def part() -> None:
-            on_the_way = [target for target in through if len(path.segments) == 1 or path.met(target) is None]
+            on_the_way = [target for target in intermediate if len(path.segments) == 1 or path.met(target) is None]
             targets = [(target, target.bind(path.problem)) for target in (*on_the_way, until)]
-            run = Run(path.record, targets, step, at_fold)
+            run = Run(path.record, targets, step, at_limit_point)
             run.follow(max_steps, progress, None if path.states else begin(path.record.curve), may_turn=True)
         if remesh is None:
             part()
@@ -137,7 +138,7 @@ def trace(scene: Scene, *, until: Target, through: Sequence[Target] = (), step: 
 
 
 def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerances | None = None, max_steps: int = 1000,
-          record: Mapping[str, Measure] | None = None, beyond: bool = False) -> Path:
+          record: Mapping[str, Measure] | None = None, allow_inadmissible: bool = False) -> Path:
     """Load the body to a value of the control in increments, each by PETSc's SNES at fixed control.
 
     For scenes without limit point before `to`; `trace` passes limit points and picks its own steps. Options such as
@@ -148,7 +149,7 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
         increments: number of equal increments; one that fails is halved, and new contact shortens them.
         tolerances: when a state counts as converged; default `Tolerances()`.
         max_steps: accepted states before the run gives up.
-        record, beyond: see `trace`.
+        record, allow_inadmissible: see `trace`.
 
     Raises:
         InputError: nothing is driven, or an argument is not allowed.
@@ -167,12 +168,12 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
         raise InputError(f"solve: increments = {increments}: must be at most max_steps = {max_steps}")
     if to == 0:
         raise InputError("solve: to = 0: the body is at rest there")
-    driven = scene.things.index(scene.driven)
+    driven = scene.items.index(scene.driven)
     name = scene.driven.quantity
     with _carried() as carried:
         problem = Problem(scene)
         curve = FixedControlCurve(problem, tolerances or Tolerances())
-        path = carried(_path(curve, None, record, beyond, before_run(scene, [Target(name, to, None)])))
+        path = carried(_path(curve, None, record, allow_inadmissible, before_run(scene, [Target(name, to, None)])))
         targets = [(Target(name, to * k / increments, None), Amplitude(problem, driven))
                    for k in range(1, increments + 1)]
         increment = abs(to / problem.forms.control_scale) / increments
@@ -184,17 +185,17 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
 class Process:
     """Stages on one scene, run in order, each from where the one before ended.
 
-    A pressure, support or tool of the scene that can be driven (`Pressure` without value, `Displaced`, `Contact` with
-    `moves`) starts at 0, and stays where it is in stages that do not drive it.
+    A pressure, support or tool of the scene that can be driven (`Pressure` without value, `PrescribedDisplacement`,
+    `Contact` with `direction`) starts at 0, and stays where it is in stages that do not drive it.
 
     Args:
         scene: with any number of things that can be driven.
 
-    >>> air, plug = fx.Pressure("bottom"), fx.Contact("top", fx.tools.plane(2.0), "none", moves=(0, -1))
+    >>> air, plug = fx.Pressure("bottom"), fx.Contact("top", fx.tools.plane(2.0), "none", direction=(0, -1))
     >>> scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(8, 1)), loads=[air], contacts=[plug],
     ...                  materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
-    >>> path = fx.Process(scene).run([fx.Stage("blow", drive=air, until=fx.pole_height(1.0)),
-    ...                               fx.Stage("press", drive=plug, until=fx.travel(1.0))])
+    >>> path = fx.Process(scene).run([fx.Stage("blow", control=air, until=fx.pole_height(1.0)),
+    ...                               fx.Stage("press", control=plug, until=fx.travel(1.0))])
     >>> round(float(path["pole_height"][-1]), 3), path.states[-1].stage
     (0.501, 'press')
     """
@@ -205,8 +206,8 @@ class Process:
     def run(self, stages: Sequence[Stage], *, step: StepControl | None = None, tolerances: Tolerances | None = None,
             max_steps: int | None = None, progress: bool = True, start: Path | State | None = None,
             checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
-            accuracy: str | float = "standard", resume: bool = False, beyond: bool = False,
-            pilot: bool | Mapping[str, float] = False, remesh: MeshRenewal | None = None) -> Path:
+            accuracy: str | float = "standard", resume: bool = False, allow_inadmissible: bool = False,
+            adapt_mesh: bool | Mapping[str, float] = False, remesh: MeshRenewal | None = None) -> Path:
         """Run the stages; one path holds the states of all of them, every stage from a state of kind "start" on.
 
         Args:
@@ -223,7 +224,7 @@ class Process:
             accuracy: of the steps in time of a material that relaxes, "draft", "standard" or "fine" (1, 0.2, 0.03 % of
                 stress and thickness), or such an error as a number.
             resume: go on from what the checkpoint holds, which must be of this process; if it holds nothing, begin.
-            beyond, pilot, remesh: see `trace`.
+            allow_inadmissible, adapt_mesh, remesh: see `trace`.
 
         Raises:
             InputError: a stage drives or leaves out something that the scene does not have, leaves the body free to
@@ -235,14 +236,14 @@ class Process:
         stages = self._checked(stages)
         if remesh is not None:
             instance("Process: remesh", remesh, MeshRenewal, "a formingx.Remesh")
-            remesh.check("Process", self.scene, [t for s in stages for t in (*s.through, s.until) if t])
-            if pilot is not False:
-                raise InputError("Process: remesh: cannot be combined with pilot")
-        if pilot is not False:
-            return _after_pilot("Process", pilot, start, resume, self.scene, checkpoint, lambda scene, checkpoint:
+            remesh.check("Process", self.scene, [t for s in stages for t in (*s.intermediate, s.until) if t])
+            if adapt_mesh is not False:
+                raise InputError("Process: remesh: cannot be combined with adapt_mesh")
+        if adapt_mesh is not False:
+            return _after_pilot("Process", adapt_mesh, start, resume, self.scene, checkpoint, lambda scene, checkpoint:
                                 Process(scene).run(stages, step=step, tolerances=tolerances, max_steps=max_steps,
                                                    progress=progress, checkpoint=checkpoint, record=record,
-                                                   accuracy=accuracy, beyond=beyond))
+                                                   accuracy=accuracy, allow_inadmissible=allow_inadmissible))
         instance("Process: step", step, StepControl | None, "a StepControl or None")
         instance("Process: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
         instance("Process: progress", progress, bool, "True or False")
@@ -261,7 +262,7 @@ class Process:
                 _check_start(state, stages, problem)
             timed = any(stage.timed for stage in stages)
             found = before_run(self.scene, stages=stages)
-            path = carried(_path(Curve(problem, tolerances), start, record, beyond, found, timed))
+            path = carried(_path(Curve(problem, tolerances), start, record, allow_inadmissible, found, timed))
             _keep(path, checkpoint)
             max_steps = None if max_steps is None else count("Process: max_steps", max_steps)
 
@@ -276,11 +277,12 @@ class Process:
 
     def _look_again(self, plan: Plan, stands: Callable[[int], float]) -> None:
         """An InputError if the tools of a stage cannot move as it says, now that their travels are known."""
-        contacts = {i: stands(i) for i, thing in enumerate(self.scene.things) if thing in self.scene.contacts}
+        contacts = {i: stands(i) for i, thing in enumerate(self.scene.items) if thing in self.scene.contacts}
         clearance.check(self.scene, [plan], contacts)
 
     def _checked(self, stages: Any) -> list[Stage]:
-        stages = several("Process: stages", stages, "stages, such as Stage('vacuum', drive=vacuum, until=pressure(1))")
+        stages = several("Process: stages", stages,
+                         "stages, such as Stage('vacuum', control=vacuum, until=pressure(1))")
         if not stages:
             raise InputError("Process: stages = []: must have at least one Stage")
         for stage in stages:
@@ -311,19 +313,21 @@ def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
     return Path(read(folder, scene, state))
 
 
-def _after_pilot(who: str, pilot: Any, start: Any, resume: bool, scene: Scene, checkpoint: Any,
+def _after_pilot(who: str, adapt_mesh: Any, start: Any, resume: bool, scene: Scene, checkpoint: Any,
                  run: Callable[[Scene, Any], Path]) -> Path:
     """The path of a run on the mesh that a first run asks for."""
     if start is not None or resume:
-        raise InputError(f"{who}: pilot={pilot!r}: a pilot run begins at rest and makes the mesh; with start or resume"
+        raise InputError(f"{who}: adapt_mesh={adapt_mesh!r}: a pilot run begins at rest and makes the mesh; with"
+                         f" start or resume"
                          f" a run goes on with the mesh that it has: give only one of them")
-    if pilot is not True and not isinstance(pilot, Mapping):
-        raise InputError(f"{who}: pilot = {pilot!r}: must be True, False or arguments of mesh.adapted, such as"
+    if adapt_mesh is not True and not isinstance(adapt_mesh, Mapping):
+        raise InputError(f"{who}: adapt_mesh = {adapt_mesh!r}: must be True, False or arguments of mesh.adapted,"
+                         f" such as"
                          f" {{'error': 0.02}}")
-    options = {} if pilot is True else dict(pilot)
+    options = {} if adapt_mesh is True else dict(adapt_mesh)
     meshes = adaptation(who)
     for name in options:
-        known(f"{who}: pilot", name, ("share", "error"))
+        known(f"{who}: adapt_mesh", name, ("share", "error"))
     meshes.check(scene.mesh)
     try:
         first = run(scene, None)
@@ -353,7 +357,7 @@ def _check_start(state: State, stages: list[Stage], problem: Problem) -> None:
                          f" process, also those that are done")
 
 
-def _path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measure] | None, beyond: bool,
+def _path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measure] | None, allow_inadmissible: bool,
           found: list[Finding], timed: bool = False) -> Path:
     """A path to be solved for by `curve`, that begins with the states of another, or with a state.
 
@@ -362,7 +366,7 @@ def _path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measur
     record = Record(curve.problem, curve)
     record.findings = found
     tell(found, curve.problem.comm.rank)
-    record.beyond = instance("beyond", beyond, bool, "True or False")
+    record.allow_inadmissible = instance("allow_inadmissible", allow_inadmissible, bool, "True or False")
     if isinstance(start, Path):
         record.go_on_from(start.record)
     elif start is not None:

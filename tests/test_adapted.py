@@ -11,7 +11,7 @@ PLUG = fx.tools.male(radius=3.0, height=60.0, base=-60.0, fillet=0.5).mirrored()
 def plugged(mesh, **options):
     """A sheet under a plug, pushed 3 lengths."""
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                     contacts=[fx.Contact("top", PLUG, moves=(0, -1))])
+                     contacts=[fx.Contact("top", PLUG, direction=(0, -1))])
     return fx.trace(scene, until=fx.travel(3.0), progress=False, **options)
 
 
@@ -21,7 +21,7 @@ def disc(elements, **options):
 
 def test_pilot_puts_columns_on_the_edge():
     """The run on adapted columns: they fit the edge, others stay long; the force is that of a finer mesh."""
-    path = plugged(disc((20, 1)), pilot={"share": 0.5})
+    path = plugged(disc((20, 1)), adapt_mesh={"share": 0.5})
     ends = path.problem.scene.mesh.columns.ends
     sizes = np.diff(ends)
     assert path.pilot is not None and len(path.pilot.problem.scene.mesh.columns.ends) == 21
@@ -78,8 +78,8 @@ def test_present_area_holds_what_is_pressed_flat():
         block = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(2, 2))
         scene = fx.Scene(mesh=block, materials=fx.NeoHookean(c10=1.0),
                          supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")],
-                         contacts=[fx.Contact("top", fx.tools.plane(1.0), "none", moves=(0, -1), **options)])
-        return fx.trace(scene, until=fx.travel(0.95), progress=False, beyond=True)
+                         contacts=[fx.Contact("top", fx.tools.plane(1.0), "none", direction=(0, -1), **options)])
+        return fx.trace(scene, until=fx.travel(0.95), progress=False, allow_inadmissible=True)
     exact = 2 * np.pi * (400 - 1 / 20)
     path = pressed(present_area=True)
     assert path.last.measures["tool_force"] == pytest.approx(exact, rel=1e-3)
@@ -94,14 +94,14 @@ def test_refusals():
         fx.mesh.adapted(None, share=0)
     with pytest.raises(fx.InputError, match="must be what trace or Process.run gave back"):
         fx.mesh.adapted(None)
-    with pytest.raises(fx.InputError, match="pilot 'sizes'"):
-        plugged(mesh, pilot={"sizes": 1})
-    with pytest.raises(fx.InputError, match="pilot = 3"):
-        plugged(mesh, pilot=3)
-    with pytest.raises(fx.InputError, match="pilot=True: a pilot run begins at rest"):
-        plugged(mesh, pilot=True, resume=True, checkpoint="nowhere")
+    with pytest.raises(fx.InputError, match="adapt_mesh 'sizes'"):
+        plugged(mesh, adapt_mesh={"sizes": 1})
+    with pytest.raises(fx.InputError, match="adapt_mesh = 3"):
+        plugged(mesh, adapt_mesh=3)
+    with pytest.raises(fx.InputError, match="adapt_mesh=True: a pilot run begins at rest"):
+        plugged(mesh, adapt_mesh=True, resume=True, checkpoint="nowhere")
     mesh.domain.geometry.x[:, 1] *= 0.99
     with pytest.raises(fx.InputError, match="were moved"):
-        plugged(mesh, pilot=True)
+        plugged(mesh, adapt_mesh=True)
     with pytest.raises(fx.InputError, match="present_area"):
         fx.Contact("top", PLUG, 0.3, present_area=True)

@@ -35,7 +35,7 @@ def test_a_flat_sheet(inflated):
     R, h, part = 1.25, 0.082, inflated.part(inflated.states[0], density=0.93, units=fx.Units("cm", "kg/cm2"))
     assert part.volume == pytest.approx(np.pi * R**2 * h, rel=1e-12)
     assert part.area == pytest.approx(np.pi * R**2, rel=1e-12) and part.draw_ratio == pytest.approx(1, rel=1e-12)
-    assert part.least_wall == pytest.approx(h, rel=1e-12) and part.evenness == pytest.approx(1, rel=1e-12)
+    assert part.min_wall == pytest.approx(h, rel=1e-12) and part.uniformity == pytest.approx(1, rel=1e-12)
     assert part.variation < 1e-10 and part.scrap == 0
     assert part.weight == pytest.approx(0.93 * np.pi * R**2 * h, rel=1e-12)
     assert inflated.part(inflated.states[0], trim=0.7).volume == pytest.approx(np.pi * 0.7**2 * h, rel=1e-3)
@@ -52,7 +52,7 @@ def test_mass_is_kept(inflated, formed):
         part = path.part()
         assert part.volume == pytest.approx(volume, rel=1e-3)          # a rim that bulges is not between the faces
         assert part.mean_wall * part.area == pytest.approx(part.volume, rel=1e-12)
-        assert part.least_wall < part.mean_wall and part.evenness == pytest.approx(part.least_wall / part.mean_wall)
+        assert part.min_wall < part.mean_wall and part.uniformity == pytest.approx(part.min_wall / part.mean_wall)
 
 
 def test_content_of_a_closed_and_of_an_open_part():
@@ -62,9 +62,9 @@ def test_content_of_a_closed_and_of_an_open_part():
                      loads=[fx.Pressure("inner")])
     path = fx.trace(scene, until=fx.pressure(0.05), progress=False)
     exact = np.pi * (2 / 3 * 2**3 + 2**2 * 5)
-    assert path.part(path.states[0]).content == pytest.approx(exact, rel=1e-3)
+    assert path.part(path.states[0]).capacity == pytest.approx(exact, rel=1e-3)
     swept = path["enclosed_volume"][-1]
-    assert path.part().content - path.part(path.states[0]).content == pytest.approx(swept, rel=2e-2) and swept > 0.3
+    assert path.part().capacity - path.part(path.states[0]).capacity == pytest.approx(swept, rel=2e-2) and swept > 0.3
 
 
 def test_trimmed_parts_add_up(formed):
@@ -127,7 +127,7 @@ def test_contact_presses_as_the_air_does(formed):
 
 def compressed(friction, points="nodes"):
     """The upper half of a block between plates, pressed to 0.8 of its height."""
-    plate = fx.Contact("top", fx.tools.plane(1.0), friction, moves=(0, -1), points=points)
+    plate = fx.Contact("top", fx.tools.plane(1.0), friction, direction=(0, -1), points=points)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(6, 4)), materials=fx.NeoHookean(c10=1.0),
                      contacts=[plate], supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z")])
     return fx.trace(scene, until=fx.travel(0.2), progress=False)
@@ -147,7 +147,7 @@ def test_a_smooth_plate_presses_alike_everywhere(points):
 def test_uneven_tractions_add_up_to_the_force(points):
     """On a plate that the block sticks to: over the areas at rest that belong to the points."""
     path = compressed("stick", points)
-    with path.problem.at(path.last) as problem:
+    with path.problem.state_context(path.last) as problem:
         contact, = problem.contacts
         _, traction = resultants.traction(contact, problem.x.array_r, problem.control)
     assert np.ptp(traction[:, 0]) > 0.2 * traction[:, 0].mean()
@@ -288,6 +288,6 @@ def test_pole_stretch_is_that_of_the_fibre(kinematics, model):
     scene = treloar((12, 2) if isinstance(model, fx.MixedPressure) else (12, 1), model=model, kinematics=kinematics)
     path = fx.trace(scene, until=fx.pole_height(0.9), progress=False)
     R = np.array([[1e-3, 0.041]])
-    with path.problem.at(path.last) as problem:
+    with path.problem.state_context(path.last) as problem:
         along = 1 + probe(problem, R).displacement(problem.x)[0, 0] / 1e-3
     assert path["pole_stretch"][-1] == pytest.approx(along, rel=2e-3) and along > 1.2

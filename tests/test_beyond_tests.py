@@ -72,7 +72,7 @@ def test_a_run_warns_and_doctor_foresees_it(caplog):
     path = blown(card)
     assert "100 % of it is deformed as in none of its tests" in caplog.text
     assert "they leave c01 open" in caplog.text and "which was not tested" in caplog.text
-    report = str(fx.doctor(path.problem.scene, targets=[fx.pole_stretch(2.0)]))
+    report = str(fx.check(path.problem.scene, targets=[fx.pole_stretch(2.0)]))
     assert "do not determine c01" in report and "about 2-fold in all directions" in report
     caplog.clear()
     blown(fx.fit(fx.MooneyRivlin, data).material)

@@ -64,7 +64,7 @@ def test_a_fault_of_its_own_is_not_hidden():
 
 def test_calls_inside_a_run_are_not_explained():
     """No iteration passes through them, though every one asks tools and laws."""
-    ball = fx.Contact("top", fx.tools.sphere(radius=0.5, z=0.082), moves=(0, -1))
+    ball = fx.Contact("top", fx.tools.sphere(radius=0.5, z=0.082), direction=(0, -1))
     scene = fx.Scene(mesh=treloar(elements=(8, 1)).mesh, materials=fx.NeoHookean(c10=2.0), contacts=[ball],
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
     profile = cProfile.Profile()

@@ -60,7 +60,7 @@ def blown(elements):
     sheet = fx.Viscoelastic(fx.NeoHookean(c10=0.2), [(1.0, 0.3)])
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=elements), materials=sheet,
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")])
-    blow = fx.Stage("blow", drive=scene.loads[0], until=fx.pressure(0.08), duration=0.5)
+    blow = fx.Stage("blow", control=scene.loads[0], until=fx.pressure(0.08), duration=0.5)
     return fx.Process(scene).run([blow], progress=False, accuracy="draft", step=fx.StepControl(length=0.02))
 
 
@@ -69,7 +69,7 @@ def test_internal_variables_are_those_of_a_run_on_the_other_mesh():
     a, b = there.problem, here.problem
     assert here.last.time == pytest.approx(there.last.time)
     for problem, path, other, most in ((b, here, there, 0.01), (a, there, here, 0.01), (a, there, there, 1e-12)):
-        with problem.at(path.last):
+        with problem.state_context(path.last):
             carry(other.problem, other.last, problem, path.last.x, path.last.control)
             found, = problem.memory
         wanted, = path.last.memory
@@ -119,6 +119,6 @@ def test_contact_comes_back_as_it_was(points):
     assert np.all(found.touch.distance[~touched] < -here.contacts[0].law.theta)
     assert np.array_equal(found.arrived, kept.arrived)
     force = here.contacts[0].tractions(path.last.x, path.last.control).force
-    with path.problem.at(path.last) as problem:
+    with path.problem.state_context(path.last) as problem:
         there = problem.contacts[0].tractions(path.last.x, path.last.control).force
     assert force == pytest.approx(there, rel=1e-6, abs=1e-9 * np.abs(there).max())

@@ -78,7 +78,7 @@ scene = fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symm
                  loads=[fx.Pressure("bottom", name="air")], contacts=[fx.Contact("top", mould)])
 """
 RUNS = {"trace": "fx.trace(scene, until=fx.pole_height(900.0))", "solve": "fx.solve(scene, to=1.0)",
-        "process": "fx.Process(scene).run([fx.Stage('blow', drive='air', until=fx.pole_height(900.0))])",
+        "process": "fx.Process(scene).run([fx.Stage('blow', control='air', until=fx.pole_height(900.0))])",
         "study": "fx.study(lambda p: fx.trace(scene, until=fx.pressure(p)), {'p': [1, 2]}, {'p': 'pressure'})"}
 
 
@@ -87,7 +87,7 @@ def test_doctor_looks_at_the_first_run(way, tmp_path, capsys):
     """The fillet is too small for the mesh, a target too far away; nothing is solved, whatever runs the scene."""
     (tmp_path / "script.py").write_text(SCENE + RUNS[way] + "\nprint('solved')\n")
     before = fx.trace, fx.solve, fx.study, fx.Process.run
-    assert main(["doctor", str(tmp_path / "script.py"), "--fast"]) == 0
+    assert main(["check", str(tmp_path / "script.py"), "--fast"]) == 0
     assert (fx.trace, fx.solve, fx.study, fx.Process.run) == before
     text = capsys.readouterr().out
     assert "options ['--fast']" in text and "solved" not in text and "its fillet of radius 0.1" in text
@@ -96,11 +96,11 @@ def test_doctor_looks_at_the_first_run(way, tmp_path, capsys):
 
 def test_doctor_of_no_scene(tmp_path, capsys):
     (tmp_path / "script.py").write_text("print(1)")
-    assert main(["doctor", str(tmp_path / "script.py")]) == 2 == main(["doctor", str(tmp_path / "absent.py")])
+    assert main(["check", str(tmp_path / "script.py")]) == 2 == main(["check", str(tmp_path / "absent.py")])
     error = capsys.readouterr().err
     assert "script.py' runs no scene" in error and "absent.py' is not there" in error
     (tmp_path / "script.py").write_text("import formingx as fx\nfx.NeoHookean(c10=-1)")
-    assert main(["doctor", str(tmp_path / "script.py")]) == 2 and "NeoHookean(c10=-1" in capsys.readouterr().err
+    assert main(["check", str(tmp_path / "script.py")]) == 2 and "NeoHookean(c10=-1" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("text, words", [
@@ -108,7 +108,7 @@ def test_doctor_of_no_scene(tmp_path, capsys):
     (b"\0" * 9, "is no Python: "), (b"x = " + b"(" * 10_000, "is no Python: ")])
 def test_doctor_of_what_is_no_python(text, words, tmp_path, capsys):
     (tmp_path / "script.py").write_bytes(text)
-    assert main(["doctor", str(tmp_path / "script.py")]) == 2
+    assert main(["check", str(tmp_path / "script.py")]) == 2
     error = capsys.readouterr().err
     assert re.search(f"script.py' {words}", error) and len(error.splitlines()) == 1
 

@@ -78,7 +78,7 @@ def roll_over(friction, step=None, **options):
     """Forces at three ratios."""
     made = block(fx.MooneyRivlin(c10=0.1, c01=1.0), friction, (8, 8), roll_over=True, **options)
     targets = [fx.travel(HALF_HEIGHT * (1 - 1 / ratio)) for ratio in (1.87, 2.5, 3.4)]
-    path = fx.trace(made, until=targets[-1], through=targets[:-1], step=step, progress=False)
+    path = fx.trace(made, until=targets[-1], intermediate=targets[:-1], step=step, progress=False)
     return [force(path.met(target)) for target in targets]
 
 
@@ -107,9 +107,9 @@ def test_forces_of_a_block_between_smooth_plates():
     mesh = fx.mesh.disc(radius=1.32, thickness=height, elements=(6, 3))
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=0.1, c01=0.01),
                      supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z")],
-                     contacts=[fx.Contact("top", fx.tools.plane(height), "none", moves=(0, -1))])
+                     contacts=[fx.Contact("top", fx.tools.plane(height), "none", direction=(0, -1))])
     targets = [fx.travel(part * height) for part in parts]
-    path = fx.trace(scene, until=targets[-1], through=targets[:-1], progress=False)
+    path = fx.trace(scene, until=targets[-1], intermediate=targets[:-1], progress=False)
     for part, target in zip(parts, targets):
         l = 1 - part
         exact = 2 * (l**-2 - l) * (0.1 + 0.01 / l) * np.pi * 1.32**2

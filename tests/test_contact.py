@@ -192,7 +192,7 @@ def cup(friction, elements=(20, 2), depth=5.0, thickness=0.3, fillet=1.0, **opti
 
 def form(scene, *pressures, **step):
     targets = [fx.pressure(p) for p in pressures]
-    return fx.trace(scene, until=targets[-1], through=targets[:-1], progress=False,
+    return fx.trace(scene, until=targets[-1], intermediate=targets[:-1], progress=False,
                     step=fx.StepControl(target=8, **step),
                     max_steps=600)
 
@@ -291,7 +291,7 @@ def test_capstan():
     mu, radius, h = 0.3, 1.0, 0.02
     bar = tools.sphere(radius=radius - 1e-4).mirrored().moved(z=radius - 1e-4)
     scene = fx.Scene(mesh=bent_strip(radius, h, 0.4, 60), materials=fx.NeoHookean(c10=1.0), kinematics=fx.PlaneStrain(),
-                     supports=[fx.Symmetry("axis"), fx.Displaced("rim")],
+                     supports=[fx.Symmetry("axis"), fx.PrescribedDisplacement("rim")],
                      contacts=[fx.Contact("bottom", bar, mu, nodes_per_step=200)])
     path = fx.trace(scene, until=fx.travel(-0.05), step=fx.StepControl(length=0.01, target=8), progress=False)
     top, end = (abs(support_force(path.problem, path.last, i)) for i in (0, 1))
@@ -351,7 +351,7 @@ def test_a_moving_tool():
     mesh = fx.mesh.disc(radius=10.0, thickness=0.5, elements=(20, 2))
     plug = tools.sphere(radius=3, z=0.5)
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                     contacts=[fx.Contact("top", plug, "stick", moves=(0, -1))])
+                     contacts=[fx.Contact("top", plug, "stick", direction=(0, -1))])
     path = fx.trace(scene, until=fx.travel(3.0), step=fx.StepControl(target=8), progress=False)
     assert path.last.measures["penetration"] < 1e-3 * 0.5 and path.last.measures["contact_length"] > 0.2
     assert path.last.measures["tool_force"] == pytest.approx(support_force(path.problem, path.last, 1), rel=1e-7)
@@ -369,7 +369,7 @@ def test_a_plate_that_holds_pulls(friction):
     """Free to slide, the block is in uniaxial tension: N = 2 A (l - 1/l^2) (c10 + c01 / l); stuck, it is stiffer."""
     c10, c01, l = 1.0, 0.2, 1.4                               # noqa: E741
     mesh = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(4, 4))
-    plate = fx.Contact("top", tools.plane(1.0), friction, moves=(0, -1), separates=False, penalty=2e6, ramp=1e-7)
+    plate = fx.Contact("top", tools.plane(1.0), friction, direction=(0, -1), separates=False, penalty=2e6, ramp=1e-7)
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=c10, c01=c01), contacts=[plate],
                      supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")])
     path = fx.trace(scene, until=fx.travel(1 - l), progress=False)
@@ -387,7 +387,7 @@ def test_a_plate_that_holds_pulls(friction):
     (lambda: fx.Contact("top", TOOL, "glue"), "must be 'stick', 'none' or a coefficient"),
     (lambda: fx.Contact("top", "cup"), "must be a tool"),
     (lambda: fx.Contact("top", TOOL, penalty=0), "must be greater than 0"),
-    (lambda: fx.Contact("top", TOOL, moves=(0, 0)), "must name a direction"),
+    (lambda: fx.Contact("top", TOOL, direction=(0, 0)), "must name a direction"),
     (lambda: scene_with(fx.Contact("top", tools.plane(0.05))), r"0\.05 deep at"),
     (lambda: scene_with(fx.Contact("bottom", tools.plane(0.2))), "behind this face"),
     (lambda: scene_with(fx.Contact("top", tools.plane(0.2)), "top"), "no tool faces the pressure"),

@@ -52,7 +52,7 @@ def test_a_predicted_step_ends_near_its_state():
     old, new = path.states[k - 1], path.states[k]
     touching = problem.contacts[0].touching(old.x, old.control)
     point = int(np.flatnonzero(~touching & (problem.contacts[0].rule.area > 0))[0])
-    with problem.at(old):
+    with problem.state_context(old):
         length = curve.progress(old, new)
         way = Way(old.x, old.control, old.direction, old.slope, length, problem.limit.predict(curve, old))
         problem.limit.length(way)
@@ -84,13 +84,13 @@ def test_sliding_points_move_as_in_the_tangent():
     scene = fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(20, 1)), materials=fx.NeoHookean(c10=0.4),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      contacts=[fx.Contact("top", mould, "stick", separates=False),
-                               fx.Contact("bottom", plug, 0.3, moves=(0, 1))])
+                               fx.Contact("bottom", plug, 0.3, direction=(0, 1))])
     path = fx.trace(scene, until=fx.travel(30.0), step=fx.StepControl(target=8), progress=False)
     problem, curve, n = path.problem, path.record.curve, path.problem.n_owned
     assert path.counts.failures <= 3                        # from rest, with 16 nodes flat on the plug, it took 6
     sliding = 0
     for old in path.states[2:-1]:
-        with problem.at(old):
+        with problem.state_context(old):
             faces = problem.present
             ahead = ContactEventSequence(faces, n, old.x, old.control, old.direction, old.slope,
                                          response_ahead(curve, old), 4)
@@ -143,7 +143,7 @@ def test_events_of_sliding_beside_sticking_points(monkeypatch):
         mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(30, 1)), materials=fx.MooneyRivlin(c10=0.35, c01=0.05),
         supports=[fx.Symmetry("axis"), fx.Clamped("rim")], contacts=[
             fx.Contact("top", mould, "stick", separates=False, nodes_per_step=n),
-            fx.Contact("bottom", tool, 0.3, moves=(0, 1), nodes_per_step=n)]),
+            fx.Contact("bottom", tool, 0.3, direction=(0, 1), nodes_per_step=n)]),
         until=fx.travel(48.0), step=fx.StepControl(target=8), progress=False) for n in (None, 1))
     assert many.counts.steps < 0.7 * one.counts.steps and min(times) >= 0
     assert many.profile().thickness == pytest.approx(one.profile().thickness, rel=2e-3)
@@ -152,7 +152,7 @@ def test_events_of_sliding_beside_sticking_points(monkeypatch):
 @pytest.mark.parametrize("friction", ["none", 0.3])
 def test_no_events_are_predicted_without_stick(friction):
     """Contact of a ball at Gauss points without stick: few steps fail (200 of 450 with predicted events)."""
-    ball = fx.Contact("top", fx.tools.sphere(radius=4.0, z=0.3), friction, moves=(0, -1), points=3)
+    ball = fx.Contact("top", fx.tools.sphere(radius=4.0, z=0.3), friction, direction=(0, -1), points=3)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(100, 2)),
                      materials=fx.MooneyRivlin(c10=17.0, c01=1.0), contacts=[ball],
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")])

@@ -75,7 +75,7 @@ def plugged():
     plug = fx.tools.sphere(radius=5.0, z=0.3)
     return fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(12, 1)),
                     materials=fx.MooneyRivlin(c10=50, c01=15), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                    contacts=[fx.Contact("top", plug, 0.3, moves=(0, -1), points=3, ramp=1e-4)])
+                    contacts=[fx.Contact("top", plug, 0.3, direction=(0, -1), points=3, ramp=1e-4)])
 
 
 def numbers(path):
@@ -88,7 +88,7 @@ def numbers(path):
 def push(folder, start=None):
     """Make, or go on with, a run that leaves its states in a folder."""
     scene = plugged()
-    path = fx.trace(scene, until=fx.travel(3.0), through=[fx.travel(2.5)], progress=False,
+    path = fx.trace(scene, until=fx.travel(3.0), intermediate=[fx.travel(2.5)], progress=False,
                     tolerances=fx.Tolerances(residual=1e-9), start=start and fx.load(start, scene, state=4))
     path.save(folder)
     return path

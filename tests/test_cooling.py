@@ -20,11 +20,11 @@ def pulled(material=RELAXING, boundaries=(), work_to_heat: float | None = 1.0):
     return fx.Scene(mesh=mesh, materials=material, temperature=20.0,
                     heat=fx.Cooling(POLYMER, boundaries, unit="C", tolerance=0.01, work_to_heat=work_to_heat),
                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
-                              fx.Displaced("rim", "r", name="rim")])
+                              fx.PrescribedDisplacement("rim", "r", name="rim")])
 
 
 def pull(scene, **options):
-    stages = [fx.Stage("pull", drive="rim", until=fx.travel(1.0), duration=1.0), fx.Stage("wait", duration=4.0)]
+    stages = [fx.Stage("pull", control="rim", until=fx.travel(1.0), duration=1.0), fx.Stage("wait", duration=4.0)]
     return fx.Process(scene).run(stages, progress=False, **options)
 
 
@@ -33,7 +33,7 @@ def test_adiabatic_work_becomes_heat():
     scene = pulled()
     path = pull(scene, accuracy="fine")
     volume = np.pi * 0.4
-    with path.problem.at(path.last):
+    with path.problem.state_context(path.last):
         T = path.problem.temperature.T.x.array.copy()
     assert np.ptp(T) < 1e-8
     lost = path.last.measures["dissipated_energy"]
@@ -50,7 +50,7 @@ def test_half_of_the_work_heats_half_as_much_and_none_not_at_all():
     for share in (1.0, 0.5, None):
         scene = pulled(work_to_heat=share)
         path = pull(scene, accuracy="draft")
-        with path.problem.at(path.last):
+        with path.problem.state_context(path.last):
             rises[share] = path.problem.temperature.T.x.array.mean() - 20.0
     assert rises[0.5] == pytest.approx(rises[1.0] / 2, rel=1e-9) and abs(rises[None]) < 1e-9
 
@@ -76,7 +76,7 @@ def pressed():
                     heat=fx.Cooling(fx.ThermalProperties(conductivity=0.01, density=1.0, heat_capacity=1.0),
                                     [fx.Convection("bottom", h=1e-3, air=60.0)], unit="C", tolerance=0.5,
                                     tools={"plug": (0.3, wall)}, work_to_heat=1e-3),
-                    contacts=[fx.Contact("top", tool, fx.table({20.0: 0.1, 150.0: 0.5, 180.0: 0.5}), moves=(0, -1),
+                    contacts=[fx.Contact("top", tool, fx.table({20.0: 0.1, 150.0: 0.5, 180.0: 0.5}), direction=(0, -1),
                                          name="plug", penalty=2e4, ramp=1e-5)])       # stiffer: round-off shows
 
 
@@ -87,8 +87,8 @@ def drawn_over(length=0.5, conductance=0.1):
                      materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      heat=fx.Cooling(fx.ThermalProperties(conductivity=0.01, density=1.0, heat_capacity=1.0),
                                      unit="C", tools={"ball": (conductance, 30.0)}, tolerance=0.5),
-                     contacts=[fx.Contact("top", ball, "none", moves=(0, -1), name="ball")])
-    return fx.Process(scene).run([fx.Stage("push", drive="ball", until=fx.travel(0.4), duration=0.5)], progress=False,
+                     contacts=[fx.Contact("top", ball, "none", direction=(0, -1), name="ball")])
+    return fx.Process(scene).run([fx.Stage("push", control="ball", until=fx.travel(0.4), duration=0.5)], progress=False,
                                  accuracy=0.5, step=fx.StepControl(length=length, largest=length))
 
 
@@ -111,7 +111,7 @@ def test_what_comes_to_touch_in_a_step_gives_off_heat_for_half_of_it():
 
 
 def press(scene, travel=0.15, **options):
-    push = fx.Stage("push", drive="plug", until=fx.travel(travel), duration=0.5)
+    push = fx.Stage("push", control="plug", until=fx.travel(travel), duration=0.5)
     return fx.Process(scene).run([push, fx.Stage("hold", duration=0.5)], progress=False, accuracy="draft", **options)
 
 
@@ -159,9 +159,9 @@ def laid_on(layers, stays=0.1):
                      materials=fx.NeoHookean(c10=fx.table({20.0: 2e6, 150.0: 1e6})),
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("top", name="air")],
                      contacts=[fx.Contact("bottom", fx.tools.plane(0.0).reversed(), "none", name="table")])
-    path = fx.Process(scene).run([fx.Stage("press", drive="air", until=fx.pressure(1e3), duration=stays)],
+    path = fx.Process(scene).run([fx.Stage("press", control="air", until=fx.pressure(1e3), duration=stays)],
                                  progress=False)
-    with path.problem.at(path.last):
+    with path.problem.state_context(path.last):
         T = path.problem.temperature.T
         X, values = T.function_space.tabulate_dof_coordinates(), T.x.array
         axis = np.flatnonzero(X[:, 0] < 1e-12)

@@ -123,7 +123,7 @@ def test_derivative_by_control(driven):
     given = scene(loads=loads)
     if driven == "motion":
         given = fx.Scene(mesh=given.mesh, materials=given.materials,
-                         supports=[fx.Clamped("rim"), fx.Displaced("inner", "z")])
+                         supports=[fx.Clamped("rim"), fx.PrescribedDisplacement("inner", "z")])
     problem = Problem(given)
     x, _ = random_state(problem)
     control, h = 0.4, 1e-5

@@ -68,7 +68,7 @@ def pushed(b, mu="none"):
     mesh = fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1))
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=lambda R, Z: 0.5 * (1 + b * R**2)),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                     contacts=[fx.Contact("top", fx.tools.sphere(radius=0.8, z=0.05), mu, moves=(0, -1))])
+                     contacts=[fx.Contact("top", fx.tools.sphere(radius=0.8, z=0.05), mu, direction=(0, -1))])
     return scene, fx.travel(0.25)
 
 
@@ -77,7 +77,7 @@ def blown(b):
     mesh = fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1))
     relaxes = fx.Viscoelastic(fx.NeoHookean(c10=lambda R, Z: 0.5 * (1 + b * R**2)), branches=[(1.0, 1.0)])
     scene = fx.Scene(mesh=mesh, materials=relaxes, supports=CAN["supports"], loads=[fx.Pressure("bottom", name="air")])
-    return scene, [fx.Stage("blow", drive="air", until=fx.pressure(0.03), duration=1.0)]
+    return scene, [fx.Stage("blow", control="air", until=fx.pressure(0.03), duration=1.0)]
 
 
 @pytest.mark.parametrize("build", (lambda b: disc(c=b), pushed, blown, lambda b: pushed(0.0, 0.3 + b)),
@@ -94,7 +94,7 @@ def test_taylor(build):
 
 def test_a_membrane_with_a_programmed_wall():
     """At its nodes too, where the slopes of elements differ."""
-    design = fx.Design(lambda h: programmed(h, fx.Membrane()), {"h": fx.along(6, start=0.0, smooth=True)})
+    design = fx.Design(lambda h: programmed(h, fx.Membrane()), {"h": fx.spline(6, start=0.0, smooth=True)})
     by, h = design.run().derivative("wall")[1], 1e-3 * np.eye(6)[4]
     above, below = (design.run({"h": way * h}).wall for way in (1, -1))
     assert by[:, 4] == pytest.approx((above - below) / 2e-3, rel=1e-4, abs=1e-8)
@@ -102,7 +102,8 @@ def test_a_membrane_with_a_programmed_wall():
 
 def test_an_even_wall():
     """Its thickness at the pole is the wall over that stretch squared."""
-    answer = fx.Design(programmed, {"h": fx.along(6, start=0.0, low=-2, high=2, smooth=True)}).fit(even=True, good=1e-3)
+    answer = fx.Design(programmed, {"h": fx.spline(6, start=0.0, low=-2, high=2, smooth=True)}).fit(even=True,
+                                                                                                    good=1e-3)
     assert answer.paths <= 4 and answer.cv[0] > 0.03 and answer.cv[1] < 1e-3
     assert np.exp(answer.values["h"](0.0)) / 50 == pytest.approx(1.2**2 * answer.best.wall.mean(), rel=2e-3)
     assert answer.best.volume == pytest.approx(answer.before.volume, rel=1e-5)
@@ -143,7 +144,7 @@ def test_bad_input_is_told_in_words():
 
 def test_what_is_not_reached_is_said():
     """A wall, a volume and a least wall beyond the bounds."""
-    design = fx.Design(programmed, {"h": fx.along(2, start=0.0, low=-0.3, high=0.3)})
+    design = fx.Design(programmed, {"h": fx.spline(2, start=0.0, low=-0.3, high=0.3)})
     answer = design.fit(wall=1.0, volume=None)
     assert "within the bounds, would be 0.9 % better" in answer.why
     wall = answer.best.wall
@@ -157,7 +158,7 @@ def test_what_is_not_reached_is_said():
     held = design.fit(wall=1.2 * design.run().wall.mean(), runs=3)
     assert "It is stopped by the volume, which is held at" in str(held)
     assert "the volume that was asked for, 99, was not reached" in str(design.fit(even=True, volume=99.0, runs=4))
-    answer = design.least_weight(least_wall=1.0)
+    answer = design.minimum_weight(min_wall=1.0)
     assert "least wall that was asked for, 1, was not reached" in str(answer)
     assert answer.best.vector.min() > 0.2                              # as thick as may be, not as light
 
@@ -190,9 +191,9 @@ def pot(mu, travel, relaxing=False):
     sheet = fx.Viscoelastic(fx.NeoHookean(c10=0.5), branches=[(1.0, 2.0)]) if relaxing else fx.NeoHookean(c10=1.0)
     scene = fx.Scene(mesh=mesh, materials=sheet, supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      loads=[fx.Pressure("bottom", name="air")],
-                     contacts=[fx.Contact("bottom", plug, mu, moves=(0, 1), name="plug")])
-    return scene, [fx.Stage("plug", drive="plug", until=fx.travel(travel), speed=4.0 if relaxing else None),
-                   fx.Stage("air", drive="air", until=fx.pressure(0.03), duration=0.5 if relaxing else None)]
+                     contacts=[fx.Contact("bottom", plug, mu, direction=(0, 1), name="plug")])
+    return scene, [fx.Stage("plug", control="plug", until=fx.travel(travel), speed=4.0 if relaxing else None),
+                   fx.Stage("air", control="air", until=fx.pressure(0.03), duration=0.5 if relaxing else None)]
 
 
 @pytest.mark.parametrize("relaxing", (False, pytest.param(True, marks=pytest.mark.slow)))
@@ -213,8 +214,8 @@ def pressed(c10, nose, travel, force=None):
     mesh = fx.mesh.disc(radius=40.0, thickness=1.2, elements=(10, 1))
     ball = fx.tools.sphere(radius=nose).mirrored()
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=c10), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                     contacts=[fx.Contact("bottom", ball, "none", moves=(0, 1), name="plug")])
-    return scene, [fx.Stage("down", drive="plug", until=fx.force(force) if force else fx.travel(travel))]
+                     contacts=[fx.Contact("bottom", ball, "none", direction=(0, 1), name="plug")])
+    return scene, [fx.Stage("down", control="plug", until=fx.force(force) if force else fx.travel(travel))]
 
 
 def test_forces_of_tools():
@@ -262,7 +263,7 @@ def test_where_a_run_has_no_derivative_it_says_so():
     """A flow with a history, a jump: no number is given."""
     def held(mu):
         scene, stages = pot(mu, 1.0)
-        return scene, [*stages[:1], fx.Stage("hold", drive="air", hold=fx.pole_height(1.05), duration=1.0)]
+        return scene, [*stages[:1], fx.Stage("hold", control="air", constant=fx.pole_height(1.05), duration=1.0)]
     run = fx.Design(held, {"mu": (0.3, 0, 1)}, step=fx.StepControl(target=8)).run()
     with pytest.raises(fx.InputError, match="no derivative: there is none yet for a stage that follows"):
         run.derivative("wall")
@@ -313,10 +314,10 @@ def test_report_says_how_sure(tmp_path):
     assert "How sure" not in run.report(tmp_path / "run.html").read_text()
 
 
-def test_least_weight():
+def test_minimum_weight():
     """The wall is nowhere thinner than asked, and somewhere as thin; a thicker one than needed is made thinner."""
-    design = fx.Design(programmed, {"h": fx.along(4, start=0.0, low=-1, high=1)})
-    answer = design.least_weight(least_wall=0.012, runs=10)
+    design = fx.Design(programmed, {"h": fx.spline(4, start=0.0, low=-1, high=1)})
+    answer = design.minimum_weight(min_wall=0.012, runs=10)
     assert answer.best.wall.min() == pytest.approx(0.012, rel=2e-3)
     assert answer.best.volume < 0.95 * answer.before.volume
     assert answer.best.wall.max() < 0.0125
@@ -324,7 +325,7 @@ def test_least_weight():
 
 def test_report(tmp_path):
     """One file, of a search and of a run: before and after, what the knots could bring, bounds, effects, pictures."""
-    design = fx.Design(lambda h, idle: programmed(h), {"h": fx.along(4, 0.0, -0.04, 1.0), "idle": (1.0, 0.0, 2.0)})
+    design = fx.Design(lambda h, idle: programmed(h), {"h": fx.spline(4, 0.0, -0.04, 1.0), "idle": (1.0, 0.0, 2.0)})
     answer = design.fit(even=True, runs=3)
     assert answer.attainable() <= answer.cv[1] + 1e-6
     text = answer.report(tmp_path / "answer.html", "Even <cap>", deviations={"h": 0.01}).read_text()

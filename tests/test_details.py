@@ -54,17 +54,17 @@ def test_heat_flows_in_the_deformed_body(by):
 
 
 def test_a_tool_that_is_away_takes_no_heat():
-    plug = fx.Contact("top", tools.cylinder(radius=0.5, z=0.05), "none", moves=(0, -1), name="plug")
+    plug = fx.Contact("top", tools.cylinder(radius=0.5, z=0.05), "none", direction=(0, -1), name="plug")
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(4, 1)), temperature=150.0, contacts=[plug],
                      materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      heat=fx.Cooling(fx.ThermalProperties(conductivity=0.01, density=1.0, heat_capacity=1.0), [],
                                      unit="C", tools={"plug": (0.3, 30.0)}))
-    path = fx.Process(scene).run([Stage("touch", duration=0.1), Stage("away", duration=0.5, without=["plug"])],
+    path = fx.Process(scene).run([Stage("touch", duration=0.1), Stage("away", duration=0.5, inactive=["plug"])],
                                  progress=False)
     means = []
     for stage in ("touch", "away"):
         state = [s for s in path.states if s.stage == stage][-1]
-        with path.problem.at(state) as problem:
+        with path.problem.state_context(state) as problem:
             T, X = problem.temperature.T, ufl.SpatialCoordinate(scene.mesh.domain)
             dx = ufl.dx(scene.mesh.domain, metadata={"quadrature_degree": 4})
             means.append(problem.forms.integral(T * X[0] * dx))
@@ -76,7 +76,7 @@ def test_area_of_the_node_on_the_axis():
     """L/24 times the weight at L, of which the middle of the facet gives twice as much: sums and moments stay."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(5, 1)), materials=fx.NeoHookean(c10=1.0),
                      supports=[fx.Symmetry("axis"), fx.Clamped("bottom")],
-                     contacts=[fx.Contact("top", tools.plane(0.1), "none", moves=(0, -1))])
+                     contacts=[fx.Contact("top", tools.plane(0.1), "none", direction=(0, -1))])
     contact, = Problem(scene).contacts
     order = np.argsort(contact.points[:, 0])
     R, area, lumped = contact.points[order, 0], contact.rule.area[order], contact.rule.lumped[order]
@@ -88,7 +88,7 @@ def test_area_of_the_node_on_the_axis():
 def test_a_step_may_not_bring_a_whole_region_into_touch():
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(8, 1)), materials=fx.NeoHookean(c10=1.0),
                      supports=[fx.Symmetry("axis"), fx.Clamped("bottom")],
-                     contacts=[fx.Contact("top", tools.plane(0.2), 0.3, moves=(0, -1))])
+                     contacts=[fx.Contact("top", tools.plane(0.2), 0.3, direction=(0, -1))])
     problem = Problem(scene)
     x = np.zeros(problem.n_owned)
     near, far = (d / problem.forms.length for d in (0.05, 0.11))
@@ -138,7 +138,7 @@ def test_a_tool_that_comes_in_remembers_nothing():
     """What stuck to it before it left has moved since: it starts from where it is now."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(3, 1)), materials=fx.NeoHookean(c10=1.0),
                      supports=[fx.Symmetry("axis"), fx.Clamped("bottom")],
-                     contacts=[fx.Contact("top", tools.plane(0.1), 0.3, moves=(0, -1))])
+                     contacts=[fx.Contact("top", tools.plane(0.1), 0.3, direction=(0, -1))])
     problem = Problem(scene)
     contact, = problem.contacts
     x = np.random.default_rng(1).uniform(-0.01, 0.01, problem.n_owned)
@@ -213,8 +213,8 @@ def test_loss_in_a_jump_is_that_of_the_mean_force_on_the_way():
 def test_a_jump_that_fails_leaves_what_is_remembered():
     """One viscous solution has advanced it; that is no rest."""
     path = fx.Process(sheet(RELAXES, elements=(4, 1))).run(
-        [Stage("blow", drive="air", until=fx.pole_height(0.2), speed=0.1)], progress=False)
-    with path.problem.at(path.last) as problem:
+        [Stage("blow", control="air", until=fx.pole_height(0.2), speed=0.1)], progress=False)
+    with path.problem.state_context(path.last) as problem:
         before = problem.memory
         with pytest.raises(snap_through.NoEquilibrium):
             snap_through.snap_through(path.record.curve, path.last, 0.01, False, snap_through.SnapThrough(), 1)
@@ -224,7 +224,7 @@ def test_a_jump_that_fails_leaves_what_is_remembered():
 def test_a_state_with_an_element_inside_out_is_none(monkeypatch):
     path = fx.trace(treloar((4, 1)), until=fx.pole_height(0.2), progress=False)
     monkeypatch.setattr(Problem, "folded", lambda *_: True)
-    with path.problem.at(path.last), pytest.raises(Failure, match="inside out"):
+    with path.problem.state_context(path.last), pytest.raises(Failure, match="inside out"):
         path.record.curve.step(path.last, 1e-3)
 
 
@@ -232,7 +232,7 @@ def test_a_step_of_a_flow_ends_at_the_first_of_two_targets():
     """Both lie within its first step; whichever is named first."""
     near, far = fx.pole_height(0.2), fx.pole_height(0.25)
     for through in ([near, far], [far, near]):
-        stage = Stage("flow", drive="air", follow={fx.enclosed_volume: [(0, 0), (1, 1.0)]}, through=through,
+        stage = Stage("flow", control="air", amplitudes={fx.enclosed_volume: [(0, 0), (1, 1.0)]}, intermediate=through,
                       step=fx.StepControl(length=1.0))
         path = fx.Process(sheet(RELAXES, elements=(4, 1))).run([stage], progress=False, accuracy=0.5)
         assert path.met(near).time < path.met(far).time

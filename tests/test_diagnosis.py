@@ -49,7 +49,7 @@ def test_a_pressure_in_time_beyond_its_maximum():
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1)), loads=[fx.Pressure("bottom")],
                      materials=fx.Viscoelastic(fx.NeoHookean(c10=0.2), branches=[(3.6, 1.0)]), model=fx.Membrane(),
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
-    stage = fx.Stage("blow", drive=scene.loads[0], until=fx.pressure(1.0), duration=0.1)
+    stage = fx.Stage("blow", control=scene.loads[0], until=fx.pressure(1.0), duration=0.1)
     error, found = failure(lambda: fx.Process(scene).run([stage], progress=False, accuracy="draft"))
     cause, = found.causes
     assert f"what is driven has its maximum, a limit point, at process time {found.control:.6g}" in cause
@@ -85,12 +85,12 @@ def test_limit_of_a_material():
 def pressed(**change):
     """A block glued to its base, pressed flat from above: its foot flows out and folds."""
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(6, 6)), materials=fx.NeoHookean(c10=1.0),
-                    supports=[fx.Symmetry("axis"), fx.Clamped("bottom"), fx.Displaced("top")], **change)
+                    supports=[fx.Symmetry("axis"), fx.Clamped("bottom"), fx.PrescribedDisplacement("top")], **change)
 
 
 def test_element_about_to_turn_inside_out(tmp_path):
     _, found = failure(lambda: fx.trace(pressed(), until=fx.travel(-0.95), max_steps=100, progress=False,
-                                        beyond=True))
+                                        allow_inadmissible=True))
     assert "an element is about to turn inside out" in found.causes[0]
     assert found.smallest_J < 0.1 and found.what == "travel"
     assert found.at_J.R > 0.6 and found.at_J.Z < 0.4 and found.at_J.layer == "sheet"      # the outer foot
@@ -107,7 +107,7 @@ def test_buckling():
     thickness, length = 0.2, 2.0
     scene = fx.Scene(mesh=fx.mesh.disc(radius=thickness, thickness=length, elements=(2, 16)),
                      kinematics=fx.PlaneStrain(), materials=fx.NeoHookean(c10=1.0),
-                     supports=[fx.Clamped("bottom"), fx.Displaced("top")])
+                     supports=[fx.Clamped("bottom"), fx.PrescribedDisplacement("top")])
     step = fx.StepControl(length=0.001, growth=1.0)
     _, found = failure(lambda: fx.trace(scene, until=fx.travel(-0.3), max_steps=14, step=step, progress=False))
     euler = length * math.pi**2 * (thickness / length) ** 2 / 12
@@ -121,7 +121,7 @@ def test_contact_that_settles_where_nodes_leave_an_edge():
     plug = fx.tools.male(radius=1.905, height=30.0, base=-30.0, fillet=0.05).mirrored().moved(z=0.6985)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=8.89, thickness=0.6985, elements=(20, 1)),
                      materials=fx.NeoHookean(c10=0.448), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                     contacts=[fx.Contact("top", plug, 0.3, moves=(0, -1))])
+                     contacts=[fx.Contact("top", plug, 0.3, direction=(0, -1))])
     path = fx.trace(scene, until=fx.travel(10.0), step=fx.StepControl(target=8), progress=False)
     assert path["travel"][-1] == pytest.approx(10.0) and np.all(np.diff(path["travel"]) > 0)
     assert all(state.jump["dissipated"] > 0 for state in path.jumps)

@@ -15,7 +15,7 @@ def pushed(elements, friction=0.2):
     scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(elements, 1)),
                      materials=fx.MooneyRivlin(c10=0.4, c01=0.04),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                     contacts=[fx.Contact("top", plug, friction, moves=(0, -1), name="plug")])
+                     contacts=[fx.Contact("top", plug, friction, direction=(0, -1), name="plug")])
     return fx.trace(scene, until=fx.travel(4.0), progress=False)
 
 

@@ -97,10 +97,10 @@ class Deflection:
         return c
 
 
-def followed(until, at_fold=None, arch=Arch, **given):
+def followed(until, at_limit_point=None, arch=Arch, **given):
     problem = arch()
     record = Record(problem, Curve(problem, fx.Tolerances()))
-    Run(record, [(Target("deflection", until, None), Deflection())], at_fold=at_fold).follow(
+    Run(record, [(Target("deflection", until, None), Deflection())], at_limit_point=at_limit_point).follow(
         None, False, begin(record.curve), **given)
     return record
 
@@ -116,7 +116,7 @@ def test_to_a_target_through_both_limit_points():
 
 def test_snap_through():
     """At the maximum of what it carries the arch snaps to the other root of g(x) = g(TOP), and loses g's area."""
-    record = followed(2.4, at_fold="jump")
+    record = followed(2.4, at_limit_point="snap_through")
     limit, after = next((a, b) for a, b in zip(record.states, record.states[1:]) if b.kind == "jump")
     assert limit.kind == "limit point" and limit.control == pytest.approx(load(TOP), rel=1e-9)
     far = max(np.roots([1, 0, -0.5, 0.5 - load(TOP)]).real) + 1

@@ -37,7 +37,7 @@ from formingx.results.show.picture import Picture
 
 @pytest.fixture(scope="module")
 def inflated():
-    return fx.trace(treloar((10, 2)), until=fx.pole_stretch(2.5), through=[fx.pole_stretch(1.5)], progress=False)
+    return fx.trace(treloar((10, 2)), until=fx.pole_stretch(2.5), intermediate=[fx.pole_stretch(1.5)], progress=False)
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +136,7 @@ import sys
 sys.path.insert(0, "tests")
 import formingx as fx
 from conftest import treloar
-path = fx.trace(treloar((10, 2)), until=fx.pole_stretch(2.5), through=[fx.pole_stretch(1.5)], progress=False)
+path = fx.trace(treloar((10, 2)), until=fx.pole_stretch(2.5), intermediate=[fx.pole_stretch(1.5)], progress=False)
 path.to_vtx(sys.argv[1], "all")
 try:
     path.to_vtx("/proc/run.bp")
@@ -285,7 +285,7 @@ def test_shells_hold_the_volume(formed, tmp_path):
 
 def test_formed_as_a_mesh_file(formed, tmp_path):
     formed.to_msh(tmp_path / "cup.msh")
-    mesh, old = fx.mesh.read(tmp_path / "cup.msh"), formed.formed()
+    mesh, old = fx.mesh.read(tmp_path / "cup.msh"), formed.deformed_mesh()
     assert mesh.layers.keys() == old.layers.keys() and mesh.boundaries.keys() == old.boundaries.keys()
     for name in old.boundaries:
         assert mesh.line_of(name) == pytest.approx(old.line_of(name), abs=1e-12)
@@ -347,7 +347,7 @@ def test_report_of_a_run_that_failed(tmp_path):
 def plugged():
     """A plug goes down with the floor taken away, and back up with it there."""
     scene = test_process.plugged(more=[test_process.FLOOR])
-    return test_process.run(scene, test_process.plug("down", 1.0, without=["floor"]), test_process.plug("up", 0.5))
+    return test_process.run(scene, test_process.plug("down", 1.0, inactive=["floor"]), test_process.plug("up", 0.5))
 
 
 def test_tools_are_drawn_where_they_are(plugged):
@@ -470,9 +470,9 @@ def test_report_of_a_warm_process(tmp_path, capsys):
                       tools={"plug": (0.025, 40.0)})
     scene = fx.Scene(mesh=sheet, materials=soft, temperature=100.0, heat=heat,
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                     contacts=[fx.Contact("top", fx.tools.sphere(radius=1.0, z=0.3), "stick", moves=(0, -1),
+                     contacts=[fx.Contact("top", fx.tools.sphere(radius=1.0, z=0.3), "stick", direction=(0, -1),
                                           name="plug")])
-    path = fx.Process(scene).run([fx.Stage("go_down", drive="plug", until=fx.travel(0.5), speed=1.0),
+    path = fx.Process(scene).run([fx.Stage("go_down", control="plug", until=fx.travel(0.5), speed=1.0),
                                   fx.Stage("hold", duration=1.0)], accuracy="draft", progress=False)
     path.report(tmp_path / "one.html", units=fx.Units("mm", "MPa"))
     path.save(tmp_path / "run")

@@ -8,7 +8,7 @@ import pytest
 from conftest import treloar
 
 import formingx as fx
-from formingx.checks.doctor import before_run
+from formingx.checks.check import before_run
 from formingx.checks.towards import moulds
 from formingx.findings import SEVERITIES, Finding, found_at, register, worst_first
 from formingx.results.evaluate import volume
@@ -25,10 +25,10 @@ def sheet(*, load="bottom", c10=0.4, contacts=None, loads=(), **scene):
 
 
 def ball(friction="none"):
-    return fx.Contact("top", fx.tools.sphere(radius=4.0).moved(z=4.5), friction, moves=(0, -1), name="plug")
+    return fx.Contact("top", fx.tools.sphere(radius=4.0).moved(z=4.5), friction, direction=(0, -1), name="plug")
 
 
-def alarms(path, about):
+def bifurcations(path, about):
     return [found.text for found in path.findings() if found.about == about and found.severity == "warning"]
 
 
@@ -54,7 +54,7 @@ def test_checks_of_extensions_are_registered():
     (lambda: sheet(contacts=[ball(fx.table({20.0: 0.3, 100.0: 6.0}))], temperature=50.0), "of friction is 6"),
     (lambda: sheet(loads=[fx.Gravity(1050.0, 9810.0)]), "tears the body apart"),
     (lambda: sheet(loads=[fx.Gravity(1e-13, 9.81)]), "moves nothing"),
-    (lambda: sheet(loads=[fx.Spin(1050.0, 100.0)]), "tears the body apart"),
+    (lambda: sheet(loads=[fx.CentrifugalLoad(1050.0, 100.0)]), "tears the body apart"),
 ])
 def test_quantities_of_no_polymer(make, words):
     """Said before every run; not of scenes in mm and MPa, m and Pa, in and psi."""
@@ -82,12 +82,12 @@ def test_a_density_is_in_grams():
 def test_a_pressure_that_points_away_from_its_mould(load, pressure, away, caplog):
     """Before the run, of the pressure; after it, of a body that has moved away (here it ends before its mould)."""
     mould = fx.Contact("top", ABOVE, "none", name="mould")
-    plug = fx.Contact("bottom", fx.tools.sphere(radius=4.0).moved(z=-9.0), "none", moves=(0, 1), name="plug")
+    plug = fx.Contact("bottom", fx.tools.sphere(radius=4.0).moved(z=-9.0), "none", direction=(0, 1), name="plug")
     scene = sheet(load=load, contacts=[mould, plug])
-    stages = [fx.Stage("blow", drive=scene.loads[0], until=fx.pressure(pressure), without=[plug])]
+    stages = [fx.Stage("blow", control=scene.loads[0], until=fx.pressure(pressure), inactive=[plug])]
     path = fx.Process(scene).run(stages, progress=False)
-    assert [("away from the mould" in text) for text in alarms(path, f"pressure = {pressure:g}")] == [True] * away
-    moved, = alarms(path, "mould")
+    assert [("away from the mould" in text) for text in bifurcations(path, f"pressure = {pressure:g}")] == [True] * away
+    moved, = bifurcations(path, "mould")
     assert ("moved away from this mould" in moved) == away and ("never touched" in moved) == (not away)
     for found in path.findings():
         assert (caplog.text.count(found.text) == 1) == (found.severity != "note")
@@ -96,11 +96,11 @@ def test_a_pressure_that_points_away_from_its_mould(load, pressure, away, caplog
 def test_status_of_a_stage_with_a_named_pressure(tmp_path):
     """The column of the target is that of the load that is driven; a stage without a step has just begun."""
     air = fx.Pressure("bottom", name="air")
-    plug = fx.Contact("top", fx.tools.sphere(radius=4.0, z=0.5), "none", moves=(0, -1), name="plug")
+    plug = fx.Contact("top", fx.tools.sphere(radius=4.0, z=0.5), "none", direction=(0, -1), name="plug")
     scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(12, 1)), loads=[air], contacts=[plug],
                      materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
-    stages = [fx.Stage("push", drive=plug, until=fx.travel(0.5)),
-              fx.Stage("blow", drive=air, until=fx.pressure(0.01))]
+    stages = [fx.Stage("push", control=plug, until=fx.travel(0.5)),
+              fx.Stage("blow", control=air, until=fx.pressure(0.01))]
     path = fx.Process(scene).run(stages, progress=False, checkpoint=tmp_path / "run")
     (tmp_path / "run" / "end.json").unlink()                                       # as while it goes on
     said = {}
@@ -150,15 +150,15 @@ def test_a_ring_is_no_mould():
 def test_a_tool_that_meets_nothing():
     """A plug that is driven the wrong way; one that arrives is not spoken of, nor is a mould that is reached."""
     scene = sheet(contacts=[ball()])
-    away = fx.Process(scene).run([fx.Stage("plug", drive="plug", until=fx.travel(-3.0))], progress=False)
-    assert "met nothing on its travel of -3: the gap was" in alarms(away, "plug")[0]
-    assert "its first travel is -3" in alarms(away, repr(scene.contacts[0]))[0]
-    stages = [fx.Stage("plug", drive="plug", until=fx.travel(1.0))]
-    near = fx.Contact("top", fx.tools.sphere(radius=4.0, z=0.5), "none", moves=(0, -1), name="plug")
-    assert alarms(fx.Process(sheet(contacts=[near])).run(stages, progress=False), "plug") == []
+    away = fx.Process(scene).run([fx.Stage("plug", control="plug", until=fx.travel(-3.0))], progress=False)
+    assert "met nothing on its travel of -3: the gap was" in bifurcations(away, "plug")[0]
+    assert "its first travel is -3" in bifurcations(away, repr(scene.contacts[0]))[0]
+    stages = [fx.Stage("plug", control="plug", until=fx.travel(1.0))]
+    near = fx.Contact("top", fx.tools.sphere(radius=4.0, z=0.5), "none", direction=(0, -1), name="plug")
+    assert bifurcations(fx.Process(sheet(contacts=[near])).run(stages, progress=False), "plug") == []
     reached = fx.trace(sheet(contacts=[fx.Contact("top", fx.tools.plane(2.0), "none", name="mould")]),
                        until=fx.enclosed_volume(500.0), progress=False)
-    assert reached["contact_length"][-1] > 0 and alarms(reached, "mould") == []
+    assert reached["contact_length"][-1] > 0 and bifurcations(reached, "mould") == []
 
 
 def test_findings_of_a_scene_belong_to_its_path():

@@ -11,13 +11,14 @@ def pushed(radius=15.0, friction="none"):
     """A clamped sheet under a ball."""
     return fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(30, 1)), materials=fx.NeoHookean(c10=0.4),
                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                    contacts=[fx.Contact("top", fx.tools.sphere(radius=radius, z=1.2), friction, moves=(0, -1))])
+                    contacts=[fx.Contact("top", fx.tools.sphere(radius=radius, z=1.2), friction, direction=(0, -1))])
 
 
 def pulled():
     """A disc that is pulled at its rim: the same stretch everywhere."""
     return fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=1.0, elements=(8, 1)), materials=fx.NeoHookean(c10=0.5),
-                    supports=[fx.Symmetry("axis"), fx.Displaced("rim", "r"), fx.Symmetry("bottom", normal="z")])
+                    supports=[fx.Symmetry("axis"), fx.PrescribedDisplacement("rim", "r"),
+                              fx.Symmetry("bottom", normal="z")])
 
 
 def travel(path):
@@ -27,7 +28,7 @@ def travel(path):
 @pytest.mark.parametrize("radius, force", [(15.0, 5.0), (24.0, 0.7)])
 def test_a_ball_comes_to_a_force_where_its_travel_has_it(radius, force):
     scene = pushed(radius)
-    path = fx.trace(scene, until=fx.force(force), through=[fx.force(force / 3)], progress=False)
+    path = fx.trace(scene, until=fx.force(force), intermediate=[fx.force(force / 3)], progress=False)
     assert path["tool_force"][-1] == pytest.approx(force, rel=1e-7) and travel(path) > 0 and len(path) < 15
     assert path.met(fx.force(force / 3)).measures["tool_force"] == pytest.approx(force / 3, rel=1e-7)
     other = fx.trace(scene, until=fx.travel(travel(path)), progress=False)

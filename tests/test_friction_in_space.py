@@ -21,21 +21,21 @@ def pushed(mu, size=0.1, **contact):
     """A quarter of a disc of radius 1 and a ball that is pushed into it."""
     sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=size)
     return fx.Scene(mesh=sheet, thickness=THICKNESS, materials=MATERIAL, supports=HELD, contacts=[
-        fx.Contact("top", fx.tools.revolved(BALL), mu, moves=(0, 0, -1), name="plug", **contact)])
+        fx.Contact("top", fx.tools.revolved(BALL), mu, direction=(0, 0, -1), name="plug", **contact)])
 
 
 def pushed_solid(mu):
     """The same as an axisymmetric solid."""
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=THICKNESS, elements=(60, 1)), materials=MATERIAL,
                     supports=[fx.SimplySupported("rim"), fx.Symmetry("axis")], contacts=[
-                        fx.Contact("top", BALL.moved(z=THICKNESS), mu, moves=(0, -1), name="plug")])
+                        fx.Contact("top", BALL.moved(z=THICKNESS), mu, direction=(0, -1), name="plug")])
 
 
 def strip(mu, size, width):
     """Half a strip under a roller."""
     sheet = fx.mesh.sheet([(0, 0), (1, 0), (1, width), (0, width)], size, names=["y0", "rim", "y1", "x0"])
     return fx.Scene(mesh=sheet, thickness=THICKNESS, materials=MATERIAL, supports=[*HELD, fx.Symmetry("y1", "y")],
-                    contacts=[fx.Contact("top", fx.tools.extruded(BALL), mu, moves=(0, 0, -1), name="roller")])
+                    contacts=[fx.Contact("top", fx.tools.extruded(BALL), mu, direction=(0, 0, -1), name="roller")])
 
 
 def formed_in_cup(mu, size):
@@ -123,7 +123,7 @@ def test_work_of_the_plug_is_strain_energy_and_friction():
     travel, force, energy = (path[name] for name in ("travel", "tool_force", "strain_energy"))
     work, lost, before = np.trapezoid(force, travel), 0.0, None
     for state in path.states:
-        with path.problem.at(state) as problem:
+        with path.problem.state_context(state) as problem:
             (face,) = problem.contacts
             x = face.positions(state.x, state.control)
             limit = face.rule.area * 0.3 * face.law.pressure(face.touch)
@@ -154,7 +154,7 @@ if path.problem.comm.rank == 0:
 
 def test_a_run_goes_on_from_a_checkpoint(tmp_path):
     """What slides goes on as if the run had not been interrupted."""
-    whole = fx.trace(pushed(0.3, 0.2), until=fx.travel(0.6), through=[fx.travel(0.4)], progress=False)
+    whole = fx.trace(pushed(0.3, 0.2), until=fx.travel(0.6), intermediate=[fx.travel(0.4)], progress=False)
     fx.trace(pushed(0.3, 0.2), until=fx.travel(0.4), progress=False).save(tmp_path)
     scene = pushed(0.3, 0.2)
     path = fx.trace(scene, until=fx.travel(0.6), progress=False, start=fx.load(tmp_path, scene))

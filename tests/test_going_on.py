@@ -25,7 +25,7 @@ def law_is_kept(path, contact=0):
     """Largest |T| over mu N of all states."""
     most = 0.0
     for state in path.states:
-        with path.problem.at(state) as problem:
+        with path.problem.state_context(state) as problem:
             found = problem.contacts[contact].tractions(state.x[: problem.forms.space.dofmap.index_map.size_local],
                                                         state.control)
         pressed = found.normal > 0
@@ -68,7 +68,7 @@ def test_a_stiff_layer_between_soft_ones_in_a_cup():
 @pytest.mark.slow
 def test_a_block_pressed_to_a_fifth_of_its_height():
     plate = tools.plane(1.0)
-    path = fx.trace(scene([fx.Contact(face, plate, 0.2, moves=(0, -1)) for face in ("top", "rim")],
+    path = fx.trace(scene([fx.Contact(face, plate, 0.2, direction=(0, -1)) for face in ("top", "rim")],
                           mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(10, 10)),
                           supports=[fx.Symmetry("bottom", normal="z")]), until=fx.travel(0.8))
     assert path["travel"][-1] == pytest.approx(0.8, rel=1e-12)
@@ -91,8 +91,8 @@ def test_a_parison_is_blown_into_a_bottle_without_friction():
 @pytest.mark.slow
 def test_a_flat_rough_plug_comes_back():
     made = plugs.scene(R, H, 5.0, 1.5, MATERIAL, "stick", (40, 1), name="plug")
-    path = fx.Process(made).run([fx.Stage("push", drive="plug", until=fx.travel(3.5)),
-                                 fx.Stage("back", drive="plug", until=fx.travel(0.0))])
+    path = fx.Process(made).run([fx.Stage("push", control="plug", until=fx.travel(3.5)),
+                                 fx.Stage("back", control="plug", until=fx.travel(0.0))])
     # within the ramp, where points that stick hold the sheet
     assert path["pole_height"][-1] == pytest.approx(0.0, abs=path.problem.contacts[0].law.theta)
     assert path["tool_force"][-1] == pytest.approx(0.0, abs=1e-8 * path["tool_force"].max())
@@ -106,7 +106,7 @@ def test_an_undercut_cup_without_friction():
     def made(points):
         return scene([fx.Contact("top", mould, "none", points=points)], [fx.Pressure("bottom")])
     with pytest.raises(fx.ConvergenceError, match="became indefinite .* another path branches off there") as error:
-        fx.trace(made("nodes"), until=fx.pressure(8.0), at_fold="stop")
+        fx.trace(made("nodes"), until=fx.pressure(8.0), at_limit_point="stop")
     found = error.value.diagnosis
     assert found.turned and found.condition > 1e14 and any("points=4" in words for words in found.advice)
     with pytest.raises(fx.ConvergenceError, match="the body buckles here") as later:

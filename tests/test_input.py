@@ -175,8 +175,8 @@ def test_column_and_value_that_a_path_does_not_have():
     path = fx.trace(treloar(), until=fx.pressure(0.1))
     with pytest.raises(fx.InputError, match="column 'height' is not known; known: pressure"):
         path["height"]
-    with pytest.raises(fx.InputError, match="through = Target.*must be a list of targets"):
-        fx.trace(treloar(), until=fx.pressure(0.1), through=fx.pressure(0.05))
+    with pytest.raises(fx.InputError, match="intermediate = Target.*must be a list of targets"):
+        fx.trace(treloar(), until=fx.pressure(0.1), intermediate=fx.pressure(0.05))
     with pytest.raises(fx.InputError, match="does not pass pressure = 0.3"):
         path.at(fx.pressure(0.3))
     with pytest.raises(fx.InputError, match="does not pass pressure = 0.10001: its values lie between 0 and 0.1"):
@@ -192,7 +192,7 @@ def test_the_last_state_of_a_path_is_found_by_a_value_of_six_digits():
 
 
 def test_no_state_is_found_beyond_a_maximum_of_the_pressure():
-    path = fx.trace(treloar(), until=fx.pressure(0.6), at_fold="stop", progress=False)
+    path = fx.trace(treloar(), until=fx.pressure(0.6), at_limit_point="stop", progress=False)
     with pytest.raises(fx.InputError, match="does not pass pressure"):
         path.at(fx.pressure(path.last.measures["pressure"] * (1 + 1e-6)))
 
@@ -201,7 +201,7 @@ def test_a_body_does_not_pass_the_axis():
     """A ring whose inner edge is driven beyond it: J > 0 there, for two factors change their sign."""
     mesh = fx.mesh.disc(radius=10.0, inner_radius=2.0, thickness=1.0, elements=(16, 2))
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0),
-                     supports=[fx.Displaced("inner", "r"), fx.Clamped("rim")])
+                     supports=[fx.PrescribedDisplacement("inner", "r"), fx.Clamped("rim")])
     with pytest.raises(fx.ConvergenceError, match="turned inside out") as error:
         fx.trace(scene, until=fx.travel(-3.0), progress=False)
     assert -2.0 < error.value.path["travel"][-1] < -1.9

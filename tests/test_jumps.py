@@ -54,7 +54,8 @@ def balloon():
     """(closed form, path): over the maximum of its pressure, at which it snaps."""
     ball = Balloon()
     limit = optimize.minimize_scalar(lambda l: -ball.pressure(l), bounds=(1.1, 2.5), method="bounded").x
-    return ball, limit, fx.trace(ball.scene(), until=fx.pressure(1.1 * ball.pressure(limit)), at_fold="jump")
+    return ball, limit, fx.trace(ball.scene(), until=fx.pressure(1.1 * ball.pressure(limit)),
+                                 at_limit_point="snap_through")
 
 
 def test_a_balloon_snaps_to_the_state_of_the_same_pressure(balloon):
@@ -73,7 +74,7 @@ def test_a_target_that_a_balloon_snaps_past_is_named(balloon):
     """No state of the path has it, and the run does not go on without end."""
     scene = balloon[0].scene()
     with pytest.raises(fx.ConvergenceError, match=r"the body snaps past the target, from 1\.\d+ to \d+\.") as caught:
-        fx.trace(scene, until=fx.pole_stretch(2.5), at_fold="jump")
+        fx.trace(scene, until=fx.pole_stretch(2.5), at_limit_point="snap_through")
     assert caught.value.path.last.kind == "jump"
 
 
@@ -92,12 +93,12 @@ def plug(mu=1.0, thickness=0.5):
     tool = tools.male(radius=2.5, height=60.0, base=-60.0, fillet=0.5).mirrored().moved(z=thickness)
     return fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=0.4, c01=0.04),
                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                    contacts=[fx.Contact("top", tool, mu, moves=(0, -1), points=4)])
+                    contacts=[fx.Contact("top", tool, mu, direction=(0, -1), points=4)])
 
 
 def pushed(to=6.5, **step):
     """To 6.5 past two jumps; at 6.9 a point is at the brink of leaving the edge."""
-    return fx.trace(plug(), until=fx.travel(to), through=[fx.travel(t) for t in range(1, 7)],
+    return fx.trace(plug(), until=fx.travel(to), intermediate=[fx.travel(t) for t in range(1, 7)],
                     step=fx.StepControl(target=6, **step), progress=False)
 
 
@@ -156,7 +157,7 @@ def share_of_friction(path):
     """Largest traction by the elastic slip that is remembered, over mu N, of all points that touch and states."""
     contact, n, most = path.problem.contacts[0], path.problem.forms.space.dofmap.index_map.size_local, 0.0
     for state in path.states:
-        with path.problem.at(state):
+        with path.problem.state_context(state):
             touches = contact.touching(state.x[:n], state.control)
             most = max(most, np.abs(contact.touch.slip[touches]).max(initial=0.0) / contact.law.elastic_slip)
     return most
@@ -194,7 +195,7 @@ def williams(**step):
     """Williams' plug with mu = 0.3 past its first snaps; elements in proportion to the radius."""
     made = plugs.scene(RADIUS, THICKNESS, PLUG, 0.35, fx.NeoHookean(c10=C10), 0.3, (37, 2), near={0.0: 0.0357},
                        points=4, penalty=2e4, ramp=1e-3)
-    return fx.trace(made, until=fx.travel(9.0), through=[fx.travel(t) for t in range(1, 9)],
+    return fx.trace(made, until=fx.travel(9.0), intermediate=[fx.travel(t) for t in range(1, 9)],
                     step=fx.StepControl(target=6, **step), progress=False)
 
 
@@ -214,7 +215,8 @@ def test_a_sheet_without_friction_snaps_off_an_edge_too():
     """Elements longer than the edge: no step is short enough where a node leaves it, and the plug moves on."""
     made = plugs.scene(10.0, 0.1, 2.5, 0.05, fx.MooneyRivlin(c10=0.4, c01=0.04), "frictionless", (40, 1),
                        near={1.5: 0.1, 2.5: 0.1})
-    path = fx.trace(made, until=fx.travel(5.0), through=[fx.travel(2.5)], step=fx.StepControl(target=6), progress=False)
+    path = fx.trace(made, until=fx.travel(5.0), intermediate=[fx.travel(2.5)], step=fx.StepControl(target=6),
+                    progress=False)
     assert path["travel"][-1] == pytest.approx(5.0, rel=1e-12)
     assert path.jumps and all(state.jump["dissipated"] >= 0 for state in path.jumps)
     assert path.jumps[0].measures["travel"] == pytest.approx(3.08, abs=0.05)
@@ -232,22 +234,22 @@ def test_what_comes_to_rest_nowhere_is_said_in_bounded_time():
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.4), loads=[fx.Pressure("bottom")],
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
     with pytest.raises(fx.ConvergenceError, match="comes to rest nowhere") as error:
-        fx.trace(scene, until=fx.pressure(1.0), at_fold="jump")
+        fx.trace(scene, until=fx.pressure(1.0), at_limit_point="snap_through")
     assert error.value.path.last.kind == "limit point"
-    stopped = fx.trace(scene, until=fx.pressure(1.0), at_fold="stop")
+    stopped = fx.trace(scene, until=fx.pressure(1.0), at_limit_point="stop")
     assert "the pressure has a limit point" in stopped.ended and stopped.last.kind == "limit point"
 
 
 @pytest.mark.slow
 def test_a_body_at_rest_where_no_state_is_found_is_not_moved_on():
     """A plug and a pressure in step, where another branch starts: each jump ends once the body rests."""
-    plug = fx.Contact("top", tools.sphere(radius=0.5, z=0.1), "none", moves=(0, -1), name="plug")
+    plug = fx.Contact("top", tools.sphere(radius=0.5, z=0.1), "none", direction=(0, -1), name="plug")
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1)), materials=fx.NeoHookean(c10=1.0),
                      loads=[fx.Pressure("bottom", name="air")], contacts=[plug],
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
     rows = [(0.0, 0.0), (0.1, 0.02), (0.93557094, 0.95713907)]
     with pytest.raises(fx.ConvergenceError, match="another path branches off there") as error:
-        fx.Process(scene).run([fx.Stage("on", follow={"air": rows, "plug": rows})], progress=False)
+        fx.Process(scene).run([fx.Stage("on", amplitudes={"air": rows, "plug": rows})], progress=False)
     assert error.value.path.counts.iterations < 9000        # 11600 with 400 solutions of a body that stands still
 
 
@@ -261,11 +263,11 @@ def test_a_pot_that_is_let_go_springs_back_and_does_not_turn_inside_out():
     assert min(state.measures["pole_height"] for state in out) > 0.85 * deep
 
 
-def test_at_fold_is_one_of_three():
-    with pytest.raises(fx.InputError, match="at_fold = 'leap' is not known"):
-        fx.trace(plug(), until=fx.travel(1.0), at_fold="leap")
-    with pytest.raises(fx.InputError, match="at_fold"):
-        fx.Stage("push", drive="plug", until=fx.travel(1.0), at_fold="leap")
+def test_at_limit_point_is_one_of_three():
+    with pytest.raises(fx.InputError, match="at_limit_point = 'leap' is not known"):
+        fx.trace(plug(), until=fx.travel(1.0), at_limit_point="leap")
+    with pytest.raises(fx.InputError, match="at_limit_point"):
+        fx.Stage("push", control="plug", until=fx.travel(1.0), at_limit_point="leap")
 
 
 def test_pictures_and_reports_mark_jumps(balloon, tmp_path):

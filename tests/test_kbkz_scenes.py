@@ -24,7 +24,7 @@ def block(material, mode="equibiaxial", **more):
     on, component = ("rim", "r") if mode == "equibiaxial" else ("top", "z")
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)), materials=material,
                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
-                              fx.Displaced(on, component, name="grip")], **more)
+                              fx.PrescribedDisplacement(on, component, name="grip")], **more)
 
 
 def true_stress(path, mode, state=None):
@@ -76,9 +76,9 @@ def test_kernel_against_tensors_and_differences(name):
 
 def test_a_guess_far_back_in_time_has_no_stress_and_nothing_is_printed():
     path = fx.Process(block(fx.KBKZ([(0.1, 1e-6), (0.02, 1.0)]))).run(
-        [fx.Stage("pull", drive="grip", until=fx.travel(0.1), duration=0.1)], progress=False, accuracy="draft")
+        [fx.Stage("pull", control="grip", until=fx.travel(0.1), duration=0.1)], progress=False, accuracy="draft")
     problem, F = path.problem, path.problem.x.duplicate()
-    with problem.at(path.last), warnings.catch_warnings():
+    with problem.state_context(path.last), warnings.catch_warnings():
         warnings.simplefilter("error")
         problem.clock -= 0.05
         problem.residual(problem.x, path.last.control, F)
@@ -92,9 +92,9 @@ def test_tangent_is_the_derivative_of_the_residual(model):
     material = fx.KBKZ(SPECTRUM, DAMPINGS["psm"], equilibrium=fx.NeoHookean(c10=0.01))
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1)), materials=material, model=model,
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom", name="p")])
-    path = fx.Process(scene).run([fx.Stage("blow", drive="p", follow={fx.enclosed_volume: [(0, 0), (0.5, 1.0)]})],
+    path = fx.Process(scene).run([fx.Stage("blow", control="p", amplitudes={fx.enclosed_volume: [(0, 0), (0.5, 1.0)]})],
                                  progress=False, accuracy="draft")
-    with path.problem.at(path.last) as problem:
+    with path.problem.state_context(path.last) as problem:
         problem.forms.clock += 0.1
         x, d = random_state(problem, size=2e-4)
         x.axpy(1.0, problem.x.copy())
@@ -107,9 +107,9 @@ def test_tangent_is_the_derivative_of_the_residual(model):
 
 def test_without_damping_it_is_the_transient_network():
     """Pulled, put further at once, held, let back."""
-    stages = [fx.Stage("pull", drive="grip", until=fx.travel(0.8), duration=1.0),
-              fx.Stage("jump", drive="grip", until=fx.travel(1.2)), fx.Stage("hold", duration=5.0),
-              fx.Stage("back", drive="grip", until=fx.travel(0.5), duration=2.0)]
+    stages = [fx.Stage("pull", control="grip", until=fx.travel(0.8), duration=1.0),
+              fx.Stage("jump", control="grip", until=fx.travel(1.2)), fx.Stage("hold", duration=5.0),
+              fx.Stage("back", control="grip", until=fx.travel(0.5), duration=2.0)]
     found = [true_stress(fx.Process(block(material)).run(stages, progress=False), "equibiaxial")
              for material in (fx.KBKZ(SPECTRUM), fx.TransientNetwork(None, SPECTRUM))]
     assert found[0] == pytest.approx(found[1], rel=2e-4)
@@ -119,9 +119,9 @@ def test_without_damping_it_is_the_transient_network():
 def test_a_step_of_strain(name):
     """G(t) h (B11 - B33) however long it is held, and after a second step the stress of both."""
     law, l = fx.KBKZ(SPECTRUM, DAMPINGS[name]), 1.6
-    path = fx.Process(block(law)).run([fx.Stage("jump", drive="grip", until=fx.travel(l - 1)),
+    path = fx.Process(block(law)).run([fx.Stage("jump", control="grip", until=fx.travel(l - 1)),
                                        fx.Stage("hold", duration=5.0),
-                                       fx.Stage("further", drive="grip", until=fx.travel(1.0)),
+                                       fx.Stage("further", control="grip", until=fx.travel(1.0)),
                                        fx.Stage("wait", duration=50.0)], progress=False)
     for stage, times, stretches in (("jump", [0], [l]), ("hold", [0, 5], [l, l]), ("further", [0, 5, 5], [l, l, 2]),
                                     ("wait", [0, 5, 5, 55], [l, l, 2, 2])):
@@ -137,7 +137,7 @@ def test_temperature_shifts_its_times():
     shift = fx.WLF(17.44, 51.6, 100.0)
     aT = float(shift(110.0))
     damping = DAMPINGS["wagner"]
-    stages = [fx.Stage("pull", drive="grip", until=fx.travel(0.8), duration=1.0)]
+    stages = [fx.Stage("pull", control="grip", until=fx.travel(0.8), duration=1.0)]
     warm = block(fx.KBKZ(SPECTRUM, damping, shift=shift), temperature=110.0)
     same = block(fx.KBKZ([(G, aT * tau) for G, tau in SPECTRUM], damping))
     found = [true_stress(fx.Process(scene).run(stages, progress=False, accuracy="draft"), "equibiaxial")
@@ -149,7 +149,7 @@ def test_irreversible_damping_does_not_come_back():
     """Let back after a step, the network of the state before bears h of the larger strain."""
     damping, G = fx.PSM(alpha=10.0, beta=0.05), 0.1
     path = fx.Process(block(fx.KBKZ([(G, 1e6)], damping, irreversible=True))).run([
-        fx.Stage("out", drive="grip", until=fx.travel(1.0)), fx.Stage("back", drive="grip", until=fx.travel(0.3))],
+        fx.Stage("out", control="grip", until=fx.travel(1.0)), fx.Stage("back", control="grip", until=fx.travel(0.3))],
         progress=False)
     h = damping(2 * 4 + 1 / 16, 2 / 4 + 16)
     assert true_stress(path, "equibiaxial") == pytest.approx(G * h * (1.3**2 - 1.3**-4), rel=1e-5)
@@ -160,8 +160,8 @@ def test_what_is_saved_goes_on_as_it_was(irreversible, tmp_path):
     def scene():
         return block(fx.KBKZ(SPECTRUM, DAMPINGS["psm"], shift=fx.WLF(17.44, 51.6, 100.0), irreversible=irreversible),
                      temperature=105.0)
-    stages = [fx.Stage("pull", drive="grip", until=fx.travel(0.5), duration=1.0)]
-    more = [*stages, fx.Stage("back", drive="grip", until=fx.travel(0.2), duration=1.0)]
+    stages = [fx.Stage("pull", control="grip", until=fx.travel(0.5), duration=1.0)]
+    more = [*stages, fx.Stage("back", control="grip", until=fx.travel(0.2), duration=1.0)]
     first = fx.Process(scene()).run(stages, progress=False, accuracy="draft")
     first.save(tmp_path / "run")
     whole = fx.Process(scene()).run(more, progress=False, accuracy="draft")
@@ -176,7 +176,7 @@ import formingx as fx
 melt = fx.KBKZ([(0.1, 0.05), (0.05, 1.0)], fx.PSM(alpha=10.0, beta=0.05))
 scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(6, 1)), materials=melt,
                  supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom", name="p")])
-path = fx.Process(scene).run([fx.Stage("blow", drive="p", follow={fx.enclosed_volume: [(0, 0), (0.5, 1.0)]})],
+path = fx.Process(scene).run([fx.Stage("blow", control="p", amplitudes={fx.enclosed_volume: [(0, 0), (0.5, 1.0)]})],
                              progress=False, accuracy="draft")
 if path.problem.comm.rank == 0:
     print(json.dumps([*path["pressure"], *path["pole_height"]]))
@@ -226,16 +226,16 @@ def test_where_a_step_ruptures():
 
 
 def test_a_melt_that_sets():
-    """`Sets` over K-BKZ: the glass holds what the melt pulls with when it is let go."""
+    """`Solidification` over K-BKZ: the glass holds what the melt pulls with when it is let go."""
     l, melt, G = 1.5, fx.KBKZ(SPECTRUM, DAMPINGS["wagner"]), 100.0
     heat = fx.ThermalProperties(conductivity=0.2, density=1000.0, heat_capacity=2000.0)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1e-3, thickness=1e-3, elements=(1, 1)), temperature=150.0,
-                     materials=fx.Sets(melt, G, between=(75, 85)),
+                     materials=fx.Solidification(melt, G, between=(75, 85)),
                      heat=fx.Cooling(heat, [fx.Convection("top", h=1000.0, air=20.0)], unit="C", tolerance=1.0),
                      supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
-                               fx.Displaced("rim", "r", name="grip")])
-    path = fx.Process(scene).run([fx.Stage("draw", drive="grip", until=fx.travel(0.5e-3)),
-                                  fx.Stage("chill", duration=15.0), fx.Stage("let go", without=["grip"])],
+                               fx.PrescribedDisplacement("rim", "r", name="grip")])
+    path = fx.Process(scene).run([fx.Stage("draw", control="grip", until=fx.travel(0.5e-3)),
+                                  fx.Stage("chill", duration=15.0), fx.Stage("let go", inactive=["grip"])],
                                  progress=False, accuracy="draft")
     left = float(np.mean(path.stress().at_quadrature_points().deformation_gradient[:, 0, 0]))
     pull = melt.relaxation("equibiaxial", l, 15.0) * l
@@ -268,11 +268,11 @@ def ruptures(volume):
                      materials=fx.KBKZ([(0.1, 0.05), (0.05, 1.0)], fx.PSM(alpha=10.0, beta=0.05)),
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
                      loads=[fx.Pressure("bottom", name="air")])
-    return scene, fx.Stage("blow", drive="air", follow={fx.enclosed_volume: [(0.0, 0.0), (0.5, volume)]})
+    return scene, fx.Stage("blow", control="air", amplitudes={fx.enclosed_volume: [(0.0, 0.0), (0.5, volume)]})
 
 
 def test_a_damped_melt_that_ruptures_is_said():
-    """The run ends at the axis, in words; doctor has said so before; not of a mild draw, nor without damping."""
+    """The run ends at the axis, in words; check has said so before; not of a mild draw, nor without damping."""
     scene, stage = ruptures(3.5)
     with pytest.raises(fx.ConvergenceError, match="the sheet thins without end at .R, Z.") as raised:
         fx.Process(scene).run([stage], accuracy="draft", progress=False)
@@ -282,12 +282,12 @@ def test_a_damped_melt_that_ruptures_is_said():
     drawn, most = map(float, re.findall(r" at an equibiaxial stretch of (\S+), .* stress at (\S+);", rupture.text)[0])
     assert float(R) < 0.2 and drawn > most == pytest.approx(1.79, abs=0.01)
     assert "lies beyond it" not in str(found)              # of a flow the time is no limit of the pressure
-    assert "thins without end" in str(fx.doctor(scene, stages=[stage]))
-    assert "thins" not in str(fx.doctor(*[scene], stages=[ruptures(0.8)[1]]))
+    assert "thins without end" in str(fx.check(scene, stages=[stage]))
+    assert "thins" not in str(fx.check(*[scene], stages=[ruptures(0.8)[1]]))
     mould = fx.tools.cup(radius=1.0, depth=1.8, mouth=0.3, draft=5, fillet=0.2)
     cup = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.03, elements=(20, 1)), materials=scene.materials["sheet"],
                    supports=scene.supports, loads=scene.loads, contacts=[fx.Contact("top", mould, "stick")])
-    assert "Contact('top'" in str(fx.doctor(cup)) and "thins without end" in str(fx.doctor(cup))
+    assert "Contact('top'" in str(fx.check(cup)) and "thins without end" in str(fx.check(cup))
 
 
 @pytest.mark.slow
@@ -296,8 +296,8 @@ def test_what_is_left_out_of_many_states_does_not_add_up():
     law, end = fx.published()["LDPE melt 150 C"].material, float(np.log(5.0))
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)), materials=law,
                      supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
-                               fx.Displaced("rim", "r", name="pull")])
-    path = fx.Process(scene).run([fx.Stage("pull", drive="pull", follow={fx.travel: np.expm1},
+                               fx.PrescribedDisplacement("rim", "r", name="pull")])
+    path = fx.Process(scene).run([fx.Stage("pull", control="pull", amplitudes={fx.travel: np.expm1},
                                            until=fx.process_time(end))], accuracy="fine", progress=False,
                                  step=fx.StepControl(length=1 / 800, largest=1 / 800))
     sigma = path.stress().at_quadrature_points().cauchy[0]

@@ -11,7 +11,7 @@ THICKNESS = 1.0
 def draw(size, friction="stick", **more):
     """A scene in which a box, or another tool, is pushed into the sheet of a tray of 160 x 100 mm."""
     plug = fx.tools.box(half=(52, 27), depth=30, corner=15, fillet=8, draft=5, mouth=30.5, plug=True)
-    contact = fx.Contact("top", more.pop("tool", plug), friction, moves=(0, 0, -1), name="plug")
+    contact = fx.Contact("top", more.pop("tool", plug), friction, direction=(0, 0, -1), name="plug")
     sheet = fx.mesh.sheet(fx.mesh.rectangle(160, 100, corner=20), size=size)
     return fx.Scene(mesh=sheet, thickness=THICKNESS, materials=fx.NeoHookean(c10=0.1), contacts=[contact],
                     supports=[fx.SimplySupported("rim")], model=fx.Membrane(wrinkles=0.01), **more)
@@ -27,7 +27,7 @@ def serious(path):
 def test_nothing_is_in_a_tool_at_a_target(more):
     """Targets are met exactly, of a box one of the force, too; between them points do come late."""
     targets = [fx.travel(5.0), *([] if more else [fx.force(2.0)]), fx.travel(20.0)]
-    path = fx.trace(draw(16.0, **more), until=targets[-1], through=targets[:-1], progress=False)
+    path = fx.trace(draw(16.0, **more), until=targets[-1], intermediate=targets[:-1], progress=False)
     for target in targets:
         met = path.met(target).measures
         assert abs(met["travel" if target.name == "travel" else "tool_force"]) == pytest.approx(target.value, rel=1e-8)
@@ -38,7 +38,7 @@ def test_nothing_is_in_a_tool_at_a_target(more):
 def test_a_stage_ends_without_late_contact():
     """A step to its end would leave a point 0.5 deep in the plug; the next stage begins with nothing in it either."""
     scene = draw(16.0)
-    path = fx.Process(scene).run([fx.Stage("plug", drive="plug", until=fx.travel(12.0), speed=60.0),
+    path = fx.Process(scene).run([fx.Stage("plug", control="plug", until=fx.travel(12.0), speed=60.0),
                                   fx.Stage("hold", duration=0.1)], progress=False)
     for name in ("plug", "hold"):
         end = [state for state in path.states if state.stage == name][-1]

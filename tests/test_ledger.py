@@ -19,7 +19,8 @@ COOLS = {"conductivity": 0.01, "density": 1.0, "heat_capacity": 1.0}
 
 def sheet(material=RUBBER, friction=None, elements=(14, 1), ball=None, more=(), **scene):
     """A clamped sheet, radius 1, with air below it or a ball above it."""
-    tool = [] if friction is None else [fx.Contact("top", BALL, friction, moves=(0, -1), name="ball", **(ball or {}))]
+    tool = [] if friction is None else [fx.Contact("top", BALL, friction, direction=(0, -1), name="ball",
+                                                   **(ball or {}))]
     air = [fx.Pressure("bottom", name="air")] if friction is None or scene.pop("blown", False) else []
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=elements), materials=material,
                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[*air, *more], contacts=tool, **scene)
@@ -28,12 +29,13 @@ def sheet(material=RUBBER, friction=None, elements=(14, 1), ball=None, more=(), 
 def bar(material, **scene):
     """A cylinder of radius and height 1, pulled at its top."""
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)), materials=material,
-                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.Displaced("top", name="pull")],
+                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z"),
+                              fx.PrescribedDisplacement("top", name="pull")],
                     **scene)
 
 
 def between_plates(friction, **scene):
-    plate = fx.Contact("top", tools.plane(1.0), friction, moves=(0, -2), name="plate")
+    plate = fx.Contact("top", tools.plane(1.0), friction, direction=(0, -2), name="plate")
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(6, 4)), materials=RUBBER, contacts=[plate],
                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z")], **scene)
 
@@ -56,7 +58,7 @@ def run(scene, *stages, **options):
 
 
 def push(travel, **options):
-    return Stage("push", drive="ball", until=fx.travel(travel), **options)
+    return Stage("push", control="ball", until=fx.travel(travel), **options)
 
 
 def cooled(**options):
@@ -80,23 +82,23 @@ RUNS = {
     "rough ball": lambda: fx.trace(sheet(friction=0.3), until=fx.travel(0.6), progress=False),
     "sticky ball": lambda: fx.trace(sheet(friction="stick"), until=fx.travel(0.6), progress=False),
     "ball, then air": lambda: run(sheet(friction=0.2, blown=True), push(0.4),
-                                  Stage("blow", drive="air", until=fx.pressure(0.05)),
-                                  Stage("away", drive="ball", until=fx.travel(0.0), without=["ball"])),
+                                  Stage("blow", control="air", until=fx.pressure(0.05)),
+                                  Stage("away", control="ball", until=fx.travel(0.0), inactive=["ball"])),
     "mould": lambda: fx.trace(cup(0.2, (12, 1)), until=fx.pressure(8.0), progress=False),
     "plates": lambda: fx.trace(between_plates(0.2), until=fx.travel(0.1), progress=False,
                                step=fx.StepControl(length=0.02, largest=0.02)),
     "fixed pressure": lambda: fx.trace(sheet(friction="none", more=[fx.Pressure("bottom", 0.03)]), until=fx.travel(0.6),
                                        progress=False),
-    "relaxing bar": lambda: run(bar(RELAXES), Stage("pull", drive="pull", until=fx.travel(1.0), speed=2.0),
+    "relaxing bar": lambda: run(bar(RELAXES), Stage("pull", control="pull", until=fx.travel(1.0), speed=2.0),
                                 Stage("hold", duration=1.0),
-                                Stage("back", drive="pull", until=fx.travel(0.3), speed=1.0)),
-    "network": lambda: run(sheet(NETWORK), Stage("flow", drive="air", follow={
+                                Stage("back", control="pull", until=fx.travel(0.3), speed=1.0)),
+    "network": lambda: run(sheet(NETWORK), Stage("flow", control="air", amplitudes={
         fx.enclosed_volume: [(0, 0), (0.5, 1.0), (2.0, 1.0)]})),
     "relaxing sheet on a rough ball": lambda: run(sheet(RELAXES, friction=0.3), push(0.5, speed=1.0),
                                                   Stage("hold", duration=0.5)),
-    "cooling": lambda: run(cooled(), Stage("blow", drive="air", follow={fx.enclosed_volume: [(0, 0), (0.5, 0.5),
+    "cooling": lambda: run(cooled(), Stage("blow", control="air", amplitudes={fx.enclosed_volume: [(0, 0), (0.5, 0.5),
                                                                                             (1.5, 0.5)]})),
-    "snapping": lambda: fx.trace(balloon(), until=fx.pressure(1.0), at_fold="jump", progress=False),
+    "snapping": lambda: fx.trace(balloon(), until=fx.pressure(1.0), at_limit_point="snap_through", progress=False),
 }
 
 
@@ -114,7 +116,7 @@ def rubbed(path):
     contact, = path.problem.contacts
     lost, before = 0.0, None
     for state in path.states:
-        with path.problem.at(state) as problem:
+        with path.problem.state_context(state) as problem:
             x = problem.x.array_r[:problem.n_owned]
             traction = contact.tractions(x, state.control).tangential
             there = contact.positions(x, state.control)
@@ -177,7 +179,7 @@ def test_books_are_kept(name, done):
     ("rough ball", "ball", "tool_force", "travel", 1), ("sticky ball", "ball", "tool_force", "travel", 1),
     ("plates", "plate", "tool_force", "travel", 2), ("relaxing bar", "pull", "support_force", "travel", 1)])
 def test_work_is_force_over_travel(name, entry, force, over, factor, done):
-    """Read off the columns; travel is in parts of `moves`. (The force of a body on a support pulls it back.)"""
+    """Read off the columns; travel is in parts of `direction`. (The force of a body on a support pulls it back.)"""
     path = done.setdefault(name, RUNS[name]())
     expected = factor * integral(path, force, over) * (-1 if entry == "pull" else 1)
     assert path.work()[entry][-1] == pytest.approx(expected, rel=0.015)
@@ -192,7 +194,7 @@ def test_loss_in_branches_is_that_of_small_steps(done):
     path = done.setdefault("relaxing bar", RUNS["relaxing bar"]())
     power, time = path["dissipated_power"], path["process_time"]
     assert path["dissipated_energy"][-1] == pytest.approx(np.trapezoid(power, time), rel=0.02)
-    pull = Stage("pull", drive="pull", until=fx.travel(1.0), speed=0.5)
+    pull = Stage("pull", control="pull", until=fx.travel(1.0), speed=0.5)
     few = run(bar(fx.Viscoelastic(RUBBER, [(1.0, 100.0)])), pull)
     many = run(few.problem.scene, pull, accuracy=2e-5)
     assert len(many) > 2 * len(few) and few["dissipated_energy"][-1] == pytest.approx(many["dissipated_energy"][-1],
@@ -203,8 +205,9 @@ LONG_STEPS = {                                             # (one step, or few, 
     "a plug in one step": lambda: fx.trace(sheet(friction="none"), until=fx.travel(0.35), progress=False,
                                            step=fx.StepControl(length=0.5)),
     "a ball that sticks, up again": lambda: run(sheet(friction="stick"), push(0.35), Stage(
-        "up", drive="ball", until=fx.travel(0.0)), step=fx.StepControl(length=0.5, target=9)),
-    "a flow that turns": lambda: run(sheet(fx.Viscoelastic(RUBBER, [(0.5, 4.0)])), Stage("flow", drive="air", follow={
+        "up", control="ball", until=fx.travel(0.0)), step=fx.StepControl(length=0.5, target=9)),
+    "a flow that turns": lambda: run(sheet(fx.Viscoelastic(RUBBER, [(0.5, 4.0)])),
+                                     Stage("flow", control="air", amplitudes={
         fx.enclosed_volume: [(0, 0), (0.5, 1.0), (1.0, 0.3), (1.1, 2.0)]}), accuracy="draft"),
 }
 
@@ -218,7 +221,7 @@ def test_long_steps_are_halved(name):
 
 
 def test_step_control_of_a_process_reaches_its_flows():
-    stage = Stage("flow", drive="air", follow={fx.enclosed_volume: [(0, 0), (1.0, 0.5)]})
+    stage = Stage("flow", control="air", amplitudes={fx.enclosed_volume: [(0, 0), (1.0, 0.5)]})
     assert len(run(sheet(RELAXES), stage, step=fx.StepControl(length=0.02, largest=0.02))) > 50
 
 
@@ -226,7 +229,7 @@ def test_a_body_that_lies_on_a_tool_has_a_tangent_that_goes_with_it():
     """Its points rest at the foot of the ramp, where there is no stiffness: the tool would move alone."""
     path = fx.trace(sheet(friction="none"), until=fx.travel(0.05), progress=False)
     start = path.states[0]
-    with path.problem.at(start) as problem:
+    with path.problem.state_context(start) as problem:
         pole = -problem.forms.length * start.direction[path.problem.contacts[0].rule.dofs[:, 1]].min()
         moved = problem.forms.length * sum(problem.setting.rate) * start.slope
     assert pole == pytest.approx(moved, rel=0.1)
@@ -234,10 +237,10 @@ def test_a_body_that_lies_on_a_tool_has_a_tangent_that_goes_with_it():
 
 def test_what_a_bond_holds():
     """A block is pulled by a tool that it is stuck to: the penalty is a spring; let go, the bond keeps nothing."""
-    tool = fx.Contact("top", tools.plane(1.0), "none", separates=False, penalty=5.0, moves=(0, 1), name="tool")
+    tool = fx.Contact("top", tools.plane(1.0), "none", separates=False, penalty=5.0, direction=(0, 1), name="tool")
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(2, 2)), materials=RUBBER, contacts=[tool],
                      supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z")], kinematics=fx.PlaneStrain())
-    path = fx.Process(scene).run([Stage("pull", drive=tool, until=fx.travel(0.5)), Stage("let go", without=[tool])],
+    path = fx.Process(scene).run([Stage("pull", control=tool, until=fx.travel(0.5)), Stage("let go", inactive=[tool])],
                                  progress=False)
     books, pulled = path.work(), path.states.index(path.state("pull"))
     force = path["tool_force"][pulled]

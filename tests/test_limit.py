@@ -90,10 +90,10 @@ def test_what_materials_remember_is_computed_four_times_a_step(monkeypatch):
     scene = fx.Scene(mesh=mesh, materials=fx.Viscoelastic(fx.NeoHookean(c10=0.05), branches=[(0.3, 0.5), (0.4, 5.0)]),
                      supports=[fx.Symmetry("bottom", "z"), fx.Symmetry("top", "z")], loads=[fx.Pressure("inner")])
     course = {lambda value: fx.displacement(value, at=(1.0, 0.0), component="r"): [(0, 0), (1, 1)]}
-    path = fx.Process(scene).run([fx.Stage("widen", drive=scene.loads[0], follow=course)], progress=False)
+    path = fx.Process(scene).run([fx.Stage("widen", control=scene.loads[0], amplitudes=course)], progress=False)
     assert len(path) > 8 and calls[0] <= 4 * (path.counts.steps + path.counts.failures) + 2
     before, last = path.states[-2:]
-    with path.problem.at(last) as problem:
+    with path.problem.state_context(last) as problem:
         problem.memory = before.memory
         problem.advance(last.x, last.control)
         for name, values in problem.memory[0].values.items():

@@ -230,14 +230,15 @@ def test_inflation_to_the_limit(material, caplog):
     """A step that is far too long leaves the domain, is halved, and the path goes on to 99.8 % of the limit.
 
     (On this mesh the quadrature points come to the limit when the pole itself is at 99.88 % of it; where they lock,
-    one row of elements does not keep its volumes, which ends a run that is not to go on `beyond` that.)
+    one row of elements does not keep its volumes, which ends a run that is not to go on `allow_inadmissible` that.)
     """
     mesh = fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1))
     scene = fx.Scene(mesh=mesh, materials=material, supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
                      loads=[fx.Pressure("bottom")])
     limit = material.largest_stretch("equibiaxial")
     caplog.set_level("INFO", "formingx")
-    path = fx.trace(scene, until=fx.pole_stretch(0.998 * limit), step=fx.StepControl(length=2.0), beyond=True)
+    path = fx.trace(scene, until=fx.pole_stretch(0.998 * limit), step=fx.StepControl(length=2.0),
+                    allow_inadmissible=True)
     assert "volumes" in path.last.verdict and not path.states[len(path) // 2].verdict
     assert path.counts.failures >= 1 and "was stretched beyond its limit, I1 <" in caplog.text
     assert path.counts.steps < 40 and path.last.measures["pole_stretch"] == pytest.approx(0.998 * limit, rel=1e-8)

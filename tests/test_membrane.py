@@ -66,7 +66,7 @@ def test_shape_converges_to_membrane_theory(c01):
     targets = [fx.pole_height(state.height) for state in states]
     errors = []
     for n in (10, 20, 40):
-        path = trace(sheet(n, fx.MooneyRivlin(c10=1.0, c01=c01)), targets[-1], through=targets[:-1])
+        path = trace(sheet(n, fx.MooneyRivlin(c10=1.0, c01=c01)), targets[-1], intermediate=targets[:-1])
         row = []
         for target, exact in zip(targets, states):
             profile = path.profile(path.met(target))
@@ -86,7 +86,7 @@ def test_table_of_a_mooney_disc():
     scene = fx.Scene(mesh=body, materials=fx.MooneyRivlin(c10=80.0, c01=20.0), loads=[fx.Pressure("bottom")],
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], model=fx.Membrane())
     targets = [fx.pressure(p) for p in table]
-    path = trace(scene, targets[-1], through=targets[:-1])
+    path = trace(scene, targets[-1], intermediate=targets[:-1])
     assert not path.limit_points
     for target, height in zip(targets, table.values()):
         assert path.met(target).measures["pole_height"] == pytest.approx(height, abs=1e-3)
@@ -234,7 +234,7 @@ import json, sys
 sys.path.insert(0, "tests")
 import formingx as fx
 from test_membrane import sheet, trace
-path = trace(sheet(7, thickness={"a": 0.004, "b": 0.006}), fx.pole_stretch(3.0), through=[fx.pressure(0.05)])
+path = trace(sheet(7, thickness={"a": 0.004, "b": 0.006}), fx.pole_stretch(3.0), intermediate=[fx.pressure(0.05)])
 profile = path.profile()
 numbers = [*path["pressure"], *path["pole_height"], *path["enclosed_volume"], *profile.thickness_ratio]
 if path.problem.comm.rank == 0:
@@ -269,7 +269,7 @@ def test_compression_is_said(material, stretch, caplog, tmp_path):
     """A flat sheet whose rim moves: the resultant over mu h is (1 - l^-6)(c10 + l^2 c01)/(c10 + c01) all over."""
     body = fx.mesh.disc(radius=1.0, thickness={"a": 0.01, "b": 0.02}, elements=(4, 1))
     scene = fx.Scene(mesh=body, materials=material, model=fx.Membrane(),
-                     supports=[fx.Symmetry("axis"), fx.Displaced("rim", "r"), fx.Symmetry("rim", "z")])
+                     supports=[fx.Symmetry("axis"), fx.PrescribedDisplacement("rim", "r"), fx.Symmetry("rim", "z")])
     try:
         path = trace(scene, fx.travel(stretch - 1))
     except fx.ConvergenceError as error:

@@ -11,7 +11,7 @@ from formingx.contact.step_limit import Way
 def ball(radius, *, elements=12, friction="none", gap=0.0, **more):
     return fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(elements, 1)),
                     materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                    contacts=[fx.Contact("top", tools.sphere(radius=radius, z=1.2 + gap), friction, moves=(0, -1),
+                    contacts=[fx.Contact("top", tools.sphere(radius=radius, z=1.2 + gap), friction, direction=(0, -1),
                                          **more)])
 
 
@@ -52,7 +52,7 @@ def test_a_tool_between_two_points_is_refused(radius, elements, narrow):
 def test_where_a_point_slides_over_a_convex_tool_its_way_may_cut_it():
     scene = ball(2.0, elements=24)
     path = fx.trace(scene, until=fx.travel(0.5), progress=False)
-    with path.problem.at(path.last) as problem:
+    with path.problem.state_context(path.last) as problem:
         contact, x = problem.contacts[0], path.last.x
         node = np.argmin(np.hypot(*(contact.points - (0.0, 1.2)).T))
         for by, passes in ((0.0, False), (0.1, False), (10.0, True)):      # seen from the tool, across it
@@ -68,7 +68,7 @@ def ridge(elements, at, points="nodes", width=30.0, fillet=0.0):
                       fillets=fillet).moved(z=0.5)
     return fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(elements, 1)), kinematics=fx.PlaneStrain(),
                     materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                    contacts=[fx.Contact("top", tool, moves=(0, -1), points=points)])
+                    contacts=[fx.Contact("top", tool, direction=(0, -1), points=points)])
 
 
 @pytest.mark.parametrize("points", ["nodes", 4])

@@ -100,11 +100,11 @@ def test_work_ahead_is_that_of_the_pressure_on_the_volume_that_grows():
         growth = (ends[0] - ends[1]) / (2 * h)
         work = curve.work_ahead(state) * forms.stress * forms.volume / forms.control_scale
         assert work == pytest.approx(growth, rel=1e-6) and growth > 0
-    assert not any(snaps(curve, state, "follow volume", 1.0) for state in (path.states[3], limit, path.last))
+    assert not any(snaps(curve, state, "continue_volume", 1.0) for state in (path.states[3], limit, path.last))
     back = replace(path.states[3], direction=-path.states[3].direction, slope=-path.states[3].slope)
-    assert snaps(curve, back, "follow volume", 1.0)                  # neither pressure nor volume grows
+    assert snaps(curve, back, "continue_volume", 1.0)                  # neither pressure nor volume grows
     limit.direction, limit.slope = -limit.direction, -limit.slope
-    assert snaps(curve, limit, "follow volume", 1.0) and not snaps(curve, limit, "follow", 1.0)
+    assert snaps(curve, limit, "continue_volume", 1.0) and not snaps(curve, limit, "continue", 1.0)
 
 
 WILLIAMS = dict(radius=8.89, plug_radius=1.905, thickness=0.6985, c10=0.448)

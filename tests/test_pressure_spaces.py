@@ -142,7 +142,7 @@ for space in ("P0", "P1", "P1dg"):
     scene = fx.Scene(mesh=mesh, materials={"a": fx.NeoHookean(c10=2.0), "b": fx.NeoHookean(c10=1.1)},
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")],
                      model=fx.MixedPressure(space=space))
-    path = fx.trace(scene, until=fx.pole_stretch(3.0), through=[fx.pressure(0.3)], progress=False)
+    path = fx.trace(scene, until=fx.pole_stretch(3.0), intermediate=[fx.pressure(0.3)], progress=False)
     numbers += [*path["pressure"], *path["pole_height"], *path["strain_energy"], *path.profile().thickness_ratio]
     counts += [path.counts.steps, path.counts.iterations]
 if path.problem.comm.rank == 0:

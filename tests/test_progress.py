@@ -14,7 +14,7 @@ from formingx.solve import progress
 
 def plug():
     ball = fx.Contact("top", fx.tools.sphere(radius=15.0, z=1.2), friction=0.3, penalty=2e4, separates=True,
-                      moves=(0, -1))
+                      direction=(0, -1))
     return fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(20, 1)), materials=fx.NeoHookean(c10=0.4),
                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], contacts=[ball])
 

@@ -9,8 +9,8 @@ import json, sys
 sys.path.insert(0, "tests")
 import formingx as fx
 from conftest import treloar
-path = fx.trace(treloar((12, 2), {support}), until=fx.pole_stretch(3.0), through=[fx.pole_stretch(1.5)], progress=False)
-profile = path.profile()
+path = fx.trace(treloar((12, 2), {support}), until=fx.pole_stretch(3.0), intermediate=[fx.pole_stretch(1.5)],
+progress=False) profile = path.profile()
 numbers = [*path["pressure"], *path["pole_height"], *path["enclosed_volume"], *path["strain_energy"],
            *profile.thickness_ratio, *profile.arc_length, path.limit_points[0].measures["pole_stretch"]]
 fixed = fx.solve(path.problem.scene, to=0.3, increments=6).last.measures["pole_height"]
@@ -73,7 +73,7 @@ import json
 import formingx as fx
 mesh = fx.mesh.disc(radius=1.0, thickness=3.0, elements=(4, 12))
 scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[
-    fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.Displaced("top", "z")])
+    fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.PrescribedDisplacement("top", "z")])
 path = fx.trace(scene, until=fx.travel(-0.5), progress=False)
 found = [float(path[c][-1]) for c in ("travel", "support_force")]
 if mesh.comm.rank == 0:
@@ -99,9 +99,9 @@ scene = fx.Scene(mesh=fx.mesh.disc(radius=5.0, thickness=0.25, elements=(14, 1))
                  materials=fx.TransientNetwork(fx.NeoHookean(c10=0.5), [(1.0, 0.02)]),
                  supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")],
                  contacts=[fx.Contact("top", pot.mould, "stick", name="mould"),
-                           fx.Contact("bottom", pot.plug, 0.3, moves=(0, 1), name="plug")])
-path = fx.Process(scene).run([fx.Stage("plug", drive="plug", until=fx.travel(1.5), speed=30.0),
-                              fx.Stage("air", drive="air", until=fx.pressure(0.2), duration=0.1)],
+                           fx.Contact("bottom", pot.plug, 0.3, direction=(0, 1), name="plug")])
+path = fx.Process(scene).run([fx.Stage("plug", control="plug", until=fx.travel(1.5), speed=30.0),
+                              fx.Stage("air", control="air", until=fx.pressure(0.2), duration=0.1)],
                              accuracy="draft", max_steps=300, progress=False)
 last = path.last.measures
 found = {"steps": path.counts.steps, "last": [last[c] for c in ("pole_height", "plug_force", "strain_energy")],

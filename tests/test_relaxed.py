@@ -17,13 +17,14 @@ from formingx.solve.state import State
 RUBBER = fx.NeoHookean(c10=0.05)
 BRANCHES = [(0.3, 0.5), (0.4, 5.0)]
 POLYMER = fx.Viscoelastic(RUBBER, BRANCHES)
-AT_ONCE = Stage("at once", drive="pull", until=fx.travel(1.0))
+AT_ONCE = Stage("at once", control="pull", until=fx.travel(1.0))
 
 
 def block(material=POLYMER, mesh=None):
     """A cylinder of radius and height 1, pulled at its top."""
     return fx.Scene(mesh=mesh or fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)), materials=material,
-                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.Displaced("top", name="pull")])
+                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z"),
+                              fx.PrescribedDisplacement("top", name="pull")])
 
 
 def run(scene, *stages, **options):
@@ -50,7 +51,7 @@ def test_stress_at_the_pole_relaxes_to_that_in_equilibrium(law, tmp_path):
 
 
 def test_no_ratio_where_nothing_is_left_in_equilibrium():
-    once = Stage("at once", drive="pull", until=fx.travel(0.1))
+    once = Stage("at once", control="pull", until=fx.travel(0.1))
     assert "pole_stress_ratio" not in run(block(RUBBER), once).columns
     assert "pole_stress_ratio" not in run(block(fx.Viscoelastic(None, BRANCHES)), once).columns
 
@@ -62,7 +63,7 @@ def test_ratio_of_a_membrane_with_layers():
     scene = fx.Scene(mesh=mesh, materials={"stiff": POLYMER, "soft": other}, model=fx.Membrane(),
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
                      loads=[fx.Pressure("bottom", name="air")])
-    path = run(scene, Stage("blow", drive="air", until=fx.pole_stretch(1.5)))
+    path = run(scene, Stage("blow", control="air", until=fx.pole_stretch(1.5)))
     assert path.last.measures["pole_stress_ratio"] == pytest.approx(
         (0.01 * 0.4 + 0.03 * 0.1) / (0.01 * 0.05 + 0.03 * 0.1), rel=1e-9)
 
@@ -106,7 +107,7 @@ def test_tangents_that_are_kept_change_no_result():
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1)), materials=POLYMER,
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
                      loads=[fx.Pressure("bottom", name="air")])
-    stage = Stage("flow", drive="air", follow={fx.enclosed_volume: [(0, 0), (1, 1.0), (6, 1.0)]},
+    stage = Stage("flow", control="air", amplitudes={fx.enclosed_volume: [(0, 0), (1, 1.0), (6, 1.0)]},
                   step=fx.StepControl(length=0.02, largest=0.02))
     kept, exact = (run(scene, stage, accuracy=0.5, tolerances=Tolerances(correction=c, residual=r))
                    for c, r in ((1e-10, 1e-8), (1e-13, 1e-11)))

@@ -1,4 +1,4 @@
-"""Parts that are let go: `Path.released`."""
+"""Parts that are let go: `Path.springback`."""
 
 import json
 
@@ -22,7 +22,7 @@ def blown(material, **more):
                         "supports": [fx.Symmetry("axis"), fx.SimplySupported("rim")],
                         "loads": [fx.Pressure("bottom", name="air")],
                         "contacts": [fx.Contact("top", fx.tools.plane(0.4), 0.2, name="stop")]} | more)
-    return fx.Process(scene).run([fx.Stage("blow", drive="air", until=fx.pressure(0.08), duration=0.5)],
+    return fx.Process(scene).run([fx.Stage("blow", control="air", until=fx.pressure(0.08), duration=0.5)],
                                  progress=False, accuracy="draft")
 
 
@@ -33,7 +33,7 @@ def path():
 
 @pytest.mark.parametrize("trim", [None, 0.7])
 def test_an_elastic_part_goes_back_to_rest(trim):
-    part = blown(fx.NeoHookean(c10=0.4)).released(trim=trim)
+    part = blown(fx.NeoHookean(c10=0.4)).springback(trim=trim)
     assert part.before.height.max() > 0.05 and part.height < 1e-7 and part.flange_angle > 10
     F = part.path.stress().at_quadrature_points().deformation_gradient
     assert np.abs(F - np.eye(3)).max() < 1e-6
@@ -42,14 +42,14 @@ def test_an_elastic_part_goes_back_to_rest(trim):
 
 def test_a_relaxing_part_recovers_in_time(path):
     """At once, and after more and more time; trimmed it is what the same material is without its rim."""
-    part = path.released(duration=0.3, accuracy="draft")
+    part = path.springback(duration=0.3, accuracy="draft")
     heights = [part.path.wall(s).height.max() for s in (part.path.states[0], part.path.state("let go"),
                                                         part.path.state("cool"))]
     assert heights[0] > heights[1] > heights[2] > 0.2 * heights[0]
     assert heights[0] == pytest.approx(path.wall().height.max(), rel=1e-12)
     assert part.path.last.time == pytest.approx(0.8)
     assert "springback of the height" in str(part) and part.springback == pytest.approx(heights[0] - heights[2])
-    gone = path.released(duration=60.0, accuracy="draft")
+    gone = path.springback(duration=60.0, accuracy="draft")
     assert gone.height < 1e-2 * heights[0]
 
 
@@ -63,7 +63,7 @@ def test_fields_of_a_part_are_those_of_the_whole(path):
     assert set(here.scene.mesh.boundaries) == set(mesh.boundaries)
     assert here.scene.mesh.nodes_of("rim")[:, 0] == pytest.approx(0.75)
     both = []
-    with source.at(path.last):
+    with source.state_context(path.last):
         for problem in (source, here):
             cells = np.arange(len(problem.forms.cells_of(["sheet"])), dtype=np.int32)
             F = problem.forms.F
@@ -80,9 +80,9 @@ def test_fields_of_a_part_are_those_of_the_whole(path):
 @pytest.mark.parametrize("trim", [None, 0.8e-3])
 def test_a_set_block_keeps_the_exact_stretch(trim):
     """Drawn to 1.5, chilled in its grip, let go and trimmed: the balance of rubber and glass."""
-    scene = block(fx.Sets(BASE, modulus=200.0, between=(75, 85)), air(20.0))
+    scene = block(fx.Solidification(BASE, modulus=200.0, between=(75, 85)), air(20.0))
     path = fx.Process(scene).run([draw(0.5), fx.Stage("chill", duration=20.0)], progress=False)
-    part = path.released(20.0, trim=trim)
+    part = path.springback(20.0, trim=trim)
     F = part.path.stress().at_quadrature_points().deformation_gradient
     assert F[:, 0, 0] == pytest.approx(balance(200.0, 1.5), rel=1e-7)
     assert part.shrinkage == pytest.approx(1 - balance(200.0, 1.5) / 1.5, rel=1e-5)
@@ -92,12 +92,12 @@ def test_what_is_refused(path):
     for words, arguments in (("no heat=Cooling", {"temperature": 20.0}),
                              ("the part goes from", {"trim": 7.0}), ("must be", {"duration": -1.0})):
         with pytest.raises(fx.InputError, match=words):
-            path.released(**arguments)
+            path.springback(**arguments)
     membrane = fx.trace(fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1)), materials=BASE,
                                  supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], model=fx.Membrane(),
                                  loads=[fx.Pressure("bottom")]), until=fx.pole_height(0.3), progress=False)
     with pytest.raises(fx.InputError, match="a membrane has no bending stiffness"):
-        membrane.released()
+        membrane.springback()
 
 
 def test_setting_pot_quick(tmp_path):
@@ -111,8 +111,8 @@ def test_setting_pot_quick(tmp_path):
 
 
 RUBBER = fx.NeoHookean(c10=0.5e6)
-WARM = {"sets": fx.Sets(RUBBER, modulus=8e8, between=(90, 120)),
-        "relaxes and sets": fx.Sets(fx.Viscoelastic(fx.NeoHookean(c10=0.4e6), [(0.4e6, 0.5)],
+WARM = {"sets": fx.Solidification(RUBBER, modulus=8e8, between=(90, 120)),
+        "relaxes and sets": fx.Solidification(fx.Viscoelastic(fx.NeoHookean(c10=0.4e6), [(0.4e6, 0.5)],
                                                     shift=fx.Arrhenius(100e3, 150.0, unit="C")),
                                     modulus=8e8, between=(90, 120)),
         "stiffens": fx.NeoHookean(c10=fx.table({19: 2e6, 151: 0.5e6}))}
@@ -134,7 +134,7 @@ def chilled():
                              supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                              loads=[fx.Pressure("bottom", name="air")])
             found[name] = fx.Process(scene).run([
-                fx.Stage("blow", drive="air", until=fx.pressure(4e4), duration=0.5),
+                fx.Stage("blow", control="air", until=fx.pressure(4e4), duration=0.5),
                 fx.Stage("chill", duration=20.0)], accuracy="draft", progress=False)
         return found[name]
     return of
@@ -145,7 +145,7 @@ def test_faces_of_a_warm_part_may_be_chilled_at_once(chilled, name):
     """What stiffens or sets as the faces go to 20 C: elastic parts go to their free size, set ones keep their shape."""
     path = chilled(name)
     assert path.temperature([(0.0, 0.0)]).min() > 85                    # within, not all has set
-    part = path.released(20.0, accuracy="draft")
+    part = path.springback(20.0, accuracy="draft")
     assert part.path.temperature([(0.0, 0.0), (0.0, 0.002)]) == pytest.approx(20.0, abs=1e-4)
     if name == "stiffens":
         assert part.diameter == pytest.approx(0.1 * (1 - 7e-5 * 130), rel=1e-5) and part.height < 1e-5 * part.diameter
@@ -154,9 +154,9 @@ def test_faces_of_a_warm_part_may_be_chilled_at_once(chilled, name):
 
 
 def test_sudden_chill_is_the_limit_of_a_large_conductance(chilled, monkeypatch):
-    part = chilled("sets").released(20.0, accuracy="draft")
+    part = chilled("sets").springback(20.0, accuracy="draft")
     monkeypatch.setattr(cooling, "_CONTINUOUS", 1e3)
-    slower = chilled("sets").released(boundaries=[fx.FixedTemperature(face, temperature=20.0) for face in (
+    slower = chilled("sets").springback(boundaries=[fx.FixedTemperature(face, temperature=20.0) for face in (
         "bottom", "top")], duration=part.path.last.time - 20.5, accuracy="draft")
     assert slower.shrinkage == pytest.approx(part.shrinkage, rel=0.01)
-    assert slower.least_wall == pytest.approx(part.least_wall, rel=1e-3)
+    assert slower.min_wall == pytest.approx(part.min_wall, rel=1e-3)

@@ -14,7 +14,7 @@ def block(friction, contact=fx.Contact, elements=(4, 4)):
     mesh = fx.mesh.disc(radius=1.0, thickness=1.0, elements=elements)
     return fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=1.0, c01=0.1),
                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")],
-                    contacts=[contact(face, fx.tools.plane(1.0), friction, moves=(0, -1))
+                    contacts=[contact(face, fx.tools.plane(1.0), friction, direction=(0, -1))
                               for face in ("top", "rim")])
 
 
@@ -26,7 +26,7 @@ def test_a_homogeneous_block_does_not_feel_it(monkeypatch):
     """Without friction F_old is the same everywhere: the force goes on, as do volume, energy and columns."""
     from formingx.extensions.remeshing import remeshing
     monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.kind == "target")
-    path = fx.trace(block("none"), until=fx.travel(0.6), through=[fx.travel(0.5)], progress=False,
+    path = fx.trace(block("none"), until=fx.travel(0.6), intermediate=[fx.travel(0.5)], progress=False,
                     remesh=fx.Remesh(size=0.3))
     state, = (s for s in path.states if s.kind == "remesh")
     before = path.states[path.states.index(state) - 1]
@@ -39,7 +39,7 @@ def test_a_homogeneous_block_does_not_feel_it(monkeypatch):
     for name in ("tool_force", "strain_energy", "travel"):
         assert path.last.measures[name] == pytest.approx(whole[name], rel=5e-4)
     assert len(path.segments) == 2 and len(path["tool_force"]) == len(path)
-    freed = path.released()
+    freed = path.springback()
     assert freed.path.last.measures["strain_energy"] < 1e-5 and freed.diameter == pytest.approx(2.0, rel=1e-4)
 
 
@@ -55,8 +55,9 @@ def test_stages_go_on_where_they_were(monkeypatch):
     monkeypatch.setattr(remeshing, "_worn", worn)
     scene = block("none")
     plate = scene.contacts[0]
-    stages = [fx.Stage("press", drive=plate, until=fx.travel(0.3), duration=0.5),
-              fx.Stage("push", drive=plate, until=fx.travel(0.5)), fx.Stage("back", drive=plate, until=fx.travel(0.3))]
+    stages = [fx.Stage("press", control=plate, until=fx.travel(0.3), duration=0.5),
+              fx.Stage("push", control=plate, until=fx.travel(0.5)),
+              fx.Stage("back", control=plate, until=fx.travel(0.3))]
     path = fx.Process(scene).run(stages, progress=False, remesh=fx.Remesh(size=0.3))
     made = [state for state in path.states if state.kind == "remesh"]
     assert [state.stage for state in made] == ["press", "push", "back"]
@@ -173,8 +174,9 @@ def test_what_is_not_carried_is_refused():
                             "contacts": like.contacts, **parts})
         with pytest.raises(fx.InputError, match=message):
             fx.trace(scene, until=fx.travel(0.1), remesh=remesh)
-    of("at Gauss points", contacts=[fx.Contact("top", fx.tools.plane(1.0), "none", moves=(0, -1), points=4)])
-    of("separates=False", contacts=[fx.Contact("top", fx.tools.plane(1.0), "stick", moves=(0, -1), separates=False)])
+    of("at Gauss points", contacts=[fx.Contact("top", fx.tools.plane(1.0), "none", direction=(0, -1), points=4)])
+    of("separates=False",
+       contacts=[fx.Contact("top", fx.tools.plane(1.0), "stick", direction=(0, -1), separates=False)])
     of("a support at a node", supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0)])
     mesh = block("none").mesh
     of("Function on the mesh", mesh=mesh, materials=fx.NeoHookean(c10=1 + ufl.SpatialCoordinate(mesh.domain)[0]))
@@ -186,8 +188,8 @@ def test_what_is_not_carried_is_refused():
         fx.trace(block("none", Own), until=fx.travel(0.1), remesh=remesh)
     with pytest.raises(fx.InputError, match="must be a travel, a pressure or"):
         fx.trace(block("none"), until=fx.pole_height(-0.2), remesh=remesh)
-    with pytest.raises(fx.InputError, match="pilot or stop_at"):
-        fx.trace(block("none"), until=fx.travel(0.2), remesh=remesh, pilot=True)
+    with pytest.raises(fx.InputError, match="adapt_mesh or stop_at"):
+        fx.trace(block("none"), until=fx.travel(0.2), remesh=remesh, adapt_mesh=True)
 
 
 def test_any_state_goes_on_to_the_same_path(tmp_path):
@@ -233,7 +235,7 @@ def test_results_go_on_from_mesh_to_mesh(tmp_path):
     with pytest.raises(fx.InputError, match="filling: is not available for a remeshed run"):
         path.filling()
     with pytest.raises(fx.InputError, match="trim: is not available for a remeshed run"):
-        path.released(trim=0.5)
+        path.springback(trim=0.5)
     virial = [axial_stress(path, state) / state.measures["tool_force"] / (1 - state.measures["travel"])
               for state in (before, after)]
     assert virial[0] == pytest.approx(-1, abs=1e-4) and virial[1] == pytest.approx(virial[0], abs=2e-5)
@@ -252,7 +254,7 @@ def axial_stress(path, state):
     problem = path.segment(state).problem
     forms = problem.forms
     places, weights = map(np.asarray, basix.make_quadrature(basix.CellType.triangle, problem.scene.quadrature_degree))
-    with problem.at(state):
+    with problem.state_context(state):
         volume = forms.J * forms.weight * abs(ufl.JacobianDeterminant(forms.domain))
         volumes = in_own_cells(forms.domain, ufl.as_vector([volume]), places)[..., 0] * weights
     return volumes.ravel() @ path.stress(state).at_quadrature_points().cauchy[:, 1, 1]
@@ -276,7 +278,7 @@ def test_what_a_material_remembers_goes_on(monkeypatch, tmp_path, material):
     tube = fx.mesh.from_lines([(0.5, 0.0), (0.5, 1.0)], [(1.5, 0.0), (1.5, 1.0)], elements=(5, 5))
     scene = fx.Scene(mesh=tube, materials=material, loads=[fx.Pressure("inner")],
                      supports=[fx.Symmetry("start", normal="z"), fx.Symmetry("end", normal="z")])
-    stages = [fx.Stage("blow", drive=scene.loads[0], until=fx.pressure(0.4), duration=0.4),
+    stages = [fx.Stage("blow", control=scene.loads[0], until=fx.pressure(0.4), duration=0.4),
               fx.Stage("creep", duration=0.2)]
 
     def run(**options):
@@ -308,10 +310,11 @@ def test_supports_hold_from_where_they_are(monkeypatch):
     monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.kind == "target")
 
     def both(scene, targets, size):
-        options = {"until": targets[1], "through": targets[:1], "progress": False}
+        options = {"until": targets[1], "intermediate": targets[:1], "progress": False}
         return fx.trace(scene, **options), fx.trace(scene, remesh=fx.Remesh(size=size, corner=size), **options)
     pulled = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(4, 4)), materials=fx.NeoHookean(c10=1.0),
-                      supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"), fx.Displaced("top", "z")])
+                      supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
+                                fx.PrescribedDisplacement("top", "z")])
     whole, path = both(pulled, [fx.travel(0.2), fx.travel(0.5)], 0.3)
     assert len(path.segments) == 2
     for name in ("travel", "support_force", "pole_height", "strain_energy"):
@@ -334,7 +337,7 @@ def test_constants_and_temperatures_go_with_the_material(monkeypatch, tmp_path, 
     scene = fx.Scene(mesh=tube, materials=material, loads=[fx.Pressure("inner")], heat=outside,
                      temperature=100.0 if heat else lambda R, Z: 100 * R / (1 + Z),
                      supports=[fx.Symmetry("start", normal="z"), fx.Symmetry("end", normal="z")])
-    stages = [fx.Stage("blow", drive=scene.loads[0], until=fx.pressure(1.5), duration=0.2),
+    stages = [fx.Stage("blow", control=scene.loads[0], until=fx.pressure(1.5), duration=0.2),
               fx.Stage("wait", duration=0.05)]
     twice(monkeypatch, blow=0.1, wait=0.22)
     run = fx.Process(scene).run
@@ -356,13 +359,13 @@ def test_a_relaxing_block_under_a_ball(monkeypatch, material):
     (Elements of 0.1 at the edge of what touches: 0.35 %.)"""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(8, 8)), materials=material,
                      supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")],
-                     contacts=[fx.Contact("top", fx.tools.sphere(radius=2.0, z=1.0), 0.2, moves=(0, -1))])
+                     contacts=[fx.Contact("top", fx.tools.sphere(radius=2.0, z=1.0), 0.2, direction=(0, -1))])
 
     def run(**options):
-        press = fx.Stage("press", drive=scene.contacts[0], until=fx.travel(0.25), duration=0.4)
-        more = fx.Stage("more", drive=scene.contacts[0], until=fx.travel(0.3), duration=0.1)
+        press = fx.Stage("press", control=scene.contacts[0], until=fx.travel(0.25), duration=0.4)
+        more = fx.Stage("more", control=scene.contacts[0], until=fx.travel(0.3), duration=0.1)
         return fx.Process(scene).run([press, fx.Stage("hold", duration=0.2), more], progress=False, **options)
-    twice(monkeypatch, press=0.3, hold=0.45)
+    twice(monkeypatch, press=0.3, constant=0.45)
     whole, path = run(), run(remesh=fx.Remesh(size=0.07, corner=0.07))
     assert [s.stage for s in path.states if s.kind == "remesh"] == ["press", "hold"]
     for stage in ("press", "hold", "more"):
@@ -409,7 +412,7 @@ def remeshed_at(monkeypatch, travel, n):
     """The path of a stuck block of n x n elements, remeshed once in between by as large ones, and its state then."""
     from formingx.extensions.remeshing import remeshing
     monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.kind == "target")
-    path = fx.trace(block("stick", elements=(n, n)), until=fx.travel(travel + 0.01), through=[fx.travel(travel)],
+    path = fx.trace(block("stick", elements=(n, n)), until=fx.travel(travel + 0.01), intermediate=[fx.travel(travel)],
                     progress=False, remesh=fx.Remesh(size=1.3 / n, corner=1.3 / n))
     state, = (s for s in path.states if s.kind == "remesh")
     return path, state
@@ -426,7 +429,7 @@ def test_no_stress_is_lost(monkeypatch):
     for travel, n, force, energy in ((0.2, 8, 5e-3, 4e-3), (0.5, 8, 4e-3, 2e-3)):
         path, state = remeshed_at(monkeypatch, travel, n)
         old, new = path.segments[0], path.segments[1].problem
-        with old.problem.at(old.states[-1]):
+        with old.problem.state_context(old.states[-1]):
             before = mean(old.problem.forms)
         new.x.array_w[:] = new.scene.preformed.unknowns(new)
         new.set_state(new.x, state.control)
@@ -440,7 +443,7 @@ def test_the_node_on_the_axis_stays_with_those_beside_it():
     made = next(s for s in path.segments[1:])
     contact, state = made.problem.contacts[0], made.states[0]
     near = np.argsort(contact.points[:, 0])[:5]
-    with made.problem.at(state):
+    with made.problem.state_context(state):
         found = contact.tractions(state.x[:made.problem.n_owned], state.control)
         place = contact.positions(state.x[:made.problem.n_owned], state.control)[near]
     assert np.ptp(place[:, 1]) < 1e-3 and np.abs(found.tangential[near]).max() < 0.2 * found.normal[near].max()

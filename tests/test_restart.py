@@ -473,4 +473,5 @@ def test_interrupted_before_its_first_state(monkeypatch, run):
     scene = treloar()
     with pytest.raises(fx.Interrupted, match="before its first state"):
         {"trace": lambda: fx.trace(scene, until=fx.pole_height(0.1)), "solve": lambda: fx.solve(scene, to=0.1),
-         "process": lambda: fx.Process(scene).run([fx.Stage("up", drive=scene.driven, until=fx.pressure(0.1))])}[run]()
+         "process": lambda: fx.Process(scene).run([fx.Stage("up", control=scene.driven,
+                                                            until=fx.pressure(0.1))])}[run]()

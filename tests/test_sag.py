@@ -62,7 +62,7 @@ def test_a_stage_waits_for_a_sag():
     met = path.met(fx.sag(0.05))
     assert met is path.state("sag") and met.measures["sag"] == pytest.approx(0.05, rel=1e-12)
     assert path.last.time == pytest.approx(met.time + 0.5) and path["sag"][-1] > 0.05
-    passed = creeping(duration=1.2 * met.time, through=[fx.sag(0.05)])
+    passed = creeping(duration=1.2 * met.time, intermediate=[fx.sag(0.05)])
     assert passed.met(fx.sag(0.05)).time == pytest.approx(met.time, rel=2e-3)
 
 

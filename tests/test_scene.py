@@ -32,7 +32,7 @@ def test_a_run_leaves_its_scene_as_it_was():
     """Friction by temperature, heat, relaxation, expansion, a process of two stages and a mesh: all as before."""
     scene = pressed()
     before, X = contents(scene), scene.mesh.domain.geometry.x.copy()
-    path = fx.Process(scene).run([fx.Stage("push", drive="plug", until=fx.travel(0.1), duration=0.2),
+    path = fx.Process(scene).run([fx.Stage("push", control="plug", until=fx.travel(0.1), duration=0.2),
                                   fx.Stage("wait", duration=0.2)], progress=False, accuracy="draft")
     assert path.temperature([(0.0, 0.05)])[0] < 140 and path.last.measures["tool_force"] != 0
     assert contents(scene) == before and np.array_equal(scene.mesh.domain.geometry.x, X)
@@ -42,7 +42,7 @@ def test_a_run_leaves_its_scene_as_it_was():
 def test_two_runs_of_a_scene_at_once_do_not_meet():
     """The temperature is the problem's: a second run of the same scene begins with that of the scene."""
     scene = pressed()
-    push = [fx.Stage("push", drive="plug", until=fx.travel(0.06), duration=0.1)]
+    push = [fx.Stage("push", control="plug", until=fx.travel(0.06), duration=0.1)]
     first = fx.Process(scene).run(push, progress=False, accuracy="draft")
     T = first.problem.temperature.T.x.array.copy()
     second = fx.Process(scene).run(push, progress=False, accuracy="draft")

@@ -18,7 +18,7 @@ def block(material, boundaries, temperature=150.0, heat=True, **more):
     return fx.Scene(mesh=fx.mesh.disc(radius=1e-3, thickness=1e-3, elements=(2, 1)), materials=material,
                     temperature=temperature, heat=fx.Cooling(HEAT, boundaries, unit="C", tolerance=1.0) if heat
                     else None, supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
-                                         fx.Displaced("rim", "r", name="grip")], **more)
+                                         fx.PrescribedDisplacement("rim", "r", name="grip")], **more)
 
 
 def air(temperature):
@@ -26,7 +26,7 @@ def air(temperature):
 
 
 def draw(by):
-    return fx.Stage("draw", drive="grip", until=fx.travel(by * 1e-3))
+    return fx.Stage("draw", control="grip", until=fx.travel(by * 1e-3))
 
 
 def stretch(path):
@@ -52,9 +52,9 @@ def test_set_block(tmp_path):
 def test_a_base_that_relaxes_sets_too():
     """The branch holds its stress as it is frozen: it pulls with the elastic strain that it had when it was let go."""
     tau, mu, G = 4.0, 1.5, 300.0
-    material = fx.Sets(fx.TransientNetwork(BASE, [(mu, tau)]), G, fraction=fx.table({70: 1, 75: 0.5, 85: 0}))
+    material = fx.Solidification(fx.TransientNetwork(BASE, [(mu, tau)]), G, fraction=fx.table({70: 1, 75: 0.5, 85: 0}))
     path = fx.Process(block(material, air(20.0))).run(
-        [draw(0.4), fx.Stage("chill", duration=20.0), fx.Stage("let go", without=["grip"])], progress=False,
+        [draw(0.4), fx.Stage("chill", duration=20.0), fx.Stage("let go", inactive=["grip"])], progress=False,
         accuracy="fine")
     L, time = 1.4, 20.0
     decay = np.exp(-time / tau)
@@ -69,7 +69,7 @@ def test_a_base_that_relaxes_sets_too():
 def test_what_melts_again_bears_no_more(hot, left):
     """Set at rest, drawn cold, warmed in its grip: the stress is that of the base and of the glass that is left."""
     G, l = 50.0, 1.1
-    scene = block(fx.Sets(BASE, G, between=(75, 85)), air(hot), temperature=20.0)
+    scene = block(fx.Solidification(BASE, G, between=(75, 85)), air(hot), temperature=20.0)
     path = fx.Process(scene).run([draw(l - 1), fx.Stage("warm", duration=60.0)], progress=False, accuracy="draft")
     for state, share in ((path.state("draw"), 1.0), (path.last, left)):
         stress = path.stress(state).at_quadrature_points().cauchy[:, 0, 0]
@@ -82,10 +82,11 @@ def test_steps_in_time_keep_the_accuracy():
     found = {}
     for accuracy in (5e-2, 1e-2, 1e-3):
         scene = fx.Scene(mesh=fx.mesh.disc(radius=1e-3, thickness=1e-3, elements=(2, 1)), temperature=150.0,
-                         materials=fx.Sets(stiffens, 20.0, between=(60, 90)), loads=[fx.Pressure("rim", name="pull")],
+                         materials=fx.Solidification(stiffens, 20.0, between=(60, 90)),
+                         loads=[fx.Pressure("rim", name="pull")],
                          heat=fx.Cooling(HEAT, air(20.0), unit="C", tolerance=0.2),
                          supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")])
-        path = fx.Process(scene).run([fx.Stage("pull", drive="pull", until=fx.pressure(-1.5)),
+        path = fx.Process(scene).run([fx.Stage("pull", control="pull", until=fx.pressure(-1.5)),
                                       fx.Stage("chill", duration=10.0)], progress=False, accuracy=accuracy)
         found[accuracy] = stretch(path)
     assert found[5e-2] == pytest.approx(found[1e-3], rel=5e-3)
@@ -95,22 +96,22 @@ def test_steps_in_time_keep_the_accuracy():
 def test_without_cold_it_is_its_base():
     """At a temperature above: to round-off; below, at rest: the glass is there, free of stress in the first shape."""
     hot, plain = (fx.Process(block(material, [], heat=False)).run([draw(0.5)], progress=False)
-                  for material in (fx.Sets(BASE, 300.0, between=(75, 85)), BASE))
+                  for material in (fx.Solidification(BASE, 300.0, between=(75, 85)), BASE))
     assert hot.last.x == pytest.approx(plain.last.x, abs=1e-12)
-    material = fx.Sets(BASE, 300.0, between=(75, 85))
+    material = fx.Solidification(BASE, 300.0, between=(75, 85))
     assert material.at_temperature(20.0).shear_modulus == pytest.approx(302.0)
     assert material.fraction([20.0, 80.0, 90.0]).tolist() == [1.0, 0.5, 0.0]
     assert material.base.parameters == BASE.parameters
 
 
 @pytest.mark.parametrize("make, words", [
-    (lambda: fx.Sets(1.0, 800.0, between=(75, 85)), "base = 1.0: must be a material"),
-    (lambda: fx.Sets(BASE, -1.0, between=(75, 85)), "modulus = -1.0: must be greater than 0"),
-    (lambda: fx.Sets(BASE, 1.0, between=(85, 75)), "the lower first"),
-    (lambda: fx.Sets(BASE, 1.0), "give one of them"),
-    (lambda: fx.Sets(BASE, 1.0, fraction=fx.table({20: 0, 80: 1})), "must fall from 1 to 0"),
-    (lambda: fx.Sets(fx.Sets(BASE, 1.0, between=(1, 2)), 1.0, between=(1, 2)), "sets already"),
-    (lambda: block(fx.Sets(BASE, 1.0, between=(1, 2)), [], temperature=None, heat=False), "temperature"),
+    (lambda: fx.Solidification(1.0, 800.0, between=(75, 85)), "base = 1.0: must be a material"),
+    (lambda: fx.Solidification(BASE, -1.0, between=(75, 85)), "modulus = -1.0: must be greater than 0"),
+    (lambda: fx.Solidification(BASE, 1.0, between=(85, 75)), "the lower first"),
+    (lambda: fx.Solidification(BASE, 1.0), "give one of them"),
+    (lambda: fx.Solidification(BASE, 1.0, fraction=fx.table({20: 0, 80: 1})), "must fall from 1 to 0"),
+    (lambda: fx.Solidification(fx.Solidification(BASE, 1.0, between=(1, 2)), 1.0, between=(1, 2)), "sets already"),
+    (lambda: block(fx.Solidification(BASE, 1.0, between=(1, 2)), [], temperature=None, heat=False), "temperature"),
 ])
 def test_what_is_refused(make, words):
     with pytest.raises(fx.InputError, match=words):

@@ -72,7 +72,7 @@ def test_restrained_cooling_against_the_closed_form():
 def test_a_part_that_is_let_go_shrinks_to_its_free_size():
     """Held while it cools, then let go at 20 C: residual stress first, then none, and the rim at j R."""
     scene = disc(20.0, [fx.PinnedNode(0.0, 0.0), grip := fx.Symmetry("rim")])
-    path = fx.Process(scene).run([fx.Stage("held", duration=1.0), fx.Stage("free", without=[grip])], progress=False)
+    path = fx.Process(scene).run([fx.Stage("held", duration=1.0), fx.Stage("free", inactive=[grip])], progress=False)
     held, free = (path.profile([s for s in path.states if s.stage == name][-1]) for name in ("held", "free"))
     assert held.top[-1, 0] == pytest.approx(1.0, abs=1e-9)
     assert free.top[-1, 0] == pytest.approx(SHRINKS.stretch(20.0), rel=1e-7)
@@ -84,12 +84,12 @@ def drawn_and_let_go(branches):
     sheet = fx.Viscoelastic(fx.NeoHookean(c10=1.0), branches, shift=fx.Arrhenius(250e3, HOT, unit="C"))
     body = fx.mesh.disc(radius=4e-3, thickness=1e-3, elements=(3, 1))
     cold = [fx.Convection(face, h=2000.0, air=20.0) for face in ("top", "bottom")]
-    grip = fx.Displaced("rim", "r", name="grip")
+    grip = fx.PrescribedDisplacement("rim", "r", name="grip")
     scene = fx.Scene(mesh=body, materials=sheet, temperature=HOT, expansion=SHRINKS,
                      heat=fx.Cooling(SHEET, cold, unit="C", tolerance=1.0),
                      supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"), grip])
-    draw = fx.Stage("draw", drive="grip", until=fx.travel(2e-3))
-    path = fx.Process(scene).run([draw, fx.Stage("chill", duration=15.0), fx.Stage("let go", without=["grip"])],
+    draw = fx.Stage("draw", control="grip", until=fx.travel(2e-3))
+    path = fx.Process(scene).run([draw, fx.Stage("chill", duration=15.0), fx.Stage("let go", inactive=["grip"])],
                                  progress=False, accuracy="draft")
     return path.profile().top[-1, 0] / 4e-3, path
 

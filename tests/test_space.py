@@ -106,7 +106,7 @@ def trough(size=0.15, **more):
 
 def test_triangles_as_a_pilot_run_asks_for():
     """Small in the fillet and where the wall thins fast: as near to the law as triangles that are small all over."""
-    path = fx.trace(trough(), until=fx.pressure(1.2), pilot={"error": 0.1}, progress=False)
+    path = fx.trace(trough(), until=fx.pressure(1.2), adapt_mesh={"error": 0.1}, progress=False)
     even = fx.trace(trough(size=0.075), until=fx.pressure(1.2), progress=False)
     errors = []
     for run in (path.pilot, even, path):
@@ -155,7 +155,7 @@ def test_goes_on_from_a_checkpoint_and_part_is_read_off(tmp_path):
     assert kept == pytest.approx(0.02 * 0.3, rel=1e-12)                             # the volume
     part = whole.part(density=1.0)
     assert part.volume == pytest.approx(kept) and part.weight == pytest.approx(kept) and str(part)
-    assert part.least_wall == wall.wall.min() and part.draw_ratio == pytest.approx(wall.area.sum() / 0.3)
+    assert part.min_wall == wall.wall.min() and part.draw_ratio == pytest.approx(wall.area.sum() / 0.3)
     cut = wall.section((0, 0.15, 0), (0, 1, 0))
     assert cut["arc_length"][-1] == pytest.approx(2.0, abs=0.25) and np.ptp(cut["y"]) < 1e-8   # met to 1e-9 of the size
     for normal in ((0, 1, 0), (0, -1, 0)):                                          # along a plane of symmetry
@@ -250,9 +250,9 @@ def test_tool_files_are_looked_over(tmp_path):
         disc(contacts=[fx.Contact("bottom", fx.tools.solid(tmp_path / "box.stl", scale=25.4).moved(z=-30))])
     large = fx.tools.solid(tmp_path / "box.stl", scale=1.25).moved(z=-0.1)
     for tool, told in ((large, True), (solid, False)):
-        report = str(fx.doctor(disc(contacts=[fx.Contact("bottom", tool)])))
+        report = str(fx.check(disc(contacts=[fx.Contact("bottom", tool)])))
         assert ("times as wide as the sheet: is its file in another unit of length?" in report) == told
-    assert r"Symmetry('y0', 'y')" in str(fx.doctor(disc(supports=HELD[:2]))) and fx.doctor(disc()).healthy
+    assert r"Symmetry('y0', 'y')" in str(fx.check(disc(supports=HELD[:2]))) and fx.check(disc()).healthy
     floor = fx.tools.revolved(fx.tools.plane(-1.0).reversed())                   # a plane is 1 long in drawings
     fx.Scene(mesh=fx.mesh.sheet(fx.mesh.circle(50.0, part="quarter"), 20.0), thickness=0.5, materials=MATERIALS[0],
              supports=HELD, loads=[fx.Pressure("top")], contacts=[fx.Contact("bottom", floor)])
@@ -310,15 +310,15 @@ def test_axes_of_a_sheet_in_space_are_x_and_y(tmp_path):
 
 def plug_above(separates):
     plug = fx.tools.box(half=(0.4, 0.4), depth=0.9, corner=0.2, fillet=0.12, draft=5, mouth=1.2, plug=True)
-    return fx.Contact("top", plug, moves=(0, 0, -1), name="plug", separates=separates)
+    return fx.Contact("top", plug, direction=(0, 0, -1), name="plug", separates=separates)
 
 
 @pytest.mark.parametrize("separates", [True, False])
 def test_a_plug_goes_in_and_back_out(separates):
     """It leaves the sheet as it was, if it separates: flat, at rest; else the sheet hangs on it, pulled up."""
     scene = disc(size=0.15, contacts=[plug_above(separates)], model=fx.Membrane(wrinkles=0.01))
-    path = fx.Process(scene).run([fx.Stage("in", drive="plug", until=fx.travel(0.8)),
-                                  fx.Stage("out", drive="plug", until=fx.travel(0.0))], progress=False)
+    path = fx.Process(scene).run([fx.Stage("in", control="plug", until=fx.travel(0.8)),
+                                  fx.Stage("out", control="plug", until=fx.travel(0.0))], progress=False)
     end, begin = ([s for s in path.states if s.stage == stage][k].measures for stage, k in (("in", -1), ("out", 0)))
     assert begin["plug_force"] == pytest.approx(end["plug_force"], rel=1e-6) and end["plug_force"] > 0.01
     assert path.counts.failures < 3 and path.counts.iterations < 400
@@ -336,9 +336,9 @@ def test_a_plug_leaves_a_sheet_that_a_vacuum_holds():
                                                            [0.0, 0.0, 0.15, 0.0])), name="mould")
     scene = disc(size=0.15, loads=[fx.Pressure("top", name="vacuum")], contacts=[plug_above(True), mould],
                  model=fx.Membrane(wrinkles=0.01))
-    path = fx.Process(scene).run([fx.Stage("in", drive="plug", until=fx.travel(0.8)),
-                                  fx.Stage("vacuum", drive="vacuum", until=fx.pressure(0.6)),
-                                  fx.Stage("out", drive="plug", until=fx.travel(0.0))], progress=False)
+    path = fx.Process(scene).run([fx.Stage("in", control="plug", until=fx.travel(0.8)),
+                                  fx.Stage("vacuum", control="vacuum", until=fx.pressure(0.6)),
+                                  fx.Stage("out", control="plug", until=fx.travel(0.0))], progress=False)
     formed = next(s for s in path.states if s.stage == "out")
     np.testing.assert_allclose(path.wall().ratio, path.wall(formed).ratio, rtol=1e-8)
     assert path.last.measures["plug_force"] == 0 and path.filling("mould").touching[-1] > 0.9
@@ -435,7 +435,7 @@ def test_moulds_from_files_fill(make, tmp_path):
     (lambda: disc(model=fx.MixedPressure()), "a sheet in space is a Membrane"),
     (lambda: disc(on="rim"), "a pressure on its 'bottom' or its 'top'"),
     (lambda: disc(thickness=None), "needs a thickness"),
-    (lambda: disc(loads=[fx.Spin(1.0)]), "spins about the axis"),
+    (lambda: disc(loads=[fx.CentrifugalLoad(1.0)]), "spins about the axis"),
     (lambda: disc(supports=[*HELD, fx.PinnedNode(0.0, 0.0)]), "at its boundaries, not at nodes"),
     (lambda: fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(2, 1)), materials=MATERIALS[0],
                       supports=[fx.Symmetry("axis"), fx.Symmetry("rim", "y")]), "a section has no component 'y'"),
@@ -466,11 +466,11 @@ def test_a_path_in_space_gives_what_it_has(tmp_path):
         with pytest.raises(fx.InputError, match="in space"):
             getattr(path, name)()
     with pytest.raises(fx.InputError, match="stability.*in space"):
-        fx.trace(trough(), until=fx.pressure(0.2), stop_at=fx.unstable(), progress=False)
-    assert fx.doctor(path, targets=[fx.pressure(0.2)]).findings == []
-    plug = fx.Contact("top", fx.tools.box(half=(0.3, 0.1), depth=0.2, mouth=0.5, plug=True), moves=(0, 0, 1))
+        fx.trace(trough(), until=fx.pressure(0.2), stop_at=fx.instability(), progress=False)
+    assert fx.check(path, targets=[fx.pressure(0.2)]).findings == []
+    plug = fx.Contact("top", fx.tools.box(half=(0.3, 0.1), depth=0.2, mouth=0.5, plug=True), direction=(0, 0, 1))
     scene = fx.Scene(mesh=disc().mesh, thickness=0.02, materials=MATERIALS[0], supports=HELD, contacts=[plug])
-    assert "must it be moves = (0, 0, -1)?" in str(fx.doctor(scene))
+    assert "must it be moves = (0, 0, -1)?" in str(fx.check(scene))
     fields = Fields(path).of(path.last)
     np.testing.assert_allclose(np.sort(fields["thickness"][:, 0, 0]), np.sort(path.wall().wall), rtol=1e-12)
     np.testing.assert_allclose(fields["thickness_ratio"] * 0.02, fields["thickness"], rtol=1e-12)

@@ -27,7 +27,7 @@ def column(nu, material=None, elements=(6, 16), half=False):
     height = np.pi / nu
     mesh = fx.mesh.disc(radius=1.0, thickness=height / 2 if half else height, elements=elements)
     return fx.Scene(mesh=mesh, materials=material or fx.NeoHookean(c10=1.0), supports=[
-        fx.Symmetry("axis"), fx.Symmetry("bottom", "z", mirror=half), fx.Displaced("top", "z")])
+        fx.Symmetry("axis"), fx.Symmetry("bottom", "z", mirror=half), fx.PrescribedDisplacement("top", "z")])
 
 
 def contact_scene():
@@ -44,7 +44,7 @@ def contact_scene():
 def test_no_waves_are_the_tangent(make, until):
     path = fx.trace(make(), until=until, progress=False)
     problem, variation = path.problem, SecondVariation(path.problem)
-    with problem.at(path.last):
+    with problem.state_context(path.last):
         n, free = problem.n_owned, np.ones(problem.n_owned, dtype=bool)
         free[problem.held] = False
         K = sparse(problem.tangent(problem.x, problem.control))[:n][:, :n][free][:, free]
@@ -63,7 +63,7 @@ def test_rigid_motions_have_no_energy(material):
     """Torsion and a shift across the axis, which frictionless plates leave free, of a body that is compressed."""
     path = fx.trace(column(1.0, material, (3, 6)), until=fx.travel(-0.5), progress=False)
     variation = SecondVariation(path.problem)
-    with path.problem.at(path.last):
+    with path.problem.state_context(path.last):
         for n, free in ((0, 1), (1, 1), (2, 0)):
             variation.fill(n)
             assert len(variation.rigid) == free
@@ -84,7 +84,7 @@ def test_ogden_is_what_it_should_be(ogden, same):
     for path in (fx.trace(two.scene, until=fx.travel(-1.2), progress=False),):
         for state in (path.states[0], path.last):
             for n in range(9):
-                with one.at(state), two.at(state):
+                with one.state_context(state), two.state_context(state):
                     A, B = sparse(a.fill(n)), sparse(b.fill(n))
                 assert abs(A - B).max() < 1e-8 * abs(B).max()
 
@@ -192,7 +192,7 @@ def test_ring_under_outer_pressure():
                      supports=[fx.Symmetry("bottom", "z"), fx.Symmetry("top", "z")])
     path = fx.trace(scene, until=fx.displacement(-0.02, at=(A, 0.0), component="r"), progress=False)
     found = path.stability(range(4))
-    assert found.first.number == 2 and len(found.alarms) == 1
+    assert found.first.number == 2 and len(found.bifurcations) == 1
     assert found.first.control == pytest.approx(0.0112425992232, rel=2e-5)      # `exact.tube(0.8, 2)`
 
 
@@ -200,7 +200,7 @@ def test_what_is_formed_is_silent():
     """A hinged sheet through its maximum of pressure: a limit point is none that alarms."""
     path = fx.trace(treloar(elements=(10, 2)), until=fx.pole_stretch(4.0), progress=False)
     found = path.stability(range(5))
-    assert found.alarms == [] and [loss.limit_point for loss in found.losses] == [True]
+    assert found.bifurcations == [] and [loss.limit_point for loss in found.losses] == [True]
     assert "limit point" in str(found)
 
 
@@ -211,11 +211,11 @@ def test_a_pot_and_a_parison_are_silent():
                      materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      loads=[fx.Pressure("bottom", name="vacuum")],
                      contacts=[fx.Contact("top", pot.mould, "stick", separates=False, name="mould"),
-                               fx.Contact("bottom", pot.plug, "none", moves=(0, 1), name="plug")])
-    path = fx.Process(scene).run([fx.Stage("plug", drive="plug", until=fx.travel(22.0)),
-                                  fx.Stage("vacuum", drive="vacuum", until=fx.pressure(0.09))],
+                               fx.Contact("bottom", pot.plug, "none", direction=(0, 1), name="plug")])
+    path = fx.Process(scene).run([fx.Stage("plug", control="plug", until=fx.travel(22.0)),
+                                  fx.Stage("vacuum", control="vacuum", until=fx.pressure(0.09))],
                                  step=fx.StepControl(target=8), progress=False)
-    assert path.stability(range(7), 12).alarms == []
+    assert path.stability(range(7), 12).bifurcations == []
     bottle = fx.tools.bottle(radius=3, height=10, neck=1.5, shoulder=2, neck_height=1.5, base=-2.9, fillet=0.8,
                              shoulder_fillet=0.8)
     scene = fx.Scene(mesh=fx.mesh.parison(inner_radius=1.1, thickness=0.3, length=10.6, elements=(40, 1)),
@@ -223,7 +223,7 @@ def test_a_pot_and_a_parison_are_silent():
                      supports=[fx.Symmetry("axis"), fx.Clamped("neck")],
                      contacts=[fx.Contact("outer", bottle, "stick")])
     path = fx.trace(scene, until=fx.pressure(100.0), progress=False)
-    assert path.stability(range(7), 12).alarms == []
+    assert path.stability(range(7), 12).bifurcations == []
 
 
 def test_membrane_and_loads_that_do_not_know():
@@ -251,7 +251,7 @@ import json, numpy as np, formingx as fx
 from mpi4py import MPI
 mesh = fx.mesh.disc(radius=1.0, thickness=np.pi, elements=(4, 12))
 scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z"),
-                 fx.Displaced("top", "z")])
+                 fx.PrescribedDisplacement("top", "z")])
 path = fx.trace(scene, until=fx.travel(-1.2), progress=False)
 found = path.stability(range(3))
 if MPI.COMM_WORLD.rank == 0:
@@ -267,7 +267,7 @@ def test_ranks():
 def test_formed_is_the_deformed_body():
     """Its volume is that of the body, its boundaries are where the deformed ones were."""
     path = fx.trace(treloar(elements=(8, 1)), until=fx.pole_height(1.0), progress=False)
-    mesh, old = path.formed(), path.problem.scene.mesh
+    mesh, old = path.deformed_mesh(), path.problem.scene.mesh
     assert mesh.layers.keys() == old.layers.keys() and mesh.boundaries.keys() == old.boundaries.keys()
     profile = path.profile()
     assert mesh.nodes_of("top")[-1] == pytest.approx(profile.top[-1], abs=1e-12)
@@ -280,7 +280,7 @@ def test_formed_is_the_deformed_body():
 def test_formed_of_new_elements():
     """A blown sheet with new elements has its volume and its boundaries, and bears what the old one does."""
     path = fx.trace(treloar(elements=(16, 2)), until=fx.pole_height(1.0), progress=False)
-    old, new = path.formed(), path.formed(size=0.03)
+    old, new = path.deformed_mesh(), path.deformed_mesh(size=0.03)
     assert new.boundaries.keys() == old.boundaries.keys() and new.layers.keys() == old.layers.keys()
     paths = [fx.trace(fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=2.0), supports=[
         fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")]), until=fx.pressure(0.1),
@@ -290,11 +290,11 @@ def test_formed_of_new_elements():
     one, two = (p.last.measures["enclosed_volume"] for p in paths)
     assert two == pytest.approx(one, rel=1e-3)
     with pytest.raises(InputError, match="size = 0: must be"):
-        path.formed(size=0)
+        path.deformed_mesh(size=0)
     with pytest.raises(InputError, match="one layer"):
         layers = fx.mesh.disc(radius=2.0, thickness={"a": 0.1, "b": 0.1}, elements=(4, 1))
         fx.trace(fx.Scene(mesh=layers, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")], supports=[
-            fx.Symmetry("axis"), fx.Clamped("rim")]), until=fx.pressure(0.01), progress=False).formed(size=0.1)
+            fx.Symmetry("axis"), fx.Clamped("rim")]), until=fx.pressure(0.01), progress=False).deformed_mesh(size=0.1)
 
 
 def inflate(mesh, ratio):
@@ -313,7 +313,7 @@ def test_branch_points_are_those_that_a_run_warns_of(caplog):
                      supports=[fx.Symmetry("axis"), fx.Symmetry("equator", "z")])
     zoelly = 4 * mu * h**2                                   # 2 E (h/R)^2 / sqrt(3 (1 - nu^2))
     step = fx.StepControl(length=2e-3, largest=2e-3)
-    path = fx.trace(scene, until=fx.pressure(1.2 * zoelly), through=[fx.pressure(1.08 * zoelly)], step=step,
+    path = fx.trace(scene, until=fx.pressure(1.2 * zoelly), intermediate=[fx.pressure(1.08 * zoelly)], step=step,
                     progress=False)
     path = fx.trace(scene, start=path, until=fx.pressure(1.4 * zoelly), step=step, progress=False)
     said = [record.getMessage() for record in caplog.records if "another path branches off" in record.getMessage()]
@@ -335,25 +335,25 @@ def test_imperfections_knock_down(caplog):
     loss = path.stability([0]).first
     (before, behind), = path.branch_points
     assert before is loss.left and behind is loss.right
-    assert len(said) == 1 and path.describe(before) in said[0] and said[0] in str(fx.doctor(path))
-    bent = fx.imperfect(mesh, loss, 1e-2)
+    assert len(said) == 1 and path.describe(before) in said[0] and said[0] in str(fx.check(path))
+    bent = fx.with_imperfection(mesh, loss, 1e-2)
     assert np.abs(bent.nodes_of("inner")[:, 0] - 0.8).max() == pytest.approx(
         1e-2 * np.abs(loss.amplitudes[loss.points[:, 0] < 0.8 + 1e-9, 0]).max(), rel=1e-6)
     drops = []
     for amplitude in (2.5e-3, 5e-3, 1e-2):
-        path = inflate(fx.imperfect(mesh, loss, amplitude), 2.1)
+        path = inflate(fx.with_imperfection(mesh, loss, amplitude), 2.1)
         drops.append(loss.control - max(limit.measures["pressure"] for limit in path.limit_points))
     assert not caplog.records                               # a limit point is none
     assert min(drops) > 0 and np.diff(np.log(drops)) / np.log(2) == pytest.approx([2 / 3] * 2, abs=0.05)
     with pytest.raises(InputError, match="of another mesh"):
-        fx.imperfect(fx.mesh.disc(radius=1.0, thickness=0.3, elements=(3, 1)), loss, 0.1)
+        fx.with_imperfection(fx.mesh.disc(radius=1.0, thickness=0.3, elements=(3, 1)), loss, 0.1)
 
 
 def test_hoop_resultants():
     """Of an even disc pushed in at its rim, of two layers: h dW/dl = 2 c10 h (l - l^-5); of a membrane at its pole."""
     mesh = fx.mesh.disc(radius=2.0, thickness={"one": 0.1, "two": 0.3}, elements=(4, (1, 2)))
     scene = fx.Scene(mesh=mesh, materials={"one": fx.NeoHookean(c10=1.0), "two": fx.NeoHookean(c10=5.0)}, supports=[
-        fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.Displaced("rim", "r")])
+        fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.PrescribedDisplacement("rim", "r")])
     path = fx.trace(scene, until=fx.travel(-0.2), progress=False)      # a stretch of 0.9
     found = path.hoop_resultants()
     assert found.resultant == pytest.approx(2 * (0.1 + 5 * 0.3) * (0.9 - 0.9**-5), rel=1e-8)
@@ -366,14 +366,14 @@ def test_hoop_resultants():
     assert found.resultant[0] == pytest.approx(2 * c10 * h * (3 - 3.0**-5), rel=2e-3)
     strip = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(2, 1)), kinematics=fx.PlaneStrain(),
                      materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis", "r"),
-                     fx.Symmetry("bottom", "z"), fx.Displaced("rim", "r")])
+                     fx.Symmetry("bottom", "z"), fx.PrescribedDisplacement("rim", "r")])
     with pytest.raises(InputError, match="plane strain"):
         fx.trace(strip, until=fx.travel(0.1), progress=False).hoop_resultants()
 
 
 def test_a_run_stops_where_it_is_unstable():
     scene = column(1.0, elements=(4, 10))
-    path = fx.trace(scene, until=fx.travel(-2.0), stop_at=fx.unstable(modes=range(3)), progress=False)
+    path = fx.trace(scene, until=fx.travel(-2.0), stop_at=fx.instability(modes=range(3)), progress=False)
     assert "1 waves become unstable" in path.ended
     before, last = (1 + state.measures["travel"] / np.pi for state in path.states[-2:])
     assert last < exact.cylinder(1.0, 1) < before

@@ -53,7 +53,7 @@ def test_time_goes_one_way(monkeypatch):
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(6, 1)),
                      materials=fx.Viscoelastic(fx.NeoHookean(c10=1.0), [(1.0, 1.0)]),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")])
-    path = fx.Process(scene).run([fx.Stage("blow", drive="air", until=fx.pressure(0.05)),
+    path = fx.Process(scene).run([fx.Stage("blow", control="air", until=fx.pressure(0.05)),
                                   fx.Stage("hold", duration=0.5)], progress=False)
     assert len(calls) > 4 and "the path turns back here" in path.counts.limits
     assert min(b.time - a.time for a, b in zip(path.states, path.states[1:])) >= 0

@@ -17,7 +17,7 @@ def sheet(mu=0.3, n=14, material=None):
     material = material or fx.Viscoelastic(fx.NeoHookean(c10=0.05), branches=[(0.3, 0.5), (0.4, 5.0)])
     return fx.Scene(mesh=fx.mesh.disc(radius=40, thickness=1.2, elements=(n, 1)), materials=material,
                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
-                    contacts=[fx.Contact("top", fx.tools.sphere(radius=15, z=1.2), mu, moves=(0, -1), name="ball")])
+                    contacts=[fx.Contact("top", fx.tools.sphere(radius=15, z=1.2), mu, direction=(0, -1), name="ball")])
 
 
 def run(scene, *stages, **options):
@@ -28,7 +28,7 @@ def run(scene, *stages, **options):
 def test_a_hold_after_a_quick_ramp_does_not_move(ramp):
     """Round-off of a short ramp was taken for what drives the hold: steps of 1e-13, without an end."""
     table = [(0, 0), (1, 0), (1 + ramp, 0.6), (2, 0.6), (2 + ramp, 0.2), (4, 0.2)]
-    path = run(block(SLOW), Stage("move", follow={"pull": table}), accuracy="draft", max_steps=200)
+    path = run(block(SLOW), Stage("move", amplitudes={"pull": table}), accuracy="draft", max_steps=200)
     held = [s for s in path.states if 1 + 2 * ramp < s.time < 2 or 2 + 2 * ramp < s.time]
     assert {s.measures["travel"] for s in held} == {0.6, 0.2} and len(path) < 250
     assert all(s.setting["rate"][2] == 0 for s in held)
@@ -36,8 +36,8 @@ def test_a_hold_after_a_quick_ramp_does_not_move(ramp):
 
 @pytest.mark.parametrize("corner", [1.0, 1.0001, 2.0, 4.0])
 def test_a_target_at_a_corner_of_a_table(corner):
-    for stage in (Stage("move", follow={"pull": QUICK}, through=[fx.process_time(corner)]),
-                  Stage("flow", drive="pull", follow={fx.travel: QUICK}, through=[fx.process_time(corner)])):
+    for stage in (Stage("move", amplitudes={"pull": QUICK}, intermediate=[fx.process_time(corner)]),
+                  Stage("flow", control="pull", amplitudes={fx.travel: QUICK}, intermediate=[fx.process_time(corner)])):
         path = run(block(SLOW), stage, accuracy="draft", max_steps=200)
         met = path.met(fx.process_time(corner))
         assert met.time == pytest.approx(corner, rel=1e-12) and path.last.time == pytest.approx(4.0, rel=1e-12)
@@ -47,8 +47,8 @@ def test_a_target_at_a_corner_of_a_table(corner):
 def test_what_the_step_control_knows_is_part_of_a_state(tmp_path):
     """From any state, under a step control of one's own, the very same path goes on."""
     scene = sheet()
-    stages = [Stage("in", drive="ball", until=fx.travel(12), speed=20),
-              Stage("out", drive="ball", until=fx.travel(4), speed=20)]
+    stages = [Stage("in", control="ball", until=fx.travel(12), speed=20),
+              Stage("out", control="ball", until=fx.travel(4), speed=20)]
     options = {"accuracy": "draft", "step": StepControl(target=8)}
     whole = run(scene, *stages, checkpoint=tmp_path, **options)
     for k in range(1, len(whole) - 1, 9):
@@ -73,7 +73,7 @@ def test_accuracy_is_kept_for_any_relaxation_time(law, tau, target, accuracy, pr
     rubber, branches = fx.NeoHookean(c10=0.5), [(1 / tau, tau)]
     material = law(branches, equilibrium=rubber) if law is fx.KBKZ else law(rubber, branches)
     times, stretches = CYCLE
-    path = run(block(material), Stage("cycle", follow={"pull": [(t, l - 1) for t, l in zip(times, stretches)]}),
+    path = run(block(material), Stage("cycle", amplitudes={"pull": [(t, l - 1) for t, l in zip(times, stretches)]}),
                accuracy=accuracy, step=StepControl(target=target))
     found = -path["support_force"] / np.pi
     exact = material.stress("uniaxial", 1 + path["travel"], times=path["process_time"])
@@ -82,10 +82,10 @@ def test_accuracy_is_kept_for_any_relaxation_time(law, tau, target, accuracy, pr
 
 def test_a_file_without_the_motion_of_a_material_is_read():
     """As one written before materials kept it; the next step begins as from rest."""
-    path = run(block(fx.TransientNetwork(None, [(1.0, 0.1)])), Stage("pull", follow={"pull": [(0, 0), (1, 0.5)]}),
+    path = run(block(fx.TransientNetwork(None, [(1.0, 0.1)])), Stage("pull", amplitudes={"pull": [(0, 0), (1, 0.5)]}),
                accuracy="draft")
     history, = path.problem.materials
-    with path.problem.at(path.last):
+    with path.problem.state_context(path.last):
         kept = history.save(history.get())
         assert kept["values"]["pace"].min() > 0
         del kept["values"]["pace"], kept["values"]["change"]
@@ -93,13 +93,13 @@ def test_a_file_without_the_motion_of_a_material_is_read():
     assert not found.values["pace"].any() and not found.values["change"].any() and found.values["A_1"].any()
 
 
-DOWN, BETWEEN = {"drive": "ball", "until": fx.travel(7), "speed": 20}, fx.travel(5.0)
+DOWN, BETWEEN = {"control": "ball", "until": fx.travel(7), "speed": 20}, fx.travel(5.0)
 
 
 @pytest.fixture(scope="module")
 def pressed():
     """A run in small steps."""
-    return run(sheet(0), Stage("in", through=[BETWEEN], **DOWN), accuracy=1e-4)
+    return run(sheet(0), Stage("in", intermediate=[BETWEEN], **DOWN), accuracy=1e-4)
 
 
 @pytest.mark.parametrize("target, promised", [(4, 1e-2), (8, 1e-2), (8, 2e-3)])
@@ -113,7 +113,7 @@ def test_accuracy_is_kept_under_a_tool_by_any_step_control(target, promised, pre
 
 
 def test_only_what_takes_time_has_an_error_in_time():
-    path = run(sheet(0), Stage("at once", drive="ball", until=fx.travel(7)), accuracy=1e-6)
+    path = run(sheet(0), Stage("at once", control="ball", until=fx.travel(7)), accuracy=1e-6)
     assert len(path) < 30
 
 
@@ -131,7 +131,7 @@ def test_accuracy_is_kept_while_a_body_cools(name):
                      heat=fx.Cooling(fx.ThermalProperties(conductivity=0.01, density=1.0, heat_capacity=1.0),
                                      [fx.Convection("top", h=0.05, air=20.0)], unit="C", tolerance=0.01),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")])
-    stages = [Stage("blow", drive="air", until=fx.pressure(pressure), duration=0.5), Stage("hold", duration=2.0)]
+    stages = [Stage("blow", control="air", until=fx.pressure(pressure), duration=0.5), Stage("hold", duration=2.0)]
 
     def heights(accuracy):
         path = run(scene, *stages, accuracy=accuracy)
@@ -151,7 +151,7 @@ def test_a_state_between_two_is_as_accurate_as_the_run(pressed):
 
 
 def test_between_states_of_a_flow_there_is_none_to_find():
-    path = run(block(), Stage("flow", drive="pull", follow={fx.travel: [(0, 0), (1, 1)]}), accuracy=1e-2)
+    path = run(block(), Stage("flow", control="pull", amplitudes={fx.travel: [(0, 0), (1, 1)]}), accuracy=1e-2)
     with pytest.raises(fx.InputError, match="that follows or holds a measure"):
         path.at(fx.travel(0.987654))
 
@@ -166,7 +166,7 @@ def test_doctor_sees_a_modulus_that_pulls_a_cooling_body_back():
                          heat=fx.Cooling(fx.ThermalProperties(conductivity=0.01, density=1.0, heat_capacity=1.0),
                                          [fx.Convection("top", h=0.05, air=air)], unit="C"),
                          supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")])
-        return [f.text for f in fx.doctor(scene).findings if "pulls back" in f.text]
+        return [f.text for f in fx.check(scene).findings if "pulls back" in f.text]
     for material in (fx.NeoHookean(c10=table), fx.Viscoelastic(fx.NeoHookean(c10=table), [(table, 0.3)])):
         assert len(found(material)) == 1 and "6 times as large at 20 degrees" in found(material)[0]
         assert not found(material, air=145.0)
@@ -183,8 +183,8 @@ def test_cutbacks_end(followed, monkeypatch):
         assert len(asked) < 500, "it goes on for ever"
         return 10.0
     monkeypatch.setattr(TimeError, "of", too_large)
-    driven = {"drive": "pull"} if followed is fx.travel else {}
-    stage = Stage("cycle", **driven, follow={followed: [(0, 0), (1, 0.5)]})
+    driven = {"control": "pull"} if followed is fx.travel else {}
+    stage = Stage("cycle", **driven, amplitudes={followed: [(0, 0), (1, 0.5)]})
     with pytest.raises(fx.ConvergenceError, match="became shorter than.*the error in time"):
         run(block(fx.Viscoelastic(fx.NeoHookean(c10=0.5), branches=[(1.0, 1.0)])), stage)
 
@@ -197,5 +197,5 @@ def test_a_second_cutback_is_one_in_time(monkeypatch):
         ways.append(control - states[-1].control)
         return 8.0 if len(ways) < 4 else 0.5
     monkeypatch.setattr(TimeError, "of", too_large)
-    run(block(SLOW), Stage("cycle", follow={"pull": [(0, 0), (1, 0.5)]}))
+    run(block(SLOW), Stage("cycle", amplitudes={"pull": [(0, 0), (1, 0.5)]}))
     assert ways[2:4] == pytest.approx([0.4 * ways[1], 0.4 * ways[2]], rel=1e-9)             # 0.8 / 8^(1/3)

@@ -99,7 +99,7 @@ def test_thick_sphere_through_its_limit_point():
     errors, maxima = [], []
     for n in (8, 16):
         targets = [fx.displacement(u, at=(1.0, 0.0), component="r") for u in (0.2, 0.5, 1.0, 2.0)]
-        path = fx.trace(sphere(n), until=targets[-1], through=targets[:-1])
+        path = fx.trace(sphere(n), until=targets[-1], intermediate=targets[:-1])
         errors.append(max(abs(path.met(t).measures["pressure"] / thick_wall("sphere", 1 + t.value, **size).pressure - 1)
                           for t in targets))
         limit, = path.limit_points

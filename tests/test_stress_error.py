@@ -74,7 +74,8 @@ def test_homogeneous_and_unloaded_states_have_no_error():
     rest = path.stress(path.states[0])
     assert rest.error().relative < 1e-6 and rest.peak().converged
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=2.0, elements=(3, 3)), materials=fx.NeoHookean(c10=1.0),
-                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"), fx.Displaced("top", "z")])
+                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
+                               fx.PrescribedDisplacement("top", "z")])
     field = fx.trace(scene, until=fx.travel(1.0), progress=False).stress()
     assert field.error().relative < 1e-9
     peak = field.peak()

@@ -99,7 +99,7 @@ def test_constants_that_are_refused(make):
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
 def test_course(function, start, until, tolerance):
     """Nowhere off by more than the tolerance, ends exact, and the points are as many as its curvature asks for."""
-    t, f = np.array(fx.course(function, until, start, tolerance=tolerance)).T
+    t, f = np.array(fx.amplitude(function, until, start, tolerance=tolerance)).T
     fine = np.linspace(start, until, 10001)
     exact = np.broadcast_to(function(fine), fine.shape)
     assert (t[0], t[-1]) == (start, until) and np.all(np.diff(t) > 0) and len(t) < 9 + 8 / np.sqrt(tolerance)
@@ -111,6 +111,6 @@ def test_course(function, start, until, tolerance):
     (None, "fails")])
 def test_a_course_that_is_none(function, words):
     with pytest.raises(fx.InputError, match=words):
-        fx.course(function, 1.0)
+        fx.amplitude(function, 1.0)
     with pytest.raises(fx.InputError, match="after start"):
-        fx.course(np.sin, 1.0, 1.0)
+        fx.amplitude(np.sin, 1.0, 1.0)

@@ -100,7 +100,7 @@ def test_time_temperature_superposition(kind):
     for material, temperature, time in ((shifted, 150.0, 3.0), (shifted, T, 3.0 * float(shift(T))),
                                         (kind(rest, branches), None, 3.0)):
         body = scene(material, temperature, fx.Membrane())
-        blow = fx.Stage("blow", drive=body.loads[0], until=fx.pressure(0.03), duration=time)
+        blow = fx.Stage("blow", control=body.loads[0], until=fx.pressure(0.03), duration=time)
         found.append(fx.Process(body).run([blow], progress=False, accuracy="draft").last.measures)
     assert found[0]["process_time"] == pytest.approx(3.0) and shift(T) < 0.3
     for other in found[1:]:
@@ -152,10 +152,10 @@ def test_a_sheet_cools_while_it_waits():
                     tolerance=0.01)
     points = np.array([[0.0, 0.0], [0.01, 1e-3]])
     c10 = path.problem.forms.terms[0].constants["c10"].ufl_operands[0]        # times how it goes on in a step
-    with path.problem.at(path.last):
+    with path.problem.state_context(path.last):
         assert path.problem.temperature.at(points) == pytest.approx(alone.at(points)[-1], abs=0.05)
         stiffer = c10.x.array.max()
-    with path.problem.at(path.states[0]):
+    with path.problem.state_context(path.states[0]):
         assert np.all(path.problem.temperature.T.x.array == 150.0)
         assert c10.x.array == pytest.approx(0.6e6)
     assert stiffer > 0.7e6
@@ -164,18 +164,18 @@ def test_a_sheet_cools_while_it_waits():
 def test_a_sheet_that_cools_needs_more_pressure():
     def height(h):
         scene = cooled(h=h)
-        blow = fx.Stage("blow", drive=scene.loads[0], until=fx.pressure(6e4), duration=2.0)
+        blow = fx.Stage("blow", control=scene.loads[0], until=fx.pressure(6e4), duration=2.0)
         return fx.Process(scene).run([blow], progress=False, accuracy="draft").last.measures["pole_height"]
     assert height(100.0) < 0.98 * height(0.0)
 
 
 def test_a_tool_takes_heat_only_where_and_while_it_touches():
     tool = fx.tools.male(radius=8e-3, height=0.02, base=-0.02, fillet=2e-3).mirrored().moved(z=1.5e-3)
-    plug = fx.Contact("top", tool, moves=(0.0, -1.0), name="plug", friction="stick")
+    plug = fx.Contact("top", tool, direction=(0.0, -1.0), name="plug", friction="stick")
     scene = cooled({"plug": (1000.0, 30.0)}, [plug], h=0)
-    push = fx.Stage("push", drive="plug", until=fx.travel(4e-3), through=[fx.travel(0.4e-3)], duration=0.5)
+    push = fx.Stage("push", control="plug", until=fx.travel(4e-3), intermediate=[fx.travel(0.4e-3)], duration=0.5)
     path = fx.Process(scene).run([push], progress=False, accuracy="draft")
-    with path.problem.at(path.met(fx.travel(0.4e-3))):
+    with path.problem.state_context(path.met(fx.travel(0.4e-3))):
         assert np.all(np.abs(path.problem.temperature.T.x.array - 150.0) < 1e-9)      # it has not come to the sheet yet
     *under, beside = path.temperature(np.array([[R, 1e-3] for R in (0.0, 0.002, 0.004, 0.006, 0.019)]))
     assert min(under) < 110 and beside > 149.9, under

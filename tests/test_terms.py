@@ -97,7 +97,7 @@ def test_a_spinning_tube():
     a, b, speed2, c10 = 1.0, 2.0, 1e-6, 0.5
     held = [fx.Symmetry(face, normal="z") for face in ("bottom", "top")]
     scene = fx.Scene(mesh=disc((8, 1), inner_radius=a), materials=fx.NeoHookean(c10=c10), supports=held,
-                     loads=[fx.Spin(1.0)])
+                     loads=[fx.CentrifugalLoad(1.0)])
     R = np.array([a, 1.5, b])
     u = displacement(fx.solve(scene, to=speed2), np.column_stack([R, 0 * R]))[:, 0]
     np.testing.assert_allclose(u, speed2 * a**2 * b**2 / (4 * 2 * c10) / R, rtol=2e-4)
@@ -118,7 +118,7 @@ def test_a_rigid_translation_does_the_work_of_the_weight(model, value):
     assert forms.volume == pytest.approx(np.pi * 2.0**2 * 0.3) and work == pytest.approx(weight, rel=1e-12)
 
 
-@pytest.mark.parametrize("load", [fx.Gravity(2.0), fx.Spin(1.5), fx.Pressure("bottom")],
+@pytest.mark.parametrize("load", [fx.Gravity(2.0), fx.CentrifugalLoad(1.5), fx.Pressure("bottom")],
                          ids=lambda v: type(v).__name__)
 def test_derivatives_of_a_driven_load(load):
     problem = Problem(fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0), loads=[load],
@@ -345,7 +345,7 @@ def test_a_memory_does_not_know_ranks():
 
 def test_a_scene_without_time_compiles_no_derivative_by_it():
     scene = fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0),
-                     supports=[SYMMETRY, fx.Clamped("rim"), fx.Displaced("bottom")])
+                     supports=[SYMMETRY, fx.Clamped("rim"), fx.PrescribedDisplacement("bottom")])
     forms = Problem(scene).forms
     assert forms.control_derivative is None and not forms.histories and forms.energy is forms.potential
 
@@ -356,9 +356,9 @@ def test_block_on_springs():
     mesh = fx.mesh.disc(radius=radius, thickness=height, elements=(3, 3))
     springs = Foundation("bottom", k, "springs")
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=c10),
-                     supports=[SYMMETRY, springs, fx.Displaced("top", name="plate")])
-    path = fx.Process(scene).run([fx.Stage("down", drive="plate", until=fx.travel(-down)),
-                                  fx.Stage("back", drive="plate", until=fx.travel(-0.3))], progress=False)
+                     supports=[SYMMETRY, springs, fx.PrescribedDisplacement("top", name="plate")])
+    path = fx.Process(scene).run([fx.Stage("down", control="plate", until=fx.travel(-down)),
+                                  fx.Stage("back", control="plate", until=fx.travel(-0.3))], progress=False)
     for travel in (down, 0.3):
         s = brentq(lambda s, d=travel: 2 * c10 * ((l := 1 - (d - s) / height) - l**-2) + k * s, 0, travel)
         state = path.state(stage="down" if travel == down else "back")
@@ -373,8 +373,8 @@ def test_energy_of_a_support_that_leaves():
     scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(10, 1)), materials=fx.NeoHookean(c10=0.4),
                      supports=[SYMMETRY, fx.Clamped("rim"), springs := Foundation("top", 0.02)],
                      loads=[fx.Pressure("bottom")])
-    path = fx.Process(scene).run([fx.Stage("up", drive=scene.loads[0], until=fx.pressure(0.03)),
-                                  fx.Stage("free", without=[springs])], progress=False)
+    path = fx.Process(scene).run([fx.Stage("up", control=scene.loads[0], until=fx.pressure(0.03)),
+                                  fx.Stage("free", inactive=[springs])], progress=False)
     free = fx.trace(fx.Scene(mesh=scene.mesh, materials=fx.NeoHookean(c10=0.4), loads=[fx.Pressure("bottom")],
                              supports=[SYMMETRY, fx.Clamped("rim")]), until=fx.pressure(0.03), progress=False)
     assert path["pole_height"][-1] == pytest.approx(free["pole_height"][-1], rel=1e-8)
@@ -433,9 +433,9 @@ def test_mullins(speed):
     soft = Mullins(c10=c10, r=r, m=m)
     assert soft.shear_modulus == pytest.approx(2 * c10)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=radius, thickness=1.0, elements=(2, 2)), materials=soft,
-                     supports=[SYMMETRY, fx.Symmetry("bottom", "z"), fx.Displaced("top", name="grip")])
+                     supports=[SYMMETRY, fx.Symmetry("bottom", "z"), fx.PrescribedDisplacement("top", name="grip")])
     path = fx.Process(scene).run([
-        fx.Stage(name, drive="grip", until=fx.travel(to), speed=speed, step=fx.StepControl(largest=0.04))
+        fx.Stage(name, control="grip", until=fx.travel(to), speed=speed, step=fx.StepControl(largest=0.04))
         for name, to in (("pull", 0.8), ("back", 0.2), ("again", 1.2))], progress=False)
     W = c10 * ((stretch := 1 + path["travel"])**2 + 2 / stretch - 3)
     softened = 1 - r * (1 - np.exp(-np.maximum.accumulate(W) / m))

@@ -18,7 +18,8 @@ EXACT = 0.99                                                 # no step is refuse
 def block(material=P0, **scene):
     """A cylinder of radius and height 1, pulled at its top."""
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)), materials=material,
-                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.Displaced("top", name="pull")],
+                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z"),
+                              fx.PrescribedDisplacement("top", name="pull")],
                     **scene)
 
 
@@ -57,14 +58,14 @@ def pull(path, stretch=2.0, state=None):
 
 def blow(T=1.0, volume=1.0, held=0.0, **options):
     knots = [(0, 0), (T, volume)] + ([(T + held, volume)] if held else [])
-    return Stage("blow", drive="air", follow={fx.enclosed_volume: knots}, **options)
+    return Stage("blow", control="air", amplitudes={fx.enclosed_volume: knots}, **options)
 
 
 def test_second_order_in_time():
     """A ramp of the inner radius of a tube, and a hold: pressures at the end, at equal steps, each half as long."""
     ends = []
     for n in (8, 16, 32):
-        flow = Stage("flow", drive="air", follow={widened: [(0, 0), (1, 1), (2, 1)]}, step=even(2 * n))
+        flow = Stage("flow", control="air", amplitudes={widened: [(0, 0), (1, 1), (2, 1)]}, step=even(2 * n))
         ends.append(run(tube(), flow, accuracy=EXACT).last.measures["pressure"])
     coarse, fine = np.diff(ends)
     assert np.log2(coarse / fine) == pytest.approx(2, abs=0.2)
@@ -95,9 +96,9 @@ def test_ranks_agree():
 
 
 @pytest.mark.parametrize("stages", [
-    [Stage("pull", drive="pull", until=fx.travel(1.0)), Stage("hold", duration=3.0)],
-    [Stage("load", drive="pull", until=fx.force(-0.5)),
-     Stage("creep", drive="pull", hold=fx.force(-0.5), duration=3.0)],
+    [Stage("pull", control="pull", until=fx.travel(1.0)), Stage("hold", duration=3.0)],
+    [Stage("load", control="pull", until=fx.force(-0.5)),
+     Stage("creep", control="pull", constant=fx.force(-0.5), duration=3.0)],
 ], ids=["hold", "creep"])
 def test_restart_in_the_middle(stages, tmp_path):
     scene = block(P1)
@@ -113,7 +114,7 @@ def test_restart_in_the_middle(stages, tmp_path):
 def test_the_state_of_a_stage_and_a_time():
     body = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1)), materials=P0,
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")])
-    path = fx.Process(body).run([fx.Stage("blow", drive="air", until=fx.pole_height(0.2), speed=1.0),
+    path = fx.Process(body).run([fx.Stage("blow", control="air", until=fx.pole_height(0.2), speed=1.0),
                                   fx.Stage("wait", duration=2.0)], progress=False, accuracy=1e-2)
     stages = list(dict.fromkeys(state.stage for state in path.states))
     for stage in stages:
@@ -144,9 +145,9 @@ def test_tangent_and_control_derivative_in_time(model):
     scene = sheet(model, n=3)
     path = run(scene, blow(T=0.5, volume=0.6), accuracy=5e-2)
     problem, last = path.problem, path.last
-    with problem.at(last):
+    with problem.state_context(last):
         setting = problem.setting
-        rate = [1.0 if thing in scene.loads else 0.0 for thing in scene.things] + [2.0]
+        rate = [1.0 if thing in scene.loads else 0.0 for thing in scene.items] + [2.0]
         base = [*setting.standing(last.control)[:-1], last.time + 0.1]
         base = [b - r * last.control for b, r in zip(base, rate)]
         problem.enter(type(setting)(base, rate, []), last.x, last.control)
@@ -174,8 +175,8 @@ def test_tangent_and_control_derivative_in_time(model):
 @pytest.mark.parametrize("ratio", [1e-9, 1e-3, 1.0, 1e3, 1e9])
 def test_steps_of_any_length(ratio):
     """One step of 1e-9 tau is elastic, one of 1e9 tau leaves the equilibrium."""
-    stages = [Stage("pull", drive="pull", until=fx.travel(1.0)),
-              Stage("hold", drive="pull", follow={fx.travel: [(0, 1.0), (ratio, 1.0)]}, step=even(1))]
+    stages = [Stage("pull", control="pull", until=fx.travel(1.0)),
+              Stage("hold", control="pull", amplitudes={fx.travel: [(0, 1.0), (ratio, 1.0)]}, step=even(1))]
     path = run(block(), *stages, accuracy=EXACT)
     now, rest = P0.stress("uniaxial", 2.0), RUBBER.stress("uniaxial", 2.0)
     if ratio <= 1e-3:
@@ -189,8 +190,8 @@ def test_steps_of_any_length(ratio):
 def test_many_branches():
     tau = np.geomspace(1e-3, 1e3, 20)
     material = fx.Viscoelastic(RUBBER, branches=[(0.03 * (1 + k % 3), float(t)) for k, t in enumerate(tau)])
-    path = run(block(material), Stage("pull", drive="pull", until=fx.travel(0.5)),
-               Stage("hold", duration=10.0, through=[fx.process_time(0.1)]))
+    path = run(block(material), Stage("pull", control="pull", until=fx.travel(0.5)),
+               Stage("hold", duration=10.0, intermediate=[fx.process_time(0.1)]))
     for t, state in ((0.1, path.met(fx.process_time(0.1))), (10.0, path.last)):
         assert pull(path, state=state) == pytest.approx(material.relaxation("uniaxial", 1.5, t), rel=1e-2)
 
@@ -200,8 +201,9 @@ def test_layers_of_different_branches():
     layers = {"a": (P0, 0.5), "b": (P1, 0.3), "c": (fx.NeoHookean(c10=0.2), 0.2)}
     mesh = fx.mesh.disc(radius=1.0, thickness={k: h for k, (_, h) in layers.items()}, elements=(1, 1))
     scene = fx.Scene(mesh=mesh, materials={k: m for k, (m, _) in layers.items()},
-                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.Displaced("rim", "r", name="pull")])
-    path = run(scene, Stage("pull", drive="pull", until=fx.travel(0.5)), Stage("hold", duration=2.0), accuracy="fine")
+                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z"),
+                               fx.PrescribedDisplacement("rim", "r", name="pull")])
+    path = run(scene, Stage("pull", control="pull", until=fx.travel(0.5)), Stage("hold", duration=2.0), accuracy="fine")
     sought = sum(h * (m.relaxation("equibiaxial", 1.5, 2.0) if m.internal else m.stress("equibiaxial", 1.5))
                  for m, h in layers.values())
     assert -path.last.measures["support_force"] / (2 * np.pi) == pytest.approx(sought, rel=ACCURACY["fine"])
@@ -213,8 +215,8 @@ def test_accuracy_is_kept(accuracy):
     times = [0.1, 0.5, 1.0, 2.0, 5.0]
     through = [fx.process_time(t) for t in times[:-1]]
     for stretch in (1.5, 4.0):
-        path = run(block(), Stage("pull", drive="pull", until=fx.travel(stretch - 1)),
-                   Stage("hold", duration=5.0, through=through), accuracy=accuracy)
+        path = run(block(), Stage("pull", control="pull", until=fx.travel(stretch - 1)),
+                   Stage("hold", duration=5.0, intermediate=through), accuracy=accuracy)
         found = [pull(path, state=path.met(t)) for t in through] + [pull(path)]
         assert found == pytest.approx(P0.relaxation("uniaxial", stretch, times), rel=ACCURACY[accuracy])
 
@@ -222,8 +224,9 @@ def test_accuracy_is_kept(accuracy):
 def test_accuracy_of_thickness_and_of_the_snap():
     """Under a held pressure; a sheet creeps until it snaps."""
     def snap(accuracy):
-        path = run(sheet(), Stage("put on", drive="air", until=fx.pressure(0.01)),
-                   Stage("creep", duration=1000.0, through=[fx.pole_stretch(1.3)], at_fold="stop"), accuracy=accuracy)
+        path = run(sheet(), Stage("put on", control="air", until=fx.pressure(0.01)),
+                   Stage("creep", duration=1000.0, intermediate=[fx.pole_stretch(1.3)], at_limit_point="stop"),
+                   accuracy=accuracy)
         assert path.limit_points and "limit point" in path.ended
         return np.array([path.last.time, path.last.measures["pole_stretch"], path.met(fx.pole_stretch(1.3)).time])
     fine = snap(3e-5)
@@ -232,8 +235,8 @@ def test_accuracy_of_thickness_and_of_the_snap():
 
 def test_constant_rate_as_a_function_of_time():
     rate, end = 0.7, np.log(3.0) / 0.7
-    path = run(block(P1), Stage("pull", drive="pull", follow={fx.travel: lambda t: np.expm1(rate * t)},
-                                until=fx.process_time(end), through=[fx.process_time(end / 2)]), accuracy="fine")
+    path = run(block(P1), Stage("pull", control="pull", amplitudes={fx.travel: lambda t: np.expm1(rate * t)},
+                                until=fx.process_time(end), intermediate=[fx.process_time(end / 2)]), accuracy="fine")
     for t, state in ((end / 2, path.met(fx.process_time(end / 2))), (end, path.last)):
         assert pull(path, state=state) == pytest.approx(P1.constant_rate("uniaxial", rate, [np.exp(rate * t)])[0],
                                                         rel=ACCURACY["fine"])
@@ -242,10 +245,10 @@ def test_constant_rate_as_a_function_of_time():
 def test_recovery_after_creep():
     """A force that is held when time has gone by already; taken off, it leaves the stretch that the creep has left."""
     force = fx.force(-0.2 * AREA)
-    path = run(block(P1), Stage("load", drive="pull", until=force),
-               Stage("creep", drive="pull", hold=force, duration=5.0),
-               Stage("unload", drive="pull", until=fx.force(0.0)),
-               Stage("recovery", drive="pull", hold=fx.force(0.0), duration=5.0), accuracy=2e-3)
+    path = run(block(P1), Stage("load", control="pull", until=force),
+               Stage("creep", control="pull", constant=force, duration=5.0),
+               Stage("unload", control="pull", until=fx.force(0.0)),
+               Stage("recovery", control="pull", constant=fx.force(0.0), duration=5.0), accuracy=2e-3)
     begin = next(s for s in path.states if s.stage == "recovery")
     assert begin.time == 5.0 and np.all(np.diff(path["process_time"]) >= 0)
     assert np.abs(path["support_force"][path.states.index(begin):]).max() < 1e-8
@@ -254,7 +257,7 @@ def test_recovery_after_creep():
 
 
 def test_flow_ends_where_it_is_told():
-    path = run(block(), Stage("pull", drive="pull", follow={fx.travel: [(0, 0), (1, 1), (3, 1)]},
+    path = run(block(), Stage("pull", control="pull", amplitudes={fx.travel: [(0, 0), (1, 1), (3, 1)]},
                               until=fx.process_time(2)))
     assert path.last.time == 2.0 and path.last.measures["travel"] == pytest.approx(1.0, abs=1e-12)
 
@@ -264,20 +267,20 @@ def test_flow_ends_where_it_is_told():
     (lambda: fx.Viscoelastic(RUBBER, branches=[]), "at least one"),
     (lambda: fx.Viscoelastic(RUBBER, branches=[(0.5, 0.0)]), "tau_1 = 0.0: must be greater than 0"),
     (lambda: fx.Viscoelastic(RUBBER, branches=[(-0.5, 1.0)]), "mu_1 = -0.5: must be greater than 0"),
-    (lambda: Stage("a", drive="air", until=fx.pressure(1), speed=0), "speed = 0: must be greater than 0"),
+    (lambda: Stage("a", control="air", until=fx.pressure(1), speed=0), "speed = 0: must be greater than 0"),
     (lambda: Stage("a", duration=0), "duration = 0: must be greater than 0"),
     (lambda: Stage("a", speed=1.0), "of what"),
-    (lambda: Stage("a", drive="air", until=fx.pole_height(1), duration=2.0), "give a speed"),
-    (lambda: Stage("a", drive="air", hold=fx.pressure(1)), "duration"),
-    (lambda: Stage("a", drive="air", follow={fx.enclosed_volume: [(0, 0)]}), "two points"),
-    (lambda: Stage("a", drive="air", follow={fx.enclosed_volume: lambda t: t}), "until when"),
-    (lambda: Stage("a", drive="air", follow={lambda v: v: [(0, 0), (1, 1)]}), "made by its measure"),
+    (lambda: Stage("a", control="air", until=fx.pole_height(1), duration=2.0), "give a speed"),
+    (lambda: Stage("a", control="air", constant=fx.pressure(1)), "duration"),
+    (lambda: Stage("a", control="air", amplitudes={fx.enclosed_volume: [(0, 0)]}), "two points"),
+    (lambda: Stage("a", control="air", amplitudes={fx.enclosed_volume: lambda t: t}), "until when"),
+    (lambda: Stage("a", control="air", amplitudes={lambda v: v: [(0, 0), (1, 1)]}), "made by its measure"),
     (lambda: run(block(), Stage("a", duration=1.0), accuracy="exact"), "accuracy = 'exact': must be one of"),
     (lambda: run(block(), Stage("a", duration=1.0), accuracy=0), "between 0 and 1"),
     (lambda: run(block(), Stage("a", duration=1.0),
-                 Stage("b", drive="pull", until=fx.process_time(1), follow={fx.travel: [(0, 0), (2, 1)]})),
+                 Stage("b", control="pull", until=fx.process_time(1), amplitudes={fx.travel: [(0, 0), (2, 1)]})),
      "time cannot go back"),
-    (lambda: run(block(), Stage("a", drive="pull", follow={fx.travel: [(1, 0), (2, 1)]})), "nothing is given"),
+    (lambda: run(block(), Stage("a", control="pull", amplitudes={fx.travel: [(1, 0), (2, 1)]})), "nothing is given"),
 ])
 def test_bad_input(make, words):
     with pytest.raises(fx.InputError, match=words):

@@ -334,7 +334,7 @@ def test_pot():
     sheet = fx.mesh.disc(radius=45, thickness=1.2, elements=(20, 1))
     fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=0.2), loads=[fx.Pressure("bottom", name="air")],
              supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-             contacts=[fx.Contact("top", mould, "stick"), fx.Contact("bottom", plug, moves=(0, 1), name="plug")])
+             contacts=[fx.Contact("top", mould, "stick"), fx.Contact("bottom", plug, direction=(0, 1), name="plug")])
 
 
 @pytest.mark.parametrize("wrong, words", [

@@ -18,7 +18,7 @@ STRETCHES = (1.2, 1.5, 2.0, 3.0, 4.0, 6.0)
 @pytest.fixture(scope="module")
 def path():
     """The default mesh of the demo, simply supported, with the stretches of its table."""
-    return fx.trace(treloar((40, 2)), until=fx.pole_stretch(8.5), through=[fx.pole_stretch(s) for s in STRETCHES])
+    return fx.trace(treloar((40, 2)), until=fx.pole_stretch(8.5), intermediate=[fx.pole_stretch(s) for s in STRETCHES])
 
 
 @pytest.mark.quick
@@ -107,7 +107,7 @@ def test_newton_is_quadratic(path, stretch):
 def test_units_change_nothing(path, length, stress):
     """`length` cm and `stress` kg/cm2 are the units."""
     scene = treloar((40, 2), length=length, stress=stress)
-    other = fx.trace(scene, until=fx.pole_stretch(8.5), through=[fx.pole_stretch(s) for s in STRETCHES])
+    other = fx.trace(scene, until=fx.pole_stretch(8.5), intermediate=[fx.pole_stretch(s) for s in STRETCHES])
     assert (other.counts.steps, other.counts.failures, other.counts.iterations) == (
         path.counts.steps, path.counts.failures, path.counts.iterations)
     assert other["pressure"] * stress == pytest.approx(path["pressure"], rel=1e-9)
@@ -186,7 +186,7 @@ def test_pressure_jumps_between_layers():
     forms, point = path.problem.forms, (0.0, 0.1)                       # where a and b meet on the axis
     assert forms.space.num_sub_spaces == 3
     normal_stretch = path.stress().at([point], "a").deformation_gradient[0, 1, 1]
-    with path.problem.at(path.last):
+    with path.problem.state_context(path.last):
         p = [value_at(forms.w.sub(1 + forms.pressure_of[name]).collapse(), point) for name in "ab"]
     # 2 c10 (l^2 - 1) + p, the stress across the interface, is the same on both sides
     assert forms.stress * (p[0] - p[1]) == pytest.approx(2 * (20.0 - 1.0) * (normal_stretch**2 - 1), rel=3e-2)

@@ -14,13 +14,13 @@ def block(height=1.0, friction="none", elements=(6, 6), **contact):
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=height, elements=elements), kinematics=fx.PlaneStrain(),
                     materials=fx.NeoHookean(c10=0.5),
                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")],
-                    contacts=[fx.Contact("top", tools.plane(height), friction, moves=(0, -1), **contact)])
+                    contacts=[fx.Contact("top", tools.plane(height), friction, direction=(0, -1), **contact)])
 
 
 def foot():
     """A block glued to its base, pressed flat: its foot flows out and folds."""
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(6, 6)), materials=fx.NeoHookean(c10=1.0),
-                    supports=[fx.Symmetry("axis"), fx.Clamped("bottom"), fx.Displaced("top")])
+                    supports=[fx.Symmetry("axis"), fx.Clamped("bottom"), fx.PrescribedDisplacement("top")])
 
 
 def funnel():
@@ -33,18 +33,19 @@ def funnel():
 
 def inside_out(path, state):
     """Part of the elements with a point where J <= 0."""
-    with path.problem.at(state) as problem:
+    with path.problem.state_context(state) as problem:
         bad, cells, _ = problem.inside_out()
     return bad / cells
 
 
 def test_a_run_ends_before_its_first_bad_state(caplog):
-    with pytest.raises(fx.ConvergenceError, match="elements are inside out, the worst at .* beyond=True") as error:
+    with pytest.raises(fx.ConvergenceError,
+                       match="elements are inside out, the worst at .* allow_inadmissible=True") as error:
         fx.trace(foot(), until=fx.travel(-0.85), progress=False)
     good = error.value.path
     assert len(good) > 2 and max(inside_out(good, state) for state in good.states) <= 0.06
     assert "The last good state is" in str(error.value)
-    path = fx.trace(foot(), until=fx.travel(-0.85), progress=False, beyond=True)
+    path = fx.trace(foot(), until=fx.travel(-0.85), progress=False, allow_inadmissible=True)
     verdicts = [state.verdict for state in path.states]
     assert next(k for k, verdict in enumerate(verdicts) if verdict) == len(good)
     assert "beyond travel" in caplog.text
@@ -58,7 +59,7 @@ def test_a_sheet_that_folds_ends_the_run():
 def test_open_and_report_say_it_too(tmp_path):
     from formingx.results.files import checkpoint
     from formingx.results.show import record
-    fx.trace(foot(), until=fx.travel(-0.85), progress=False, beyond=True, checkpoint=tmp_path / "run")
+    fx.trace(foot(), until=fx.travel(-0.85), progress=False, allow_inadmissible=True, checkpoint=tmp_path / "run")
     for found in (record.of_checkpoint(*checkpoint.contents(tmp_path / "run")),
                   record.of_path(fx.load(tmp_path / "run", foot()))):
         assert any("the results must not be used:" in text and "inside out" in text for text in found.warnings())
@@ -96,7 +97,7 @@ def test_a_pole_that_is_thinner_than_nothing_is_no_state():
     """A ball on elements that are far too long for it."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(20, 1)), materials=fx.NeoHookean(c10=0.4),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                     contacts=[fx.Contact("top", tools.sphere(radius=1.1, z=1.2), 0.3, moves=(0, -1))])
+                     contacts=[fx.Contact("top", tools.sphere(radius=1.1, z=1.2), 0.3, direction=(0, -1))])
     try:
         path = fx.trace(scene, until=fx.travel(40.0), progress=False)
     except fx.ConvergenceError as error:

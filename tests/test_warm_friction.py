@@ -16,8 +16,8 @@ def pushed(friction, temperature=150.0, heat=None, points="nodes", travel=0.3):
     tool = fx.tools.male(radius=0.4, height=1.0, base=-1.0, fillet=0.15).mirrored().moved(z=0.05)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(14, 1)), materials=fx.NeoHookean(c10=1.0),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], temperature=temperature, heat=heat,
-                     contacts=[fx.Contact("top", tool, friction, moves=(0, -1), name="plug", points=points)])
-    stage = fx.Stage("push", drive="plug", until=fx.travel(travel), duration=1.0)
+                     contacts=[fx.Contact("top", tool, friction, direction=(0, -1), name="plug", points=points)])
+    stage = fx.Stage("push", control="plug", until=fx.travel(travel), duration=1.0)
     return scene, fx.Process(scene).run([stage], progress=False, accuracy="draft")
 
 
@@ -25,7 +25,7 @@ def tractions(path, state=None):
     """(reference R, normal, tangential, mu) of a state at the points that touch."""
     problem = path.problem
     contact = problem.contacts[0]
-    with problem.at(state or path.last):
+    with problem.state_context(state or path.last):
         found = contact.tractions(problem.x.array_r[: problem.n_owned], problem.control)
         mu = np.broadcast_to(contact.law.mu, len(found.normal)).copy()
     on = found.normal > 0
@@ -116,7 +116,7 @@ def test_a_melt_that_is_chilled_below_the_pole_of_its_shift_does_not_relax(caplo
                          unit="C", tolerance=1.0)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1)), materials=melt, temperature=150.0,
                      heat=cooling, supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")])
-    stage = fx.Stage("blow", drive=scene.loads[0], until=fx.pressure(1e-3), duration=1.0)
+    stage = fx.Stage("blow", control=scene.loads[0], until=fx.pressure(1e-3), duration=1.0)
     path = fx.Process(scene).run([stage], progress=False, accuracy="draft")
     assert path.temperature(path.profile().rest_top).max() < 90
     known = "where the material does not relax any more"

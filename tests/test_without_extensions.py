@@ -12,7 +12,7 @@ import formingx as fx
 
 MISSING = {"heat": ("Cooling", "ThermalExpansion", "heat"), "kbkz": ("KBKZ", "PSM"), "fits": ("fit", "treloar1944"),
            "release": ()}
-METHODS = {"release": ("released", "formed", "to_msh")}
+METHODS = {"release": ("springback", "deformed_mesh", "to_msh")}
 SCRIPT = """
 import formingx as fx
 print(fx.__file__)
@@ -21,7 +21,7 @@ warm = fx.Viscoelastic(fx.NeoHookean(c10=fx.table({120.0: 0.5, 160.0: 0.3})), [(
 scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(6, 1)), materials=warm,
                  temperature=lambda R, Z: 150.0 - R, supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
                  loads=[fx.Pressure("bottom", name="air")], contacts=[fx.Contact("top", fx.tools.plane(4.0), 0.2)])
-path = fx.Process(scene).run([fx.Stage("blow", drive="air", until=fx.pressure(0.05), duration=0.5)], progress=False)
+path = fx.Process(scene).run([fx.Stage("blow", control="air", until=fx.pressure(0.05), duration=0.5)], progress=False)
 print(path.part().volume, path.wall().wall.min(), len(path.stress().at_quadrature_points().points))
 print(len(path), path.last.x.tobytes().hex())
 """

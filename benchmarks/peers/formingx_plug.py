@@ -8,7 +8,7 @@ import formingx as fx
 clock = Clock()
 sheet = fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=sizes()).with_part("plug", "bottom", (0, PLUG))
 scene = fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=C10), supports=[
-    fx.Symmetry("axis"), fx.Clamped("rim"), fx.Symmetry("plug", normal="r"), fx.Displaced("plug", "z")])
+    fx.Symmetry("axis"), fx.Clamped("rim"), fx.Symmetry("plug", normal="r"), fx.PrescribedDisplacement("plug", "z")])
 rest = fx.trace(scene, until=fx.travel(0.0), progress=False)
 setup = clock.lap()
 path = fx.trace(scene, until=fx.travel(TRAVEL), start=rest, progress=False)

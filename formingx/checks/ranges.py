@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..findings import Finding, register
-from ..physics.loads import Gravity, Spin
+from ..physics.loads import CentrifugalLoad, Gravity
 from ..values.table import Table
 from .sizes import Body
 from .towards import moulds, sign_towards
@@ -53,7 +53,7 @@ def friction(body: Body) -> Iterator[Finding]:
 def weight(body: Body) -> Iterator[Finding]:
     """Weight and centrifugal forces against the stiffness of the body."""
     for load in body.scene.loads:
-        if not isinstance(load, Gravity | Spin) or load.value is None:
+        if not isinstance(load, Gravity | CentrifugalLoad) or load.value is None:
             continue
         size = body.length if isinstance(load, Gravity) else body.length**2
         stress = max(load.density.values()) * abs(load.value) * size

@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from ..findings import Finding, register
 from ..physics.models import DisplacementPenalty
-from ..physics.supports import Displaced, Symmetry
+from ..physics.supports import PrescribedDisplacement, Symmetry
 from ..scene.aims import unreachable
 from ..scene.scene import Scene
 from ..tools.shapes import Arc
@@ -23,7 +23,8 @@ _PENETRATION = 0.01        # of the thickness
 def _driven(sheet: Body) -> Iterator[Finding]:
     if not sheet.scene.drivable:
         yield Finding("warning", "loads", "nothing is driven: only a process of stages that wait can run; give one"
-                                          " load no value, as Pressure('bottom'), or add a Displaced support")
+                                          " load no value, as Pressure('bottom'), or add a"
+                                          " PrescribedDisplacement support")
 
 
 @register("scene")
@@ -64,7 +65,9 @@ def _layers(sheet: Body) -> Iterator[Finding]:
     if not sheet.scene.model.solid:
         return
     scene = sheet.scene
-    bends = scene.contacts or not any(isinstance(s, Symmetry | Displaced) and s.component == 1 for s in scene.supports)
+    bends = scene.contacts or not any(isinstance(s,
+                                                 Symmetry | PrescribedDisplacement)
+                                                 and s.component == 1 for s in scene.supports)
     for name in scene.mesh.layers if bends else ():          # between planes that it slides on a slice stays straight
         mine = sheet.layer == name
         depth = sheet.area[mine].sum() / sheet.length

@@ -1,4 +1,4 @@
-"""A script looked over before it runs: executed up to its first run, whose scene and targets `doctor` looks at."""
+"""A script looked over before it runs: executed up to its first run, whose scene and targets `check` looks at."""
 
 import os
 import runpy
@@ -14,7 +14,7 @@ from ..errors import InputError, place
 from ..extensions.design import design as designs
 from ..extensions.study.study import design
 from ..runs import Process
-from .doctor import Report, doctor
+from .check import Report, check
 
 
 class _Looked(BaseException):
@@ -26,7 +26,7 @@ class _Looked(BaseException):
 
 
 def look_over(script: Any, arguments: Sequence[str] = ()) -> Report:
-    """What `doctor` says of the first scene that a script runs, by whichever way; nothing is solved.
+    """What `check` says of the first scene that a script runs, by whichever way; nothing is solved.
 
     Args:
         script: a Python file; what it does before its first run is done, also heating (`heat`).
@@ -35,9 +35,9 @@ def look_over(script: Any, arguments: Sequence[str] = ()) -> Report:
     Raises:
         InputError: there is no such file, it is no Python, runs no scene, or the scene or a target is refused.
     """
-    file = place("doctor: script", script)
+    file = place("check: script", script)
     if not file.is_file():
-        raise InputError(f"doctor: script {str(file)!r} is not there")
+        raise InputError(f"check: script {str(file)!r} is not there")
     _check_python(file)
     before = sys.argv, sys.path[:]
     sys.argv, sys.path[:0] = [os.fspath(file), *arguments], [os.fspath(file.parent)]
@@ -48,7 +48,7 @@ def look_over(script: Any, arguments: Sequence[str] = ()) -> Report:
         return found.report
     finally:
         sys.argv, sys.path[:] = before
-    raise InputError(f"doctor: {str(file)!r} runs no scene in this process: there is nothing to look over")
+    raise InputError(f"check: {str(file)!r} runs no scene in this process: there is nothing to look over")
 
 
 def _check_python(file: Path) -> None:
@@ -57,23 +57,23 @@ def _check_python(file: Path) -> None:
     except (SyntaxError, ValueError, OverflowError, MemoryError, RecursionError) as error:
         where = f", line {error.lineno}" if isinstance(error, SyntaxError) and error.lineno else ""
         words = error.msg if isinstance(error, SyntaxError) else str(error) or type(error).__name__
-        raise InputError(f"doctor: script {str(file)!r} is no Python: {words}{where}") from None
+        raise InputError(f"check: script {str(file)!r} is no Python: {words}{where}") from None
 
 
 @contextmanager
 def _no_runs() -> Iterator[None]:
     """`trace`, `solve`, `Process.run` and the like look their scene over instead of running it."""
-    def trace(scene, *, until, through=(), **_):
-        raise _Looked(doctor(scene, targets=[*through, until]))
+    def trace(scene, *, until, intermediate=(), **_):
+        raise _Looked(check(scene, targets=[*intermediate, until]))
 
     def solve(scene, **_):
-        raise _Looked(doctor(scene))
+        raise _Looked(check(scene))
 
     def study(build, variables, *_, **__):
         build(**design(variables)[0])
 
     def run(process, stages, **_):
-        raise _Looked(doctor(process.scene, stages=stages))
+        raise _Looked(check(process.scene, stages=stages))
     others: list[Any] = [(formingx, trace), (designs, trace), (formingx, solve), (formingx, study), (Process, run)]
     kept = [getattr(owner, other.__name__) for owner, other in others]
     try:

@@ -25,7 +25,7 @@ Found = Iterator[Finding]
 _PRESSED = 100.0           # of the shear modulus: more presses no wall further into any corner
 _SLIGHT = 1e-4             # of shear modulus x thickness / length: as good as no pressure
 _BEYOND = 1.1              # of the largest pressure of a cap, which is 3 % below that of a disc
-_LEFT = 0.8                # of a tube's largest pressure, at the mould: see tests/test_doctor.py
+_LEFT = 0.8                # of a tube's largest pressure, at the mould: see tests/test_check.py
 _BLOWN = 8.0               # blow ratio that no bottle has
 _DEEP = 0.5                # of the opening: a wall beyond it that high is a mould's, not a grip's
 _WIDER = 4.0               # times wider than the other: of a sheet and its mould one is in another unit
@@ -59,14 +59,14 @@ class Body(Triangles):
         self.natural = max(self.moduli.values()) * self.thickness / self.length
         self.aims = [aim for target in targets for aim in self._aim(target, scene.driven)]
         self.goals = bool(targets or stages)
-        self.targets = [*targets, *(t for stage in stages for t in (*stage.through, stage.until) if t)]
+        self.targets = [*targets, *(t for stage in stages for t in (*stage.intermediate, stage.until) if t)]
         self.highest = [stage.highest for stage in stages if stage.highest]
         for stage in stages:
-            drive = None if stage.drive is None else scene.things[scene.number(stage.who, stage.drive)]
-            for target in (*stage.through, stage.until):
+            drive = None if stage.control is None else scene.items[scene.number(stage.who, stage.control)]
+            for target in (*stage.intermediate, stage.until):
                 self.aims += [] if target is None else self._aim(target, drive)
             for thing, table in stage.tables:
-                of = scene.things[scene.number(stage.who, thing)]
+                of = scene.items[scene.number(stage.who, thing)]
                 most = float(table[np.argmax(np.abs(table[:, 1])), 1])
                 self.aims.append(Aim(of, str(of.quantity), most, f"the table of {thing!r} in {stage.who}"))
 
@@ -79,7 +79,7 @@ class Body(Triangles):
         name, _, quantity = str(target.name).rpartition("_")
         if quantity not in ("pressure", "travel"):
             return []
-        things = [t for t in self.scene.things if t.driven and t.quantity == quantity]
+        things = [t for t in self.scene.items if t.driven and t.quantity == quantity]
         of = next((t for t in things if name and t.name == name), drive if not name and drive in things else None)
         return [Aim(of, quantity, target.value, str(target))]
 
@@ -98,7 +98,7 @@ class Body(Triangles):
                 line = self.scene.mesh.line_of(load.on)
             except InputError:                               # not one line: a section that is no sheet
                 continue
-            tools = [c for c in self.scene.contacts if c.moves is None and c.on != load.on]
+            tools = [c for c in self.scene.contacts if c.direction is None and c.on != load.on]
             found.append(Pushed(self, load, line, tools))
         return found
 
@@ -249,7 +249,7 @@ def _mould_sizes(body: Body) -> Found:
             continue
         face, outline = body.scene.mesh.nodes_of(contact.on), contact.tool.surface()[0]
         wide, reach = float(np.abs(face[:, 0]).max()), np.abs(outline[:, 0])
-        if contact.moves is not None or np.ptp(face[:, 1]) > 0.1 * wide:
+        if contact.direction is not None or np.ptp(face[:, 1]) > 0.1 * wide:
             continue
         bottom, flange = outline[[np.argmin(reach), np.argmax(reach)], 1] - face[:, 1].mean()
         gap = float(-contact.tool.signed_distance(face).max())
@@ -264,26 +264,26 @@ def _mould_sizes(body: Body) -> Found:
 @register("start")
 def _ways(body: Body) -> Found:
     """A tool that moves away from its face, or past it."""
-    for i, tool in enumerate(body.scene.things):
-        if not isinstance(tool, Contact) or tool.moves is None or not (tool.separates or tool.tool.components == 3):
+    for i, tool in enumerate(body.scene.items):
+        if not isinstance(tool, Contact) or tool.direction is None or not (tool.separates or tool.tool.components == 3):
             continue
         if body.scene.together(i)[0] != i:
             continue
-        meets = [c for c in (body.scene.things[k] for k in body.scene.together(i)) if isinstance(c, Contact)]
+        meets = [c for c in (body.scene.items[k] for k in body.scene.together(i)) if isinstance(c, Contact)]
         aims = [aim.value for aim in body.aims if aim.thing is tool]
         if any(value < 0 for value in aims):                 # it is taken back, or pulls
             if aims[0] < 0 and tool.separates and tool is not body.scene.driven:       # else the aim is refused
                 yield Finding("warning", repr(tool),
                               f"its first travel is {body.say(aims[0], 'travel')}: below 0 it moves away from"
-                              f" {tool.on!r}. A tool comes in along moves ="
-                              f" ({', '.join(f'{m:g}' for m in tool.moves)}) with a travel above 0")
+                              f" {tool.on!r}. A tool comes in along direction ="
+                              f" ({', '.join(f'{m:g}' for m in tool.direction)}) with a travel above 0")
             continue
         others = bool(body.scene.loads) or len(body.scene.drivable) > 1
         size = float(max(body.scene.extent))
         faces = [(c.tool, body.scene.mesh.nodes_of(c.on)) for c in meets]
-        start = _gap(faces, tool.moves, 0.0)
+        start = _gap(faces, tool.direction, 0.0)
         far = max([*aims, 0.0]) or 3 * size + 2 * max(start, 0.0)
-        gaps = np.array([_gap(faces, tool.moves, travel) for travel in np.linspace(0, far, _LOOKS)])
+        gaps = np.array([_gap(faces, tool.direction, travel) for travel in np.linspace(0, far, _LOOKS)])
         near = 0.5 * min(body.edge.min(), body.thickness)
         if gaps.min() <= near and (start > near or gaps[1] <= gaps[0]) or not far > 0:
             continue
@@ -291,8 +291,8 @@ def _ways(body: Body) -> Found:
             yield Finding("warning", repr(tool),
                           f"it moves away from the body: over a travel of {body.say(far, 'travel')} its gap to"
                           f" {tool.on!r} grows from {body.say(max(0.0, start), 'travel')} to"
-                          f" {body.say(gaps[-1], 'travel')}: must it be moves ="
-                          f" ({', '.join(f'{0 - m:g}' for m in tool.moves)})?")
+                          f" {body.say(gaps[-1], 'travel')}: must it be direction ="
+                          f" ({', '.join(f'{0 - m:g}' for m in tool.direction)})?")
         elif not others and gaps.min() > near:
             yield Finding("warning", repr(tool),
                           f"it touches nothing on its way: over a travel of {body.say(far, 'travel')} it comes no"
@@ -306,11 +306,11 @@ def _gap(faces: list[tuple[Tool, np.ndarray]], moves: Any, travel: float) -> flo
 
 @register("scene")
 def _sharp_edges(body: Body) -> Found:
-    """Under a sharp edge the force depends on where nodes lie, whatever the mesh: see tests/test_doctor.py."""
+    """Under a sharp edge the force depends on where nodes lie, whatever the mesh: see tests/test_check.py."""
     for contact in body.scene.contacts:
         facets = (len(body.scene.mesh.nodes_of(contact.on)) - 1) // 2
         rows = len(body.edge) / max(2 * facets, 1)
-        if contact.moves is None or contact.sticks or rows < 1.5:
+        if contact.direction is None or contact.sticks or rows < 1.5:
             continue
         pieces = contact.tool.pieces
         for a, b in zip(pieces, pieces[1:] + (pieces[:1] if contact.tool.closed else ())):

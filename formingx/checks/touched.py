@@ -33,16 +33,17 @@ def untouched(path: Any) -> Iterator[Finding]:
         start, end = (_distances(problem, state, contacts) for state in (there[0], there[-1]))
         law, tool = contacts[0].contact, contacts[0].contact.name or contacts[0].contact.on
         gaps = f"the gap was {start.min():.4g} at first and {end.min():.4g} at the end"
-        if law.moves is None and any(one.contact in before for one in contacts) and \
+        if law.direction is None and any(one.contact in before for one in contacts) and \
                 end.mean() > _AWAY * start.mean() + contacts[0].thickness:
             yield Finding("warning", tool, f"the body moved away from this mould: the mean distance of its face"
                           f" {law.on!r} grew from {start.mean():.4g} to {end.mean():.4g}. Does the pressure act on the"
                           f" other face, and has it the right sign?")
-        elif not touched and law.moves is not None:
+        elif not touched and law.direction is not None:
             column = problem.scene.column(law) if law in problem.scene.drivable else ""
             travel = f" of {there[-1].measures[column]:.4g}" if column in there[-1].measures else ""
             yield Finding("warning", tool, f"this tool met nothing on its travel{travel}: {gaps}. A travel above 0 is"
-                          f" along moves = ({', '.join(f'{m:g}' for m in law.moves)}); place the tool nearer, or turn"
+                          f" along direction = ({', '.join(f'{m:g}' for m in law.direction)}); place the tool nearer,"
+                          f" or turn"
                           f" its direction")
         elif not touched:
             yield Finding("warning", tool, f"the body never touched this tool: {gaps}")
@@ -57,19 +58,19 @@ def _looked_at(path: Any, states: list[Any], name: str) -> list[Any]:
 
 
 def _with(problem: Any, state: Any, contacts: list[Any]) -> bool:
-    with problem.at(state):
+    with problem.state_context(state):
         return any(contact in problem.present for contact in contacts)
 
 
 def _touches(problem: Any, state: Any, contacts: list[Any]) -> bool:
-    with problem.at(state):
+    with problem.state_context(state):
         return any(resultants.length(contact, state.x, state.control) > 0 for contact in contacts
                    if contact in problem.present)
 
 
 def _distances(problem: Any, state: Any, contacts: list[Any]) -> np.ndarray:
     """Distances of the points of faces from their tools at a state, of all ranks, shape (n,), length."""
-    with problem.at(state):
+    with problem.state_context(state):
         found = [-contact.contact.tool.signed_distance(contact.positions(state.x, state.control))
                  for contact in contacts]
     return np.concatenate([part for parts in problem.comm.allgather(found) for part in parts])

@@ -16,7 +16,7 @@ _BEFORE = 0.5              # share of the face that must lie before a tool that 
 
 def moulds(scene: Scene) -> list[Contact]:
     """Return the contacts with tools that stay, before at least half of their face at rest."""
-    return [contact for contact in scene.contacts if contact.moves is None and _is_before(scene, contact)]
+    return [contact for contact in scene.contacts if contact.direction is None and _is_before(scene, contact)]
 
 
 def sign_towards(contact: Contact, load: Any) -> float:

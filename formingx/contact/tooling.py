@@ -40,7 +40,8 @@ class Tooling(NamedTuple):
     def names(self) -> list[str]:
         """Of the tool of each contact; one without a name is "tool 1" and so on, by its (first) contact."""
         first: dict[Any, int] = {}
-        alike = [k if c.moves is None else c.moves for k, c in enumerate(self.contacts)]   # what moves alike is one
+        # what moves alike is one
+        alike = [k if c.direction is None else c.direction for k, c in enumerate(self.contacts)]
         return [c.name or f"tool {first.setdefault(alike[k], k) + 1}" for k, c in enumerate(self.contacts)]
 
     @property
@@ -89,10 +90,11 @@ def tool_of(shape: dict[str, Any]) -> Any:
 
 
 def _contact(data: dict[str, Any]) -> Contact:
-    moves = data["moves"] and tuple(data["moves"])
+    direction = data["direction"] and tuple(data["direction"])
     names = ("penalty", "ramp", "elastic_slip", "separates", "nodes_per_step", "points", "name")
     more = {name: data[name] for name in names if name in data}
     words = isinstance(data["friction"], str) and data["friction"] not in ("stick", "none")
-    found = Contact(data["on"], tool_of(data["tool"]), "stick" if words else data["friction"], moves=moves, **more)
+    found = Contact(data["on"], tool_of(data["tool"]), "stick" if words else data["friction"], direction=direction,
+                    **more)
     found.friction = data["friction"]                       # a function of the temperature can only be told
     return found

@@ -58,7 +58,7 @@ def take_fields(source: Any, state: Any, problem: Any) -> None:
     """
     there, here = source.forms, problem.forms
     domain = there.domain
-    with source.at(state):
+    with source.state_context(state):
         fields = [there.u / here.length] + [there.stress / here.stress * p for p in ufl.split(there.w)[1:]]
         known = [in_own_cells(domain, f, _PLACES) for f in fields]
     corners = gathered(source.comm, of_cells(domain, own_cells(domain))[:, :3])
@@ -115,7 +115,7 @@ def carry(source: Any, state: Any, problem: Any, x: np.ndarray, control: float, 
         moved: its mesh is one of the body as it is in the state (and contacts are seen to elsewhere).
     """
     problem.look_at(x, control)
-    with source.at(state):
+    with source.state_context(state):
         def there(points: np.ndarray) -> np.ndarray:
             return points + Probe(source, points).displacement_in(state) if moved else points
         same = len(problem.histories) == len(source.histories) and not moved

@@ -58,7 +58,7 @@ class Constraints:
         self._n = forms.space.dofmap.index_map.size_local
         self.entries: list[Entry] = []
         self.means: list[tuple[int, np.ndarray]] = []
-        for i, support in enumerate(forms.scene.things):
+        for i, support in enumerate(forms.scene.items):
             for item in forms.constraints(support):
                 if isinstance(item, Held):
                     sub = forms.space.sub(0).sub(item.component)

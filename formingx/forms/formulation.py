@@ -92,8 +92,8 @@ class Formulation(ABC):
         self.J = kin.volume_ratio(self.elastic_F) / self.ratio_before
         body = LoadedBody(self)
         self.scales = [load.unit(body) if load.driven else self.length for load in scene.loads]
-        self.scales += [self.length] * (len(scene.things) - len(self.scales)) + [1.0]
-        self.control_scale = next((s for s, t in zip(self.scales, scene.things) if t is scene.driven), self.length)
+        self.scales += [self.length] * (len(scene.items) - len(self.scales)) + [1.0]
+        self.control_scale = next((s for s, t in zip(self.scales, scene.items) if t is scene.driven), self.length)
         self._take_materials()
         self._take_supports(body)
         self.residual, self.control_derivative, self.time_derivative = self._residual(body)
@@ -287,7 +287,7 @@ class Formulation(ABC):
     def set_loads(self, setting: Any) -> None:
         """Loads, elastic supports and process time as a `Setting` wants them."""
         for support, present in self.elastic_supports:
-            present.value = float(not any(self.scene.things[i] is support for i in setting.off))
+            present.value = float(not any(self.scene.items[i] is support for i in setting.off))
         for i, (load, base, rate) in enumerate(self._loads):
             there = i not in setting.off
             base.value = there * (setting.base[i] if load.driven else load.value)

@@ -32,7 +32,7 @@ class Setting:
     @classmethod
     def first(cls, scene: Any) -> Setting:
         """Everything at 0 and there; what is driven, if it is one thing, is the control."""
-        rate = [float(scene.driven is not None and t.driven) for t in scene.things] + [0.0]
+        rate = [float(scene.driven is not None and t.driven) for t in scene.items] + [0.0]
         return cls([0.0] * len(rate), rate, [])
 
     @property

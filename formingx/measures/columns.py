@@ -120,7 +120,7 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
     found: dict[str, Bound] = {"process_time": Amplitude(problem, -1)} if timed else {}
-    for i, thing in enumerate(scene.things):
+    for i, thing in enumerate(scene.items):
         if any(thing is t for t in scene.drivable):
             found[column := scene.column(thing)] = Amplitude(problem, i)
             if thing in scene.supports:
@@ -151,7 +151,7 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
         tooling = Tooling.of_problem(problem)
         tools = {name: [c for c, tool in zip(problem.contacts, tooling.names, strict=True) if tool == name]
                  for name in tooling.force_columns}
-        for name in sorted(tools, key=lambda tool: tools[tool][0].contact.moves is None):    # what moves comes first
+        for name in sorted(tools, key=lambda tool: tools[tool][0].contact.direction is None):  # what moves comes first
             force = _Nodal(problem, lambda c, *at: resultants.force(c, *at) @ resisting(c.contact), sum, tools[name])
             found[tooling.force_columns[name]] = force
             if tools[name][0].contact.name:

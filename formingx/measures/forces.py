@@ -14,7 +14,7 @@ from .targets import Bound, Target
 def resisting(contact: Any) -> np.ndarray:
     """Unit vector (r, z) along which the force of the body on a tool counts: against its travel, or +Z if it stays."""
     up = np.eye(contact.tool.components)[-1]
-    return up if contact.moves is None else -contact.way / np.linalg.norm(contact.way)
+    return up if contact.direction is None else -contact.way / np.linalg.norm(contact.way)
 
 
 def force(value: float, *, of: str | None = None) -> Target:
@@ -22,12 +22,12 @@ def force(value: float, *, of: str | None = None) -> Target:
 
     Of the body: on a driven support along its component; on a tool against its travel, positive when it resists.
 
-    >>> fx.Stage("press", drive="plug", until=fx.force(100.0, of="plug"))
+    >>> fx.Stage("press", control="plug", until=fx.force(100.0, of="plug"))
     Stage('press')
     """
     def bind(problem):
         scene = problem.scene
-        found = {i: t for i, t in enumerate(scene.things) if t in scene.drivable and t.quantity == "travel"}
+        found = {i: t for i, t in enumerate(scene.items) if t in scene.drivable and t.quantity == "travel"}
         if of is not None:
             known("force: of =", of, [t.name for t in found.values() if t.name])
             found = {i: t for i, t in found.items() if t.name == of}
@@ -37,7 +37,7 @@ def force(value: float, *, of: str | None = None) -> Target:
                              f" driven" + ", say which with of=..." * bool(moving))
         number, thing = next(iter(moving.items()))
         if thing in scene.contacts:
-            tools = [scene.things[i] for i in scene.together(number)]
+            tools = [scene.items[i] for i in scene.together(number)]
             return _ToolForce(problem, [c for c in problem.contacts if c.contact in tools])
         return _SupportForce(problem, number)
     return Target("force" if of is None else f"{of}_force", finite("force", value), bind)

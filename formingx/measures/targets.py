@@ -190,7 +190,7 @@ def travel(value: float, *, of: str | None = None) -> Target:
 def process_time(value: float) -> Target:
     """The time of a process, as its tables give it, reaches `value`.
 
-    >>> blow = fx.Stage("blow", follow={scene.driven: [(0.0, 0.0), (2.0, 0.02)]}, until=fx.process_time(1.0))
+    >>> blow = fx.Stage("blow", amplitudes={scene.driven: [(0.0, 0.0), (2.0, 0.02)]}, until=fx.process_time(1.0))
     """
     return Target("process_time", finite("process_time", value), lambda problem: Amplitude(problem, -1))
 
@@ -203,11 +203,11 @@ def changed() -> Target:
 def _driven(quantity: str, value: float, of: str | None) -> Target:
     def bind(problem):
         scene, rate = problem.scene, problem.setting.rate
-        found = [i for i, t in enumerate(scene.things)
+        found = [i for i, t in enumerate(scene.items)
                  if any(t is d for d in scene.drivable) and t.quantity == quantity]
         if of is not None:
-            known(f"{quantity}: of =", of, [n for n in (scene.things[i].name for i in found) if n])
-            return Amplitude(problem, next(i for i in found if scene.things[i].name == of))
+            known(f"{quantity}: of =", of, [n for n in (scene.items[i].name for i in found) if n])
+            return Amplitude(problem, next(i for i in found if scene.items[i].name == of))
         moving = [i for i in found if rate[i]] or found
         if len(moving) != 1:
             raise InputError(f"{quantity} = {value:g}: the scene has {len(moving) or 'no'} {quantity} that can be"
@@ -308,7 +308,7 @@ def bind_volume(problem: Any) -> Bound:
     so_far = 0.0
     if problem.scene.preformed is not None:
         old, state = problem.scene.preformed.before
-        with old.at(state):
+        with old.state_context(state):
             so_far = bind_volume(old).value(old.x, state.control)
     return _Form(problem, -swept / forms.constant(2 * scale) * face, scale, so_far)
 

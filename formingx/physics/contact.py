@@ -79,14 +79,15 @@ class Contact(Part):
             depends, by its penetration, on the steps on the way to it.)
         points: where it acts: at the "nodes" of the face, or at so many Gauss points of each facet, which let go one by
             one: smoother where a sheet slides over an edge.
-        moves: (r, z), in space (x, y, z), of the tool's motion per unit of travel: the tool is what the run controls;
+        direction: (r, z), in space (x, y, z), of the tool's motion per unit of travel: the tool is what the run
+            controls;
             None: it stays.
         name: what it is called in a process and in its columns.
 
     Raises:
         InputError: an argument that is not allowed.
 
-    >>> plug = fx.Contact("top", fx.tools.cylinder(radius=20.0, z=2.0, fillet=4.0), 0.3, moves=(0, -1), name="plug")
+    >>> plug = fx.Contact("top", fx.tools.cylinder(radius=20.0, z=2.0, fillet=4.0), 0.3, direction=(0, -1), name="plug")
     >>> plug.driven
     True
     """
@@ -100,7 +101,7 @@ class Contact(Part):
     def __init__(self, on: str, tool: Any, friction: Any = "stick", *, penalty: float | None = None,
                  ramp: float | None = None, elastic_slip: float = _ELASTIC_SLIP, separates: bool | None = None,
                  nodes_per_step: int | None = None, points: str | int = "nodes",
-                 present_area: bool = False, moves: tuple[float, ...] | None = None, name: str | None = None):
+                 present_area: bool = False, direction: tuple[float, ...] | None = None, name: str | None = None):
         self.name, name = name, f"Contact({on!r})"
         if isinstance(tool, type) or not hasattr(tool, "signed_distance"):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
@@ -125,14 +126,14 @@ class Contact(Part):
                              f" what a point holds on to would change with its penalty; use 'none', or a larger"
                              f" penalty")
         numbers: Callable = pair if tool.components == 2 else triple
-        self.moves = None if moves is None else numbers(f"{name}: moves", moves)
-        if self.moves is not None and not any(self.moves):
-            raise InputError(f"{name}: moves = {moves!r}: must name a direction, or be None")
+        self.direction = None if direction is None else numbers(f"{name}: direction", direction)
+        if self.direction is not None and not any(self.direction):
+            raise InputError(f"{name}: direction = {direction!r}: must name a direction, or be None")
 
     @property
     def driven(self) -> bool:
         """True if the run controls the motion of the tool."""
-        return self.moves is not None
+        return self.direction is not None
 
     @property
     def friction_by_temperature(self) -> bool:
@@ -147,7 +148,7 @@ class Contact(Part):
     @property
     def way(self) -> np.ndarray:
         """Motion of the tool per unit of its travel, shape (components,); 0 of one that stays."""
-        return np.array(self.moves or (0.0,) * self.tool.components)
+        return np.array(self.direction or (0.0,) * self.tool.components)
 
     @property
     def symmetric(self) -> bool:

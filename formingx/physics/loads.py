@@ -126,22 +126,22 @@ class Gravity(Load):
         return None
 
 
-class Spin(Load):
+class CentrifugalLoad(Load):
     """Centrifugal force of a body that turns about the axis: dW = integral of density omega^2 (R + u_r) du_r.
 
     Args:
         density, name: as of `Gravity`.
         value: omega^2, the square of the angular speed, 1/time^2; None: the run controls it.
 
-    >>> fx.Spin(density=0.95e-9, value=100.0**2)                                         # t/mm3; 100 rad/s
-    Spin(10000.0)
+    >>> fx.CentrifugalLoad(density=0.95e-9, value=100.0**2)                                         # t/mm3; 100 rad/s
+    CentrifugalLoad(10000.0)
     """
 
     symmetric = True
 
     def __init__(self, density: Any, value: float | None = None, name: str | None = None):
         super().__init__(None, value, name)
-        self.density = _density("Spin", density)
+        self.density = _density("CentrifugalLoad", density)
 
     def virtual_work(self, body, value):
         return value * _weighed(body, self.density, (body.X[0] + body.u[0]) * body.du[0])

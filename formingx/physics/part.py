@@ -14,7 +14,7 @@ class Part:
         driven: True if the run controls it.
         quantity: what a run controls of it, e.g. "pressure" or "travel"; None: nothing.
         symmetric: True if its part of the tangent is symmetric.
-        moves: (r, z) of its motion per unit of travel; None: it does not move as a whole.
+        direction: (r, z) of its motion per unit of travel; None: it does not move as a whole.
         holds_rotation: True if it holds the rotation of what it holds.
         told: attributes of which its repr tells in words; a summary leaves their numbers out.
     """
@@ -24,7 +24,7 @@ class Part:
     driven: Any = False
     quantity: str | None = None
     symmetric: Any = False
-    moves: tuple[float, float] | None = None
+    direction: tuple[float, float] | None = None
     holds_rotation = False
     told: tuple[str, ...] = ()
 

@@ -165,7 +165,7 @@ class PinnedNode(Support):
         return f"PinnedNode({self.point[0]!r}, {self.point[1]!r})"
 
 
-class Displaced(_OneComponent):
+class PrescribedDisplacement(_OneComponent):
     """One displacement component of a boundary follows the run's control (a length).
 
     Args:
@@ -174,7 +174,8 @@ class Displaced(_OneComponent):
         name: what it is called in a process and in its columns.
 
     >>> pulled = fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=0.4),
-    ...                   supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0), fx.Displaced("rim", "r")])
+    ...                   supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0), fx.PrescribedDisplacement("rim",
+    "r")])
     >>> round(float(fx.solve(pulled, to=10.0)["pole_stretch"][-1]), 3)                  # to twice its width
     2.0
     """

@@ -163,7 +163,7 @@ class Problem(Histories, Units):
             InputError: a tool comes in where the body is.
         """
         for contact in self.contacts:
-            if contact.contact is self.scene.things[number]:
+            if contact.contact is self.scene.items[number]:
                 contact.come_in(x, control)
                 depth = penetration(contact, x, control)
                 if depth > 1e-6 * self.forms.length:
@@ -176,7 +176,7 @@ class Problem(Histories, Units):
         return points if preformed is None else preformed.followed(self, points)
 
     @contextlib.contextmanager
-    def at(self, state: Any) -> Iterator[Problem]:
+    def state_context(self, state: Any) -> Iterator[Problem]:
         """Stand at a state: its setting, histories, unknowns (`x`, `forms.w`) and control; all restored on leaving.
 
         state: anything with x (own part), control, setting (a `Setting` as plain data, or empty) and memory.
@@ -184,7 +184,7 @@ class Problem(Histories, Units):
         fields, control, clock = self.forms.w.x.array.copy(), self.control, self.forms.clock
         stage, memory, x, foretold = self._stage, self.memory, self.x.array_r.copy(), self._foretold
         try:
-            self.stand(state)
+            self.restore(state)
             self.x.array_w[:] = state.x
             self.set_state(self.x, state.control)
             yield self
@@ -196,7 +196,7 @@ class Problem(Histories, Units):
             self.forms.w.x.array[:] = fields
             self.forms.control.value = control
 
-    def stand(self, state: Any) -> None:
+    def restore(self, state: Any) -> None:
         """Go on from an accepted state: its setting and its histories are what they were then."""
         if self.has_history:
             self.memory = state.memory
@@ -267,12 +267,12 @@ class Problem(Histories, Units):
 
     def furthest_volume_ratio(self, state: Any) -> Least | None:
         """Where J is furthest from 1 in a state, see `Admissible.furthest_volume_ratio`; collective."""
-        with self.at(state):
+        with self.state_context(state):
             return self.admissible.furthest_volume_ratio()
 
     def volume_error_away(self, state: Any, places: np.ndarray, distance: float) -> float:
         """See `Admissible.volume_error_away`, in a state; collective."""
-        with self.at(state):
+        with self.state_context(state):
             return self.admissible.volume_error_away(places, distance)
 
     def inside_out(self) -> tuple[int, int, tuple[float, float]]:
@@ -430,7 +430,7 @@ class Problem(Histories, Units):
         before, self._stage = self._stage, stage
         if before is stage:
             return
-        setting, number = stage.setting, {id(thing): i for i, thing in enumerate(self.scene.things)}
+        setting, number = stage.setting, {id(thing): i for i, thing in enumerate(self.scene.items)}
         self.forms.set_loads(setting)
         for contact in self.contacts:
             i = number[id(contact.contact)]

@@ -33,7 +33,7 @@ class Units:
 
     def shown(self, control: float) -> tuple[str, float]:
         """What the control stands for, in words, and its value in the user's units."""
-        number, things = self.setting.leading, self.scene.things
+        number, things = self.setting.leading, self.scene.items
         if number is None:
             return "control", control
         name = "process time" if number == len(things) else self.scene.column(things[number]).replace("_", " ")
@@ -46,7 +46,7 @@ class Units:
     @property
     def drives(self) -> str | None:
         """What the control stands for: "pressure", "travel", "time" or, if it is none of them, None."""
-        number, things = self.setting.leading, self.scene.things
+        number, things = self.setting.leading, self.scene.items
         return None if number is None else "time" if number == len(things) else things[number].quantity
 
     @property

@@ -44,8 +44,8 @@ class PartNumbers(KeyNumbers):
     area: float
     draw_ratio: float
     mean_wall: float
-    least_wall: float
-    evenness: float
+    min_wall: float
+    uniformity: float
     variation: float
     weight: float | None
     scrap: float
@@ -54,9 +54,9 @@ class PartNumbers(KeyNumbers):
         """Rows; where: the least wall is; more: those of one kind of part alone."""
         rows = [("weight" + ", lengths taken for cm" * (not self.units.length), self._said(self.weight, "g"))
                 ] if self.weight is not None else []
-        rows += [("least wall", f"{self._length(self.least_wall)} at {where}"),
+        rows += [("least wall", f"{self._length(self.min_wall)} at {where}"),
                  ("mean wall", self._length(self.mean_wall)),
-                 ("evenness (least over mean wall)", f"{self.evenness:.4g}"),
+                 ("evenness (least over mean wall)", f"{self.uniformity:.4g}"),
                  ("coefficient of variation of the wall", f"{self.variation:.4g}"),
                  ("areal draw ratio", f"{self.draw_ratio:.4g}"),
                  ("volume", self._said(self.volume, self.units.volume)),

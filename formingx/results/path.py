@@ -24,7 +24,7 @@ class Path(States):
 
     Attributes:
         record: what the solver keeps of the run (`formingx.solve.record.Record`).
-        pilot: the path of the run that its mesh was made by (`trace(..., pilot=True)`); else None.
+        pilot: the path of the run that its mesh was made by (`trace(..., adapt_mesh=True)`); else None.
 
     >>> path
     Path(9 states, to State('target', pressure=0.045088, pole_height=12, pole_stretch=2.26198, enclosed_volume=2895.08,
@@ -224,7 +224,7 @@ class Path(States):
         if self.problem.temperature is None:
             raise InputError("temperature: the scene has none: give Scene a temperature=...")
         state = state or self.last
-        with self.segment(state).problem.at(state) as problem:
+        with self.segment(state).problem.state_context(state) as problem:
             return problem.temperature.at(problem.followed(as_points("Path.temperature: points", points)))
 
     def tool_forces(self) -> dict[str, np.ndarray]:

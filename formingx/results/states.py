@@ -131,7 +131,7 @@ class States:
         if isinstance(measure, str):
             self._check(measure)
             measure = self._view(segment).columns[measure]
-        with segment.problem.at(state) as problem:
+        with segment.problem.state_context(state) as problem:
             return measure.value(problem.x, state.control)
 
     def state(self, stage: str | None = None, time: float | None = None) -> State:
@@ -182,7 +182,7 @@ class States:
                 started = started or left is after
                 if not started or left.setting != right.setting:
                     continue
-                with segment.problem.at(left):              # a travel is that of what the stage drives
+                with segment.problem.state_context(left):              # a travel is that of what the stage drives
                     try:
                         bound = target.bind(segment.problem)
                     except InputError as error:
@@ -199,7 +199,7 @@ class States:
                     piece = segment, left, right, bound
         if piece is not None and piece[2] is self.last and 0 < (target.value - b) * np.sign(b - a) < _WRITTEN * abs(b):
             segment, left, right, bound = piece
-            with segment.problem.at(left), contextlib.suppress(ConvergenceError):
+            with segment.problem.state_context(left), contextlib.suppress(ConvergenceError):
                 found = self._between(segment, left, right, target, bound)
                 if segment.curve.distance(right, found) < segment.curve.distance(left, right):
                     return found
@@ -223,7 +223,8 @@ class States:
         """The state that a run would come to that goes on from `left` to the target."""
         if left.time < right.time and not left.setting["rate"][-1]:
             raise InputError(f"the path passes {target} between two of its states, in a stage that follows or holds a"
-                             f" measure: none can be solved for there afterwards; run with through=[...] to have one")
+                             f" measure: none can be solved for there afterwards; run with intermediate=[...]"
+                             f" to have one")
         record = Record(segment.problem, segment.curve)
         record.segments[-1].states.append(replace(left, met=None))
         record.stage = left.stage
@@ -235,7 +236,7 @@ class States:
             Run(record, [(target, bound)], step, **given).follow(200, False, None)
         except (ConvergenceError, Failure) as error:
             raise ConvergenceError(f"the path passes {target} between two of its states, but no state was found there:"
-                                   f" {error}; run with through=[...] to have one") from None
+                                   f" {error}; run with intermediate=[...] to have one") from None
         for k in range(2, len(record.states) + 1):
             self._fill(segment, record.states[:k])
         return record.last
@@ -275,7 +276,7 @@ class States:
         smooth = {c: known_columns[c] for c in columns if c in known_columns and known_columns[c].smooth}
         through = {c: PchipInterpolator(at, [s.measures[c] for s in states]) for c in columns if c not in smooth}
         rows = []
-        with segment.problem.at(states[0]):
+        with segment.problem.state_context(states[0]):
             for k, (a, b) in enumerate(zip(states, states[1:])):
                 for fraction in np.arange(1, points) / points:
                     there, s = segment.curve.interpolate(a, b, fraction), at[k] + fraction * (at[k + 1] - at[k])
@@ -321,7 +322,7 @@ class States:
             past = [*predictor.before(states[:-1], time, predictor.CUBIC - 1), state]
             weights = predictor.weights(past, time)
             x, control = weights @ [s.x for s in past], float(weights @ [s.control for s in past])
-        with segment.problem.at(before) as problem:
+        with segment.problem.state_context(before) as problem:
             if not state.setting["rate"][-1]:
                 problem.clock = time
             time = problem.forms.time_at(control)
@@ -338,7 +339,7 @@ class States:
 
     def _measures(self, segment: Segment, state: State) -> dict[str, float]:
         columns = self._view(segment).columns
-        with segment.problem.at(state) as problem:
+        with segment.problem.state_context(state) as problem:
             return {name: bound.value(problem.x, state.control) for name, bound in columns.items()}
 
     def segment(self, state: State | None = None) -> Segment:

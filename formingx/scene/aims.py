@@ -30,7 +30,7 @@ def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -
     off: numbers of the things that a stage leaves out; None: a run from rest that drives the only thing that can be.
     """
     name, value, driven = target.name, target.value, scene.driven
-    there = [thing for i, thing in enumerate(scene.things) if i not in (off or ())]
+    there = [thing for i, thing in enumerate(scene.items) if i not in (off or ())]
     moulds = [thing for thing in there if thing in scene.contacts and not thing.driven]
     if name == "pole_stretch" and scene.kinematics.axisymmetric:
         largest, material = max(((m.largest_stretch("equibiaxial"), m) for m in scene.materials.values()),

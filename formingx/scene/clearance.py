@@ -22,7 +22,7 @@ def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None
     stands: travels at the beginning {number: length}, default 0.
     Where a travel cannot be known before the run (a stage that ends at a pole height) its tool is left out from there.
     """
-    tools = {i: thing for i, thing in enumerate(scene.things) if isinstance(thing, Contact)}
+    tools = {i: thing for i, thing in enumerate(scene.items) if isinstance(thing, Contact)}
     outlines = {i: _outline(tool) for i, tool in tools.items()}
     stands, unsure = stands or dict.fromkeys(tools, 0.0), []
     for plan in plans:
@@ -70,7 +70,7 @@ def _check_overlap(scene: Scene, who: str, present: dict[int, Contact], outlines
                     axes = ", ".join(scene.kinematics.axes).replace("r, z", "R, Z")
                     raise InputError(f"{who}: tools overlap: {_at(a, where[i])} and {_at(b, where[j])} reach"
                                      f" {depth[worst]:.6g} into each other at ({axes}) = ({at}); leave one out"
-                                     f" with without=[...], or end the travel earlier")
+                                     f" with inactive=[...], or end the travel earlier")
 
 
 def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
@@ -83,4 +83,4 @@ def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
 
 
 def _at(contact: Contact, travel: float) -> str:
-    return f"{contact!r}" + (f" at travel {travel:g}" if contact.moves else "")
+    return f"{contact!r}" + (f" at travel {travel:g}" if contact.direction else "")

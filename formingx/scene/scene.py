@@ -44,7 +44,7 @@ class Scene:
         supports: see `formingx.physics.supports`.
         loads: see `formingx.physics.loads`. One load, support or tool may be driven (controlled by the run), several by
             a `formingx.Process`.
-            (Contacts of one tool with several faces, of the same `moves` and name, count as one.)
+            (Contacts of one tool with several faces, of the same `direction` and name, count as one.)
         contacts: faces of the body that rigid tools stop, see `formingx.Contact`.
         model: how the scene is modelled: `MixedPressure()` (default) or `DisplacementPenalty()`, a solid; `Membrane()`.
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`; of a sheet in space `ThreeD()`.
@@ -157,22 +157,23 @@ class Scene:
                      temperature=temperature)
 
     @property
-    def things(self) -> list[Part]:
+    def items(self) -> list[Part]:
         """Loads, supports and contacts, in order."""
         return [*self.loads, *self.supports, *self.contacts]
 
     @property
     def drivable(self) -> list[Any]:
         """What can be driven; of a tool that meets several faces its first contact."""
-        return [thing for i, thing in enumerate(self.things)
+        return [thing for i, thing in enumerate(self.items)
                 if thing.driven and self.together(i)[0] == i]
 
     def together(self, number: int) -> list[int]:
-        """Numbers of the things that move as this one does: contacts with the same `moves` and name are of one tool."""
-        thing = self.things[number]
-        if thing.moves is None:
+        """Return the numbers of the contacts of one tool: those with the same `direction` and name."""
+        thing = self.items[number]
+        if thing.direction is None:
             return [number]
-        return [i for i, other in enumerate(self.things) if (other.moves, other.name) == (thing.moves, thing.name)]
+        return [i for i,
+                other in enumerate(self.items) if (other.direction, other.name) == (thing.direction, thing.name)]
 
     @property
     def driven(self) -> Any:
@@ -184,7 +185,7 @@ class Scene:
         """`driven`, or an InputError unless one thing can be driven."""
         if not self.drivable:
             raise InputError(f"{who}: nothing is driven: give one load no value, as Pressure('bottom'), or"
-                             " add a Displaced support")
+                             " add a PrescribedDisplacement support")
         if len(self.drivable) > 1:
             raise InputError(f"{who}: {', '.join(map(repr, self.drivable))} are all driven: one control drives a run;"
                              f" give the others a value, or drive them in stages with formingx.Process")
@@ -193,11 +194,11 @@ class Scene:
 
     def number(self, who: str, thing: Any) -> int:
         """The place in `things` of a thing, given as itself or by its name; an InputError if it is not there."""
-        for i, known_thing in enumerate(self.things):
+        for i, known_thing in enumerate(self.items):
             if thing is known_thing or isinstance(thing, str) and thing == known_thing.name:
                 return i
-        names = [t.name for t in self.things if t.name]
-        raise InputError(f"{who}: {thing!r} is not in the scene; it has {', '.join(map(repr, self.things))}"
+        names = [t.name for t in self.items if t.name]
+        raise InputError(f"{who}: {thing!r} is not in the scene; it has {', '.join(map(repr, self.items))}"
                          + (f"; by name {', '.join(map(repr, names))}" if names else ""))
 
     def column(self, thing: Any) -> str:
@@ -220,11 +221,11 @@ class Scene:
                     raise InputError(f"{mine!r}: {other!r} holds the same component of the same boundary")
 
     def _check_names(self) -> None:
-        names = [thing.name for thing in self.things if thing.name is not None]
+        names = [thing.name for thing in self.items if thing.name is not None]
         for name in names:
             if not isinstance(name, str) or not name:
                 raise InputError(f"Scene: name = {name!r}: must be a word")
-            called = [i for i, thing in enumerate(self.things) if thing.name == name]
+            called = [i for i, thing in enumerate(self.items) if thing.name == name]
             if called != self.together(called[0]) and len(called) > 1:
                 raise InputError(f"Scene: two things are called {name!r}: names must differ")
         columns = [self.column(thing) for thing in self.drivable]
@@ -288,7 +289,7 @@ class Scene:
         return self._moduli[layer]
 
     def _check_boundaries(self) -> None:
-        for thing in self.things:
+        for thing in self.items:
             on = thing.on
             if on is None:
                 continue
@@ -309,10 +310,10 @@ class Scene:
         if contact.tool.components == 3:
             self.kinematics.scene_checks.check_contact(self, contact)
             return
-        if self.kinematics.axisymmetric and contact.moves and contact.moves[0] \
+        if self.kinematics.axisymmetric and contact.direction and contact.direction[0] \
                 and contact.tool.bounds[0, 0] <= near:
             raise InputError(f"{contact!r}: it moves along R, but its tool covers the axis: no rigid tool of revolution"
-                             f" does that; must be moves=(0, ...), or PlaneStrain()")
+                             f" does that; must be direction=(0, ...), or PlaneStrain()")
         face = mesh.nodes_of(contact.on)
         comm = mesh.comm
         points = gathered(comm, of_mesh(mesh.domain))

@@ -55,7 +55,7 @@ def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> 
     tool = contact.tool
     near = tool.nearest(ends.mean(1))
     way = -near.normal[np.argmax(near.distance)]
-    if contact.moves:
+    if contact.direction:
         way = contact.way / np.hypot(*contact.way)
     at = np.array([0.0, 0.5, 1.0]) if contact.points == "nodes" else (
         np.polynomial.legendre.leggauss(int(contact.points))[0] + 1) / 2

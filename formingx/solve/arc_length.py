@@ -291,7 +291,7 @@ class Curve:
             return self.between(a, b, bound, target.value)
         except Failure as failure:
             raise ConvergenceError(f"the path passes {target} between two of its states, but no state was found there:"
-                                   f" {failure.reason}; run with through=[...] to have one") from None
+                                   f" {failure.reason}; run with intermediate=[...] to have one") from None
 
     def limit_point(self, a: State, b: State) -> State:
         """The state between two where the control is stationary; raises `Failure`.

@@ -248,7 +248,7 @@ def _signs(curve: Curve, solver: DirectSolver) -> Callable[[State], int]:
     problem = curve.problem
 
     def sign(state: State) -> int:
-        with problem.at(state):
+        with problem.state_context(state):
             problem.tangent(problem.x, state.control)
             return solver.sign() if solver.factorise() else 0
     return sign
@@ -374,7 +374,7 @@ def _of_limits(failure: Failure) -> Iterator[Finding]:
         yield Finding("serious", "limit point",
                       f"what is driven has its maximum, a limit point, at process time {facts['control']:.6g}",
                       "a stage in which something goes on growing, such as"
-                      " follow={enclosed_volume: [(time, value), ...]}")
+                      " amplitudes={enclosed_volume: [(time, value), ...]}")
     elif target is not None and limits and abs(facts["control"]) <= max(map(abs, limits)) < abs(target):
         yield Finding("serious", "limit point",
                       f"the {what} has its maximum, {max(limits, key=abs):.6g}, at a limit point that was passed, and"

@@ -306,10 +306,10 @@ class Stages(Protocol):
     def enter(self, setting: Setting, x: Array, control: float) -> None:
         """Take a setting, in which (x, control), own part, is a state."""
 
-    def stand(self, state: Standing) -> None:
+    def restore(self, state: Standing) -> None:
         """Go on from an accepted state: its setting and its histories are what they were then."""
 
-    def at(self, state: Standing) -> AbstractContextManager[Equations]:
+    def state_context(self, state: Standing) -> AbstractContextManager[Equations]:
         """Stand at a state, its x and control too, and come back on leaving."""
 
     def bring_in(self, number: int, x: Array, control: float) -> None:

@@ -64,7 +64,7 @@ class Flow(Run):
                  targets: Sequence[tuple[Target, Measure]], step: StepControl | None, accuracy: float,
                  label: str = ""):
         end = process_time(times[-1])
-        super().__init__(record, [*targets, (end, end.bind(record.equations))], step, "follow", accuracy, label)
+        super().__init__(record, [*targets, (end, end.bind(record.equations))], step, "continue", accuracy, label)
         self._measure, self._course, self._times, self._duration = measure, course, times, times[-1] - times[0]
 
     def _accept(self, state: State) -> None:

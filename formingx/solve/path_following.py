@@ -55,8 +55,8 @@ class Run:
         record: where the states go; its curve solves for them.
         targets: (target, its measure): the last one ends the run, the others are met on the way.
         step: step control; default that of the record's last states, or `StepControl()`.
-        at_fold: what to do where the control has a limit point: "follow" the path back, "jump" to the next state, or
-            "stop"; None: as `at_limit_points` says.
+        at_limit_point: what to do where the control has a limit point: "continue" along the path back,
+            "snap_through" to the next state, or "stop"; None: as `at_limit_points` says.
         accuracy: the error in time that is allowed, relative.
         label: what is said before the target beside a progress bar.
         wanted: one of the targets that ends the run as the last does, or None.
@@ -65,9 +65,9 @@ class Run:
     settings = PathFollowing()
 
     def __init__(self, record: Record, targets: Sequence[tuple[Target, Measure]], step: StepControl | None = None,
-                 at_fold: str | None = None, accuracy: float = 2e-3, label: str = "", wanted: Target | None = None):
+                 at_limit_point: str | None = None, accuracy: float = 2e-3, label: str = "", wanted: Any = None):
         self.record, self._label, self.curve, self.problem = record, label, record.curve, record.equations
-        self._at_fold = at_fold or ""
+        self._limit_rule = at_limit_point or ""
         self._accuracy = accuracy
         self._time_error = TimeError(self.problem, accuracy) if self.problem.relaxes else None
         self.aim = Aim(self.curve, targets, wanted)
@@ -94,7 +94,7 @@ class Run:
                 kept = self._go_on(may_turn)
             else:
                 self._accept(self.aim.facing(start, first=not record.states))
-            self._at_fold = self._at_fold or at_limit_points(self.problem, self._falls)
+            self._limit_rule = self._limit_rule or at_limit_points(self.problem, self._falls)
             if self._step is None or asdict(self._step) == kept.get("given"):
                 self.step = StepControl(**kept.get("step", {}))
             else:
@@ -109,9 +109,9 @@ class Run:
                 for state in self._next(states[-1]):
                     self._accept(state)
                     self._stop_if(self.aim.jumped_past(state))
-                    if state.kind == "limit point" and self._at_fold == "stop":
+                    if state.kind == "limit point" and self._limit_rule == "stop":
                         record.ended = f"the {self._driven} has a limit point at {record.describe(state)}"
-                    if record.ended or self.problem.has_history or self._at_fold == "jump":
+                    if record.ended or self.problem.has_history or self._limit_rule == "snap_through":
                         break                           # the rest of the step starts from here
                     if not self.aim.is_open() and state.met is self.aim.until:
                         break
@@ -141,7 +141,7 @@ class Run:
     def _may_jump(self) -> bool:
         """True if the body may jump: at folds, or, if these are followed, where contact or friction ends the path."""
         may_end = self.problem.has_history or self.problem.has_kinks
-        return self._at_fold in ("jump", "follow volume") or self._at_fold == "follow" and may_end
+        return self._limit_rule in ("snap_through", "continue_volume") or self._limit_rule == "continue" and may_end
 
     @property
     def _jumps_soon(self) -> bool:
@@ -149,7 +149,7 @@ class Run:
 
         Not where a pressure is followed with a history: what slips on the way counts.
         """
-        return self._at_fold == "jump" or self._at_fold == "follow volume" and not self.problem.has_history
+        return self._limit_rule in ("snap_through", *["continue_volume"] * (not self.problem.has_history))
 
     @property
     def _sense(self) -> float:
@@ -172,16 +172,16 @@ class Run:
         If it turns, its first state is the last one. (It does not turn to a pressure, which may come again ahead.)
         """
         record, last = self.record, self.record.last
-        there = record.stand()
+        there = record.restore()
         aim, bound = self.aim, self.aim.measure
         pressure = isinstance(bound, Amplitude) and bound.of_load
         if may_turn and last.stepping.get("until") != [*aim.until[:2]] and not pressure:
-            with self.problem.at(last):
+            with self.problem.state_context(last):
                 facing = aim.facing(replace(last))
             self._turned = [facing] if facing.slope != last.slope else []
         self._first -= 1 if self._turned else there
         for state in self.states:
-            with self.problem.at(state):
+            with self.problem.state_context(state):
                 aim.look(state)
         met = [s.met[:2] for s in self.states if s.met]
         aim.open = [(target, bound) for target, bound in aim.open if target[:2] not in met]
@@ -211,7 +211,7 @@ class Run:
         first, failed, most, limit = self.step.length, 0, np.inf, self.problem.limit
         held: float | None = None                           # a control, where shorter steps do not reduce the error
         lengths, last = [*self.settings.snap_through.lengths, 0.0], self.settings.snap_through.lengths[-1]
-        if snaps(self.curve, old, self._at_fold, self._sense):
+        if snaps(self.curve, old, self._limit_rule, self._sense):
             return self._snap(old)
         self._way = Way(old.x, old.control, old.direction, old.slope, 0.0, limit and limit.predict(self.curve, old))
         while True:
@@ -278,7 +278,7 @@ class Run:
         cut = limit and limit.check(old, new, reach, ends=True)
         if cut:
             raise Cutback(cut.why, max(cut.part, 0.1)) if cut.part else _Astray(cut.why, [])
-        if self._at_fold == "jump" and (new.control - old.control) * self._sense < 0 < old.slope * new.slope:
+        if self._limit_rule == "snap_through" and (new.control - old.control) * self._sense < 0 < old.slope * new.slope:
             raise Failure("the path turns back here", [])
         if was_passed(self.curve, self.states[:-1], old, new):
             raise _Astray("the iteration fell back to a part of the path that was passed already", [])
@@ -318,7 +318,7 @@ class Run:
 
     def _snap(self, old: State) -> list[State]:
         """The state that the body jumps to from a fold; none if there is none: a body left alone has snapped."""
-        onward = self._sense * (self._at_fold == "follow volume")
+        onward = self._sense * (self._limit_rule == "continue_volume")
         if old.kind != "limit point":
             with contextlib.suppress(Failure):
                 return [self._jump(old, self.settings.snap_through.lengths[-1], onward=onward)]
@@ -419,7 +419,7 @@ class Run:
         except Unusable as unusable:
             if not self.states:
                 raise
-            self._give_up("at {} {:.6g}: {}; beyond=True goes on, to see what follows".format(
+            self._give_up("at {} {:.6g}: {}; allow_inadmissible=True goes on".format(
                 *self.problem.shown(state.control), unusable), hint="")
         if self.problem.has_kinks:
             self.curve.look_ahead(state)

@@ -67,7 +67,7 @@ class Execution:
         self._max_steps, self._progress = max_steps, progress
         last = self.record.last.setting if self.record.states else {"stage": 0, "piece": -1}
         if self.record.states:
-            self.record.stand()
+            self.record.restore()
         for k, plan in enumerate(self.plans[last["stage"]:], last["stage"]):
             self.record.stage, self._stage, self._off, self._k = plan.stage.name, plan.stage, plan.off, k
             piece = last["piece"] if k == last["stage"] else -1     # of this stage, that has begun already
@@ -94,7 +94,7 @@ class Execution:
         rate = [float(i in moving) for i in range(len(self._still.rate) - 1)] + [float(stage.timed)]
         self.problem.enter(replace(self._still, rate=rate, off=plan.off), self._rest, 0.0)
         found = []
-        for target in (*stage.through, *([stage.until] if stage.until and (plan.numbers or stage.waits) else [])):
+        for target in (*stage.intermediate, *([stage.until] if stage.until and (plan.numbers or stage.waits) else [])):
             try:
                 bound = target.bind(self.problem)
             except InputError as error:
@@ -109,7 +109,7 @@ class Execution:
         met = [s.met[:2] for segment in self.record.segments[:-1] for s in segment.states
                if s.met and s.setting["stage"] == self._k]
         return [(target, bound) for target, bound in self._targets[self._k]
-                if target[:2] not in met or target not in self._stage.through]
+                if target[:2] not in met or target not in self._stage.intermediate]
 
     def _standing(self) -> tuple[Setting, Array, float]:
         """The setting, the unknowns and the control where the process stands now."""
@@ -149,7 +149,7 @@ class Execution:
         if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
             held = self.problem.has_kinks and not any(self.problem.setting.rate[:-1])
             step = step or (_HELD if held else _IN_TIME)     # a piece that has begun goes on with its own steps
-        run = Run(self.record, targets, step, self._stage.at_fold, self._accuracy, self._label, wanted)
+        run = Run(self.record, targets, step, self._stage.at_limit_point, self._accuracy, self._label, wanted)
         start = None if control is None else self._resumed(control)
         run.follow(self._max_steps, self._progress, start)
         return run.aim.open
@@ -209,9 +209,9 @@ class Execution:
     def _course(self, now: float) -> tuple[Target, Callable[[float], float], list[float]]:
         """(a target of the measure, the measure at a time, the times of its corners) of a flow that begins now."""
         stage, end = self._stage, self._stage.until
-        if stage.hold and stage.duration:
-            value = stage.hold.value
-            return stage.hold, lambda time: value, [now, now + stage.duration]
+        if stage.constant and stage.duration:
+            value = stage.constant.value
+            return stage.constant, lambda time: value, [now, now + stage.duration]
         assert stage.flow is not None
         measure, course = stage.flow
         corners = [] if callable(course) else course[:, 0].tolist()

@@ -63,7 +63,7 @@ class Record:
         on_end: functions called when the run ends, with the words of what failed, or "", and the findings of the run.
         findings: of the checks before the run.
         judge: says of a state whose measures are known why it is none that a body can have, "" if it is one.
-        beyond: keep such states, too.
+        allow_inadmissible: keep such states, too.
     """
 
     def __init__(self, problem: Equations, curve: Curve):
@@ -74,7 +74,7 @@ class Record:
         self.on_end: list[Callable[[str, list[Finding]], None]] = []
         self.findings: list[Finding] = []
         self.judge: Callable[[State], str] = lambda state: ""
-        self.beyond = False
+        self.allow_inadmissible = False
 
     @property
     def problem(self) -> Any:
@@ -103,7 +103,7 @@ class Record:
         """The last accepted state."""
         return self.segments[-1].states[-1]
 
-    def stand(self) -> int:
+    def restore(self) -> int:
         """Let the problem stand at the last state, its setting taken where it began; the number of states with that.
 
         (What is held, and what fades, is reckoned from where a setting began: elsewhere it would differ by round-off.)
@@ -111,7 +111,7 @@ class Record:
         setting = self.last.setting
         states = list(itertools.takewhile(lambda s: s.setting == setting, reversed(self.segments[-1].states)))
         for state in (states[-1], self.last):
-            self.equations.stand(state)
+            self.equations.restore(state)
         return len(states)
 
     def go_on_from(self, other: Record) -> None:
@@ -137,7 +137,7 @@ class Record:
             for told in self.on_state:
                 told(state)
             state.verdict = self.judge(state)
-            if state.verdict and not self.beyond:
+            if state.verdict and not self.allow_inadmissible:
                 raise Unusable(state.verdict)
         except BaseException:
             self.segments[-1].states.pop()

@@ -247,7 +247,7 @@ def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: Sna
 
 
 def at_limit_points(problem: Equations, falls: bool) -> str:
-    """What is done at limit points of the control: "follow", "jump", or "follow volume".
+    """What is done at limit points of the control: "continue", "snap_through", or "continue_volume".
 
     The last follows the path while the volume of the air grows, as under volume control, and lets the body snap where
     that has its maximum, too.
@@ -258,21 +258,22 @@ def at_limit_points(problem: Equations, falls: bool) -> str:
     driven is let off.
     """
     if problem.drives == "time":
-        return "jump"
+        return "snap_through"
     by_pressure = problem.drives == "pressure"
     if not (problem.has_history or problem.has_kinks and by_pressure):
-        return "follow"
-    return "follow volume" if by_pressure and not falls else "jump"
+        return "continue"
+    return "continue_volume" if by_pressure and not falls else "snap_through"
 
 
-def snaps(curve: Curve, old: State, at_fold: str, sense: float) -> bool:
+def snaps(curve: Curve, old: State, at_limit_point: str, sense: float) -> bool:
     """True if the body snaps from a state: its path leads back. sense: 1 or -1, which way the control goes at first.
 
     (Right behind the maximum of a pressure that of the volume may follow.)
     """
-    if at_fold not in ("jump", "follow volume") or old.kind != "limit point" and old.slope * sense >= 0:
+    if at_limit_point not in ("snap_through",
+                              "continue_volume") or old.kind != "limit point" and old.slope * sense >= 0:
         return False
-    return at_fold == "jump" or curve.work_ahead(old) * sense < 0
+    return at_limit_point == "snap_through" or curve.work_ahead(old) * sense < 0
 
 
 def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) -> bool:

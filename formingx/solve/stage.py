@@ -16,7 +16,7 @@ from .stepping import StepControl
 
 _OF_CONTROL = ("pressure", "travel")
 
-AT_FOLD = (None, "follow", "jump", "stop")
+AT_LIMIT_POINT = (None, "continue", "snap_through", "stop")
 """What a run may do where its control has a limit point."""
 
 
@@ -25,61 +25,61 @@ class Stage:
 
     Args:
         name: of the stage, in the record.
-        drive: the load, support or contact to drive, itself or its name.
+        control: the load, support or contact to drive, itself or its name.
         until: the target that ends the stage, hit exactly, from either side, e.g. `travel(6.0)` (from the reference,
-            not from here); with `follow` a `process_time`, or None: the end of the tables. With a
+            not from here); with `amplitudes` a `process_time`, or None: the end of the tables. With a
             `duration`, while nothing is driven: what is waited for, such as `sag(30.0)`, within that time.
-        through: more targets to hit exactly on the way; those that are not met are left out.
-        without: what is not there during the stage, itself or its name: a support that is open, a tool that is away, a
+        intermediate: more targets to hit exactly on the way; those that are not met are left out.
+        inactive: what is not there during the stage, itself or its name: a support that is open, a tool that is away, a
             load that is off. A support takes hold of the body where it is when it comes back; a load comes back with
             its value, and its column reads what acts of it: 0 while it is away.
-        follow: instead of `drive`: {thing: [(time, value), ...]}, piecewise linear in time, values in the user's units
-            (the last one stays). A table that begins later than the stage is reached in a straight line from
-            where the thing stands. With `drive`, instead of a thing a function that makes targets, such as
+        amplitudes: instead of `control`: {thing: [(time, value), ...]}, piecewise linear in time, values in the
+            user's units (the last one stays). A table that begins later than the stage is reached in a straight line
+            from where the thing stands. With `control`, instead of a thing a function that makes targets, such as
             `enclosed_volume`: what is driven is what makes that measure follow the table: a flow. Its course may
             be a function of time, too; then `until` is the `process_time` of its end.
         speed: of what is driven (its unit per time), greater than 0: time goes by while it moves.
         duration: time that the stage takes: on the way to a target of what is driven, or while it stands still.
-        hold: with `drive` and `duration`: a target, such as `force(2.0)`: what is driven gives way so that it stays
-            met. Process time is 0 at first; it runs in stages with a table, a speed or a duration; others are
+        constant: with `control` and `duration`: a target, such as `force(2.0)`: what is driven gives way so that it
+            stays met. Process time is 0 at first; it runs in stages with a table, a speed or a duration; others are
             instantaneous.
         step: step control of this stage; default that of the run.
-        at_fold: see `formingx.trace`.
+        at_limit_point: see `formingx.trace`.
 
     Raises:
-        InputError: no target, both `drive` and `follow`, a table that goes back in time, an argument not allowed.
+        InputError: no target, both `control` and `amplitudes`, a table that goes back in time, an argument not allowed.
 
     >>> air = scene.driven
-    >>> blow = fx.Stage("blow", follow={air: [(0.0, 0.0), (2.0, 0.02)]})                   # time, pressure
+    >>> blow = fx.Stage("blow", amplitudes={air: [(0.0, 0.0), (2.0, 0.02)]})                   # time, pressure
     >>> done = fx.Process(scene).run([blow], progress=False)
     >>> done.last.time, round(float(done.last.measures["pressure"]), 9)
     (2.0, 0.02)
     """
 
-    def __init__(self, name: str, drive: Any = None, until: Target | None = None,
-                 through: Sequence[Target] = (), without: Sequence[Any] = (), *,
-                 follow: Mapping[Any, Sequence[Any]] | None = None, step: StepControl | None = None,
-                 at_fold: str | None = None, speed: float | None = None, duration: float | None = None,
-                 hold: Target | None = None):
+    def __init__(self, name: str, control: Any = None, until: Target | None = None,
+                 intermediate: Sequence[Target] = (), inactive: Sequence[Any] = (), *,
+                 amplitudes: Mapping[Any, Sequence[Any]] | None = None, step: StepControl | None = None,
+                 at_limit_point: str | None = None, speed: float | None = None, duration: float | None = None,
+                 constant: Target | None = None):
         if not isinstance(name, str) or not name:
             raise InputError(f"Stage: name = {name!r}: must be a word")
         who = self.who = f"Stage {name!r}"
-        self.name, self.drive, self.until = name, drive, until
-        self.through = several(f"{who}: through", through, "targets, such as pole_stretch(3)")
-        self.without = several(f"{who}: without", without, "things of the scene")
-        known(f"{who}: at_fold =", at_fold, AT_FOLD)
-        self.at_fold = at_fold
+        self.name, self.control, self.until = name, control, until
+        self.intermediate = several(f"{who}: intermediate", intermediate, "targets, such as pole_stretch(3)")
+        self.inactive = several(f"{who}: inactive", inactive, "things of the scene")
+        known(f"{who}: at_limit_point =", at_limit_point, AT_LIMIT_POINT)
+        self.at_limit_point = at_limit_point
         self.step = instance(f"{who}: step", step, StepControl | None, "a StepControl or None")
-        for target in (*([] if until is None else [until]), *self.through):
+        for target in (*([] if until is None else [until]), *self.intermediate):
             instance(f"{who}: target", target, Target, "a target, such as pole_stretch(3)")
         self.speed = None if speed is None else positive(f"{who}: speed", speed)
         self.duration = None if duration is None else positive(f"{who}: duration", duration)
-        self.hold = instance(f"{who}: hold", hold, Target | None, "a target, such as force(2.0), or None")
+        self.constant = instance(f"{who}: constant", constant, Target | None, "a target, such as force(2.0), or None")
         self.flow: tuple[Any, Any] | None = None
-        if drive is not None and follow is not None:
-            self.flow = self._flow(follow)
-        self.tables = [] if follow is None or self.flow else self._tables(follow)
-        self._check(follow)
+        if control is not None and amplitudes is not None:
+            self.flow = self._flow(amplitudes)
+        self.tables = [] if amplitudes is None or self.flow else self._tables(amplitudes)
+        self._check(amplitudes)
 
     @property
     def timed(self) -> bool:
@@ -89,7 +89,7 @@ class Stage:
     @property
     def waits(self) -> bool:
         """True if it ends when `until` is met while time goes by and nothing is driven."""
-        return self.until is not None and self.drive is None and not self.tables
+        return self.until is not None and self.control is None and not self.tables
 
     @property
     def highest(self) -> Target | None:
@@ -98,52 +98,56 @@ class Stage:
             return None
         return self.flow[0](float(np.max(self.flow[1][:, 1])))
 
-    def _check(self, follow: Any) -> None:
+    def _check(self, amplitudes: Any) -> None:
         who, until = self.who, self.until
-        if self.hold is not None and (self.drive is None or self.duration is None or until or follow is not None):
-            raise InputError(f"{who}: hold = {self.hold}: give it drive=..., what is adjusted to hold it, and"
-                             f" duration=..., and neither until nor follow")
-        if follow is not None and (self.speed or self.duration):
-            raise InputError(f"{who}: follow has times of its own: give no speed or duration")
-        if self.speed and (self.drive is None or self.duration):
-            raise InputError(f"{who}: speed = {self.speed:g}: of what? give it drive=... and until=..., no duration")
-        if self.drive is not None and until is None and self.hold is None and self.flow is None:
-            raise InputError(f"{who}: drives {self.drive!r} without a target: give it until=..., such as travel(3)")
-        if self.drive is not None and self.duration and until and until.name.split("_")[-1] not in _OF_CONTROL:
+        if self.constant is not None and (self.control is None
+                                          or self.duration is None or until or amplitudes is not None):
+            raise InputError(f"{who}: constant = {self.constant}: give it control=..., what is adjusted to hold it, and"
+                             f" duration=..., and neither until nor amplitudes")
+        if amplitudes is not None and (self.speed or self.duration):
+            raise InputError(f"{who}: amplitudes has times of its own: give no speed or duration")
+        if self.speed and (self.control is None or self.duration):
+            raise InputError(f"{who}: speed = {self.speed:g}: of what? give it control=... and until=..., no duration")
+        if self.control is not None and until is None and self.constant is None and self.flow is None:
+            raise InputError(f"{who}: drives {self.control!r} without a target: give it until=..., such as travel(3)")
+        if self.control is not None and self.duration and until and until.name.split("_")[-1] not in _OF_CONTROL:
             raise InputError(f"{who}: until = {until} with a duration: must be a target of what is driven; give a speed"
                              f" instead")
-        if self.drive is None and follow is None and until is not None and self.duration is None:
-            raise InputError(f"{who}: has a target but drives nothing: give it drive=..., follow=..., or duration=...,"
+        if self.control is None and amplitudes is None and until is not None and self.duration is None:
+            raise InputError(f"{who}: has a target but drives nothing: give it control=..., amplitudes=..., or"
+                             f" duration=...,"
                              f" the longest time that it is waited for")
-        if self.drive is None and follow is None and self.duration is None and self.through:
-            raise InputError(f"{who}: has targets but drives nothing: give it drive=..., follow=... or duration=...")
-        if follow is not None and until is not None and until.name != "process_time":
+        if self.control is None and amplitudes is None and self.duration is None and self.intermediate:
+            raise InputError(f"{who}: has targets but drives nothing: give it control=..., amplitudes=... or"
+                             f" duration=...")
+        if amplitudes is not None and until is not None and until.name != "process_time":
             raise InputError(f"{who}: until = {until}: tables are followed until a process_time, or to their end")
 
-    def _flow(self, follow: Any) -> tuple[Any, Any]:
+    def _flow(self, amplitudes: Any) -> tuple[Any, Any]:
         """(what makes targets, knots, shape (n, 2), or a function of time) of a measure that follows a course."""
-        if not isinstance(follow, Mapping) or len(follow) != 1 or not callable(next(iter(follow))):
-            raise InputError(f"{self.who}: both drive and follow are given: then follow must be {{measure: [(time,"
+        if not isinstance(amplitudes, Mapping) or len(amplitudes) != 1 or not callable(next(iter(amplitudes))):
+            raise InputError(f"{self.who}: both control and amplitudes are given: then amplitudes must be {{measure:"
+                             f" [(time,"
                              f" value), ...]}} with a function that makes targets, such as enclosed_volume")
-        ((measure, course),) = follow.items()
+        ((measure, course),) = amplitudes.items()
         if callable(course):
             if self.until is None:
                 raise InputError(f"{self.who}: follows a function of time: until when? give it until=process_time(...)")
         else:
-            ((measure, course),) = self._tables(follow)
+            ((measure, course),) = self._tables(amplitudes)
             if len(course) < 2:
                 raise InputError(f"{self.who}: the table of {measure!r} must have two points at least")
         first = course(0.0) if callable(course) else course[0, 1]
-        instance(f"{self.who}: follow", measure(finite(f"{self.who}: follow: value", first)), Target,
+        instance(f"{self.who}: amplitudes", measure(finite(f"{self.who}: amplitudes: value", first)), Target,
                  "made by its measure")
         return measure, course
 
-    def _tables(self, follow: Any) -> list[tuple[Any, Array]]:
+    def _tables(self, amplitudes: Any) -> list[tuple[Any, Array]]:
         """[(thing, knots, shape (n, 2))]."""
-        if not isinstance(follow, Mapping) or not follow:
-            raise InputError(f"{self.who}: follow = {follow!r}: must be {{thing: [(time, value), ...]}}")
+        if not isinstance(amplitudes, Mapping) or not amplitudes:
+            raise InputError(f"{self.who}: amplitudes = {amplitudes!r}: must be {{thing: [(time, value), ...]}}")
         tables = []
-        for thing, knots in follow.items():
+        for thing, knots in amplitudes.items():
             table = f"{self.who}: the table of {thing!r}"
             rows = [several(table, row, "two numbers") for row in several(table, knots, "(time, value)")]
             if not rows or any(len(row) != 2 for row in rows):
@@ -173,7 +177,7 @@ class Plan(NamedTuple):
     @property
     def in_flow(self) -> bool:
         """True if what is driven makes a measure follow a course in time."""
-        return bool(self.stage.flow or self.stage.hold)
+        return bool(self.stage.flow or self.stage.constant)
 
     @property
     def by_time(self) -> bool:
@@ -189,30 +193,30 @@ def plan(scene: Scene, stage: Stage) -> Plan:
             cannot be met.
     """
     who = stage.who
-    off = sorted({i for thing in stage.without for i in scene.together(scene.number(f"{who}: without", thing))})
-    driven = [stage.drive] if stage.drive is not None else [thing for thing, _ in stage.tables]
+    off = sorted({i for thing in stage.inactive for i in scene.together(scene.number(f"{who}: inactive", thing))})
+    driven = [stage.control] if stage.control is not None else [thing for thing, _ in stage.tables]
     numbers = [scene.number(who, thing) for thing in driven]
     for number in numbers:
-        thing = scene.things[number]
+        thing = scene.items[number]
         if not thing.driven:
             raise InputError(f"{who}: {thing!r} cannot be driven: a Pressure without value, a Displaced support, or"
                              f" a Contact that moves can")
-        if number in off and thing.moves is None:                  # a tool may go home while it is away
+        if number in off and thing.direction is None:                  # a tool may go home while it is away
             raise InputError(f"{who}: {thing!r} is both driven and left out")
     if len({scene.together(number)[0] for number in numbers}) < len(numbers):
         raise InputError(f"{who}: one thing has two tables")
-    there = [thing for i, thing in enumerate(scene.things) if i not in off]
+    there = [thing for i, thing in enumerate(scene.items) if i not in off]
     try:
         supports = [t for t in there if t in scene.supports]
         scene.check_held(supports, any(t in there for t in scene.contacts))
         scene.check_driven(supports)
-        aims.check(scene, [t for t in (stage.until, stage.hold, *stage.through) if t is not None], off)
+        aims.check(scene, [t for t in (stage.until, stage.constant, *stage.intermediate) if t is not None], off)
     except InputError as error:
         raise InputError(f"{who}: {error}") from None
     for number, (_, table) in zip(numbers, stage.tables):
-        thing, most = scene.things[number], float(np.abs(table[:, 1]).max())
+        thing, most = scene.items[number], float(np.abs(table[:, 1]).max())
         if (why := aims.beyond_all(scene, thing.quantity, most)) is not None:
             raise InputError(f"{who}: the table of {thing!r} goes to {most:g}: {why}")
     tables = [(i, table) for number, (_, table) in zip(numbers, stage.tables) for i in scene.together(number)]
-    return Plan(stage, scene.together(numbers[0]) if stage.drive is not None else [], tables, off,
-                list(map(repr, scene.things)))
+    return Plan(stage, scene.together(numbers[0]) if stage.control is not None else [], tables, off,
+                list(map(repr, scene.items)))

@@ -174,7 +174,7 @@ def pot(*, mouth: float, base: float, depth: float, sheet: float, fillet: float,
     """Mould and plug of a tapered round cup, upside down: the sheet is formed upwards.
 
     The sheet lies on Z from 0 to its thickness, as `mesh.disc` makes it; the mould opens downwards onto its top, the
-    plug points up and touches its bottom; drive it with `moves=(0, 1)`. Lengths in millimetres, or as the mesh.
+    plug points up and touches its bottom; drive it with `direction=(0, 1)`. Lengths in millimetres, or as the mesh.
 
     Args:
         mouth, base: radii of the cup at its mouth and at its base, the base not wider; depth: between the two.

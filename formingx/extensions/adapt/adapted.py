@@ -48,7 +48,7 @@ def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = Non
     >>> plug = fx.tools.male(radius=3.0, height=60.0, base=-60.0, fillet=0.5).mirrored().moved(z=0.5)
     >>> scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(20, 1)),
     ...                  materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-    ...                  contacts=[fx.Contact("top", plug, moves=(0, -1))])
+    ...                  contacts=[fx.Contact("top", plug, direction=(0, -1))])
     >>> pilot = fx.trace(scene, until=fx.travel(3.0), progress=False)
     >>> mesh = fx.mesh.adapted(pilot, share=0.5)
     >>> 20 < len(mesh.columns.ends) < 40

@@ -68,12 +68,12 @@ def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
         a, b = (np.linalg.norm(outline.rest[edges, k] - first, axis=1) for k in (0, 1))
         sides.append((edges, a > b))
     for state in path.states:
-        with problem.at(state):
+        with problem.state_context(state):
             edges = outline.edges()
         found = np.minimum(found, share / np.maximum(_turns(edges, sides), 1e-300))
         points = along(edges, _PARTS)
         length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(1)
-        with problem.at(state):
+        with problem.state_context(state):
             for contact, face in zip(problem.contacts, faces):
                 if not contact.present:
                     continue

@@ -148,5 +148,5 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
 def _displacements(path: Any, state: Any, points: np.ndarray) -> np.ndarray:
     """u at reference points in a state (default: the last), shape (n, 2)."""
     problem, state = path.problem, state or path.last
-    with problem.at(state):
+    with problem.state_context(state):
         return probe(problem, points).displacement(problem.x)

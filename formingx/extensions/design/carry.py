@@ -65,8 +65,8 @@ class _Carrier:
             raise Failure(f"the body snaps at {self.path.describe(jump)}, where the result does not depend smoothly on"
                           " parameters", [])
         if history and any(p.in_flow for p in self._plans):
-            raise Failure("there is none yet for a stage that follows or holds a measure (follow={measure: ...},"
-                          " hold=...) in a scene with friction, relaxation or heat", [])
+            raise Failure("there is none yet for a stage that follows or holds a measure (amplitudes={measure: ...},"
+                          " constant=...) in a scene with friction, relaxation or heat", [])
         before: State | None = None
         for k, state in enumerate(states):
             last = k == len(states) - 1 or states[k + 1].setting != state.setting
@@ -94,7 +94,7 @@ class _Carrier:
         self._late: list[np.ndarray] = []
         self._beside = state
         if np.any(state.x):
-            with self.problem.at(replace(state, memory=state.before)):
+            with self.problem.state_context(replace(state, memory=state.before)):
                 constraint = fixed(state.control)
                 settle(self.curve, state, self.neighbours, constraint, [constraint] * len(self.neighbours))
 
@@ -124,7 +124,7 @@ class _Carrier:
 
     def _settle(self, state: State, before: State, last: bool) -> None:
         """The neighbours beside a state that was solved for."""
-        with self.problem.at(replace(state, memory=state.before)):
+        with self.problem.state_context(replace(state, memory=state.before)):
             self._late = []
             for number, face in enumerate(self.problem.contacts):
                 self._late.append(self._arrivals(number, face, state, before))

@@ -173,7 +173,7 @@ class Design:
         lacks = [lack("volume", aim.held, best.volume), aim.shortfall(best)]
         return Answer(first, best, taken, notes, aim.inside, why, foretold, "\n".join(filter(None, lacks)), aim.wanted)
 
-    def least_weight(self, least_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
+    def minimum_weight(self, min_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
         """Search for the least volume of the body with a wall nowhere less than so much (successive linear programs).
 
         Each iteration minimises the volume along its derivative with the wall as its derivatives foretell it, within a
@@ -181,13 +181,13 @@ class Design:
         bound, and its least value, which has kinks, is not differentiated.
 
         Args:
-            least_wall: length; within: reference lengths that count; runs: at most so many.
+            min_wall: length; within: reference lengths that count; runs: at most so many.
 
         Raises:
             InputError, ConvergenceError: as `fit`.
         """
         from scipy.optimize import linprog
-        least, most = positive("least_weight: least_wall", least_wall), count("least_weight: runs", runs)
+        least, most = positive("minimum_weight: min_wall", min_wall), count("minimum_weight: runs", runs)
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
         first = self._run(self.parameters.start.copy())
         inside = inside_of(first, within)

@@ -62,7 +62,7 @@ class Neighbour:
         self.name, self.end = name, end
         self.path: Any = None
         mine, its = (s.mesh.domain.geometry.dofmap for s in (scene, base.scene))
-        if mine.shape != its.shape or not np.array_equal(mine, its) or len(scene.things) != len(base.scene.things):
+        if mine.shape != its.shape or not np.array_equal(mine, its) or len(scene.items) != len(base.scene.items):
             raise InputError(f"Design: {name} changes the elements of the mesh, or the number of loads, supports or"
                              f" contacts: there are derivatives only by what moves nodes or changes numbers")
         self.problem = Problem(scene)

@@ -42,7 +42,7 @@ class Knots:
 
 
 @dataclass(frozen=True)
-class Along:
+class Spline:
     """See `along`. start: at the knots, shape (k,); profile: False if it is one number."""
 
     start: np.ndarray
@@ -52,7 +52,7 @@ class Along:
     profile: bool = True
 
 
-def along(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, smooth: bool = False) -> Along:
+def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, smooth: bool = False) -> Spline:
     """A parameter of a design that is a profile of so many equidistant knots: of thickness, temperature, a constant.
 
     The function that makes the scene gets it as a function of a length from 0 to 1, see `Knots`.
@@ -66,7 +66,7 @@ def along(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, sm
     Raises:
         InputError: an argument that is not allowed.
 
-    >>> fx.along(3, start=2.0, low=1.0).start.tolist()
+    >>> fx.spline(3, start=2.0, low=1.0).start.tolist()
     [2.0, 2.0, 2.0]
     """
     least = 4 if instance("along: smooth", smooth, bool, "True or False") else 2
@@ -77,7 +77,7 @@ def along(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, sm
         raise InputError(f"along: start has {len(values)} numbers: must be one for each of {knots} knots")
     at = np.array([finite("along: start", v) for v in values])
     _check_bounds("along", at, low, high)
-    return Along(at, float(low), float(high), smooth)
+    return Spline(at, float(low), float(high), smooth)
 
 
 class Parameters:
@@ -93,13 +93,13 @@ class Parameters:
 
     def __init__(self, given: Mapping[str, Any]):
         if not isinstance(given, Mapping) or not given:
-            raise InputError("Design: parameters: must be {name: (start, low, high) or fx.along(...)}, at least one")
-        self._given: dict[str, Along] = {}
+            raise InputError("Design: parameters: must be {name: (start, low, high) or fx.spline(...)}, at least one")
+        self._given: dict[str, Spline] = {}
         self.names: list[str] = []
         for name, one in given.items():
             if not isinstance(name, str):
                 raise InputError(f"Design: parameter {name!r}: must be a name")
-            self._given[name] = one = one if isinstance(one, Along) else _number(name, one)
+            self._given[name] = one = one if isinstance(one, Spline) else _number(name, one)
             self.names += [f"{name}[{k}]" for k in range(len(one.start))] if one.profile else [name]
         all_of = list(self._given.values())
         self.start = np.concatenate([one.start for one in all_of])
@@ -141,13 +141,13 @@ class Parameters:
         return found
 
 
-def _number(name: str, given: Any) -> Along:
+def _number(name: str, given: Any) -> Spline:
     parts: Sequence[Any] = (given, -np.inf, np.inf) if np.ndim(given) == 0 else tuple(given)
     if len(parts) != 3:
         raise InputError(f"Design: {name} = {given!r}: must be a number, (start, low, high) or fx.along(...)")
     start = np.array([finite(f"Design: {name}: start", parts[0])])
     _check_bounds(f"Design: {name}", start, parts[1], parts[2])
-    return Along(start, float(parts[1]), float(parts[2]), profile=False)
+    return Spline(start, float(parts[1]), float(parts[2]), profile=False)
 
 
 def _check_bounds(who: str, start: np.ndarray, low: Any, high: Any) -> None:

@@ -46,7 +46,7 @@ def ends_beyond_tests(path: Any) -> Iterator[Finding]:
         tested = known.get(terms.names[0])
         if tested is None:
             continue
-        with problem.at(path.last):
+        with problem.state_context(path.last):
             strains, points, volumes = _deformation(problem, terms)
         outside = tested.outside(strains)
         share = float(volumes[outside].sum() / volumes.sum())

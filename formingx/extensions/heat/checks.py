@@ -8,7 +8,7 @@ import numpy as np
 from ...errors import InputError
 from ...findings import Finding, register
 from ...materials.constants import OfTemperature
-from ...materials.sets import Sets
+from ...materials.solidification import Solidification
 from ...values.temperature import FunctionOfTemperature
 from .cooling import CoolingHistory
 
@@ -28,7 +28,7 @@ def springs_back(body: Any) -> Iterator[Finding]:
         return
     low, high = scene.heat.extremes(scene)
     for layer, material in scene.materials.items() if np.isfinite([low, high]).all() else ():
-        if isinstance(material, Sets):                      # what it adds as it cools is free of stress
+        if isinstance(material, Solidification):                      # what it adds as it cools is free of stress
             continue
         relaxed = getattr(material, "equilibrium", material)
         for name, value in {} if relaxed is None else relaxed.constants().items():

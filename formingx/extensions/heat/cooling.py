@@ -119,7 +119,7 @@ class Cooling:
             boundaries: laws, or {boundary: temperature at which it is held}.
         """
         laws = [FixedTemperature(name, temperature=T) for name, T in boundaries.items()] if isinstance(
-            boundaries, Mapping) else several("Path.released: boundaries", boundaries,
+            boundaries, Mapping) else several("Path.springback: boundaries", boundaries,
                                               "boundaries, such as Convection(...)")
         h = _CONTINUOUS * max(m.conductivity for m in checked_materials(mesh, self.materials).values()) / thickness
         laws = [Convection(law.on, h=h, air=law.parameters["temperature"]) if isinstance(law, FixedTemperature) else law
@@ -201,7 +201,7 @@ class CoolingHistory:
         estimate, touches = SpaceError(self._body, finer), self._touching(finer)
         try:
             for state in states:
-                with self._problem.at(state):
+                with self._problem.state_context(state):
                     self._body.power = 0.0                  # of both, or of none
                     for body, touching in ((self._body, self._touches), (finer, touches)):
                         _look_where_it_touches(body, touching, state.control)

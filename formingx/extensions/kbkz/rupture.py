@@ -34,7 +34,7 @@ def thins(failure: Any) -> Iterator[Finding]:
     if failure.last is None:
         return
     problem, drawn = failure.problem, None
-    with problem.at(failure.last):
+    with problem.state_context(failure.last):
         for past in (history for history in problem.materials if isinstance(history, PastStates)):
             most = getattr(past.material, "base", past.material).rupture_stretch("equibiaxial")
             least, point = past.thinnest()

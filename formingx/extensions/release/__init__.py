@@ -1,8 +1,8 @@
-"""Springback of a formed part, and its mesh: `Path.released`, `Path.formed`, `Path.to_msh`.
+"""Springback of a formed part, and its mesh: `Path.springback`, `Path.deformed_mesh`, `Path.to_msh`.
 
-Imports `remeshing` where a formed body gets new elements (`Path.formed(size=...)`).
+Imports `remeshing` where a formed body gets new elements (`Path.deformed_mesh(size=...)`).
 """
 
-from . import formed, released
+from . import deformed_mesh, springback
 
-__all__ = ["formed", "released"]
+__all__ = ["deformed_mesh", "springback"]

@@ -48,7 +48,7 @@ def scene_on(mesh: Any, preformed: Any) -> Any:
     old, state = preformed.before
     if old.temperature is None:
         return old.scene.with_mesh(mesh, preformed)
-    with old.at(state):
+    with old.state_context(state):
         field = old.temperature.T.copy()
     nodes, T = of_space(field.function_space), field.x.array
     moved = nodes + Probe(old, nodes).displacement_in(state)

@@ -65,7 +65,7 @@ class Preformed(NamedTuple):
     def of(cls, problem: Any, state: Any) -> Preformed:
         """What the body of a state brings."""
         forms = problem.forms
-        with problem.at(state):
+        with problem.state_context(state):
             both = in_own_cells(forms.domain, ufl.as_vector([*(forms.X + forms.u), *forms.X]), _PLACES)
             fields = ufl.split(forms.w)[1:]
             pressures = (in_own_cells(forms.domain, ufl.as_vector(fields), _PLACES[:3]) if fields else

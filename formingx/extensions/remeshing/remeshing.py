@@ -221,7 +221,7 @@ def _best(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, S
 
 
 def _ratios(record: Record, state: State) -> tuple[float, float]:
-    with record.problem.at(state) as problem:
+    with record.problem.state_context(state) as problem:
         return problem.admissible.volume_ratios()
 
 
@@ -251,7 +251,7 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
     record, old, state = path.record, path.problem, path.last
     scene = old.scene
     outline = Outline(old.forms)
-    with old.at(state):
+    with old.state_context(state):
         edges = outline.edges()
         of = {name: outline.of(name) for name in scene.mesh.boundaries}
         x_old = old.x.array_r[: old.n_owned].copy()

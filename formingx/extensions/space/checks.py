@@ -33,7 +33,7 @@ def too_large(body: Any) -> Iterator[Finding]:
     """A tool from a file that is many times as wide as the sheet: a file has no unit of length."""
     scene = body.scene
     for contact in scene.contacts:
-        if scene.kinematics.components == 3 and isinstance(contact.tool, Triangulated) and contact.moves is None:
+        if scene.kinematics.components == 3 and isinstance(contact.tool, Triangulated) and contact.direction is None:
             cut = [any(isinstance(s, Symmetry) and NAMES[s.component] == axis for s in scene.supports) for axis in "xy"]
             sheet = max((1 + half) * float(length) for half, length in zip(cut, scene.extent))
             ratio = float(np.ptp(contact.tool.bounds, axis=0)[:2].max() / sheet)

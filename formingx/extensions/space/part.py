@@ -21,8 +21,8 @@ class PartInSpace(PartNumbers):
 
     Attributes:
         volume, area: length^3, of the surface length^2; draw_ratio: area over that at rest; mean_wall: volume/area.
-        least_wall: length; least_at: (x, y, z) where; least_from: (x, y) where it was on the flat sheet.
-        evenness: least over mean wall; variation: standard deviation of the wall over the surface, over its mean.
+        min_wall: length; min_wall_at: (x, y, z) where; min_wall_reference: (x, y) where it was on the flat sheet.
+        uniformity: least over mean wall; variation: standard deviation of the wall over the surface, over its mean.
         weight: grams if a density in g/cm3 was given; else None. scrap: volume beyond the trim over that of the sheet.
         wrinkled: share of the area at rest that is in compression. units: of the labels.
     """
@@ -31,10 +31,10 @@ class PartInSpace(PartNumbers):
     area: float
     draw_ratio: float
     mean_wall: float
-    least_wall: float
-    least_at: tuple[float, ...]
-    least_from: tuple[float, ...]
-    evenness: float
+    min_wall: float
+    min_wall_at: tuple[float, ...]
+    min_wall_reference: tuple[float, ...]
+    uniformity: float
     variation: float
     weight: float | None
     scrap: float
@@ -44,7 +44,7 @@ class PartInSpace(PartNumbers):
     @property
     def rows(self) -> list[tuple[str, str]]:
         """(what, its value with its unit), for people."""
-        at, rest = (", ".join(f"{v:.4g}" for v in where) for where in (self.least_at, self.least_from))
+        at, rest = (", ".join(f"{v:.4g}" for v in where) for where in (self.min_wall_at, self.min_wall_reference))
         return self._rows(f"(x, y, z) = ({at}), from (X, Y) = ({rest})", []) + (
             [("in compression, of the sheet", f"{100 * self.wrinkled:.3g} %")] if self.wrinkled else [])
 
@@ -101,7 +101,7 @@ def filling(path: Any, contact: Any) -> FillingInSpace:
     """See `Path.filling`."""
     rows, comm = [], path.problem.comm
     for state in path.states:
-        with path.problem.at(state) as problem:
+        with path.problem.state_context(state) as problem:
             d = contact.contact.tool.signed_distance(contact.positions(problem.x.array_r, state.control))
             held = contact.touching(problem.x.array_r, state.control) | (d > -0.1 * contact.thickness)
         area = contact.rule.area

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, finite, known, positive, together, values
-from ...physics.loads import Pressure, Spin
+from ...physics.loads import CentrifugalLoad, Pressure
 from ...physics.supports import PinnedNode
 from ...ranks import gathered
 from .sheet import Sheet
@@ -71,7 +71,7 @@ def refuse(scene: Any, heat: Any) -> None:
     if heat is not None:
         raise InputError("Scene: heat: is not available in space yet: give a temperature=... that stays as it is")
     for load in scene.loads:
-        if isinstance(load, Spin):
+        if isinstance(load, CentrifugalLoad):
             raise InputError(f"Scene: {load!r}: it spins about the axis of a round body, which a sheet in space has"
                              " not")
         if isinstance(load, Pressure) and load.on not in ("bottom", "top"):
@@ -97,7 +97,7 @@ def check_contact(scene: Any, contact: Any) -> None:
                          f" sheet: must be 'stick', or a tool made by box, revolved or extruded")
     if contact.separates and any(material.internal or material.integral for material in scene.materials.values()):
         raise InputError(f"{contact!r}: separates = True: in space a sheet that relaxes is held where it touches, until"
-                         f" a stage leaves the tool out (without=[...]): must be 'stick', with separates left out")
+                         f" a stage leaves the tool out (inactive=[...]): must be 'stick', with separates left out")
     if contact.present_area:
         raise InputError(f"{contact!r}: present_area = True: is for sections: in space the penalty is per area at rest:"
                          f" leave it out")

@@ -183,7 +183,7 @@ def wall_of(path: Any, state: Any) -> WallInSpace:
     own = own_cells(domain)
     vectors, numbers = forms.space.sub(0).collapse()
     dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, 3)
-    with problem.at(state):
+    with problem.state_context(state):
         now = forms.length * forms.w.x.array[dofs]
     cells = vectors.dofmap.list[own]
     X = vectors.tabulate_dof_coordinates()

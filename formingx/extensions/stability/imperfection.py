@@ -9,14 +9,14 @@ import numpy as np
 from ...errors import InputError, finite, instance
 from ...mesh.grid import gathered, to_mesh
 from ...mesh.mesh import Mesh
-from .instability import Loss
+from .instability import CriticalPoint
 
 
-def imperfect(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
+def with_imperfection(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
     """The mesh with its nodes moved along a mode, free of stress there: an imperfection; collective.
 
     Args:
-        mode: a `Loss` with n = 0 of a run on this mesh, or on one with the same nodes.
+        mode: a `CriticalPoint` with n = 0 of a run on this mesh, or on one with the same nodes.
         amplitude: the largest motion of a node, length; negative: against the mode.
 
     Raises:
@@ -24,12 +24,12 @@ def imperfect(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
 
     >>> column = fx.mesh.disc(radius=1.0, thickness=3.0, elements=(1, 4))
     >>> pressed = fx.Scene(mesh=column, materials=fx.NeoHookean(c10=0.5), supports=[
-    ...     fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.Displaced("top", "z")])
+    ...     fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.PrescribedDisplacement("top", "z")])
     >>> loss = fx.trace(pressed, until=fx.travel(-1.9), progress=False).stability([0]).first
-    >>> bent = fx.imperfect(column, loss, 0.01)
+    >>> bent = fx.with_imperfection(column, loss, 0.01)
     """
     instance("imperfect: mesh", mesh, Mesh, "a mesh")
-    mode, amplitude = instance("imperfect: mode", mode, Loss, "a loss that Path.stability found"), finite(
+    mode, amplitude = instance("imperfect: mode", mode, CriticalPoint, "a loss that Path.stability found"), finite(
         "imperfect: amplitude", amplitude)
     if mode.number or mode.flipped:
         raise InputError(f"imperfect: mode: {mode!r}: varies round the body, or is antisymmetric about a mirror"

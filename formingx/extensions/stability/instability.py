@@ -21,7 +21,7 @@ from .modes import Kind, Located, Modes
 
 
 @dataclass(eq=False, repr=False)
-class Loss:
+class CriticalPoint:
     """One mode that begins (or ceases) to be unstable along a path.
 
     Attributes:
@@ -74,11 +74,11 @@ class Loss:
             InputError: the mode varies round the axis (its branch is three-dimensional), or at a limit point.
         """
         if sense not in (1, -1):
-            raise InputError(f"Loss.branch: sense = {sense!r}: must be 1 or -1")
+            raise InputError(f"CriticalPoint.branch: sense = {sense!r}: must be 1 or -1")
         if self.number or self.flipped or self.limit_point:
             why = "is a limit point, through which the path itself goes on" if self.limit_point else (
                 "varies round the body, or is antisymmetric about a mirror plane: its branch leaves this scene")
-            raise InputError(f"Loss.branch: the mode {why}; branches of n = 0 can be followed")
+            raise InputError(f"CriticalPoint.branch: the mode {why}; branches of n = 0 can be followed")
         segment = self.path.segment(self.left)
         curve, problem = segment.curve, segment.problem
         start = State(self.state.x.copy(), self.state.control, self.found.x, 0.0, kind="branch point",
@@ -113,27 +113,27 @@ class Stability:
     Attributes:
         numbers: the waves that were asked for; states: the states looked at, in order.
         counts: {(number, flipped): number of unstable modes in each state, shape (states,)}.
-        losses: list of `Loss` in order along the path.
+        losses: list of `CriticalPoint` in order along the path.
     """
 
     def __init__(self, path: Any, numbers: list[float], states: list[State], counts: dict[Kind, list[int]],
-                 losses: list[Loss]):
+                 losses: list[CriticalPoint]):
         self.path, self.numbers, self.states, self.losses = path, numbers, states, losses
         self.counts = {tuple(kind): np.array(found) for kind, found in counts.items()}
 
     @property
-    def alarms(self) -> list[Loss]:
+    def bifurcations(self) -> list[CriticalPoint]:
         """Losses that are no limit points."""
         return [loss for loss in self.losses if loss.gained and not loss.limit_point]
 
     @property
-    def first(self) -> Loss | None:
+    def first(self) -> CriticalPoint | None:
         """The first alarm on the path, or None: the states looked at are stable."""
-        return next(iter(self.alarms), None)
+        return next(iter(self.bifurcations), None)
 
-    def first_of(self, number: float) -> Loss | None:
+    def first_of(self, number: float) -> CriticalPoint | None:
         """The first alarm of modes with so many waves, or None."""
-        return next((loss for loss in self.alarms if loss.number == number), None)
+        return next((loss for loss in self.bifurcations if loss.number == number), None)
 
     def __str__(self) -> str:
         problem = self.path.problem
@@ -150,7 +150,7 @@ class Stability:
     __repr__ = __str__
 
 
-def _shown(loss: Loss) -> str:
+def _shown(loss: CriticalPoint) -> str:
     states = loss.path.states
     what = "limit point" if loss.limit_point else "lost" if loss.gained else "regained"
     R, Z = loss.at
@@ -178,7 +178,7 @@ class Watch:
         numbers = wave_numbers(self._path.problem.scene, modes)
         chosen = _chosen(self._path, states)
         counts: dict[Kind, list[int]] = {}
-        losses: list[Loss] = []
+        losses: list[CriticalPoint] = []
         known: dict[tuple[int, Kind], int] = {}
 
         def count_at(state: State, kind: Kind) -> int:
@@ -196,7 +196,7 @@ class Watch:
         losses.sort(key=lambda loss: (order.index(loss.left), abs(loss.state.control - loss.left.control)))
         return Stability(self._path, numbers, chosen, counts, losses)
 
-    def _between(self, a: State, b: State, kind: Kind, count_at: Any) -> list[Loss]:
+    def _between(self, a: State, b: State, kind: Kind, count_at: Any) -> list[CriticalPoint]:
         """What happens between two states: found between neighbours of the path, however far these are."""
         if count_at(a, kind) == count_at(b, kind):
             return []
@@ -227,7 +227,7 @@ class Watch:
             vector.destroy()
         return bool(alike > 0.5)
 
-    def _loss(self, segment: Any, found: Located, fold: bool) -> Loss:
+    def _loss(self, segment: Any, found: Located, fold: bool) -> CriticalPoint:
         comm, nodes = segment.problem.comm, self.of(segment).variation.nodes
         points, amplitudes = gathered(comm, nodes), gathered(comm, found.mode)
         size = np.linalg.norm(amplitudes, axis=1)
@@ -238,9 +238,9 @@ class Watch:
             before, behind = found.left.measures, found.right.measures
             found.state.measures = {name: before[name] + found.fraction * (behind[name] - before[name])
                                     for name in before.keys() & behind.keys()}
-        with segment.problem.at(found.left):
+        with segment.problem.state_context(found.left):
             driven, control = segment.problem.shown(found.state.control)
-        return Loss(self._path, found, float(control), driven, fold, points, amplitudes)
+        return CriticalPoint(self._path, found, float(control), driven, fold, points, amplitudes)
 
 
 @method_of(Path)
@@ -263,7 +263,7 @@ def stability(path: Path, modes: Any = range(9), states: Any = 20) -> Stability:
     return watch.look(modes, states)
 
 
-class Unstable:
+class InstabilityCondition:
     """Ends a run where modes that were stable at its first state are not; see `unstable`."""
 
     def __init__(self, modes: Any):
@@ -288,16 +288,16 @@ class Unstable:
         path.record.on_step.append(look)
 
 
-def unstable(modes: Iterable[float] = range(9)) -> Unstable:
+def instability(modes: Iterable[float] = range(9)) -> InstabilityCondition:
     """For `trace(stop_at=...)`: end the run, as a result, once a mode is unstable that was not at its first state.
 
     modes: waves round the axis; in plane strain wave numbers along the depth. It costs about two iterations a mode and
     state. `Path.ended` says which mode, `Path.stability` finds where.
 
-    >>> fx.trace(scene, until=fx.pole_height(12.0), stop_at=fx.unstable([0, 1]), progress=False).ended
+    >>> fx.trace(scene, until=fx.pole_height(12.0), stop_at=fx.instability([0, 1]), progress=False).ended
     ''
     """
-    return Unstable(modes)
+    return InstabilityCondition(modes)
 
 
 def wave_numbers(scene: Any, modes: Any) -> list[float]:

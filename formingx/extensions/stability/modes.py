@@ -114,7 +114,7 @@ class Modes:
 
     def count(self, state: State, kind: Kind) -> int:
         """The number of unstable modes of a kind."""
-        with self.problem.at(state):
+        with self.problem.state_context(state):
             return self._count(kind)
 
     def _count(self, kind: Kind) -> int:
@@ -156,14 +156,14 @@ class Modes:
             x, control = self.curve.interpolate(a, b, fraction)
             state = State(x, control, a.direction, a.slope, memory=a.memory, stage=a.stage, setting=a.setting,
                           time=self.problem.time_at(control))
-        with self.problem.at(nearest.state):
+        with self.problem.state_context(nearest.state):
             self.variation.fill(*kind)
             x = nearest.modes[np.argmin(abs(nearest.values))] if exact else self._of_index(nearest, index)
             mode, plane = self.variation.amplitudes(x), self.variation.plane(x)
         return Located(kind, a, b, state, fraction, mode, plane, gained, solved and exact)
 
     def _look(self, fraction: float, state: State, kind: Kind, index: int) -> _Look:
-        with self.problem.at(state):
+        with self.problem.state_context(state):
             count = self._count(kind)
             return _Look(fraction, state, count, *self._lanczos(4 + abs(count - index)))
 
@@ -186,7 +186,7 @@ class Modes:
         """The state there, solved for; raises `Failure`."""
         if self.problem.has_history:
             raise Failure("with a history the state between two others depends on the steps", [])
-        with self.problem.at(a):
+        with self.problem.state_context(a):
             state = self.curve.inside(a, b, fraction)
         self.curve.spent()
         state.stage, state.setting, state.memory = a.stage, a.setting, a.memory

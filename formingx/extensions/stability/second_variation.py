@@ -251,7 +251,7 @@ class SecondVariation:
         Round the axis what is held in r and in z is held, too: a clamped rim, a node, a face that is driven.
         """
         problem, held, places = self.problem, [*self._idle], {0: [], 1: []}     # type: ignore[var-annotated]
-        for i, thing in enumerate(problem.scene.things):
+        for i, thing in enumerate(problem.scene.items):
             items = [] if i in problem.setting.off else self._forms.constraints(thing)
             for item in items:
                 if isinstance(item, Held):
@@ -279,7 +279,7 @@ class SecondVariation:
         """(number of the thing, row of a mean that it holds, what m takes off it), own parts; the mean of V, too."""
         forms, problem = self._forms, self.problem
         n = problem.n_owned
-        for number, thing in enumerate(problem.scene.things):
+        for number, thing in enumerate(problem.scene.items):
             means = {item.component: item for item in forms.constraints(thing) if not isinstance(item, Held)}
             for item in means.values():
                 row = np.zeros(self._own)

@@ -10,7 +10,7 @@ from ...results.show.views import plotted
 
 
 def draw(loss: Any, file: Any, scale: float) -> None:
-    """See `Loss.view3d`: the deformed body with the mode, coloured by how far and which way the mode moves it.
+    """See `CriticalPoint.view3d`: the deformed body with the mode, coloured by how far and which way the mode moves it.
 
     Blue: towards the axis (downwards, where that is more), red: away from it.
     """
@@ -31,7 +31,7 @@ def _outline(loss: Any) -> list[tuple[np.ndarray, np.ndarray]]:
         at = mesh.line_of(name)
         if loss.path.problem.scene.kinematics.axisymmetric and at[:, 0].max() < 1e-9 * np.ptp(mesh.nodes_of(name)):
             continue
-        with segment.problem.at(state) as problem:
+        with segment.problem.state_context(state) as problem:
             moved = at + probe(problem, at).displacement(problem.x)
         away = np.linalg.norm(at[:, None] - loss.points[None], axis=2)
         lines.append((moved, loss.amplitudes[np.argmin(away, axis=1)]))

@@ -15,13 +15,13 @@ from ...errors import ConvergenceError, InputError, instance, known, positive
 from ...measures.targets import travel as travel_to
 from ...mesh.mesh import Mesh
 from ...physics.contact import Contact
-from ...physics.supports import Displaced, Symmetry
+from ...physics.supports import PrescribedDisplacement, Symmetry
 from ...results.path import Path
 from ...runs import trace
 from ...scene.scene import Scene
 from ...solve.stepping import StepControl
 from ...tools import Tool, plane
-from .instability import Loss, Stability, wave_numbers
+from .instability import CriticalPoint, Stability, wave_numbers
 
 _FOOT: dict[str, Any] = {"points": 16, "penalty": 2.0, "ramp": 1e-4}
 """Contact of the foot: a line on a rigid plate hops from point to point; this many, on a plate that gives way by a
@@ -66,11 +66,11 @@ class TopLoad:
         return bool(self.force.argmax() < len(self.force) - 1)
 
     @property
-    def first(self) -> Loss | None:
+    def first(self) -> CriticalPoint | None:
         """Where it buckles first, or None."""
         return self.stability.first
 
-    def of(self, number: float) -> Loss | None:
+    def of(self, number: float) -> CriticalPoint | None:
         """Where it buckles first in so many waves, or None; `buckling` has its force and travel."""
         return self.stability.first_of(number)
 
@@ -113,7 +113,7 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
     on which a bottle stands rolls on.
 
     Args:
-        body: for example `Path.formed()`.
+        body: for example `Path.deformed_mesh()`.
         material: as in `Scene`.
         travel: how far the neck is to go down, length; the run may end earlier, see `TopLoad.ended`.
         floor: what it stands on; default: a plane at its lowest node.
@@ -131,7 +131,7 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
     >>> round(found.largest_force, 2)
     0.21
     """
-    instance("top_load: body", body, Mesh, "a mesh, such as path.formed()")
+    instance("top_load: body", body, Mesh, "a mesh, such as path.deformed_mesh()")
     known("top_load: neck", neck, body.boundaries)
     known("top_load: foot", foot, body.boundaries)
     travel = positive("top_load: travel", travel)
@@ -139,7 +139,7 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
         floor = plane(float(body.nodes_of(foot)[:, 1].min())).reversed()
     scene = Scene(mesh=body, materials=material,
                   supports=[*[Symmetry("axis")] * ("axis" in body.boundaries), Symmetry(neck, "r"),
-                            Displaced(neck, "z")],
+                            PrescribedDisplacement(neck, "z")],
                   contacts=[Contact(foot, floor, "none", **_FOOT)])
     modes, ended = wave_numbers(scene, modes), ""
     try:

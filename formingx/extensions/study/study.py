@@ -5,7 +5,7 @@
         return fx.trace(...)                                 # a path
 
     def evenness(path):
-        return path.part().evenness
+        return path.part().uniformity
 
     if __name__ == "__main__":                               # processes read the script again
         found = fx.study(pot, {"depth": [30, 40, 50], "radius": [18, 22]}, {"evenness": evenness},

@@ -66,7 +66,7 @@ class ContactFace:
     def of(self, state: Any) -> ContactTable:
         """The face in a state; of a tool that takes no part, without pressure."""
         path, contact = self._path, self._contact
-        with path.problem.at(state) as problem:
+        with path.problem.state_context(state) as problem:
             fields = problem.x.array_r.copy()
             moved = contact.points + path.problem.forms.length * contact.displacement(fields)
             gap = -contact.contact.tool.signed_distance(contact.positions(fields, state.control))

@@ -30,7 +30,7 @@ def coarsest(path: Any, state: Any) -> Edge | None:
     Neighbours are next to each other in the order of R, then Z. What a support holds does not slide.
     """
     found: list[Edge] = []
-    with path.problem.at(state) as problem:
+    with path.problem.state_context(state) as problem:
         fields = problem.x.array_r.copy()
         free = np.ones(len(fields))
         free[problem.held] = 0

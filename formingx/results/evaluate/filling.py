@@ -85,7 +85,7 @@ def filling(path: Any, contact: Any) -> Filling:
     for n, state in enumerate(path.states):
         travel = tooling.travels(state.setting, state.control)[number] or 0.0
         shift = travel * contact.contact.way
-        with path.problem.at(state) as problem:
+        with path.problem.state_context(state) as problem:
             line = fine(face.points + face.displacement(problem.x))
         gaps[n] = [distance_to_line(points + shift, line).max() for _, points in corners]
     driven = [c for c in path.columns if c.endswith("pressure")] or [

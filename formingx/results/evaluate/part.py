@@ -23,14 +23,14 @@ class Part(PartNumbers):
         area: of the middle surface, length^2.
         draw_ratio: area over the area that it had at rest (areal draw ratio).
         mean_wall: volume over area, length.
-        least_wall: length; and where: reference radius, (r, z) of the middle line, height (as in `Wall`); least_from:
-            ("R", radius at rest), of a parison ("Z", height of its inner face at rest).
-        evenness: least wall over mean wall, 1 for an even part.
+        min_wall: length; and where: reference radius, (r, z) of the middle line, height (as in `Wall`);
+            min_wall_reference: ("R", radius at rest), of a parison ("Z", height of its inner face at rest).
+        uniformity: least wall over mean wall, 1 for an even part.
         variation: standard deviation of the wall over the middle surface, over its mean: coefficient of variation.
         weight: grams if a density in g/cm3 was given; else None: of what the material was at rest, before anything
             expanded, so that it does not change with the temperature.
         walls: {height: wall there}, lengths.
-        content: that the part holds, length^3: within its inner face, between planes across its ends (of a closed
+        capacity: that the part holds, length^3: within its inner face, between planes across its ends (of a closed
             bottle: all of it; of a pot: to its rim, or to the trim).
         scrap: volume beyond the trim over the volume of the whole sheet.
         units: of the labels.
@@ -40,26 +40,26 @@ class Part(PartNumbers):
     area: float
     draw_ratio: float
     mean_wall: float
-    least_wall: float
-    least_at_radius: float
-    least_at: tuple[float, ...]
-    least_at_height: float
-    least_from: tuple[str, float]
-    evenness: float
+    min_wall: float
+    min_wall_radius: float
+    min_wall_at: tuple[float, ...]
+    min_wall_height: float
+    min_wall_reference: tuple[str, float]
+    uniformity: float
     variation: float
     weight: float | None
     walls: dict[float, float]
     scrap: float
-    content: float
+    capacity: float
     units: Units = field(repr=False, default=NONE)
 
     @property
     def rows(self) -> list[tuple[str, str]]:
         """(what, its value with its unit), for people."""
-        along, rest = self.least_from
-        where = (f"height {self._length(self.least_at_height)}, r = {self._length(self.least_at[0])}, from {along} ="
+        along, rest = self.min_wall_reference
+        where = (f"height {self._length(self.min_wall_height)}, r = {self._length(self.min_wall_at[0])}, from {along} ="
                  f" {self._length(rest)}")
-        return self._rows(where, [("content", self._said(self.content, self.units.volume)), *(
+        return self._rows(where, [("capacity", self._said(self.capacity, self.units.volume)), *(
             (f"wall at height {self._length(h)}", self._length(w)) for h, w in self.walls.items())])
 
 

@@ -258,7 +258,7 @@ class Stresses:
 
     def project(self, state: Any) -> np.ndarray:
         """Nodal values of F and S, shape (nodes, layers, _COUNT), ghosts included."""
-        with self.problem.at(state):
+        with self.problem.state_context(state):
             return self._projected()
 
     def _projected(self) -> np.ndarray:
@@ -341,7 +341,7 @@ class Stresses:
             self._raw[number] = *(_compat.compile_expression(e, points) for e in (values, where)), weights
         values, where, weights = self._raw[number]
         cells, q = self._owned(layer), len(weights)
-        with self.problem.at(state):
+        with self.problem.state_context(state):
             values, where = (e.eval(forms.domain, cells).reshape(-1, q, n) if len(cells) else np.zeros((0, q, n))
                              for e, n in ((values, _COUNT), (where, 3)))
         return where[..., :-1], values, where[..., -1] * weights

@@ -72,7 +72,7 @@ class Tension:
 
     def _values(self, state: Any) -> np.ndarray:
         problem, domain = self._problem, self._problem.forms.domain
-        with problem.at(state):
+        with problem.state_context(state):
             cells = own_cells(domain)
             values = self._found.eval(domain, cells).reshape(-1, 5) if len(cells) else np.zeros((0, 5))
         return gathered(problem.comm, values)

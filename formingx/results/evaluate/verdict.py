@@ -92,7 +92,7 @@ class Verdict:
             deepest = self._deepest_points(state, lambda contact: CUT * contact.thickness)
             return [Finding("serious", deep.name, f"{deep.words}: shorter steps (StepControl(length=...)), or a larger"
                                                   " penalty.") for deep in deepest]
-        with self._problem.at(state):
+        with self._problem.state_context(state):
             edges, found = self._outline.edges(), []
             for contact in self._problem.present:
                 off = _off(contact, state)
@@ -120,12 +120,12 @@ class Verdict:
         if measures["volume_error"] > _LIMITS.volume:
             yield (f"the elements do not keep their volumes: the root mean square of J - 1 is"
                    f" {measures['volume_error']:.2g}")
-        with self._problem.at(state) as problem:
+        with self._problem.state_context(state) as problem:
             bad, cells, (R, Z) = problem.inside_out()
             if bad > max(_LIMITS.fewest, _LIMITS.inside_out * cells):
                 yield (f"{bad} of {cells} elements are inside out, the worst at (R, Z) = ({R:.5g}, {Z:.5g}):"
                        " remesh on the way (trace(remesh=Remesh(size=...)), for a crushed block), or adapt the mesh"
-                       f" by a pilot run (trace(pilot=True), for a sheet over an edge)")
+                       f" by a pilot run (trace(adapt_mesh=True), for a sheet over an edge)")
             edges = self._outline.edges()
             for deep in self._deepest(edges, state, own=False):
                 yield (f"the body is {deep.depth:.4g} deep in the tool of {deep.name!r} at (r, z) ="
@@ -165,7 +165,7 @@ class Verdict:
         """The contact point of each tool in space that is deepest, over what is allowed (length), if it is too deep."""
         if self._problem.scene.kinematics.components < 3:
             return
-        with self._problem.at(state) as problem:
+        with self._problem.state_context(state) as problem:
             for contact in problem.present:
                 x = contact.positions(state.x, state.control)
                 depth, place = contact.law.distance(x), x + contact.travelled(state.control)

@@ -107,7 +107,7 @@ class Walls:
                 names, between = between_layers(path.problem.scene.mesh, profile)
                 self._lines = names, probe(path.problem, between.reshape(-1, between.shape[-1]))
             names, there = self._lines
-            with path.problem.at(state) as problem:
+            with path.problem.state_context(state) as problem:
                 deformed = there.points + there.displacement(problem.x)
             lines = [profile.bottom, *deformed.reshape(len(names) - 1, -1, deformed.shape[-1]), profile.top]
             lengths = np.array([np.hypot(*(b - a).T) for a, b in zip(lines, lines[1:])])

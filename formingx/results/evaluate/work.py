@@ -90,7 +90,7 @@ class Ledger:
         self._energy = forms.stress * forms.volume
         self._loads = [(_called(scene, load), forms.compile(work))
                        for load, work in zip(scene.loads, forms.load_works, strict=True)]
-        self._driven = [(i, thing) for i, thing in enumerate(scene.things)
+        self._driven = [(i, thing) for i, thing in enumerate(scene.items)
                         if any(thing is d for d in scene.drivable) and thing not in scene.loads]
         self._stored = forms.compile(forms.energy) if scene.heat is not None or forms.elastic_supports else None
         self._ends: dict[int, tuple[Any, dict[str, _Reaction]]] = {}
@@ -125,7 +125,7 @@ class Ledger:
             return None
         line = [replace(s, direction=(b.x - a.x) / h, slope=(b.control - a.control) / h) for s in (a, b)]
         for part, (start, end) in itertools.product(_PARTS, [line] if self._flows(a, b) else [(a, b), line]):
-            with problem.at(a):
+            with problem.state_context(a):
                 if self._flows(a, b):
                     problem.clock = a.time + part * (b.time - a.time)
                 problem.limit.prepare(Way(a.x, a.control, start.direction, start.slope, part * h))
@@ -182,7 +182,7 @@ class Ledger:
         problem = self._problem
         names = [name for name, _ in self._loads]
         found = dict.fromkeys(names, 0.0)
-        with problem.at(a):
+        with problem.state_context(a):
             n, fading = problem.n_owned, problem.fading_forces
             for s, w in zip(*_GAUSS):
                 by = x.slope(s)[:n]
@@ -204,7 +204,7 @@ class Ledger:
         problem, found = self._problem, {}
         scene, forms = problem.scene, problem.forms
         scale = forms.stress * forms.volume / forms.length
-        with problem.at(state) as at:
+        with problem.state_context(state) as at:
             fields, n = at.x.array_r.copy(), at.n_owned
             e, d = _SMALL, state.direction
             ahead, behind = (at.body_forces(fields + sign * e * d, state.control + sign * e * state.slope)
@@ -219,7 +219,7 @@ class Ledger:
                 if i in setting.off:
                     force = slope = 0.0
                 elif thing in scene.contacts:
-                    together = [scene.things[k] for k in scene.together(i)]
+                    together = [scene.items[k] for k in scene.together(i)]
                     tools = [c for c in at.present if c.contact in together]
                     force = -sum(float(resultants.force(c, fields, state.control) @ c.contact.way)
                                  for c in tools)
@@ -241,7 +241,7 @@ class Ledger:
 
     def _kinked(self, state: Any) -> bool:
         """True if a point of the body is where a tool begins to resist."""
-        with self._problem.at(state) as at:
+        with self._problem.state_context(state) as at:
             x, control = state.x[: at.n_owned], state.control
             return self._sum([np.any(np.abs(c.law.distance(c.positions(x, control)) / c.law.theta + 1) < _FOOT)
                               for c in at.present]) > 0
@@ -252,10 +252,10 @@ class Ledger:
         contacts = [c for c in problem.contacts if c.law.has_friction and not c.contact.sticks]
         if a.setting != b.setting or not contacts:
             return lost
-        with problem.at(a):
+        with problem.state_context(a):
             for c in (c for c in contacts if c in problem.present):
                 before[c] = c.positions(a.x[: problem.n_owned], a.control), c.touch, _friction_of(c, a, problem)
-        with problem.at(b):
+        with problem.state_context(b):
             for c, (x, touch, T) in before.items():
                 slid = _slid(c.law, x, touch, c.positions(b.x[: problem.n_owned], b.control)) - c.touch.slip
                 lost += self._sum(c.rule.area * (T + _friction_of(c, b, problem)) / 2 * slid)
@@ -272,12 +272,12 @@ class Ledger:
 
     def _energy_at(self, state: Any) -> float:
         """Stored energy at a state."""
-        with self._problem.at(state) as problem:
+        with self._problem.state_context(state) as problem:
             return self._energy * problem.assemble_scalar(self._stored)
 
     def _bonds(self, state: Any) -> float:
         """What tools hold that the body may pull at."""
-        with self._problem.at(state) as at:
+        with self._problem.state_context(state) as at:
             return sum(resultants.energy(c, state.x[: at.n_owned], state.control) for c in at.present if c.law.pulls)
 
     def _sum(self, values: Any) -> float:

@@ -185,7 +185,7 @@ def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
     kept = next((s.stepping for s in reversed(record.states) if s.stepping), None)
     record.counts = Counts(**kept["counts"]) if kept else Counts()
     record.counts.steps = sum(s.kind != "start" for s in record.states)
-    problem.stand(record.last)
+    problem.restore(record.last)
     return record
 
 

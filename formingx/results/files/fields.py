@@ -65,12 +65,12 @@ class Fields:
     def of(self, state: Any) -> dict[str, np.ndarray]:
         """{name: values, shape (cells, nodes, components)} of a state; collective."""
         problem, forms, shape = self._problem, self._problem.forms, self.points.shape[:2]
-        with problem.at(state):
+        with problem.state_context(state):
             found = {"displacement": self._eval(self._u)}
         if self._components == 3:
             ratio, rest = forms.F[2, 2], sum(forms.thicknesses.values())
             wall = _compat.compile_expression(ufl.as_vector([rest * ratio, ratio, 0.0]), _NODES[2])
-            with problem.at(state):
+            with problem.state_context(state):
                 h = self._eval(wall)
             found |= {"thickness": h[..., 0], "thickness_ratio": h[..., 1]}
         elif self.dimension == 2:
@@ -81,7 +81,7 @@ class Fields:
                       "cauchy_rr": sigma[:, 0, 0], "cauchy_zz": sigma[:, 1, 1], "cauchy_rz": sigma[:, 0, 1],
                       "cauchy_hoop": sigma[:, 2, 2], "hydrostatic_pressure": stress.hydrostatic_pressure,
                       "stress_error": np.repeat(field.error_in_cells(), len(_NODES[2]))}
-            with problem.at(state):
+            with problem.state_context(state):
                 elastic = self._elastic.now(len(self._cells))
             found |= {f"elastic_stretch_{k + 1}": elastic[..., k] for k in range(self._elastic.count)}
             if problem.contacts:

@@ -126,7 +126,7 @@ def _driven(record: Record, stage: slice) -> list[tuple[str, str, np.ndarray, np
             continue
         if column.endswith("travel"):
             name = column.removesuffix("travel").rstrip("_")
-            moving = {n for n, c in zip(record.tooling.names, record.tooling.contacts) if c.moves is not None}
+            moving = {n for n, c in zip(record.tooling.names, record.tooling.contacts) if c.direction is not None}
             force = record.forces.get(name or min(moving, default=""))      # one travel without a name: one tool moves
             if force is None:
                 force = measures.get(f"{name}_force" if name else "support_force")

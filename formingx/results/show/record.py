@@ -137,7 +137,7 @@ class Record:
         """{"tool, corner": gap left in that corner of a tool that stays} in each of some states with profiles."""
         found = {}
         for contact in self.tooling.contacts if states else ():
-            if contact.moves is not None or contact.on not in ("top", "bottom", "inner", "outer"):
+            if contact.direction is not None or contact.on not in ("top", "bottom", "inner", "outer"):
                 continue
             for k, (_, points) in enumerate(corners_of(contact.tool), 1):
                 faces = [self.profiles[i].top if contact.on in ("top", "outer") else self.profiles[i].bottom

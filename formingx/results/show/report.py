@@ -176,8 +176,8 @@ def _cards(record: Record, found: Part | None, units: Units) -> str:
     cards = []
     if found is not None:
         length = f" {units.length}" if units.length else ""
-        cards = [(f"{found.least_wall:.4g}{length}", f"least wall, at r = {found.least_at[0]:.4g}{length}"),
-                 (f"{found.evenness:.3g}", "least over mean wall"),
+        cards = [(f"{found.min_wall:.4g}{length}", f"least wall, at r = {found.min_wall_at[0]:.4g}{length}"),
+                 (f"{found.uniformity:.3g}", "least over mean wall"),
                  (f"{found.weight:.4g} g", found.rows[0][0]) if found.weight is not None else
                  (f"{found.volume:.{4 if found.volume < 1e4 else 6}g} {units.volume}", "volume of the part")]
     cards += [(value, what) for what, value in _peaks(record, units)]
@@ -259,8 +259,9 @@ def _tools(record: Record, units: Units) -> str:
     rows = []
     for contact, name, travel in zip(record.tooling.contacts, record.tooling.names, record.travels[-1]):
         force = record.forces.get(name)
-        moves = "stays" if contact.moves is None else f"moves along ({', '.join(f'{x:g}' for x in contact.moves)})"
-        where = "takes no part" if travel is None else page.number(travel) if contact.moves else ""
+        along = ", ".join(f"{x:g}" for x in contact.direction or ())
+        moves = f"moves along ({along})" if along else "stays"
+        where = "takes no part" if travel is None else page.number(travel) if contact.direction else ""
         rows.append([contact.name or "", contact.on, re.sub(r"^Tool\((.*)\)$", r"\1", repr(contact.tool)),
                      f"{contact.friction}{'' if contact.separates else ', holds what has touched'}",
                      page.number(contact.penalty), moves, where, "" if force is None else page.number(force[-1])])

@@ -14,11 +14,11 @@ from . import ended, ranges, scenes, touched
 from .sizes import Body
 
 # modules that register checks are named here, as they are not called by name
-__all__ = ["Report", "before_run", "doctor", "ended", "ranges", "scenes", "touched"]
+__all__ = ["Report", "before_run", "check", "ended", "ranges", "scenes", "touched"]
 
 
 class Report:
-    """What `doctor` found, worst first; prints in plain words.
+    """What `check` found, worst first; prints in plain words.
 
     Attributes:
         findings: list of `Finding`; empty for a good scene.
@@ -38,7 +38,7 @@ class Report:
     __repr__ = __str__
 
 
-def doctor(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequence[Stage] = (),
+def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequence[Stage] = (),
            units: Units = NONE) -> Report:
     """Look a scene over before the run; collective, no form is compiled and nothing is solved.
 
@@ -57,22 +57,22 @@ def doctor(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Seque
     Raises:
         InputError: `scene` is not a Scene or a Path, a target not a target, a stage not a stage or of another scene.
 
-    >>> print(fx.doctor(scene, targets=[fx.pole_height(12.0)]))
+    >>> print(fx.check(scene, targets=[fx.pole_height(12.0)]))
     no fault was found in this scene
     """
     if isinstance(scene, Path):
         branches = [Finding("warning", "branch point", ANOTHER_PATH % (scene.describe(left), scene.describe(right)))
                     for left, right in scene.branch_points]
-        before = doctor(scene.problem.scene, targets=targets, stages=stages, units=units).findings
+        before = check(scene.problem.scene, targets=targets, stages=stages, units=units).findings
         return Report([*(found for found in scene.findings() if found.severity != "note"), *branches, *before])
-    instance("doctor: scene", scene, Scene, "a formingx.Scene, or the Path of a run")
-    instance("doctor: units", units, Units, "a formingx.Units")
-    targets = several("doctor: targets", targets, "targets, such as [pole_stretch(3)]")
-    stages = several("doctor: stages", stages, "stages, such as [Stage('blow', drive='air', until=pressure(1))]")
+    instance("check: scene", scene, Scene, "a formingx.Scene, or the Path of a run")
+    instance("check: units", units, Units, "a formingx.Units")
+    targets = several("check: targets", targets, "targets, such as [pole_stretch(3)]")
+    stages = several("check: stages", stages, "stages, such as [Stage('blow', control='air', until=pressure(1))]")
     for target in targets:
-        instance("doctor: targets: target", target, Target, "a target, such as pole_stretch(3)")
+        instance("check: targets: target", target, Target, "a target, such as pole_stretch(3)")
     for stage in stages:
-        instance("doctor: stages: stage", stage, Stage, "a formingx.Stage")
+        instance("check: stages: stage", stage, Stage, "a formingx.Stage")
     body = Body(scene, targets, stages, units)
     return Report([*found_at("scene", body), *found_at("start", body)])
 

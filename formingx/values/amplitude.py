@@ -9,9 +9,9 @@ from ..errors import InputError, finite, positive, values
 _MOST = 2000           # points: a function that jumps, or rattles, has no table
 
 
-def course(function: Callable, until: float, start: float = 0.0, *, tolerance: float = 1e-3,
+def amplitude(function: Callable, until: float, start: float = 0.0, *, tolerance: float = 1e-3,
            ) -> list[tuple[float, float]]:
-    """[(time, value), ...] of a function of time, for `Stage(follow={thing: ...})`; straight between its points.
+    """[(time, value), ...] of a function of time, for `Stage(amplitudes={thing: ...})`; straight between its points.
 
     Args:
         function: f(t), called with an array of times, or made of numbers; the value of what is driven then.
@@ -21,7 +21,7 @@ def course(function: Callable, until: float, start: float = 0.0, *, tolerance: f
     Raises:
         InputError: times in the wrong order, a value that is not finite, a function that takes over 2000 points.
 
-    >>> stroke = fx.course(lambda t: 20 * (1 - np.cos(np.pi * t)), until=1.0)
+    >>> stroke = fx.amplitude(lambda t: 20 * (1 - np.cos(np.pi * t)), until=1.0)
     >>> len(stroke), stroke[0], round(stroke[-1][1], 6)
     (29, (0.0, 0.0), 40.0)
     """

@@ -23,10 +23,10 @@ _TO_GRID = [0, 1, 2, 5, 3, 4]                               # middles of the edg
 
 
 @method_of(Path)
-def formed(path: Path, state: State | None = None, *, size: float | None = None) -> Mesh:
+def deformed_mesh(path: Path, state: State | None = None, *, size: float | None = None) -> Mesh:
     """Make a new mesh of the body of a state, free of stress; collective.
 
-    (`Path.released` releases the body with the stresses that it has.)
+    (`Path.springback` releases the body with the stresses that it has.)
 
     Args:
         path: the path of a solid.
@@ -41,22 +41,23 @@ def formed(path: Path, state: State | None = None, *, size: float | None = None)
         InputError: a membrane, a sheet in three dimensions, or deformed elements that are no mesh (inside out, or one
             over another); new elements of several layers, on several ranks, or round a hole.
     """
-    path.section_only("formed", "use to_stl, or shell_model")
+    path.section_only("deformed_mesh", "use to_stl, or shell_model")
     state = state or path.last
     problem = path.segment(state).problem
     forms, mesh = problem.forms, problem.scene.mesh
     domain, comm = mesh.domain, mesh.comm
     if forms.domain is not domain:
-        raise InputError("Path.formed: a membrane has no elements across its thickness: form a solid, MixedPressure()")
+        raise InputError("Path.deformed_mesh: a membrane has no elements across its thickness: form"
+                         " a solid, MixedPressure()")
     if size is not None:
-        return _of_size(problem, state, positive("Path.formed: size", size))
+        return _of_size(problem, state, positive("Path.deformed_mesh: size", size))
     numbers = fem.functionspace(domain, ("Lagrange", 2)).dofmap
     cells = own_cells(domain)
     triangles = numbers.index_map.local_to_global(np.asarray(numbers.list)[cells].ravel().astype(np.int32))
     triangles = triangles.reshape(-1, 6)
     points = np.zeros((len(cells), 6, forms.scene.kinematics.components))
     if len(cells):
-        with problem.at(state):
+        with problem.state_context(state):
             moved = _compat.compile_expression(forms.X + forms.u, _NODES)
             points = moved.eval(domain, cells).reshape(points.shape)
     layers = {name: triangles[(found := mesh.cells.find(tag))[found < len(cells)]] for name, tag in mesh.layers.items()}
@@ -83,19 +84,19 @@ def formed(path: Path, state: State | None = None, *, size: float | None = None)
                      for name in mesh.layers},
                     {name: np.array([row for p in parts for row in p[3][name]], dtype=np.int64).reshape(-1, 3)
                      for name in mesh.boundaries})
-    return to_mesh(grid, comm, "Path.formed: the deformed mesh")
+    return to_mesh(grid, comm, "Path.deformed_mesh: the deformed mesh")
 
 
 @method_of(Path)
 def to_msh(path: Path, file: Any, state: State | None = None) -> None:
-    """Write the mesh that `formed` makes of a state as a gmsh file, with its names; on one rank.
+    """Write the mesh that `deformed_mesh` makes of a state as a gmsh file, with its names; on one rank.
 
     Args:
         path: the path of a solid.
         file: name of the file.
         state: default the last.
     """
-    write(formed(path, state), file)
+    write(deformed_mesh(path, state), file)
 
 
 def _of_size(problem: Any, state: Any, size: float) -> Mesh:
@@ -103,10 +104,11 @@ def _of_size(problem: Any, state: Any, size: float) -> Mesh:
     from ..remeshing.remeshed import remeshed
     mesh, outline = problem.scene.mesh, Outline(problem.forms)
     if len(mesh.layers) > 1 or mesh.comm.size > 1:
-        raise InputError(f"Path.formed: size = {size:g}: new elements are made of one layer, on one rank: leave it out")
-    with problem.at(state):
+        raise InputError(f"Path.deformed_mesh: size = {size:g}: new elements are made of one layer, on one"
+                         f" rank: leave it out")
+    with problem.state_context(state):
         edges = outline.edges()
-    of, order = {name: outline.of(name) for name in mesh.boundaries}, outline.around("Path.formed: size")
+    of, order = {name: outline.of(name) for name in mesh.boundaries}, outline.around("Path.deformed_mesh: size")
     names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
     (layer,), axisymmetric = mesh.layers, problem.scene.kinematics.axisymmetric
     return remeshed(edges[order], names, np.zeros((0, edges.shape[-1])), size, size, layer, axisymmetric, mesh.comm)

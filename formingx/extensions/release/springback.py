@@ -35,7 +35,7 @@ _THROUGH = 1.0
 
 
 @dataclass(frozen=True, repr=False)
-class Released(KeyNumbers):
+class Springback(KeyNumbers):
     """A part before and after it was let go.
 
     Attributes:
@@ -62,7 +62,7 @@ class Released(KeyNumbers):
         return _height(self.before) - self.height
 
     @property
-    def least_wall(self) -> float:
+    def min_wall(self) -> float:
         """Length."""
         return float(self.after.wall.min())
 
@@ -91,7 +91,7 @@ class Released(KeyNumbers):
                 ("springback of the height", said(self.springback)),
                 ("largest diameter (in its tools)", f"{said(self.diameter)} ({said(_diameter(before))})"),
                 ("shrinkage of the diameter", f"{100 * self.shrinkage:.3g} %"),
-                ("least wall", said(self.least_wall)),
+                ("least wall", said(self.min_wall)),
                 ("flange has turned by", f"{self.flange_angle:.3g} degrees")]
 
 
@@ -110,9 +110,9 @@ def _end(wall: Wall) -> float:
 
 
 @method_of(Path)
-def released(path: Path, temperature: float | None = None, *, trim: Any = None, boundaries: Any = None,
-             duration: float | None = None, state: State | None = None, accuracy: str | float = "standard",
-             units: Any = None) -> Released:
+def springback(path: Path, temperature: float | None = None, *, trim: Any = None, boundaries: Any = None,
+               duration: float | None = None, state: State | None = None, accuracy: str | float = "standard",
+               units: Any = None) -> Springback:
     """Release a formed part: compute its springback, shrinkage and warpage.
 
     Tools and loads are removed; the part is trimmed; of supports only `Symmetry` is left; then, where heat or materials
@@ -130,33 +130,33 @@ def released(path: Path, temperature: float | None = None, *, trim: Any = None, 
         units: a `formingx.Units`, of the labels.
 
     Returns:
-        The `Released`, which prints a table; its own run is `Released.path`.
+        The `Springback`, which prints a table; its own run is `Springback.path`.
 
     Raises:
         InputError: a membrane; arguments that do not fit the scene; the part does not reach the trim.
         ConvergenceError: no state of the free part was found; it carries the path so far.
     """
-    path.section_only("released")
+    path.section_only("springback")
     state = state or path.last
     source = path.segment(state).problem
     mesh, trimmed = source.scene.mesh, float(path.wall(state).r[-1])
     if source.forms.domain is not mesh.domain:
-        raise InputError("Path.released: a membrane has no bending stiffness to keep a shape: form a solid,"
+        raise InputError("Path.springback: a membrane has no bending stiffness to keep a shape: form a solid,"
                          " MixedPressure()")
     if trim is not None:
         if source.scene.preformed is not None:
-            raise InputError("Path.released: trim: is not available for a remeshed run: leave it out")
+            raise InputError("Path.springback: trim: is not available for a remeshed run: leave it out")
         mesh, trimmed = _trimmed(mesh, path.wall(state), trim)
     heat, cools = _heat(source.scene, mesh, temperature, boundaries, duration, path.wall(state))
     problem = Problem(_scene(source.scene, mesh, heat))
     x = _carried(source, state, problem)
-    problem.enter(Setting([0.0] * len(problem.scene.things) + [state.time], [0.0] * (1 + len(problem.scene.things)),
+    problem.enter(Setting([0.0] * len(problem.scene.items) + [state.time], [0.0] * (1 + len(problem.scene.items)),
                           [], fading=True), x, 0.0)
-    return _run(problem, x, cools, allowed_error("Path.released", accuracy), trimmed, units or NONE)
+    return _run(problem, x, cools, allowed_error("Path.springback", accuracy), trimmed, units or NONE)
 
 
 def _run(problem: Problem, x: np.ndarray, cools: float, accuracy: float, trimmed: float,
-         units: Units) -> Released:
+         units: Units) -> Springback:
     """Let the body go, and let time go by."""
     stages = [Stage("let go"), *([Stage("cool", duration=cools)] if cools else [])]
     record = Record(problem, Curve(problem, Tolerances()))
@@ -169,27 +169,28 @@ def _run(problem: Problem, x: np.ndarray, cools: float, accuracy: float, trimmed
     except ConvergenceError as error:
         error.path = path if path.states else None
         raise
-    return Released(path, path.wall(path.states[0]), path.wall(), trimmed, units)
+    return Springback(path, path.wall(path.states[0]), path.wall(), trimmed, units)
 
 
 def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration: Any, wall: Wall) -> tuple[Any, float]:
     """(how the part cools, or None; how long)."""
     if scene.heat is None:
         if temperature is not None or boundaries is not None:
-            raise InputError("Path.released: temperature: the scene has no heat=Cooling(...) that could change it:"
+            raise InputError("Path.springback: temperature: the scene has no heat=Cooling(...) that could change it:"
                              " leave the temperature out, or give the scene one")
-        return None, 0.0 if duration is None else positive("Path.released: duration", duration)
+        return None, 0.0 if duration is None else positive("Path.springback: duration", duration)
     if (temperature is None) == (boundaries is None):
-        raise InputError("Path.released: give the temperature to which the part is cooled, or the boundaries= at which"
+        raise InputError("Path.springback: give the temperature to which the part is cooled, or the boundaries= at"
+                         " which"
                          " it loses heat, and not both")
     if boundaries is not None and duration is None:
-        raise InputError("Path.released: boundaries: for how long? give duration=...")
+        raise InputError("Path.springback: boundaries: for how long? give duration=...")
     faces = next(pair for pair in FACES if all(face in mesh.boundaries for face in pair))
     thickness = float(wall.wall.max())
     heat = scene.heat.without_tools(scene.mesh, thickness, boundaries if temperature is None else dict.fromkeys(
-        faces, finite("Path.released: temperature", temperature)))
+        faces, finite("Path.springback: temperature", temperature)))
     if duration is not None:
-        return heat, positive("Path.released: duration", duration)
+        return heat, positive("Path.springback: duration", duration)
     return heat, _THROUGH * heat.time_through(scene.mesh, thickness)
 
 

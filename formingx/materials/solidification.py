@@ -15,7 +15,7 @@ from .tensors import IDENTITY, cofactor, entries, inner, isochoric, plus
 _BEFORE, _LAST, _GLASS, _FRACTION = "C_before", "C_last", "A_glass", "fraction"
 
 
-class Sets(Material):
+class Solidification(Material):
     """A material that sets as it cools, and softens when it is heated again.
 
     Of the fraction phi(T) that has set, what is added in a cooling step is stress-free in the shape of that moment:
@@ -33,13 +33,13 @@ class Sets(Material):
         between: two temperatures; all has set at the lower, nothing at the higher, phi is linear between.
         fraction: phi(T) instead, a `table` from 1 to 0; beyond its ends phi stays as it is there.
 
-    >>> fx.Sets(fx.NeoHookean(c10=0.4), modulus=800.0, between=(90.0, 110.0))
-    Sets(NeoHookean(c10=0.4), modulus=800.0, between=(90, 110))
+    >>> fx.Solidification(fx.NeoHookean(c10=0.4), modulus=800.0, between=(90.0, 110.0))
+    Solidification(NeoHookean(c10=0.4), modulus=800.0, between=(90, 110))
     """
 
     def __init__(self, base: Material, modulus: float, between: Any = None, fraction: Table | None = None):
         instance("Sets: base", base, Material, "a material")
-        if isinstance(base, Sets):
+        if isinstance(base, Solidification):
             raise InputError(f"Sets: base = {base}: sets already: give its base, with one fraction")
         self._base, self._phi = base, _fraction(between, fraction)
         for name in {"G_set", "set_end", "set_middle"} & base.parameters.keys():
