@@ -11,7 +11,7 @@ from without import run_without
 
 import formingx as fx
 from formingx.contact.step_limit import Way
-from formingx.extensions.contact_events.event_sequence import ContactEventSequence
+from formingx.extensions.contact_events.event_sequence import ContactEventSequence, _Piece
 from formingx.extensions.contact_events.reduced_contact import FREE, STICKS, Near, Points
 from formingx.extensions.contact_events.response import Response
 
@@ -166,3 +166,17 @@ def test_the_core_without_contact_events(tmp_path):
     path = form(cup("stick", (20, 1)), 30.0)
     assert file.startswith(str(tmp_path)) and int(steps) > 2 * path.counts.steps
     np.testing.assert_allclose(path.profile().thickness, [float(t) for t in walls], rtol=4e-3)
+
+
+def test_iterations_that_go_to_and_fro_are_mixed():
+    """Two coordinates, by an iteration -3 and -0.5 times as far from a fixed point: three find it (Anderson)."""
+    fixed, grows = np.array([0.4, -0.2]), np.array([-3.0, -0.5])
+
+    def piece(x):
+        none = np.zeros((0, 2))
+        return _Piece(x[0], [x[None]], [np.zeros((1, 2))], np.zeros(0), none, none, none, none, none, (x, x[1]))
+    starts = [fixed + by for by in ([0.1, 0.3], [-0.3, -0.1], [0.2, 0.05])]
+    tried = [(piece(x), piece(fixed + grows * (x - fixed))) for x in starts]
+    found = ContactEventSequence._mixed(SimpleNamespace(_comm=MPI.COMM_SELF), tried)
+    np.testing.assert_allclose(found.at[0][0], fixed, atol=1e-9)
+    np.testing.assert_allclose([found.begins, *found.off[0], found.off[1]], [*fixed[:1], *fixed, fixed[1]], atol=1e-9)

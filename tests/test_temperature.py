@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import formingx as fx
+from formingx import _compat
 from formingx.problem.problem import Problem
 
 HOT = {130.0: 2.0, 150.0: 0.6, 170.0: 0.2}
@@ -159,6 +160,22 @@ def test_a_sheet_cools_while_it_waits():
         assert np.all(path.problem.temperature.T.x.array == 150.0)
         assert c10.x.array == pytest.approx(0.6e6)
     assert stiffer > 0.7e6
+
+
+def test_relaxation_times_are_those_in_the_middle_of_a_step():
+    """Of a rate of relaxation the mean over the step counts; a modulus is that at its end."""
+    heat = fx.Cooling(SHEET, [fx.Convection("top", h=100.0, air=20.0)], unit="C")
+    melt = fx.Viscoelastic(fx.NeoHookean(c10=fx.table({20: 2.0, 150: 1.0})), [(1.0, 4.0)],
+                           shift=fx.Arrhenius(100e3, 150.0, unit="C"))
+    terms, = Problem(scene(melt, 150.0, fx.MixedPressure(), heat=heat)).forms.terms
+    forms, rate, begins, step = terms.forms, 0.7, 1.0, 0.4
+    terms.start.value, forms._time[0].value, forms._time[1].value = begins, begins + step, 0.0
+    for followed in terms._followed:
+        followed._rate.x.array[:], followed._since.value = rate, begins
+    found = {name: _compat.compile_expression(terms.constants[name], terms.places).eval(
+        forms.domain, np.arange(2, dtype=np.int32)) for name in ("c10", "tau_1")}
+    assert found["c10"] == pytest.approx(1.0 * np.exp(rate * step))
+    assert found["tau_1"] == pytest.approx(4.0 * np.exp(rate * step / 2))
 
 
 def test_a_sheet_that_cools_needs_more_pressure():

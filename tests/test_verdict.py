@@ -109,3 +109,15 @@ def test_a_good_state_has_no_verdict():
     path = fx.trace(block(), until=fx.travel(0.3), progress=False)
     verdict = Verdict(path.problem)
     assert [verdict.of(state) for state in path.states] == [""] * len(path)
+
+
+def test_contact_points_sink_by_less_than_a_seventh_of_the_wall():
+    """A sheet blown against a plate of too low a penalty: the last good state is below the limit, the next above."""
+    sheet = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=1.0, elements=(10, 1)), materials=fx.NeoHookean(c10=0.5),
+                     loads=[fx.Pressure("bottom")], supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", tools.plane(3.0), "stick", penalty=20.0)])
+    with pytest.raises(fx.ConvergenceError, match="did not follow the tool of 'top'") as error:
+        fx.trace(sheet, until=fx.pressure(10.0), progress=False)
+    share = float(re.search(r"deep in it, (\S+) % of the wall", str(error.value))[1]) / 100
+    path = error.value.path
+    assert path["penetration"][-1] / path.profile().thickness.min() < 0.15 < share < 0.25
