@@ -104,6 +104,7 @@ with _optional():
 with _optional():
     from .extensions.compare.compare import Comparison, compare
     from .extensions.compare.compare_nodes import NodalComparison, compare_nodes, write_nodes
+    from .extensions.compare.measured_wall import MeasuredWall, WallComparison
 with _optional():
     from .extensions.study.study import Study, StudyRun, study
 with _optional():

@@ -22,6 +22,7 @@ class Search:
         reached: a wanted wall is reached where it deviates by less than this part of it.
         less: what stops a search is told if the deviation without it would be less than this part of what it is.
         damped: Levenberg's damping over the largest singular value of the sensitivities: less effect counts as none.
+        damped_measured: likewise, where a measured wall, which scatters, is fitted.
         worth: the search ends after two runs that lower the sum of squares by less than this part of it.
         shortest: a step is halved, where it is no better, down to this part of it.
     """
@@ -32,6 +33,7 @@ class Search:
     reached: float = 0.01
     less: float = 0.8
     damped: float = 1e-6
+    damped_measured: float = 1e-2
     worth: float = 0.02
     shortest: float = 1 / 64
 
@@ -52,8 +54,13 @@ class Aim:
     Attributes:
         inside: the places of the wall that count, shape (k,).
         held: the volume that is held, length^3, or None.
-        wanted: the wanted wall at the m places that count, shape (m,), length; None: an even one.
+        wanted: the wanted wall at the m places that count, shape (m,), length; None: an even or a measured one.
+        measured: the `MeasuredWall`, or None.
+        damped: see `Search`.
     """
+
+    measured: Any = None
+    damped = SEARCH.damped
 
     def __init__(self, run: DesignRun, wall: Any, within: tuple[float, float] | None, held: float | None):
         self.inside, self.held = inside_of(run, within), held
@@ -74,6 +81,10 @@ class Aim:
         slopes = by / np.reshape(wanted, (-1, 1))
         if self.wanted is None:
             slopes -= np.outer(wall / wanted**2, by.mean(0))
+        return self._with_volume(run, left, slopes)
+
+    def _with_volume(self, run: DesignRun, left: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Residuals and their derivatives, with those of the volume where it is held."""
         if self.held is not None:
             grows = run.derivative("volume")[1][0] / self.held
             weight = SEARCH.held * np.sqrt(len(left))
@@ -124,6 +135,32 @@ class Aim:
         if stops:
             return f"It is stopped by {'; '.join(stops)}; now it is {100 * now:.2g} %"
         return f"These parameters bring it no nearer: by the derivatives {100 * now:.2g} % is left on the mean"
+
+
+class MeasuredAim(Aim):
+    """A measured wall as least squares: relative deviations at its points, wherever they are on the part.
+
+    Args:
+        run: the first.
+        measured: a `MeasuredWall`.
+        held: see `Aim`.
+    """
+
+    damped = SEARCH.damped_measured
+
+    def __init__(self, run: DesignRun, measured: Any, held: float | None):
+        super().__init__(run, None, None, held)
+        self.measured = measured
+
+    def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
+        """Shape (m,), and its derivatives, (m, n)."""
+        wall, by = run.derivative(self.measured.of_path)
+        return self._with_volume(run, wall / self.measured.wall - 1, by / self.measured.wall[:, None])
+
+    def cost(self, run: DesignRun) -> float:
+        """Mean square of the relative deviations, and of the volume's."""
+        left = self.measured.of_path(run.path) / self.measured.wall - 1
+        return float(np.mean(left**2) + (0.0 if self.held is None else (run.volume / self.held - 1) ** 2))
 
 
 def _deviation(left: np.ndarray, by: np.ndarray, m: int, low: np.ndarray, high: np.ndarray) -> tuple[float, np.ndarray]:

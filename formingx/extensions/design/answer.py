@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 
+from ...errors import InputError
 from ...findings import alarming
+from .confidence import Confidence, confidence
 from .run import DesignRun
 
 _SCATTER = 6e-5
@@ -29,7 +32,8 @@ class Answer:
             no path, in words; inside: which places of the wall counted, shape (k,); why: the search ended; foretold:
             the wall that the run before the best foretold for it, shape (k,), length; lack: a volume, a wall or a least
             wall that was asked for and not reached, and what stops it, in words, or ""; wanted: the wall that was asked
-            for at the places that count, shape (m,), length, or None.
+            for at the places that count, shape (m,), length, or None; measured: the `MeasuredWall` that was fitted to,
+            or None.
     """
 
     before: DesignRun
@@ -41,6 +45,18 @@ class Answer:
     foretold: np.ndarray
     lack: str = ""
     wanted: np.ndarray | None = None
+    measured: Any = None
+
+    @cached_property
+    def confidence(self) -> Confidence:
+        """How sure the parameters are after a fit to a measured wall, and which it does not tell.
+
+        Raises:
+            InputError: no measured wall was fitted to, or it has no more points than there are parameters.
+        """
+        if self.measured is None:
+            raise InputError("confidence: needs a fit to a MeasuredWall")
+        return confidence(self.best, self.measured)
 
     @property
     def values(self) -> dict[str, Any]:
@@ -93,6 +109,9 @@ class Answer:
             lines.insert(3, f"{'wanted wall, mean':24}{'':12}{self.wanted.mean():12.5g}")
             a, b = (np.abs(wall / self.wanted - 1).max() for wall in (before, after))
             lines.insert(4, f"{'largest deviation, %':24}{100 * a:12.4g}{100 * b:12.4g}")
+        if self.measured is not None:
+            a, b = (self.measured.compare(run.path).rms_percent for run in (self.before, self.best))
+            lines.insert(2, f"{'deviation, rms, %':24}{a:12.4g}{b:12.4g}")
         p = self.best.parameters
         lines += [f"{name:24}{x:12.5g}{y:12.5g}" for name, x, y in zip(p.names, self.before.vector, self.best.vector)]
         lines += [f"the run before predicted the wall to {100 * off:.2g} %"]
@@ -112,6 +131,9 @@ class Answer:
             axes.plot(run.profile.reference_length, run.wall, color=colour, label=label)
         if self.wanted is not None:
             axes.plot(self.best.profile.reference_length[self.inside], self.wanted, "k--", linewidth=1, label="wanted")
+        if self.measured is not None:
+            found = self.measured.compare(self.best.path)
+            axes.plot(found.reference_length, found.measured, "ko", markersize=4, label="measured")
         axes.set_xlabel("reference length")
         axes.set_ylabel("wall")
         axes.set_ylim(bottom=0)

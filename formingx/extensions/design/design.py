@@ -17,7 +17,7 @@ from ...scene.scene import Scene
 from ...solve.newton import Tolerances
 from ...solve.stage import Stage
 from ...solve.stepping import StepControl
-from .aim import SEARCH, Aim, inside_of, lack
+from .aim import SEARCH, Aim, MeasuredAim, inside_of, lack
 from .answer import Answer
 from .parameters import Parameters
 from .run import DesignRun
@@ -100,10 +100,12 @@ class Design:
         """Search for a wall: Gauss and Newton's method with bounds, each step tried by a run of its own.
 
         Args:
-            wall: the wanted thickness, length: a number, or a function of the reference length; or
+            wall: the wanted thickness, length: a number, or a function of the reference length; or a `MeasuredWall`, to
+                which the parameters are fitted (`Answer.confidence`); or
             even: True: as even as can be; least standard deviation over mean.
             within: reference lengths (of the middle line, from the axis) that count; default all.
-            volume: "kept": the body's at rest stays that of the start; a number: it is that, length^3; None: free.
+            volume: "kept": the body's at rest stays that of the start (with a measured wall it is free); a number: it
+                is that, length^3; None: free.
             runs: at most so many.
             good: relative change of the wall, in the mean square, that is foretold and not worth another run.
             start: values to start from, by name, or a run of this design.
@@ -118,9 +120,12 @@ class Design:
         if isinstance(volume, str) and volume != "kept" or isinstance(volume, bool):
             raise InputError(f"fit: volume = {volume!r}: must be 'kept', a number or None")
         first = start if isinstance(start, DesignRun) else self._run(self.parameters.vector(start or {}))
-        held = None if volume is None else (
+        measured = hasattr(wall, "of_path")
+        if measured and within is not None:
+            raise InputError("fit: within is for a wanted wall: leave points of a measured one out of it")
+        held = None if volume is None or measured and volume == "kept" else (
             first.volume * (1 - SEARCH.spare) if volume == "kept" else positive("fit: volume", volume))
-        aim = Aim(first, wall, within, held)
+        aim = MeasuredAim(first, wall, held) if measured else Aim(first, wall, within, held)
         return self._search(first, aim, most, good)
 
     def _search(self, first: DesignRun, aim: Aim, most: int, good: float) -> Answer:
@@ -140,7 +145,7 @@ class Design:
                 break
             if not np.any(np.abs(by * size) > 1e-9):
                 raise InputError("fit: no parameter has an effect on what is fitted")
-            held = SEARCH.damped * np.linalg.norm(by * size, 2) * np.eye(len(size))     # what has no effect stays
+            held = aim.damped * np.linalg.norm(by * size, 2) * np.eye(len(size))     # what has no effect stays
             step = lsq_linear(np.vstack([by * size, held]), np.append(-left, 0 * size), tol=1e-12,
                               bounds=((low - best.vector) / size, (high - best.vector) / size)).x * size
             gain = np.sqrt(np.mean((by @ step) ** 2))
@@ -171,7 +176,8 @@ class Design:
             before = gained
             log.info("design: run %d, cost %.3g", len(taken), aim.cost(best))
         lacks = [lack("volume", aim.held, best.volume), aim.shortfall(best)]
-        return Answer(first, best, taken, notes, aim.inside, why, foretold, "\n".join(filter(None, lacks)), aim.wanted)
+        return Answer(first, best, taken, notes, aim.inside, why, foretold, "\n".join(filter(None, lacks)), aim.wanted,
+                      aim.measured)
 
     def minimum_weight(self, min_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
         """Search for the least volume of the body with a wall nowhere less than so much (successive linear programs).

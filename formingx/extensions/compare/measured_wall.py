@@ -1,0 +1,209 @@
+"""Measured walls of a formed part beside those of a run."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError, finite_array, place
+from ...io.csv_files import read
+from ...results import files
+from ...results.path import Path
+
+_FAR = 1.0
+"""Distance of a measured point from the computed section, over the wall there, from which it is named."""
+_BEYOND = 0.1
+"""Length beyond the end of the computed part, over its length, up to which a point counts as at its end."""
+_WALL = ("wall", "thickness", "wall_thickness")
+_LENGTH = ("length", "arc_length")
+_REFERENCE = ("reference_length", "R")
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredWall:
+    """Wall thickness that was measured at points of a formed part.
+
+    Args:
+        wall: shape (m,), length.
+        length: along the section of the part, from the axis, on its middle line, shape (m,), length; or
+        points: (r, z) on the section, shape (m, 2), length; or
+        reference_length: where the points were on the flat sheet (as by a printed grid), shape (m,), length.
+
+    Raises:
+        InputError: not just one place is given, a wall is not above 0, or the shapes do not fit.
+
+    >>> part = fx.MeasuredWall(wall=[0.06, 0.1, 0.2], length=[0.0, 5.0, 14.0])
+    >>> round(part.compare(path).mean_percent, 1)
+    -22.1
+    """
+
+    wall: Any
+    length: Any = None
+    points: Any = None
+    reference_length: Any = None
+
+    def __post_init__(self) -> None:
+        wall = finite_array("MeasuredWall: wall", self.wall)
+        given = {name: getattr(self, name) for name in ("length", "points", "reference_length")}
+        given = {name: value for name, value in given.items() if value is not None}
+        if len(given) != 1:
+            raise InputError(f"MeasuredWall: {', '.join(given) or 'no places'} given: must be one of length, points and"
+                             f" reference_length")
+        name, value = next(iter(given.items()))
+        places = finite_array(f"MeasuredWall: {name}", value)
+        shape = wall.shape + (2,) * (name == "points")
+        if wall.ndim != 1 or not len(wall) or places.shape != shape:
+            raise InputError(f"MeasuredWall: wall has the shape {wall.shape}, {name} {places.shape}: must be (m,) and"
+                             f" {'(m, 2)' if name == 'points' else '(m,)'}")
+        for k in np.flatnonzero(wall <= 0)[:1]:
+            raise InputError(f"MeasuredWall: wall[{k}] = {wall[k]:g}: must be above 0")
+        object.__setattr__(self, "wall", wall)
+        object.__setattr__(self, name, places)
+
+    @classmethod
+    def from_csv(cls, file: Any) -> MeasuredWall:
+        """Read a CSV file with a column `wall` (or `thickness`) and `length`, `reference_length`, or `r` and `z`.
+
+        Numbers are in the unit of the run; units in the header ("wall [mm]") must be the same in all columns.
+
+        Raises:
+            InputError: the file cannot be read, lacks a column, or has columns in different units.
+        """
+        table = read(place("MeasuredWall: file", file))
+        units = {unit for unit in table.units.values() if unit is not None}
+        if len(units) > 1:
+            raise InputError(f"MeasuredWall: {table.name}: columns are in {', '.join(sorted(units))}: must be in one"
+                             f" unit, that of the run")
+
+        def column(names: tuple[str, ...]) -> np.ndarray | None:
+            found = [name for name in table.columns if name.replace(" ", "_") in names]
+            return table._replace(units=dict.fromkeys(table.units)).take(found[0]) if found else None
+        wall, r, z = column(_WALL), column(("r",)), column(("z",))
+        if wall is None:
+            raise InputError(f"MeasuredWall: {table.name}: has the columns {', '.join(table.columns)}: needs 'wall'")
+        return cls(wall, length=column(_LENGTH), reference_length=column(_REFERENCE),
+                   points=None if r is None or z is None else np.column_stack([r, z]))
+
+    def of_path(self, path: Path) -> np.ndarray:
+        """Return the wall of the last state of a path at these points, shape (m,), length.
+
+        Raises:
+            InputError: a length is more than a tenth beyond the end of the computed part.
+        """
+        profile = path.profile()
+        return np.interp(self._numbers(profile)[0], np.arange(len(profile.middle)), profile.wall_thickness)
+
+    def compare(self, path: Path) -> WallComparison:
+        """Return the walls of the last state of a path beside the measured ones; collective.
+
+        Raises:
+            InputError: a length is more than a tenth beyond the end of the computed part; a sheet in space.
+        """
+        profile = path.profile()
+        at, away = self._numbers(profile)
+        numbers = np.arange(len(profile.middle))
+
+        def there(values: np.ndarray) -> np.ndarray:
+            return np.interp(at, numbers, values)
+        return WallComparison(there(profile.arc_length), there(profile.reference_length), self.wall,
+                              there(profile.wall_thickness), away, path.problem.comm)
+
+    def _numbers(self, profile: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Places on the middle line as (fractional) numbers of its points, and their distances from it, shapes (m,)."""
+        numbers = np.arange(len(profile.middle), dtype=float)
+        if self.points is None:
+            name = "length" if self.length is not None else "reference_length"
+            line = profile.arc_length if self.length is not None else profile.reference_length
+            places = getattr(self, name)
+            beyond = np.maximum(np.maximum(-places, places - line[-1]), 0.0)
+            for k in np.flatnonzero(beyond > _BEYOND * line[-1])[:1]:
+                raise InputError(f"MeasuredWall: {name}[{k}] = {places[k]:.6g}: the computed part goes from 0 to"
+                                 f" {line[-1]:.6g}")
+            return np.interp(places, line, numbers), beyond
+        a, b = profile.middle[:-1], profile.middle[1:]
+        along = np.einsum("mij,ij->mi", self.points[:, None] - a, b - a) / np.einsum("ij,ij->i", b - a, b - a)
+        along = np.clip(along, 0, 1)
+        away = np.hypot(*np.moveaxis(self.points[:, None] - a - along[..., None] * (b - a), -1, 0))
+        nearest = away.argmin(1)
+        each = np.arange(len(nearest))
+        return nearest + along[each, nearest], away[each, nearest]
+
+
+class WallComparison:
+    """Computed walls beside measured ones; print it, `.plot()`, `.to_csv(file)`.
+
+    Attributes:
+        length, reference_length: where the m points are on the computed part, shape (m,), length.
+        measured, computed: walls, shape (m,), length.
+        away: distance of the measured points from the computed middle line, or beyond its end, shape (m,), length.
+    """
+
+    def __init__(self, length: np.ndarray, reference_length: np.ndarray, measured: np.ndarray, computed: np.ndarray,
+                 away: np.ndarray, comm: Any):
+        self.length, self.reference_length, self.away = length, reference_length, away
+        self.measured, self.computed, self._comm = measured, computed, comm
+
+    @property
+    def deviation_percent(self) -> np.ndarray:
+        """Computed over measured wall, minus 1, shape (m,), %."""
+        return 100 * (self.computed / self.measured - 1)
+
+    @property
+    def mean_percent(self) -> float:
+        """Mean deviation, %."""
+        return float(self.deviation_percent.mean())
+
+    @property
+    def rms_percent(self) -> float:
+        """Root mean square of the deviation, %."""
+        return float(np.sqrt(np.mean(self.deviation_percent**2)))
+
+    def __str__(self) -> str:
+        lines = [f"{'length':>10}{'measured':>12}{'computed':>12}{'deviation':>12}"]
+        lines += [f"{s:10.4g}{m:12.4g}{c:12.4g}{d:+11.1f} %" + (f"   {a:.3g} off the computed section" * bool(
+            a > _FAR * c)) for s, m, c, d, a in zip(self.length, self.measured, self.computed, self.deviation_percent,
+                                                    self.away)]
+        worst = int(np.abs(self.deviation_percent).argmax())
+        return "\n".join([*lines, f"mean {self.mean_percent:+.1f} %, root mean square {self.rms_percent:.1f} %, largest"
+                                  f" {self.deviation_percent[worst]:+.1f} % at length {self.length[worst]:.4g}"])
+
+    __repr__ = __str__
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw measured and computed walls, and the deviation in %, over the length; returns two matplotlib axes.
+
+        Args:
+            axes: a pair of them; default a new figure.
+        """
+        if axes is None:
+            from ...figures import figure
+            axes = figure(2, width=5)[1]
+        wall, off = axes
+        order = np.argsort(self.length)
+        wall.plot(self.length[order], self.computed[order], "-", label="computed")
+        wall.plot(self.length, self.measured, "ko", ms=4, label="measured")
+        wall.set(xlabel="length from the axis", ylabel="wall", ylim=(0, None))
+        wall.legend()
+        off.axhline(0, color="0.6", linewidth=1)
+        off.plot(self.length[order], self.deviation_percent[order], "o-", ms=4)
+        off.set(xlabel="length from the axis", ylabel="deviation, %")
+        return axes
+
+    def to_csv(self, file: Any) -> FilePath:
+        """Write the table (rank 0 writes); returns where it is."""
+        columns: Mapping[str, np.ndarray] = {
+            "length": self.length, "reference_length": self.reference_length, "measured": self.measured,
+            "computed": self.computed, "deviation_percent": self.deviation_percent, "away": self.away}
+
+        def write(stream: Any) -> None:
+            out = csv.writer(stream)
+            out.writerow(columns)
+            out.writerows(zip(*(values.tolist() for values in columns.values())))
+        path = place("to_csv: file", file)
+        files.on_root(self._comm, lambda: files.replace(path, write))
+        return path
