@@ -330,7 +330,7 @@ def test_points_that_arrive_cost_few_iterations_and_change_no_state(friction, cl
     (Fewer iterations make other steps, which with friction decide by so much where points slide.)
     """
     settled = form(cup(friction), 15.0)
-    monkeypatch.setattr(Increment, "arrivals", property(lambda increment: np.zeros(len(increment.active), dtype=bool)))
+    monkeypatch.setattr(Increment, "arrivals", property(lambda increment: np.zeros(len(increment.status), dtype=bool)))
     plain = form(cup(friction), 15.0)
     assert settled.counts.iterations < 0.8 * plain.counts.iterations
     np.testing.assert_allclose(settled.profile().thickness, plain.profile().thickness, rtol=close)

@@ -12,8 +12,9 @@ from without import run_without
 import formingx as fx
 from formingx.contact.step_limit import Way
 from formingx.extensions.contact_events.event_sequence import ContactEventSequence, _Piece
-from formingx.extensions.contact_events.reduced_contact import FREE, STICKS, Near, Points
+from formingx.extensions.contact_events.reduced_contact import Near, Points
 from formingx.extensions.contact_events.response import Response
+from formingx.physics.contact_law import ContactStatus
 
 tools = fx.tools
 WITHOUT = """
@@ -107,10 +108,10 @@ def test_sliding_points_move_as_in_the_tangent():
 
 @pytest.mark.parametrize("before, force, moves, after, rate", [
     (1, (1.0, 0.3), (0.0, 1.0), 1, (0.0, 0.0)),             # slides on
-    (1, (1.0, 0.3), (0.0, -1.0), STICKS, (0.0, -1.0)),      # turns back
-    (STICKS, (1.0, 0.3), (0.0, 1.0), 1, (0.0, 0.0)),        # is at the limit of friction
-    (STICKS, (1.0, 0.3), (0.0, -1.0), STICKS, (0.0, -1.0)),
-    (STICKS, (0.0, 0.0), (-1.0, 0.0), FREE, (0.0, 0.0))])   # goes away
+    (1, (1.0, 0.3), (0.0, -1.0), ContactStatus.STICKS, (0.0, -1.0)),      # turns back
+    (ContactStatus.STICKS, (1.0, 0.3), (0.0, 1.0), 1, (0.0, 0.0)),        # is at the limit of friction
+    (ContactStatus.STICKS, (1.0, 0.3), (0.0, -1.0), ContactStatus.STICKS, (0.0, -1.0)),
+    (ContactStatus.STICKS, (0.0, 0.0), (-1.0, 0.0), ContactStatus.FREE, (0.0, 0.0))])   # goes away
 def test_a_point_sticks_slides_or_lets_go(before, force, moves, after, rate):
     """One of unit compliance, mu = 0.3; (normal, tangential)."""
     face = SimpleNamespace(comm=MPI.COMM_SELF, points=np.zeros((1, 2)))

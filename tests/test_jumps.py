@@ -222,11 +222,12 @@ def test_a_sheet_without_friction_snaps_off_an_edge_too():
     assert path.jumps[0].measures["travel"] == pytest.approx(3.08, abs=0.05)
 
 
-def test_a_sheet_that_is_nearly_singular_comes_to_rest_after_one_snap():
-    """On a rough plug. Where it only seems to rest, it snaps again at once: 16 times, with looser viscous solutions."""
+def test_a_sheet_that_is_nearly_singular_comes_to_rest_after_two_snaps():
+    """On a rough plug, at 8.80 and 8.82 as with steps of 0.01. With looser viscous solutions it snaps 16 times."""
     made = plugs.scene(RADIUS, THICKNESS, PLUG, 0.35, fx.NeoHookean(c10=C10), "stick", (60, 2))
     path = fx.trace(made, until=fx.travel(9.5), step=fx.StepControl(target=6), progress=False)
-    assert len(path.jumps) == 1 and path.jumps[0].jump["dissipated"] > 1e-3
+    assert [state.measures["travel"] for state in path.jumps] == pytest.approx([8.80, 8.82], abs=0.005)
+    assert min(state.jump["dissipated"] for state in path.jumps) > 5e-4
 
 
 def test_what_comes_to_rest_nowhere_is_said_in_bounded_time():

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..findings import Finding, register
-from ..results.evaluate import edges, snaps, tension, volume
+from ..results.evaluate import edges, resticking, snaps, tension, volume
 
 
 @register("end")
@@ -25,9 +25,10 @@ def volumes(path: Any) -> Iterator[Finding]:
 
 @register("end")
 def contact(path: Any) -> Iterator[Finding]:
-    """Penetration that changes forces, faces in tools between contact points, edges between them; collective."""
+    """Penetration that changes forces, faces in tools between contact points, edges, points that stick again."""
     yield from path.admissibility.findings(path.last)
     yield from edges.findings(edges.coarsest(path, path.last))
+    yield from resticking.findings(resticking.furthest(path))
 
 
 @register("end")

@@ -32,6 +32,7 @@ class StepLimits:
         inaccurate: change of the pressure, over `lag`, at which a step is taken again.
         weak: smallest force of which these are parts, over shear modulus, thickness and length of a sheet.
         shortest: lengths of steps (dimensionless) that are never too long for what comes into contact.
+        mixed: the same for steps in which sticking points lift off while the gaps of others close.
     """
 
     as_good: float = 0.02
@@ -48,6 +49,7 @@ class StepLimits:
     inaccurate: float = 1.4
     weak: float = 1e-2
     shortest: float = 1e-4
+    mixed: float = 5e-4
 
 
 LIMITS = StepLimits()
@@ -176,6 +178,22 @@ class Approach:
         sums = np.array([face.rule.area @ np.where(before > 0, off, 0.0), face.rule.area @ before])
         change, pressure = self._comm.allreduce(sums, MPI.SUM)
         return float(change / (pressure + LIMITS.weak * face.force_scale))
+
+    def opens_and_closes(self, new: np.ndarray, control: float) -> bool:
+        """True if sticking points lifted off and sprang back in the step to a state while the gaps of others closed.
+
+        Positions where gaps close depend on which points still stick: a long step gets them wrong.
+        """
+        face, theta, touch = self.face, self.face.law.theta, self.face.touch
+        if touch is None or not face.contact.sticks or face.law.pulls or face.contact.lagged:
+            return False
+        x, area = face.positions(new, control), face.rule.area > 0
+        near = face.law.nearest(x)
+        distance, back = near.distance, np.abs(np.einsum("ni,ni->n", near.tangent, x - touch.position))
+        opens = area & (touch.distance > -theta) & (distance <= -theta) & (back > 0)      # not on the axis
+        closes = area & (touch.distance <= -theta - LIMITS.near * face.thickness) & (distance > -theta)
+        found = self._comm.allreduce(np.array([opens.any(), closes.any()], dtype=int), MPI.SUM)
+        return bool(np.all(found > 0))
 
     def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """True if a point's straight way from one state to another, seen from the tool, leads through the tool."""

@@ -17,7 +17,7 @@ class Increment:
         tractions(x)     for the residual, at the positions x of the points seen from the tool, shape (n, components);
         linearise(x)     at the same positions: the tangent of the iteration is that of `tractions(x)` from now on;
 
-    and then it is asked: `active`, `arrivals`, `taken`, `foretold`, and `expect` says what the next iteration is to
+    and then it is asked: `status`, `arrivals`, `taken`, `foretold`, and `expect` says what the next iteration is to
     take. Whoever accepts the state begins another increment.
 
     Args:
@@ -56,9 +56,9 @@ class Increment:
         return found.force - plain.force
 
     @property
-    def active(self) -> np.ndarray:
-        """`Tractions.active` of those last computed, shape (n,)."""
-        return self._now[1].active
+    def status(self) -> np.ndarray:
+        """`Tractions.status` of those last computed, shape (n,)."""
+        return self._now[1].status
 
     @property
     def arrivals(self) -> np.ndarray:

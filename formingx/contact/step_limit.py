@@ -97,6 +97,12 @@ class StepLimit:
         return [approach for approach in self._all if approach.face.present]
 
     @property
+    def only_sticks(self) -> bool:
+        """True if all contacts with friction stick: then sliding never ends a path, and short steps go on."""
+        rough = [approach.face for approach in self.present if approach.face.law.has_friction]
+        return bool(rough) and all(face.contact.sticks and not face.contact.lagged for face in rough)
+
+    @property
     def predicts_events(self) -> bool:
         """True if contact events ahead of a state are predicted."""
         return self._predictor is not None and self._predictor.active
@@ -143,6 +149,8 @@ class StepLimit:
         change = max([c.change_of_pressure(new.x[:n], new.control) for c in contacts], default=0.0)
         if change > LIMITS.inaccurate * LIMITS.lag and length > LIMITS.shortest:
             return Cut("the pressure that limits friction changes", LIMITS.lag / change)
+        if length > LIMITS.mixed and any([c.opens_and_closes(new.x[:n], new.control) for c in contacts]):
+            return Cut("points lift off while others come into contact", 0.5)
         if ends and length > LIMITS.shortest:
             part = min([c.touches_by(new.x[:n], new.control, new.direction[:n], new.slope, length) for c in contacts],
                        default=1.0)

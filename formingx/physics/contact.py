@@ -41,6 +41,9 @@ from .part import Part
 _STICKS = 100.0
 """Coefficients of friction from which on a point counts as one that sticks: nothing slides there."""
 
+_ROUGH = 1000.0
+"""T/N beyond which a sticking point slides that may lift off: none keeps its shear traction without pressure."""
+
 _ELASTIC_SLIP = 1e-3
 """g_s over thickness: forces hardly feel it (tests/test_compression.py), and Newton's method can still aim at it."""
 
@@ -200,8 +203,10 @@ class Contact(Part):
             return self.tool.contact_law(self, k, thickness)
         foot = (1 - _AT_FOOT * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)
-        return Law(self.tool, self.friction_at(temperature, clamped=True), k, theta, elastic_slip, shift,
-                   not self.separates, self.shear_limit)
+        mu, shear_limit = self.friction_at(temperature, clamped=True), self.shear_limit
+        if self.separates and isinstance(mu, float) and mu == math.inf:
+            mu, shear_limit = _ROUGH, None
+        return Law(self.tool, mu, k, theta, elastic_slip, shift, not self.separates, shear_limit)
 
     def __repr__(self) -> str:
         return f"Contact({self.on!r}, {self.tool!r}, {self.friction!r})"

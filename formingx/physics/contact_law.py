@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from enum import IntEnum
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol, Self
 
@@ -17,6 +18,15 @@ from ..tools.tool import PlaneTool
 
 _FAR = 1e30
 """A length beyond all others, which may still be multiplied with 0."""
+
+
+class ContactStatus(IntEnum):
+    """Status of a contact point; of a sliding one also the sense, along the tangent of the tool."""
+
+    SLIDES_BACK = -1
+    STICKS = 0
+    SLIDES = 1
+    FREE = 2
 
 
 class Touch(NamedTuple):
@@ -57,9 +67,9 @@ class Tractions:
         return self._touch()
 
     @property
-    def active(self) -> np.ndarray:
-        """What each point does: 0 is free, 4 sticks, 3 and 5 slide either way, shape (n,)."""
-        return (self.sense + 4 * (self.normal != 0)).astype(np.int8)
+    def status(self) -> np.ndarray:
+        """The `ContactStatus` of each point, shape (n,)."""
+        return np.where(self.normal != 0, self.sense, ContactStatus.FREE).astype(np.int8)
 
 
 class Motion(NamedTuple):

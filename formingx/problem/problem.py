@@ -144,7 +144,7 @@ class Problem(Histories, Units):
     @property
     def active_set(self) -> Any:
         """Which points touch and slide, of the residual last computed, the same on all ranks; hashable; None: none."""
-        status = tuple(c.increment.active.tobytes() for c in self.present)
+        status = tuple(c.increment.status.tobytes() for c in self.present)
         return tuple(self.comm.allgather(status)) if self.present else None
 
     @property

@@ -77,6 +77,11 @@ class Curve:
         """Count iterations that another has spent for it."""
         self._iterations += iterations
 
+    @property
+    def iterations(self) -> int:
+        """Newton iterations since `spent` was last asked: those of the step so far."""
+        return self._iterations
+
     def moved(self, a: State, b: State) -> float:
         """How far the body moves from a to b, in the mean (dimensionless)."""
         self._x.array_w[:] = b.x - a.x

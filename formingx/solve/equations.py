@@ -60,7 +60,7 @@ class Standing(Protocol):
 
 class Tractions(Protocol):
     """What the law of contact gives at n points: force, shape (n, 2), stress; sense of sliding, shape (n,);
-    stiffness, dforce/dposition, shape (n, 2, 2), stress/length; active: the status of each, shape (n,)."""
+    stiffness, dforce/dposition, shape (n, 2, 2), stress/length; status: `ContactStatus` of each, shape (n,)."""
 
     force: Array
     sense: Array
@@ -69,7 +69,7 @@ class Tractions(Protocol):
     def stiffness(self) -> Array: ...
 
     @property
-    def active(self) -> Array: ...
+    def status(self) -> Array: ...
 
 
 class Increment(Protocol):
@@ -80,7 +80,7 @@ class Increment(Protocol):
         """Half-width of the distances over which contact begins, length."""
 
     @property
-    def active(self) -> Array:
+    def status(self) -> Array:
         """Status of the points: hashable as bytes, shape (n,)."""
 
     @property

@@ -67,16 +67,16 @@ class LocalSolve:
     def __init__(self, problem: Equations):
         self._problem, self._contacts = problem, problem.present
         self._marked: list[Array] = []
-        self._active: list[Array] = []
+        self._status: list[Array] = []
         self.failed = 0
 
     def look(self) -> None:
         """To be called once an iteration, after the problem was linearised."""
-        now = [contact.increment.active for contact in self._contacts]
+        now = [contact.increment.status for contact in self._contacts]
         self._marked = self._marked or [contact.increment.arrivals for contact in self._contacts]
-        for mark, a, b in zip(self._marked, self._active, now):
+        for mark, a, b in zip(self._marked, self._status, now):
             mark |= a != b
-        self._active = now
+        self._status = now
 
     def correct(self, solver: DirectSolver, dx: PETSc.Vec, step: float, border: Border) -> float:
         """Make a correction (dx, in place, and step, of the control) consistent with the law; returns the step.
@@ -103,9 +103,9 @@ class LocalSolve:
     def _others(self, dx: Array, step: float) -> bool:
         """Mark more points whose status changes on the way; True if there are any."""
         found = False
-        for contact, mark, active in zip(self._contacts, self._marked, self._active):
+        for contact, mark, status in zip(self._contacts, self._marked, self._status):
             law = contact.increment.foretold(contact.moved(dx, step))
-            new = (law.active != active) & ~mark
+            new = (law.status != status) & ~mark
             mark |= new
             found |= bool(new.any())
             contact.increment.expect(mark, law.sense)

@@ -204,13 +204,12 @@ class Run:
     def _next(self, old: State) -> list[State]:
         """The next states: one at a target within reach, or one step ahead, and what lies on the way to it.
 
-        A failure halves the step. Where short ones fail, or the control has its limit, the body snaps through. (Only
-        where the shortest fails if a snap-through from near there came to rest nowhere; and from the first state, with
-        a history: slip in a step is predicted along the tangent, which at rest knows no contact yet.)
+        A failure halves the step. Where short ones fail, or the control has its limit, the body snaps through; where a
+        snap-through near there found no rest, and from a first state with a history, only if the shortest fails.
         """
         first, failed, most, limit = self.step.length, 0, np.inf, self.problem.limit
         held: float | None = None                           # a control, where shorter steps do not reduce the error
-        lengths, last = [*self.settings.snap_through.lengths, 0.0], self.settings.snap_through.lengths[-1]
+        lengths, last = [*self.settings.snap_through.lengths_for(limit), 0.0], self.settings.snap_through.lengths[-1]
         if snaps(self.curve, old, self._limit_rule, self._sense):
             return self._snap(old)
         self._way = Way(old.x, old.control, old.direction, old.slope, 0.0, limit and limit.predict(self.curve, old))
@@ -277,7 +276,8 @@ class Run:
             new.met = target
         cut = limit and limit.check(old, new, reach, ends=True)
         if cut:
-            raise Cutback(cut.why, max(cut.part, 0.1)) if cut.part else _Astray(cut.why, [])
+            part = min(max(cut.part, 0.1), self.settings.snap_through.most_of_step(self.curve.iterations))
+            raise Cutback(cut.why, part) if cut.part else _Astray(cut.why, [])
         if self._limit_rule == "snap_through" and (new.control - old.control) * self._sense < 0 < old.slope * new.slope:
             raise Failure("the path turns back here", [])
         if was_passed(self.curve, self.states[:-1], old, new):

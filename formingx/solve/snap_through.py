@@ -13,6 +13,7 @@ not; where it is 0 the body is at rest. What is out of balance on the way does w
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -24,6 +25,8 @@ from .arc_length import Curve
 from .equations import Array, Equations, Viscosity
 from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
 from .state import State
+
+log = logging.getLogger("formingx")
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,8 @@ class SnapThrough:
             within bounds. again: how many times as far the first may move it, or it is made again with more viscosity.
         solutions, too_far: viscous solutions, and a distance, after which the body counts as never coming to rest.
             (Where a sheet is drawn over an edge point by point hundreds of short ones are needed.)
+        iterations: Newton iterations of one step, failed tries and jumps included, after which it tries no jump and
+            halves its length.
         near_rest: viscous forces below which the state at rest is looked for.
         sweeps: solutions in which a body lets go of a tool in space.
         at_rest: viscous forces below which the body rests, though where a point is at a kink of its law of friction the
@@ -73,10 +78,19 @@ class SnapThrough:
     share: float = 0.1
     again: float = 3.0
     solutions: int = 1000
+    iterations: int = 5000
     too_far: float = 10.0
     near_rest: float = 1e-3
     at_rest: float = 1e-10
     sweeps: int = 30
+
+    def lengths_for(self, limit: StepLimit | None) -> tuple[float, ...]:
+        """Return `lengths`; the last alone where contacts with friction stick, for there shorter steps succeed."""
+        return self.lengths[-1:] if limit and limit.only_sticks else self.lengths
+
+    def most_of_step(self, iterations: int) -> float:
+        """Return the largest part of a step that is tried next, after so many Newton iterations of it."""
+        return 0.5 if iterations > self.iterations else 1.0
 
 
 class NoEquilibrium(Failure):
@@ -229,6 +243,9 @@ def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: Sna
     eta, solutions = settings.eta, solutions or settings.solutions
     try:
         while motion.solved < solutions and motion.goes_on(eta):
+            if curve.iterations > settings.iterations:
+                log.info("no jump within %d Newton iterations of this step: shorter steps are tried", curve.iterations)
+                raise Failure(f"a jump took more than {settings.iterations} Newton iterations", [])
             told()
             state = motion.end() if motion.settles else None
             if state is not None:

@@ -17,7 +17,8 @@ import numpy as np
 from mpi4py import MPI
 
 from ...contact.approach import gap_closures
-from .reduced_contact import FREE, STICKS, Points
+from ...physics.contact_law import ContactStatus
+from .reduced_contact import Points
 from .response import Response
 
 
@@ -37,6 +38,8 @@ class EventSettings:
         soon: part of a step within which two points arrive together.
         earlier: at most so many points turn out to have arrived before the one that is looked at.
         late: part of the way to an arrival by which an iteration may move it: beyond, where it is is not known.
+        work: iterations to equilibrium and changes of direction, in all, for the events of one step. With more, the
+            step takes one gap closure.
     """
 
     iterations: int = 8
@@ -49,6 +52,7 @@ class EventSettings:
     soon: float = 0.02
     earlier: int = 3
     late: float = 1.0
+    work: int = 200
 
 
 _SETTINGS = EventSettings()
@@ -107,7 +111,7 @@ class _Piece(NamedTuple):
         none = np.zeros((more, self.force.shape[1]))
         grown = {name: np.concatenate([getattr(self, name), none])
                  for name in ("place", "force", "rate", "extra", "growth")}
-        return self._replace(status=np.append(self.status, np.full(more, FREE)), **grown)
+        return self._replace(status=np.append(self.status, np.full(more, ContactStatus.FREE)), **grown)
 
 
 class ContactEventSequence:
@@ -138,15 +142,20 @@ class ContactEventSequence:
         self._pieces = [_Piece(0.0, start, self._along, np.zeros(0, dtype=int), none, none, none, none, none,
                                (np.zeros(len(x)), 0.0))]
         self._end: _Piece | None = None                     # of the last piece, in equilibrium
-        self._taken = 0                                     # arrivals that are held
+        self._taken = self._work = 0                        # arrivals that are held; see `EventSettings.work`
         self.ends, self.stops = np.inf, False
         if not self._take_over():
             self._pieces, self.ends = self._pieces[:1], 0.0
 
+    @property
+    def exhausted(self) -> bool:
+        """True if the events of this step took all the work that they may."""
+        return self._work >= _SETTINGS.work
+
     def next(self, k: int, length: float) -> GapClosure | None:
         """The arrival number k (from 0) within a length, or None; those before it are held."""
         while len(self._closures) <= k:
-            if self.ends < np.inf:
+            if self.ends < np.inf or self.exhausted:
                 return None
             if self._taken < len(self._closures) and not self._hold(length):
                 self.ends = self._closures[-1].time
@@ -167,7 +176,7 @@ class ContactEventSequence:
                 times[arrival.face][arrival.point] = arrival.time
                 at[arrival.face][arrival.point] = arrival.place
         sure = [np.zeros(len(x), dtype=bool) for x in at]
-        self._points.spread(piece.of(len(self._points.who)).status != FREE, sure)
+        self._points.spread(piece.of(len(self._points.who)).status != ContactStatus.FREE, sure)
         return times, at, sure
 
     def positions(self, length: float) -> list[np.ndarray]:
@@ -229,17 +238,18 @@ class ContactEventSequence:
     def _turn(self, piece: _Piece, status: np.ndarray) -> bool:
         """The piece of path that goes on from where one begins, with other statuses; False: it cannot be told."""
         points, near = self._points, self._points.near(piece.at, piece.force)
+        self._work += 1
         found = points.rates(points.at(self._along), status, near, piece.force)
         if found is None:
             return False
         rate, growth, status = found
-        stuck = (status == STICKS) & (np.abs(piece.status) == 1)
+        stuck = (status == ContactStatus.STICKS) & (np.abs(piece.status) == 1)
         slip = (piece.status * points.elastic_slip)[:, None] * near.tangent
         piece = piece._replace(
             place=np.where(stuck[:, None], self._points.at(piece.at) - slip, piece.place), status=status, rate=rate,
-            growth=growth, force=np.where((status == FREE)[:, None], 0.0, piece.force),
+            growth=growth, force=np.where((status == ContactStatus.FREE)[:, None], 0.0, piece.force),
             speed=[w - points.moved_by(growth, f) for f, w in enumerate(self._along)])
-        points.spread(status == FREE, self._free)
+        points.spread(status == ContactStatus.FREE, self._free)
         self._pieces.append(piece)
         return True
 
@@ -252,7 +262,7 @@ class ContactEventSequence:
         end, k = end.of(len(self._points.who)), self._points.who.index(arrival.who)
         status, place = end.status.copy(), end.place.copy()
         slips = self._points.at(last.speed)[k] @ self._points.near(end.at, end.force).tangent[k]
-        status[k] = STICKS if self._points.friction[k] == np.inf else -1 if slips < 0 else 1
+        status[k] = ContactStatus.STICKS if self._points.friction[k] == np.inf else -1 if slips < 0 else 1
         place[k] = arrival.place
         return self._turn(end._replace(status=status, place=place), status)
 
@@ -260,7 +270,7 @@ class ContactEventSequence:
         """The next arrival within a length, on the last piece or off its end."""
         for _ in range(_SETTINGS.changes):
             last = self._pieces[-1]
-            if last.begins >= length:
+            if last.begins >= length or self.exhausted:
                 return False
             times = [gap_closures(face.law, x, w, free, length - last.begins)
                      for face, x, w, free in zip(self._faces, last.at, last.speed, self._free)]
@@ -312,7 +322,7 @@ class ContactEventSequence:
             return True
         tried: list[tuple[_Piece, _Piece]] = []
         for _ in range(_SETTINGS.iterations * _SETTINGS.earlier):
-            if len(tried) == _SETTINGS.iterations:
+            if len(tried) == _SETTINGS.iterations or self.exhausted:
                 return False
             arrival, moved = self._closures[-1], self._moved(arrival.time, end)
             if moved is None:
@@ -377,6 +387,7 @@ class ContactEventSequence:
         """A piece of path, from a time on, moved by an iteration towards equilibrium there; None: no factors."""
         piece, points = piece.of(len(self._points.who)).after(time), self._points
         x, control, direction, slope = self._way
+        self._work += 1
         forces = [np.full(at.shape, np.nan) for at in piece.at]
         for given, free in zip(forces, self._free):
             given[free] = 0.0                               # what has not arrived yet touches nothing

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ from ...contact.approach import LIMITS, Approach
 from ...contact.step_limit import StepLimit
 from .event_sequence import ContactEventSequence
 from .response import Response
+
+log = logging.getLogger("formingx")
 
 SHARE = 0.05
 """Of the points of a face, that close their gaps in one step at most."""
@@ -84,6 +87,9 @@ class ContactEventPrediction:
             if not allowed[closure.face]:
                 return min(LIMITS.beyond * closure.time, length)
         else:
+            return None
+        if sequence.exhausted:
+            log.info("the contact events of this step took too many iterations: it takes one gap closure")
             return None
         if sequence.stops or sequence.ends <= LIMITS.as_good * length:
             return None

@@ -19,13 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
+from ...physics.contact_law import ContactStatus
 from .response import Response
-
-STICKS = 0
-"""Status of a point that sticks; 1 and -1: it slides that way along the tangent of its tool."""
-
-FREE = 2
-"""Status of a point that touches nothing."""
 
 
 @dataclass(frozen=True)
@@ -176,7 +171,7 @@ class Points:
         slips = np.divide(self.elastic_slip, mu * N, out=np.zeros(len(N)), where=mu * N > 0)
         try:
             small = self._small(u + (self._C @ force.ravel()).reshape(u.shape), near,
-                                force * (status != FREE)[:, None])
+                                force * (status != ContactStatus.FREE)[:, None])
             F, dx = self._solved(small, status, near, to, slips)
         except np.linalg.LinAlgError:
             return force, np.full(force.shape, np.nan)
@@ -188,13 +183,13 @@ class Points:
 
         status: as before, of which those that disagree with what they lead to are changed.
         """
-        (N, T), here = self.parts(force, near), status != FREE
+        (N, T), here = self.parts(force, near), status != ContactStatus.FREE
         try:
             small = self._small(u, near, force)
         except np.linalg.LinAlgError:
             return None
         slack = here & (np.abs(N).max(initial=0.0) * _AGREEMENT.limit >= N) & ~self._pulls
-        for begin in (status, np.where(slack, FREE, status)):
+        for begin in (status, np.where(slack, ContactStatus.FREE, status)):
             found = self._agreed(small, begin.copy(), near, N, T, here)
             if found is not None:
                 F, dx, status = found
@@ -213,22 +208,23 @@ class Points:
                 return None
             if not np.isfinite(F).all():
                 return None
-            (dN, dT), (into, along), held = self.parts(F, near), self.parts(dx, near), status != FREE
+            (dN, dT), (into, along), held = self.parts(F, near), self.parts(dx, near), status != ContactStatus.FREE
             none = _AGREEMENT.limit * (np.abs(N).max() + _AGREEMENT.soon * np.abs(dN).max())
             other, miss = status.copy(), np.zeros(len(N))
-            slides = held & (status != STICKS) & (mu > 0)
+            slides = held & (status != ContactStatus.STICKS) & (mu > 0)
             turns = slides & (status * along < -_AGREEMENT.none * np.abs(along).max())
-            other[turns], miss[turns] = STICKS, np.abs(along[turns])
+            other[turns], miss[turns] = ContactStatus.STICKS, np.abs(along[turns])
             most = mu * ((1 - _AGREEMENT.limit) * N - none)
-            full = held & (status == STICKS) & (self.friction < np.inf) & (np.abs(T) >= most)
+            full = held & (status == ContactStatus.STICKS) & (self.friction < np.inf) & (np.abs(T) >= most)
             sense = np.where(np.abs(T) > mu * none, np.sign(T), np.sign(dT))
             over = sense * dT - mu * dN
             gives = full & (over > _AGREEMENT.none * np.abs(dT).max())
             other[gives], miss[gives] = sense[gives], (over * gives_way)[gives]
             lets = held & ~self._pulls & (none >= N) & (dN < 0)
-            other[lets], miss[lets] = FREE, -(dN * gives_way)[lets]
+            other[lets], miss[lets] = ContactStatus.FREE, -(dN * gives_way)[lets]
             comes = here & ~held & (into > 0)
-            other[comes] = np.where(self.friction[comes] < np.inf, np.where(along[comes] < 0, -1, 1), STICKS)
+            sense = np.where(along[comes] < 0, ContactStatus.SLIDES_BACK, ContactStatus.SLIDES)
+            other[comes] = np.where(self.friction[comes] < np.inf, sense, ContactStatus.STICKS)
             miss[comes] = into[comes]
             changes = np.flatnonzero(other != status)
             if not len(changes):
@@ -241,13 +237,13 @@ class Points:
 
     def change(self, status: np.ndarray, near: Near, force: np.ndarray, rate: np.ndarray) -> tuple[float, np.ndarray]:
         """Arc length to where the first point lets go or slides, and statuses then."""
-        (N, T), (dN, dT), held = self.parts(force, near), self.parts(rate, near), status != FREE
+        (N, T), (dN, dT), held = self.parts(force, near), self.parts(rate, near), status != ContactStatus.FREE
         none = _AGREEMENT.limit * max(np.abs(N).max(initial=0.0), 1e-30)
         times, other = np.full(len(status), np.inf), status.copy()
         lets = held & ~self._pulls & (dN < 0) & (none < N)
-        times[lets], other[lets] = -N[lets] / dN[lets], FREE
+        times[lets], other[lets] = -N[lets] / dN[lets], ContactStatus.FREE
         for sense in (1, -1):
-            k = np.flatnonzero(held & (status == STICKS) & (self.friction < np.inf))
+            k = np.flatnonzero(held & (status == ContactStatus.STICKS) & (self.friction < np.inf))
             mu = self.friction[k]
             left, grows = mu * N[k] - sense * T[k], sense * dT[k] - mu * dN[k]
             slips = (grows > 0) & (left > _AGREEMENT.limit * mu * np.abs(N[k]))
@@ -275,8 +271,8 @@ class Points:
                 to: np.ndarray | None = None, slips: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Forces (or, without `to`, their rates) and motions, shape (m, 2); slips: elastic, of those that stick."""
         free, by, turn = small
-        size, held = len(free), status != FREE
-        sticks = np.flatnonzero(held & (status == STICKS) & (self.friction > 0))
+        size, held = len(free), status != ContactStatus.FREE
+        sticks = np.flatnonzero(held & (status == ContactStatus.STICKS) & (self.friction > 0))
         slides = np.setdiff1d(np.flatnonzero(held), sticks)
         rows, columns, wanted, c = [], [], [], self._components
         for way in (near.normal, near.tangent):

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...physics.contact_law import Motion, Touch, Tractions, outer
+from ...physics.contact_law import ContactStatus, Motion, Touch, Tractions, outer
 from .lagged_stick import SMALL_GAP, LaggedStick
 
 _LEAST = 0.1               # pressure that limits friction, over the pressure at the last state, at least
@@ -158,8 +158,9 @@ class _Tractions(Tractions):
     """`Tractions` whose `sense` is the angle of sliding in the tangent plane, 0 of what does not slide."""
 
     @property
-    def active(self) -> np.ndarray:
-        return ((self.sense != 0) + 4 * (self.normal != 0)).astype(np.int8)
+    def status(self) -> np.ndarray:
+        touching = np.where(self.sense != 0, ContactStatus.SLIDES, ContactStatus.STICKS)
+        return np.where(self.normal != 0, touching, ContactStatus.FREE).astype(np.int8)
 
 
 def _basis(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,78 @@
+"""Sticking points that lift off and touch their tool again elsewhere: walls between them depend on the steps."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...findings import Finding
+from ...ranks import gathered
+
+_WALL = 3e-3
+"""Change of the wall, over the wall, that steps may cause without a finding."""
+
+_LARGE = 0.1
+"""The same, from which its size is not told: neighbours move, too."""
+
+
+class Resticking(NamedTuple):
+    """The contact point that moved most along its tool while it was open between two closures.
+
+    Attributes:
+        tool: its name, or the face that touches it.
+        points: number of points that closed their gaps again.
+        shift: distance between positions of sticking, summed over the run, over the length of face of the point.
+        point: its reference position, shape (2,), length.
+    """
+
+    tool: str
+    points: int
+    shift: float
+    point: tuple[float, float]
+
+
+def furthest(path: Any) -> Resticking | None:
+    """Return the point of a run that stuck again furthest from where it stuck before, or None; collective.
+
+    A point that sticks again elsewhere changes the stretch beside it by `shift`. Whether it lifts off may depend on
+    small changes of the forces, so this is also the size of the error by the steps.
+    """
+    found = []
+    for number, contact in enumerate(path.problem.histories):
+        definition = getattr(contact, "contact", None)
+        if definition is None or definition.lagged or not (definition.sticks and definition.separates):
+            continue
+        touches = [state.memory[number].touch for state in path.states
+                   if len(state.memory) > number and state.memory[number] is not None]
+        rows = gathered(contact.comm, np.column_stack([contact.points, *_shifts(contact, touches)]))
+        again = rows[rows[:, 2] > 0]
+        if len(again):
+            r, z, shift = again[np.argmax(again[:, 2])]
+            found.append(Resticking(definition.name or definition.on, len(again), float(shift), (float(r), float(z))))
+    return max(found, key=lambda item: item.shift, default=None)
+
+
+def _shifts(contact: Any, touches: list[Any]) -> list[np.ndarray]:
+    """Return the shift of each own point over its length of face, shape (n,), in a list."""
+    last, total = np.full(contact.points.shape, np.nan), np.zeros(len(contact.points))
+    stuck = np.zeros(len(total), dtype=bool)
+    for touch in touches:
+        if len(touch.distance) != len(total):               # of another mesh
+            continue
+        touching = touch.distance > -contact.law.theta
+        again = touching & ~stuck & ~np.isnan(last[:, 0])
+        total[again] += np.linalg.norm(touch.position[again] - last[again], axis=1)
+        last[touching], stuck = touch.position[touching], touching
+    return [np.divide(total, contact.rule.lengths, out=np.zeros(len(total)), where=contact.rule.lengths > 0)]
+
+
+def findings(item: Resticking | None) -> list[Finding]:
+    """Return the finding on points that stick again elsewhere."""
+    if item is None or item.shift < _WALL:
+        return []
+    size = f"by up to {100 * item.shift:.2g} %" if item.shift < _LARGE else f"by {100 * _LARGE:.0f} % or more"
+    count = f"{item.points} points that stuck" if item.points > 1 else "A point that stuck"
+    return [Finding("warning", item.tool, f"{count} to {item.tool!r} lifted off and stuck again elsewhere, most near"
+                    f" R = {item.point[0]:.5g}: walls near there depend on the steps, {size}. Compare"
+                    f" StepControl(target=4) and StepControl(target=8).")]
