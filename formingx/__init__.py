@@ -106,7 +106,7 @@ with _optional():
     from .extensions.compare.compare_nodes import NodalComparison, compare_nodes, write_nodes
     from .extensions.compare.measured_wall import MeasuredWall, WallComparison
 with _optional():
-    from .extensions.study.study import Study, StudyRun, study
+    from .extensions.study import Study, StudyRun, study
 with _optional():
     from .extensions.design.design import Design
     from .extensions.design.parameters import spline

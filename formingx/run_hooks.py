@@ -49,6 +49,9 @@ class MeshAdaptation(Protocol):
         """Return the adapted mesh; raise an InputError for an unknown option."""
 
 
+dry_runs: dict[str, Callable[..., None]] = {}
+"""Functions that call the user's code once without a run, by the public name that each replaces (`fx.check`)."""
+
 _adaptation: list[MeshAdaptation] = []
 
 

@@ -1,5 +1,6 @@
 """A script looked over before it runs: executed up to its first run, whose scene and targets `check` looks at."""
 
+import inspect
 import os
 import runpy
 import sys
@@ -10,10 +11,9 @@ from typing import Any
 
 import formingx
 
+from .. import runs
 from ..errors import InputError, place
-from ..extensions.design import design as designs
-from ..extensions.study.study import design
-from ..runs import Process
+from ..run_hooks import dry_runs
 from .check import Report, check
 
 
@@ -69,17 +69,18 @@ def _no_runs() -> Iterator[None]:
     def solve(scene, **_):
         raise _Looked(check(scene))
 
-    def study(build, variables, *_, **__):
-        build(**design(variables)[0])
-
     def run(process, stages, **_):
         raise _Looked(check(process.scene, stages=stages))
-    others: list[Any] = [(formingx, trace), (designs, trace), (formingx, solve), (formingx, study), (Process, run)]
-    kept = [getattr(owner, other.__name__) for owner, other in others]
+    inner = inspect.unwrap(formingx.trace)                  # as modules of the package know it
+    tracing = [module for name, module in list(sys.modules.items())
+               if name.partition(".")[0] == "formingx" and inspect.unwrap(getattr(module, "trace", len)) is inner]
+    others: list[Any] = [*((module, "trace", trace) for module in tracing), (formingx, "solve", solve),
+                         (runs.Process, "run", run), *((formingx, name, other) for name, other in dry_runs.items())]
+    kept = [getattr(owner, name) for owner, name, _ in others]
     try:
-        for owner, other in others:
-            setattr(owner, other.__name__, other)
+        for owner, name, other in others:
+            setattr(owner, name, other)
         yield
     finally:
-        for (owner, other), original in zip(others, kept):
-            setattr(owner, other.__name__, original)
+        for (owner, name, _), original in zip(others, kept):
+            setattr(owner, name, original)
