@@ -1,6 +1,7 @@
 """Temperatures on any mesh: layers below faces that heat passes, and what is said of the error in space."""
 
 import logging
+import re
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from dolfinx import fem
 
 import formingx as fx
 from formingx.exact import heat as reference
+from formingx.extensions.heat import checks
 from formingx.extensions.heat import run as running
 from formingx.extensions.heat.layers import layered
 from formingx.mesh.grid import gathered
@@ -120,3 +122,34 @@ if mesh.comm.rank == 0:
 def test_ranks_agree():
     one, three = (run_json("import sys; sys.path.insert(0, 'tests')" + RANKS, ranks) for ranks in (1, 3))
     assert three == pytest.approx(one, rel=1e-7)
+
+
+def chilled_from_below(layers, biot):
+    """A sheet of equal layers that is 130 degrees above the air below it; conductivity 0.2, wall 1e-3."""
+    polymer = fx.ThermalProperties(conductivity=0.2, density=1000.0, heat_capacity=2000.0)
+    return fx.Scene(mesh=fx.mesh.disc(radius=4e-3, thickness=1e-3, elements=(4, layers)),
+                    materials=fx.NeoHookean(c10=1e5), temperature=150.0,
+                    heat=fx.Cooling(polymer, [fx.Convection("bottom", h=biot * 200.0, air=20.0)], unit="C"),
+                    supports=[fx.Symmetry("axis"), fx.Symmetry("top", normal="z"),
+                              fx.Displaced("rim", "r", name="grip")])
+
+
+@pytest.mark.parametrize("layers, biot", [(1, 0.5), (2, 0.5), (1, 5.0), (2, 5.0), (4, 50.0), (8, 50.0), (4, 1e4)])
+def test_error_of_few_layers(layers, biot):
+    """The check's error of a chilled sheet is the measured one, within a factor of 2.5."""
+    wall_time = 1e-6 / 1e-7
+    path = fx.Process(chilled_from_below(layers, biot)).run([fx.Stage("chill", duration=0.3 * wall_time)],
+                                                            progress=False)
+    late = [state for state in path.states if state.time >= 0.01 * wall_time]
+    error = path.problem.histories[-1].errors_in_space(late).max() / 130
+    assert 1 / 2.5 < error / checks.error_of_layers(layers, biot) < 2.5
+
+
+def test_coarse_layers_are_found():
+    """With one layer the check asks for five, and with these it finds nothing."""
+    said = [f for f in fx.check(chilled_from_below(1, 50.0)).findings if "layers" in f.text]
+    assert [f.about for f in said] == ["boundary 'bottom'"] and "use 5 layers" in said[0].text
+    assert checks.layers_needed(50.0) == 5 and checks.layers_needed(0.1) == 1
+    assert not [f for f in fx.check(chilled_from_below(5, 50.0)).findings if "layers" in f.text]
+    sizes = [float(size) for size in re.search(r"\(n, \[(.*?)\]\)", said[0].text)[1].split(",")]
+    assert sizes == sorted(sizes) and sizes[0] / sum(sizes) == pytest.approx(1 / 5, abs=0.05)

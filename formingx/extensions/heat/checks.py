@@ -11,9 +11,68 @@ from ...materials.constants import OfTemperature
 from ...materials.solidification import Solidification
 from ...values.temperature import FunctionOfTemperature
 from .cooling import CoolingHistory
+from .layers import graded, height_at
+from .run import checked_materials
 
 _FROZEN = ", where the material does not relax any more: give Sets or a modulus that rises, if it turns into glass"
 _RISES = 2.0               # modulus of the coldest over the modulus of the hottest body
+
+
+_ALLOWED = 0.01
+"""Error of the temperature in space, over the span of temperatures, that the check tells of."""
+_ONE_LAYER = 0.14
+"""Error over the span of temperatures with one layer of elements, its face at another temperature at once. This and the
+next two are measured with one to eight equal layers, after a hundredth of wall^2/diffusivity: see
+tests/test_heat_layers.py.
+"""
+_ORDER = 1.75
+"""Order of the error in the number of layers."""
+_WEAK = 2.0
+"""Biot number, conductance times wall over conductivity, at which the error is half as large."""
+
+
+def error_of_layers(layers: float, biot: float) -> float:
+    """Return the error of the temperature in a chilled sheet, over its span, soon after the face is chilled.
+
+    Args:
+        layers: wall over the thickness of the elements at the face. biot: conductance times wall over conductivity.
+    """
+    return _ONE_LAYER * _share(biot) * layers ** -_ORDER
+
+
+def layers_needed(biot: float) -> int:
+    """Return the number of equal layers of elements for which `error_of_layers` is 1 %."""
+    return max(1, int(np.ceil((_ONE_LAYER * _share(biot) / _ALLOWED) ** (1 / _ORDER))))
+
+
+def _share(biot: float) -> float:
+    return 1.0 if np.isinf(biot) else biot / (biot + _WEAK)
+
+
+@register("scene")
+def coarse_layers(body: Any) -> Iterator[Finding]:
+    """Too few layers of elements through a sheet that is chilled at a face."""
+    scene = body.scene
+    if scene.heat is None:
+        return
+    conductivity = min(m.conductivity for m in checked_materials(scene.mesh, scene.heat.materials).values())
+    found = []
+    for face, conductance in sorted(scene.heat.conductances(scene).items()):
+        height, biot = height_at(scene.mesh, face), conductance * body.thickness / conductivity
+        layers, needed = body.thickness / height, layers_needed(biot)
+        if layers < 0.99 * needed:                          # round-off
+            found.append((error_of_layers(layers, biot), face, height, needed))
+    if not found:
+        return
+    error, face, height, needed = max(found)
+    such = ""
+    if face in ("bottom", "top"):
+        sizes = graded(scene.mesh, [face], body.thickness / needed / height, np.inf)
+        such = f", such as elements=(n, {[float(f'{size:.2g}') for size in sizes]}), from the bottom up"
+    yield Finding("warning", f"boundary {face!r}",
+                  f"it is chilled, and the elements along it are {height:.3g} thick, in a wall of {body.thickness:.3g}:"
+                  f" temperatures will be off by about {100 * error:.2g} % of their span: use {needed} layers of equal"
+                  f" elements, or thin ones at this face{such}")
 
 
 @register("scene")

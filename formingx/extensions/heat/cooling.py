@@ -140,6 +140,16 @@ class Cooling:
         ends = scene.mesh.comm.allgather((first.min(initial=np.inf), first.max(initial=-np.inf)))
         return _extremes([*np.ravel(ends)], [*self.boundaries, *self._touches(scene)])
 
+    def conductances(self, scene: Any) -> dict[str, float]:
+        """Return {boundary: the largest conductance of its laws}, heat per time, area and degree; inf: a fixed one."""
+        found: dict[str, float] = {}
+        for law in [*self.boundaries, *self._touches(scene)]:
+            given = np.inf if isinstance(law, FixedTemperature) else getattr(law, "conductance", None) or getattr(
+                law, "parameters", {}).get("h", 0.0)
+            value = float(np.max(given.y)) if isinstance(given, Table) else float(given)
+            found[law.on] = max(value, found.get(law.on, 0.0))
+        return {on: value for on, value in found.items() if value}
+
     def conducts(self, contact: Any) -> bool:
         """True if heat flows through a contact of the scene."""
         return contact.name in self.tools

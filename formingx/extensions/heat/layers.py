@@ -45,18 +45,26 @@ def graded(mesh: Mesh, faces: Sequence[str], part: float, depth: float) -> list[
     """Relative sizes of layers from the bottom up, each 1.26 times the next one towards the faces (of "bottom", "top"),
     where they are `part` as thick as elements are now, and of the depth that heat has gone; collective."""
     grid = gathered(mesh)
-    triangles = np.concatenate([rows[:, :3] for rows in grid.layers.values()])
-    double = np.abs(np.linalg.det(grid.points[triangles[:, 1:]] - grid.points[triangles[:, :1]]))
-    thinnest, longest = _PART * depth, 0.0
-    for face in faces:
-        ends = grid.boundaries[face][:, :2]
-        length = np.hypot(*(grid.points[ends[:, 1]] - grid.points[ends[:, 0]]).T)
-        below = [np.flatnonzero(np.isin(triangles, edge).sum(1) == 2)[0] for edge in ends]
-        thinnest = min(thinnest, part * float(np.median(double[below] / length)))
-        longest = max(longest, float(length.sum()))
-    n = int(np.ceil(3 * np.log2((2 ** (1 / 3) - 1) * double.sum() / 2 / longest / len(faces) / thinnest + 1)))
+    heights, lengths, area = zip(*(_along(grid, face) for face in faces))
+    thinnest, longest = min([_PART * depth, *(part * height for height in heights)]), max(lengths)
+    n = int(np.ceil(3 * np.log2((2 ** (1 / 3) - 1) * area[0] / longest / len(faces) / thinnest + 1)))
     sizes = [2 ** (k / 3) for k in range(n)]
     return sizes + sizes[::-1] if len(faces) > 1 else sizes if "bottom" in faces else sizes[::-1]
+
+
+def height_at(mesh: Mesh, face: str) -> float:
+    """Return the median height of the elements along a boundary, length; collective."""
+    return _along(gathered(mesh), face)[0]
+
+
+def _along(grid: Grid, face: str) -> tuple[float, float, float]:
+    """Median height of the elements along a boundary, its length, and the area of the mesh."""
+    triangles = np.concatenate([rows[:, :3] for rows in grid.layers.values()])
+    double = np.abs(np.linalg.det(grid.points[triangles[:, 1:]] - grid.points[triangles[:, :1]]))
+    ends = grid.boundaries[face][:, :2]
+    length = np.hypot(*(grid.points[ends[:, 1]] - grid.points[ends[:, 0]]).T)
+    below = [np.flatnonzero(np.isin(triangles, edge).sum(1) == 2)[0] for edge in ends]
+    return float(np.median(double[below] / length)), float(length.sum()), float(double.sum() / 2)
 
 
 def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
