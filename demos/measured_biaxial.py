@@ -20,7 +20,7 @@ DATA = Path(__file__).parent / "data"
 RUBBERS = {"James 1975": "james_1975.csv", "Kawamura 2001": "kawamura_2001.csv"}
 LAWS = {"neo-Hookean": fx.NeoHookean, "Mooney-Rivlin": fx.MooneyRivlin, "Yeoh": fx.Yeoh, "Gent": fx.Gent,
         "Arruda-Boyce": fx.ArrudaBoyce, "Ogden": fx.Ogden}
-QUICK = ("Yeoh", "Ogden")
+QUICK = ("Yeoh", "Mooney-Rivlin")
 LEAST = 0.05                                                                # of the largest stress
 
 
@@ -82,7 +82,7 @@ def main():
             say(f"  {law:20}" + "".join(f"{off[kind]['along']:17.1f}{off[kind]['across']:9.1f}" for kind in given)
                 + "   open: " + ("; ".join(f"{kind}: {', '.join(f.undetermined)}" for kind, f in fits.items()
                                            if f.undetermined) or "none"))
-    picture(args.out, best, names[1])
+    picture(args.out, best, "Mooney-Rivlin")
     summarise(args.out, summary | {"versions": files.versions()})
 
 

@@ -65,15 +65,26 @@ def test_treloar(tmp_path):
 def test_biaxial_quick(tmp_path):
     """Across the larger stretch a law of I1 from a uniaxial test is worse than along it; biaxial tests help."""
     off = summary("measured_biaxial", tmp_path, "--quick")["deviation_percent"]
-    yeoh, ogden = (off["James 1975"][law] for law in ("Yeoh", "Ogden"))
+    yeoh, mooney = (off["James 1975"][law] for law in ("Yeoh", "Mooney-Rivlin"))
     assert 10 < yeoh["uniaxial"]["along"] < 17 and 21 < yeoh["uniaxial"]["across"] < 30
-    assert ogden["biaxial"]["along"] < 2 and ogden["biaxial"]["across"] < 4
+    assert mooney["biaxial"]["along"] < 5 and mooney["biaxial"]["across"] < 9 < yeoh["biaxial"]["across"]
     kawamura = off["Kawamura 2001"]["Yeoh"]["uniaxial"]
     assert 3 < kawamura["along"] < 10 and 9 < kawamura["across"] < 21
     for rubber in off.values():
         for law in rubber.values():
             assert law["biaxial"]["across"] < law["uniaxial"]["across"]
     assert drawn(tmp_path / "measured_biaxial.png")
+
+
+@pytest.mark.slow
+def test_biaxial(tmp_path):
+    """Ogden's law misses biaxial tests of its own fit by little; of one test alone it leaves constants open."""
+    found = summary("measured_biaxial", tmp_path)
+    for rubber in ("James 1975", "Kawamura 2001"):
+        ogden = found["deviation_percent"][rubber]["Ogden"]
+        assert ogden["biaxial"]["along"] < 2.5 and ogden["biaxial"]["across"] < 6
+        assert ogden["biaxial"]["across"] < 0.2 * ogden["uniaxial"]["across"]
+        assert len(found["fitted"][rubber]["Ogden"]["uniaxial"]["undetermined"]) >= 3
 
 
 @pytest.mark.slow
@@ -86,4 +97,4 @@ def test_uncertain_wall(tmp_path):
     assert 0.85 < found["walls_inside_the_95_percent_band"] <= 1
     assert found["band"]["volume"]["deviation_percent"] == pytest.approx(2, rel=1e-4)
     page = (tmp_path / "report.html").read_text()
-    assert "How sure" in page and "contact force" in page and drawn(tmp_path / "uncertain_wall.png")
+    assert "How sure" in page and "tool force" in page and drawn(tmp_path / "uncertain_wall.png")
