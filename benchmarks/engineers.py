@@ -5,8 +5,8 @@
 Each run is a process of its own. Its row: accepted states, failed steps, Newton iterations, jumps; seconds of processor
 time while paths are followed, in all and by part (contact: laws, arrivals, local problems; tangents; LU factors;
 solves; rest), forms compiled before; what made steps shorter or fail. `--against` puts the same of another version of
-the package beside it, `--finest` the largest difference of the walls, farther than a thickness from the rim, to one
-node a step in steps of at most `LARGEST`.
+the package beside it, by that version's own copy of this script. `--finest` adds the largest difference of the walls,
+farther than a thickness from the rim, to one node a step in steps of at most `LARGEST`.
 """
 
 import argparse
@@ -219,7 +219,8 @@ def in_child(name, finest, checkout):
     """The row of one run with the package of a checkout; one that could not be made says why."""
     with tempfile.TemporaryDirectory() as place:
         file = Path(place) / "row.json"
-        command = [sys.executable, __file__, "--row", name, "--json", str(file), *["--finest"] * finest]
+        script = checkout / "benchmarks" / "engineers.py"   # of that version: names of calls and modules change
+        command = [sys.executable, str(script), "--row", name, "--json", str(file), *["--finest"] * finest]
         for _ in range(2 if not finest else 1):             # the first compiles forms
             try:
                 done = subprocess.run(command, env=os.environ | {"PYTHONPATH": str(checkout)}, capture_output=True,
