@@ -151,10 +151,10 @@ class Solidification(Material):
         return {name: value for name, value in internal.items() if name not in (_BEFORE, _LAST, _GLASS, _FRACTION)}
 
     def __repr__(self) -> str:
-        return f"Sets({self.base!r}, modulus={self.parameters['G_set']!r}, {self._phi})"
+        return f"Solidification({self.base!r}, modulus={self.parameters['G_set']!r}, {self._phi})"
 
     def __str__(self) -> str:
-        return f"Sets({self.base}, modulus={brief(self.parameters['G_set'])}, {self._phi})"
+        return f"Solidification({self.base}, modulus={brief(self.parameters['G_set'])}, {self._phi})"
 
 
 class _Fraction:

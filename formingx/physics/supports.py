@@ -174,8 +174,8 @@ class PrescribedDisplacement(_OneComponent):
         name: what it is called in a process and in its columns.
 
     >>> pulled = fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=0.4),
-    ...                   supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0), fx.PrescribedDisplacement("rim",
-    "r")])
+    ...                   supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0),
+    ...                             fx.PrescribedDisplacement("rim", "r")])
     >>> round(float(fx.solve(pulled, to=10.0)["pole_stretch"][-1]), 3)                  # to twice its width
     2.0
     """
