@@ -70,7 +70,7 @@ class Arch(Equations):
         pass
 
     @contextlib.contextmanager
-    def at(self, state):
+    def state_context(self, state):
         before = self.x.array_r.copy()
         self.x.array_w[:] = state.x
         yield self

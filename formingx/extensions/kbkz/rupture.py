@@ -35,7 +35,7 @@ def thins(failure: Any) -> Iterator[Finding]:
         return
     problem, drawn = failure.problem, None
     with problem.state_context(failure.last):
-        for past in (history for history in problem.materials if isinstance(history, PastStates)):
+        for past in (history for history in getattr(problem, "materials", ()) if isinstance(history, PastStates)):
             most = getattr(past.material, "base", past.material).rupture_stretch("equibiaxial")
             least, point = past.thinnest()
             if (stretch := least**-0.5) > max(most, drawn[0] if drawn else 0.0):
