@@ -86,7 +86,8 @@ class StepLimit:
         self._n, heat = problem.n_owned, problem.scene.heat
         self._all = [Approach(face, heat is not None and heat.conducts(face.contact)) for face in problem.contacts]
         self.several = not problem.scene.one_by_one
-        self._predictor = self.make_predictor(self) if self.make_predictor else None
+        make = type(self).make_predictor
+        self._predictor = make(self) if make else None
 
     make_predictor: ClassVar[Callable[[StepLimit], EventPredictor] | None] = None
     """Makes the predictor of a limit. An extension sets it; without one, steps end where points touch that stick."""

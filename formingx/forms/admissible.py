@@ -49,7 +49,8 @@ class Admissible:
         self._has_hoop = forms.scene.kinematics.axisymmetric
         cell = basix.CellType[domain.topology.cell_name()]
         scene = forms.scene
-        inside, self._weights = basix.make_quadrature(cell, scene.quadrature_degree)
+        rule: Any = basix.make_quadrature(cell, scene.quadrature_degree)
+        inside, self._weights = rule
         beside: Any = basix.make_quadrature(cell, scene.quadrature_degree + 1)[0]
         self._n = len(inside)
         points = np.concatenate([inside, beside, np.array(_MIDDLES[cell], dtype=float)])

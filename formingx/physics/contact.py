@@ -203,7 +203,8 @@ class Contact(Part):
             return self.tool.contact_law(self, k, thickness)
         foot = (1 - _AT_FOOT * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)
-        mu, shear_limit = self.friction_at(temperature, clamped=True), self.shear_limit
+        mu = self.friction_at(temperature, clamped=True)
+        shear_limit: Callable | None = self.shear_limit
         if self.separates and isinstance(mu, float) and mu == math.inf:
             mu, shear_limit = _ROUGH, None
         return Law(self.tool, mu, k, theta, elastic_slip, shift, not self.separates, shear_limit)

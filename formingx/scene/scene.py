@@ -273,7 +273,7 @@ class Scene:
             raise InputError("Scene: expansion: depends on the temperature: give Scene a temperature=...")
         for layer, law in laws.items():
             known("Scene: expansion: layer", layer, self.mesh.layers)
-            looked_at = sample(self.mesh, layer, self.quadrature_degree, self.temperature).temperature
+            looked_at: Any = sample(self.mesh, layer, self.quadrature_degree, self.temperature).temperature
             together(self.mesh.comm, [partial(law.stretch, looked_at)])
         return dict(laws)
 

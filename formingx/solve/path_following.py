@@ -207,12 +207,12 @@ class Run:
         A failure halves the step. Where short ones fail, or the control has its limit, the body snaps through; where a
         snap-through near there found no rest, and from a first state with a history, only if the shortest fails.
         """
-        first, failed, most, limit = self.step.length, 0, np.inf, self.problem.limit
-        held: float | None = None                           # a control, where shorter steps do not reduce the error
+        first, failed, most, limit, held = self.step.length, 0, np.inf, self.problem.limit, None
         lengths, last = [*self.settings.snap_through.lengths_for(limit), 0.0], self.settings.snap_through.lengths[-1]
         if snaps(self.curve, old, self._limit_rule, self._sense):
             return self._snap(old)
-        self._way = Way(old.x, old.control, old.direction, old.slope, 0.0, limit and limit.predict(self.curve, old))
+        events: Any = limit and limit.predict(self.curve, old)                         # type: ignore[arg-type]
+        self._way = Way(old.x, old.control, old.direction, old.slope, 0.0, events)
         while True:
             length = min(self.step.length, most)
             length = limit.length(self._way._replace(length=length)) if limit else length

@@ -91,4 +91,5 @@ def _deformation(problem: Any, terms: Any) -> tuple[np.ndarray, np.ndarray, np.n
         forms.domain))]), terms.places)
     values = where.eval(forms.domain, cells).reshape(-1, size + 1) if len(cells) else np.zeros((0, size + 1))
     volumes = values[:, size] * np.tile(np.abs(rule), len(cells))
-    return tuple(gathered(problem.comm, part) for part in (np.log(squares[:, :2]) / 2, values[:, :size], volumes))
+    comm = problem.comm
+    return gathered(comm, np.log(squares[:, :2]) / 2), gathered(comm, values[:, :size]), gathered(comm, volumes)

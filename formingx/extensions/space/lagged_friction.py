@@ -56,6 +56,8 @@ class LaggedFriction(LaggedStick):
         elastic_slip: g_s, length.
     """
 
+    tool: Any
+
     def __init__(self, tool: Any, mu: float, k: Any, theta: float, elastic_slip: float):
         super().__init__(tool, k, theta, True)
         self.mu, self.elastic_slip = mu, elastic_slip
