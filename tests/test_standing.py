@@ -31,7 +31,7 @@ def test_a_found_state_is_that_of_a_run_that_steps_there(path, target, stage):
              if a.stage == b.stage == STAGES[stage].name
              and (a.measures[target.name] - target.value) * (b.measures[target.name] - target.value) <= 0)
     last = STAGES[stage]
-    stages = [*STAGES[:stage], fx.Stage(last.name, control=last.drive, until=target, step=last.step)]
+    stages = [*STAGES[:stage], fx.Stage(last.name, control=last.control, until=target, step=last.step)]
     begun = run(path.problem.scene, *stages, start=path.states[k]).last
     assert np.abs(found.x - begun.x).max() < 1e-9 * np.abs(begun.x).max()
     for column, value in begun.measures.items():
