@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ...errors import positive
 from ...forms.outline import Outline, along
@@ -50,6 +49,7 @@ def column_factors(path: Any, share: float | None, error: float | None) -> np.nd
 def _column_of(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
     """Numbers of the columns whose middle lines, shape (rows, n, 2), are nearest to points."""
     n = middles.shape[1]
+    from scipy.spatial import cKDTree
     return cKDTree(middles.reshape(-1, middles.shape[-1])).query(points)[1] % n
 
 
