@@ -15,7 +15,7 @@ from formingx.results import files
 from formingx.results.show import plots
 
 R0, H0 = 1.0, 0.01
-HALF = 2 / 3 * np.pi * R0**3                                 # V0 of the half that is meshed
+VOLUME = 4 / 3 * np.pi * R0**3                               # V0
 FLOWS, STRETCHES, HELD = (2.6, 26, 260), (1.1, 1.25, 1.5, 2, 2.5, 3), (0.1, 0.5, 1, 2, 5, 20)
 PRESSURES, CREPT = (0.1, 0.2, 0.4, 0.8), (1.1, 1.2, 1.3, 1.5)
 LONG = 1000.0                                                # s: 200 times the longest relaxation
@@ -34,7 +34,7 @@ def blow(q, n, accuracy):
     at = [(stretch**3 - 1) / q for stretch in STRETCHES]     # volume grows with the middle of the wall
     end = at[-1]
     stage = fx.Stage("blow", control="air",
-                     amplitudes={fx.enclosed_volume: [(0, 0), (end, full * HALF), (end + HELD[-1], full * HALF)]},
+                     amplitudes={fx.enclosed_volume: [(0, 0), (end, full * VOLUME), (end + HELD[-1], full * VOLUME)]},
                      intermediate=times(0.0, at) + times(end, HELD[:-1]))
     path = fx.Process(balloon(n)).run([stage], accuracy=accuracy, max_steps=100_000)
 

@@ -26,7 +26,7 @@ def block(material, mode):
     """A cylinder of radius and height 1, pulled at its top or at its rim."""
     face, direction, _ = PULLED[mode]
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)), materials=material,
-                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
+                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z", guide=True),
                               fx.PrescribedDisplacement(face, direction, name="pull")])
 
 

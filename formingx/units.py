@@ -17,6 +17,7 @@ _KINDS = (("pressure", "stress"), ("stress", "stress"), ("force", "force"), ("en
           ("penetration", "length"), ("displacement", "length"), ("radius", "length"), ("wall", "length"),
           ("gap", "length"), ("resultant", "tension"),
           ("thickness", "length"), ("process_time", "time"), ("temperature", "temperature"))
+_COORDINATES = {*"rzxyRZXY", "r_bottom", "z_bottom", "r_top", "z_top", "sag"}
 
 
 @dataclass(frozen=True)
@@ -53,17 +54,22 @@ class Units:
     @property
     def area(self) -> str:
         """The unit of areas, "" if that of length is not said."""
-        return f"{self.length}2" if self.length else ""
+        return self._whole(f"{self.length}2" if self.length else "")
 
     @property
     def volume(self) -> str:
         """The unit of volumes, "" if that of length is not said."""
-        return f"{self.length}3" if self.length else ""
+        return self._whole(f"{self.length}3" if self.length else "")
+
+    @property
+    def weight(self) -> str:
+        """The unit of weights: "g"."""
+        return self._whole("g")
 
     @property
     def force(self) -> str:
         """The unit of forces, stress length^2: "N" of mm and MPa, "lbf" of in and psi; "" if one is not said."""
-        return self._derived(_FORCES, 2)
+        return self._whole(self._derived(_FORCES, 2))
 
     @property
     def tension(self) -> str:
@@ -73,7 +79,19 @@ class Units:
     @property
     def energy(self) -> str:
         """The unit of energies, stress length^3: "mJ" of mm and MPa; "" if one is not said."""
-        return self._derived(_ENERGIES, 3)
+        return self._whole(self._derived(_ENERGIES, 3))
+
+    def per_depth(self) -> "Units":
+        """Return the units of a body in plane strain, whose forces, energies, volumes and areas are per unit depth.
+
+        >>> fx.Units(length="mm", stress="MPa").per_depth().force
+        'N/mm'
+        """
+        return _UnitsPerDepth(self.length, self.stress, self.time)
+
+    def _whole(self, unit: str) -> str:
+        """The unit of what a whole body has."""
+        return unit
 
     @property
     def power(self) -> str:
@@ -81,7 +99,10 @@ class Units:
         return f"{self.energy}/{self.time}" if self.energy else ""
 
     def mass(self, volume: float, density: float) -> float:
-        """Grams of a volume (length^3) of a density in g/cm3; a length that is not said is taken for cm."""
+        """Grams of a volume (length^3) of a density in g/cm3; a length that is not said is taken for cm.
+
+        In plane strain grams per unit depth.
+        """
         volume, density = finite("mass: volume", volume), finite("mass: density", density)
         if density > _DENSEST:
             raise InputError(f"density = {density:g}: must be in g/cm3 (water has 1), at most {_DENSEST:g}")
@@ -89,7 +110,7 @@ class Units:
 
     def of(self, column: str) -> str:
         """The unit of a column of results by its name, "" of numbers without one, or where it is not said."""
-        if column in ("r", "z"):
+        if column in _COORDINATES or column.startswith("u_"):
             return self.length or ""
         if column.endswith(("ratio", "stretch", "error")):
             return ""
@@ -101,12 +122,24 @@ class Units:
         unit = self.of(column)
         return (words or column.replace("_", " ")) + (f", {unit}" if unit else "")
 
+    def heading(self, column: str) -> str:
+        """A column's name in a file, with its unit: "plug_force [N]"."""
+        unit = self.of(column)
+        return f"{column} [{unit}]" if unit else column
+
     def _derived(self, names: dict[str, float], power: int) -> str:
         if not (self.length and self.stress):
             return ""
         size = STRESSES[self.stress] * LENGTHS[self.length] ** power
         exact = (name for name, unit in names.items() if abs(unit / size - 1) < 1e-9)
         return next(exact, f"{self.stress} {self.length}{power}")
+
+
+class _UnitsPerDepth(Units):
+    """Units of a body in plane strain."""
+
+    def _whole(self, unit: str) -> str:
+        return f"{unit}/{self.length or 'cm'}" if unit else ""
 
 
 _DENSEST = 25.0

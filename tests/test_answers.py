@@ -88,8 +88,8 @@ def test_a_sphere_of_two_layers():
     assert list(wall.layers) == ["in", "out"]
     for name, thickness in zip(layers, exact):
         assert wall.columns[f"wall_of_{name}"] == pytest.approx(np.full(len(wall.wall), thickness), rel=2e-3)
-    assert part.area == pytest.approx(2 * np.pi * ((moved[0] + moved[2]) / 2) ** 2, rel=2e-4)
-    assert part.volume == pytest.approx(2 * np.pi / 3 * (1.4**3 - 1), rel=2e-4)
+    assert part.area == pytest.approx(4 * np.pi * ((moved[0] + moved[2]) / 2) ** 2, rel=2e-4)
+    assert part.volume == pytest.approx(4 * np.pi / 3 * (1.4**3 - 1), rel=2e-4)
     assert wall.height[0] == 0 and wall.height[-1] == pytest.approx((moved[0] + moved[2]) / 2, rel=1e-4)
 
 
@@ -213,7 +213,7 @@ def test_units():
     labels = {"plug_force": "N", "vacuum_pressure": "MPa", "plug_travel": "mm", "pole_stretch": "", "wall_ratio": "",
               "enclosed_volume": "mm3", "strain_energy": "mJ", "dissipated_power": "mJ/s", "process_time": "s",
               "mass_error": "", "r": "mm", "contact_pressure": "MPa", "contact_length": "mm",
-              "wall_of_outer": "mm"}
+              "wall_of_outer": "mm", "X": "mm", "y": "mm", "r_top": "mm", "sag": "mm", "u_z_at_1_0": "mm"}
     assert {name: units.of(name) for name in labels} == labels
     with pytest.raises(fx.InputError, match="length 'furlong' is not known"):
         fx.Units("furlong")

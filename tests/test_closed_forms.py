@@ -11,7 +11,7 @@ def cylinder(material, model=None):
     """A block pulled along Z, free to contract: uniaxial tension."""
     mesh = fx.mesh.disc(radius=1.0, thickness=2.0, elements=(3, 3))
     return fx.Scene(mesh=mesh, materials=material, model=model,
-                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
+                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z", guide=True),
                               fx.PrescribedDisplacement("top", "z")])
 
 

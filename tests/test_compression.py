@@ -30,11 +30,11 @@ def test_homogeneous_compression():
 
 
 def test_a_long_strip():
-    """Plane strain, free of friction: sigma_zz = mu (l^2 - 1/l^2) on a width R0 / l."""
+    """Plane strain, free of friction: sigma_zz = mu (l^2 - 1/l^2) on a width 2 R0 / l."""
     l, c = 0.5, 0.2                                          # noqa: E741
     scene = block(fx.NeoHookean(c10=c), "none", (2, 2), kinematics=fx.PlaneStrain(), **STIFF)
     path, _ = press(scene, [HALF_HEIGHT * (1 - l)], progress=False)
-    assert path.last.measures["tool_force"] == pytest.approx(2 * c * (1 / l**2 - l**2) * RADIUS / l, rel=2e-4)
+    assert path.last.measures["tool_force"] == pytest.approx(2 * c * (1 / l**2 - l**2) * 2 * RADIUS / l, rel=2e-4)
 
 
 @pytest.mark.parametrize("friction", ["stick", 0.2])

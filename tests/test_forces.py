@@ -18,7 +18,7 @@ def pulled():
     """A disc that is pulled at its rim: the same stretch everywhere."""
     return fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=1.0, elements=(8, 1)), materials=fx.NeoHookean(c10=0.5),
                     supports=[fx.Symmetry("axis"), fx.PrescribedDisplacement("rim", "r"),
-                              fx.Symmetry("bottom", normal="z")])
+                              fx.Symmetry("bottom", normal="z", guide=True)])
 
 
 def travel(path):

@@ -66,7 +66,7 @@ def test_a_balloon_snaps_to_the_state_of_the_same_pressure(balloon):
     assert after.measures["pressure"] == pytest.approx(before.measures["pressure"], rel=1e-4)
     beyond = optimize.brentq(lambda l: ball.pressure(l) - ball.pressure(limit), limit + 1, 20)
     volume = after.measures["enclosed_volume"]
-    assert beyond > 4 and volume == pytest.approx(2 * np.pi / 3 * (beyond**3 - 1), rel=1e-3)
+    assert beyond > 4 and volume == pytest.approx(4 * np.pi / 3 * (beyond**3 - 1), rel=1e-3)
     assert path["pressure"][-1] > 1.09 * ball.pressure(limit)
 
 

@@ -177,9 +177,12 @@ def test_books_are_kept(name, done):
     ("inflation", "pressure", "pressure", "enclosed_volume", 1), ("ring", "pressure", "pressure", "enclosed_volume", 1),
     ("strip", "pressure", "pressure", "enclosed_volume", 1), ("ball", "ball", "tool_force", "travel", 1),
     ("rough ball", "ball", "tool_force", "travel", 1), ("sticky ball", "ball", "tool_force", "travel", 1),
-    ("plates", "plate", "tool_force", "travel", 2), ("relaxing bar", "pull", "support_force", "travel", 1)])
+    ("plates", "plate", "tool_force", "travel", 4), ("relaxing bar", "pull", "support_force", "travel", 2)])
 def test_work_is_force_over_travel(name, entry, force, over, factor, done):
-    """Read off the columns; travel is in parts of `direction`. (The force of a body on a support pulls it back.)"""
+    """Read off the columns; travel is in parts of `direction`. (The force of a body on a support pulls it back.)
+
+    Two plates press the whole block, and both ends of the whole bar are pulled: one of them is modelled.
+    """
     path = done.setdefault(name, RUNS[name]())
     expected = factor * integral(path, force, over) * (-1 if entry == "pull" else 1)
     assert path.work()[entry][-1] == pytest.approx(expected, rel=0.015)

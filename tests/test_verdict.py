@@ -72,13 +72,13 @@ def test_a_travel_that_the_body_did_not_follow_is_no_target_met(height, gap):
     penalty = float(re.search("a penalty of ([^;]+);", str(error.value))[1])
     left = gap / height
     path = fx.trace(block(height, penalty=10 * penalty), until=fx.travel(height - gap), progress=False)
-    assert path["tool_force"][-1] == pytest.approx(left**-3 - left, rel=0.1)
+    assert path["tool_force"][-1] == pytest.approx(2 * (left**-3 - left), rel=0.1)
 
 
 @pytest.mark.parametrize("gap, penalty", [(0.5, 2e5), (0.35, 2e5), (0.26, 2e5), (0.2, 2e5), (0.14, 2e5), (0.8, 1e3)])
 def test_a_run_says_how_much_penetration_changes_the_force(gap, penalty, caplog):
     path = fx.trace(block(penalty=penalty), until=fx.travel(1 - gap), progress=False)
-    off = abs(path["tool_force"][-1] / (gap**-3 - gap) - 1)
+    off = abs(path["tool_force"][-1] / (2 * (gap**-3 - gap)) - 1)
     said = re.search(r"changes the force on the tool of 'top' by about (\S+) %", caplog.text)
     assert (said is not None) == (off > 2e-3)
     assert said is None or float(said[1]) == pytest.approx(100 * off, rel=0.2)
@@ -90,7 +90,7 @@ def test_a_force_that_penetration_changes_by_more_than_5_percent_is_none(gap, pe
         fx.trace(block(penalty=penalty), until=fx.travel(1 - gap), progress=False)
     harder = float(re.search("a penalty of ([^;]+);", str(error.value))[1])
     path = fx.trace(block(penalty=harder), until=fx.travel(1 - gap), progress=False)
-    assert path["tool_force"][-1] == pytest.approx(gap**-3 - gap, rel=5e-3)
+    assert path["tool_force"][-1] == pytest.approx(2 * (gap**-3 - gap), rel=5e-3)
 
 
 def test_a_pole_that_is_thinner_than_nothing_is_no_state():

@@ -29,6 +29,11 @@ def length(face: FaceContact, fields: np.ndarray, control: float) -> float:
     return float(extent @ touching)
 
 
+def area(face: FaceContact, fields: np.ndarray, control: float) -> float:
+    """Deformed area of the face of a sheet in space that is in touch, length^2."""
+    return _sum(face, face.rule.lumped * face.rule.area_ratio(fields) * face.touching(fields, control))
+
+
 def force(face: FaceContact, fields: np.ndarray, control: float) -> np.ndarray:
     """Total force of the body on the tool, shape (components,), stress length^2 (per depth: length).
 

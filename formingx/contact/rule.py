@@ -153,6 +153,18 @@ class Vertices(Lobatto):
         self.points = self.nodes = vectors.tabulate_dof_coordinates()[own].copy()
         self.area = self.lumped = assemble(surface.compile(surface.area_row()))[self.dofs[:, 0]]
         self.lengths = np.sqrt(self.area)
+        self._surface, self._assemble = surface, assemble
+        self._now = surface.compile(surface.area_row(deformed=True))
+
+    def area_ratio(self, fields: np.ndarray) -> np.ndarray:
+        """Of the triangles around each node together."""
+        w = self._surface.w.x
+        before = w.array.copy()
+        w.array[: len(fields)] = fields
+        w.scatter_forward()
+        area = self._assemble(self._now)[self.dofs[:, 0]]
+        w.array[:] = before
+        return area / self.area
 
     @property
     def extent(self) -> np.ndarray:

@@ -7,9 +7,9 @@ from ..contact import resultants
 from ..contact.tooling import Tooling
 from ..errors import InputError
 from ..physics.loads import Gravity
-from .forces import resisting
+from .forces import resisting, support_factor, tool_factor
 from .relaxed import PoleStressRatio
-from .targets import Amplitude, Bound, Sag, Target, bind_pole_height, bind_pole_stretch, bind_volume
+from .targets import Amplitude, Bound, OfWholePart, Sag, Target, bind_pole_height, bind_pole_stretch, bind_volume
 
 Measure = Target | Callable[[Any], float]
 """What a user's own column records, see `formingx.trace`."""
@@ -105,11 +105,15 @@ def own(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Bound]
 def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     """The measures that every run records, by column name.
 
+    Energies, volumes, areas and forces are those of the whole part, of the whole tool and of the whole support, also
+    where a half or a quarter is modelled (`Scene.symmetry_factor`); in plane strain they are per unit depth.
+
     pressure (or travel: a length), pole_height (length), pole_stretch, enclosed_volume (length^3), strain_energy
     (stress length^3), mass_error (volume over its original value, minus 1), volume_error (root mean square of J - 1),
     both over what thermal expansion makes of the volume. Pole and volume are there where the scene has an axis and a
     driven pressure. With `Gravity`: sag, the largest downward displacement (length). With contacts: contact_length
-    (reference length in touch), penetration (of the deepest node, length) and the force of the body on each tool: along
+    (reference length in touch), in space contact_area (of the deformed sheet) and reference_contact_area (of the flat
+    one), penetration (of the deepest node, length) and the force of the body on each tool: along
     its travel, positive when it resists; of a tool that stays along Z, positive when the body pushes it up. It is
     plug_force for one named "plug" (tool_1_force for one without a name), and tool_force where there is one tool. With
     a driven support: support_force (of the body on it, along its component). Where several things can be driven each
@@ -119,12 +123,14 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     one in equilibrium (`PoleStressRatio`). With a rate-independent history: damage_energy (stress length^3).
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
+    energy = scene.symmetry_factor * forms.stress * volume
     found: dict[str, Bound] = {"process_time": Amplitude(problem, -1)} if timed else {}
     for i, thing in enumerate(scene.items):
         if any(thing is t for t in scene.drivable):
             found[column := scene.column(thing)] = Amplitude(problem, i)
             if thing in scene.supports:
-                found["support_force" if column == thing.quantity else f"{thing.name}_force"] = _Reaction(problem, i)
+                found["support_force" if column == thing.quantity else f"{thing.name}_force"] = (
+                    OfWholePart(_Reaction(problem, i), support_factor(scene, thing)))
     if "axis" in scene.mesh.boundaries:
         found["pole_height"] = bind_pole_height(problem)
         found["pole_stretch"] = bind_pole_stretch(problem)
@@ -134,25 +140,29 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
         found["enclosed_volume"] = bind_volume(problem)
     change = forms.J - 1
     if forms.energy is not None:
-        found["strain_energy"] = _Scalar(problem, forms.energy, lambda v: v * forms.stress * volume)
+        found["strain_energy"] = _Scalar(problem, forms.energy, lambda v: v * energy)
     found["mass_error"] = _Scalar(problem, change * forms.weight * forms.dx, lambda v: v / volume)
     found["volume_error"] = _Scalar(problem, change**2 * forms.weight * forms.dx,
                                     lambda v: (v / volume) ** 0.5)
     if forms.dissipation is not None:
-        found["dissipated_power"] = _Scalar(problem, forms.dissipation, lambda v: v * forms.stress * volume)
+        found["dissipated_power"] = _Scalar(problem, forms.dissipation, lambda v: v * energy)
         if PoleStressRatio.known(problem):
             found["pole_stress_ratio"] = _Ratio(problem)
     if forms.damage_energy is not None:
-        found["damage_energy"] = _Scalar(problem, forms.damage_energy, lambda v: v * forms.stress * volume)
+        found["damage_energy"] = _Scalar(problem, forms.damage_energy, lambda v: v * energy)
     if problem.contacts:
-        of_face = "contact_length" if scene.kinematics.components == 2 else "contact_area"
-        found[of_face] = _Nodal(problem, resultants.length, sum)
+        factors = {c: tool_factor(scene, c.contact) for c in problem.contacts}
+        sizes = {"contact_length": resultants.length} if scene.kinematics.components == 2 else {
+            "contact_area": resultants.area, "reference_contact_area": resultants.length}
+        for column, size in sizes.items():
+            found[column] = _Nodal(problem, lambda c, *at, size=size: factors[c] * size(c, *at), sum)
         found["penetration"] = _Nodal(problem, resultants.penetration, max)
         tooling = Tooling.of_problem(problem)
         tools = {name: [c for c, tool in zip(problem.contacts, tooling.names, strict=True) if tool == name]
                  for name in tooling.force_columns}
         for name in sorted(tools, key=lambda tool: tools[tool][0].contact.direction is None):  # what moves comes first
-            force = _Nodal(problem, lambda c, *at: resultants.force(c, *at) @ resisting(c.contact), sum, tools[name])
+            force = _Nodal(problem, lambda c, *at: factors[c] * (resultants.force(c, *at) @ resisting(c.contact)), sum,
+                           tools[name])
             found[tooling.force_columns[name]] = force
             if tools[name][0].contact.name:
                 found[f"{name}_force"] = force

@@ -8,7 +8,7 @@ from dolfinx import fem
 
 from ..contact import resultants
 from ..errors import InputError, finite, known
-from .targets import Bound, Target
+from .targets import Bound, OfWholePart, Target
 
 
 def resisting(contact: Any) -> np.ndarray:
@@ -17,10 +17,25 @@ def resisting(contact: Any) -> np.ndarray:
     return up if contact.direction is None else -contact.way / np.linalg.norm(contact.way)
 
 
+def tool_factor(scene: Any, contact: Any) -> int:
+    """Return the factor by which the force on a contact's tool as modelled is that on the whole tool."""
+    return int(scene.symmetry.factor_of(contact.tool.bounds, resisting(contact)))
+
+
+def support_factor(scene: Any, support: Any) -> int:
+    """Return the factor by which the force on a driven support as modelled is that on the whole support."""
+    (held,) = scene.kinematics.in_axes(support, support.constraints())
+    nodes = scene.first.mesh.nodes_of(held.on)
+    return int(scene.symmetry.factor_of(np.stack([nodes.min(0), nodes.max(0)]),
+                                        np.eye(scene.kinematics.components)[held.component]))
+
+
 def force(value: float, *, of: str | None = None) -> Target:
     """The force on what is driven, or on what is called `of`, reaches `value` (stress length^2).
 
-    Of the body: on a driven support along its component; on a tool against its travel, positive when it resists.
+    Of the body: on a driven support along its component; on a tool against its travel, positive when it resists. It is
+    the force on the whole tool or support, also where a half or a quarter is modelled (`Scene.symmetry_factor`); in
+    plane strain per unit depth (stress length).
 
     >>> fx.Stage("press", control="plug", until=fx.force(100.0, of="plug"))
     Stage('press')
@@ -38,8 +53,9 @@ def force(value: float, *, of: str | None = None) -> Target:
         number, thing = next(iter(moving.items()))
         if thing in scene.contacts:
             tools = [scene.items[i] for i in scene.together(number)]
-            return _ToolForce(problem, [c for c in problem.contacts if c.contact in tools])
-        return _SupportForce(problem, number)
+            return OfWholePart(_ToolForce(problem, [c for c in problem.contacts if c.contact in tools]),
+                               tool_factor(scene, thing))
+        return OfWholePart(_SupportForce(problem, number), support_factor(scene, thing))
     return Target("force" if of is None else f"{of}_force", finite("force", value), bind)
 
 

@@ -33,6 +33,20 @@ class Bound:
         raise NotImplementedError
 
 
+class OfWholePart(Bound):
+    """A measure of the part as modelled, times the number of its images (`Scene.symmetry`)."""
+
+    def __init__(self, modelled: Bound, factor: int):
+        self._modelled, self._factor = modelled, factor
+        self.size, self.smooth = factor * modelled.size, modelled.smooth
+
+    def value(self, x, control):
+        return self._factor * self._modelled.value(x, control)
+
+    def equation(self, target):
+        return self._modelled.equation(target / self._factor)
+
+
 class Amplitude(Bound):
     """Of a thing that can be driven (by its number in the scene), of the process time (-1), or the control (None).
 
@@ -241,7 +255,8 @@ def pole_stretch(value: float) -> Target:
 def enclosed_volume(value: float) -> Target:
     """The volume that the driven face has swept reaches `value` (length^3; per depth in plane strain).
 
-    It lies between the face at rest and now; where an end of the face has moved, straight lines close it.
+    It lies between the face at rest and now; where an end of the face has moved, straight lines close it. Where a half
+    or a quarter is modelled it is that of the whole part (`Scene.symmetry_factor`).
 
     >>> round(float(path.at(fx.enclosed_volume(500.0)).measures["enclosed_volume"]), 6)
     500.0
@@ -293,9 +308,15 @@ def bind_pole_stretch(problem: Any) -> Bound:
 
 
 def bind_volume(problem: Any) -> Bound:
-    """See `enclosed_volume`: minus the integral of u . n da over the face of the (first) driven load, from X to X + u.
+    """See `enclosed_volume`."""
+    return OfWholePart(_volume(problem), problem.scene.symmetry_factor)
 
-    The area vector of X + t u is of degree 2 in t (axisymmetric): Gauss's rule with two points in t is exact.
+
+def _volume(problem: Any) -> Bound:
+    """That of the body as modelled: minus the integral of u . n da over the face of the (first) driven load.
+
+    The face goes from X to X + u. The area vector of X + t u is of degree 2 in t (axisymmetric): Gauss's rule with two
+    points in t is exact.
     """
     driven = next((t for t in problem.scene.drivable if t.quantity == "pressure"), problem.scene.driven)
     if driven is None or driven.on is None:
@@ -309,7 +330,7 @@ def bind_volume(problem: Any) -> Bound:
     if problem.scene.preformed is not None:
         old, state = problem.scene.preformed.before
         with old.state_context(state):
-            so_far = bind_volume(old).value(old.x, state.control)
+            so_far = _volume(old).value(old.x, state.control)
     return _Form(problem, -swept / forms.constant(2 * scale) * face, scale, so_far)
 
 

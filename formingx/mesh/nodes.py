@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from .. import _compat
 
@@ -23,6 +24,13 @@ def own_cells(domain: Any) -> np.ndarray:
 def of_mesh(domain: Any) -> np.ndarray:
     """This rank's nodes at rest, shape (n, COORDINATES)."""
     return domain.geometry.x[:, :COORDINATES]
+
+
+def span(domain: Any, comm: Any) -> np.ndarray:
+    """Lowest and highest coordinates of the nodes at rest, all ranks, shape (2, COORDINATES)."""
+    X = of_mesh(domain)
+    return np.array([[comm.allreduce(f(X[:, i], initial=-sign * np.inf), op) for i in range(COORDINATES)]
+                     for f, sign, op in ((np.min, -1, MPI.MIN), (np.max, 1, MPI.MAX))])
 
 
 def of_space(space: Any) -> np.ndarray:

@@ -86,17 +86,29 @@ class _OneComponent(Support):
 class Symmetry(_OneComponent):
     """No displacement across a symmetry line that lies along Z (an axis, `normal="r"`) or R (`normal="z"`).
 
+    Where a flat end of the body lies in it the part goes on behind it as the image of the body, and results are those
+    of the whole part: see `Scene.symmetry_factor`.
+
     Args:
-        mirror: the body goes on behind it, as its own image: then modes that are no image of themselves count, too, see
-            `Path.stability`. False: it is an axis, or a guide along which the body slides.
+        on: name of the boundary.
+        normal: the component that is held: "r" or "z"; in space "x", "y" or "z".
+        mirror: modes that are no image of themselves count, too, see `Path.stability`.
+        guide: the part ends there and slides along a frictionless wall: results are those of the body alone.
 
     >>> [fx.Symmetry("axis"), fx.Symmetry("middle", normal="z", mirror=True)]
     [Symmetry('axis', 'r'), Symmetry('middle', 'z')]
     """
 
-    def __init__(self, on: str, normal: str = "r", mirror: bool = False):
+    guide = False
+
+    def __init__(self, on: str, normal: str = "r", mirror: bool = False, guide: bool = False):
         super().__init__(on, "normal", normal)
         self.mirror = instance(f"Symmetry({on!r}): mirror", mirror, bool, "True or False")
+        if instance(f"Symmetry({on!r}): guide", guide, bool, "True or False"):
+            if mirror:
+                raise InputError(f"Symmetry({on!r}): mirror = True, guide = True: must be one of them: behind a mirror"
+                                 " the body goes on, at a guide it ends")
+            self.guide = True
 
     def constraints(self):
         return [Held(self.component, on=self.on)]

@@ -66,8 +66,8 @@ class Units:
 
     @property
     def units(self) -> tuple[float, float]:
-        """One of the dimensionless energy (stress length^3) and length in the user's units."""
-        return self.forms.stress * self.forms.volume, self.forms.length
+        """One of the dimensionless energy, of the whole part (stress length^3), and length in the user's units."""
+        return self.scene.symmetry_factor * self.forms.stress * self.forms.volume, self.forms.length
 
     @property
     def slack_at_rest(self) -> bool:

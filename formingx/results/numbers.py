@@ -49,11 +49,17 @@ class PartNumbers(KeyNumbers):
     variation: float
     weight: float | None
     scrap: float
+    basis: str
+
+    @property
+    def weight_label(self) -> str:
+        """The words before the weight."""
+        return "weight" + ", lengths taken for cm" * (not self.units.length)
 
     def _rows(self, where: str, more: list[tuple[str, str]]) -> list[tuple[str, str]]:
         """Rows; where: the least wall is; more: those of one kind of part alone."""
-        rows = [("weight" + ", lengths taken for cm" * (not self.units.length), self._said(self.weight, "g"))
-                ] if self.weight is not None else []
+        rows = [("given for", self.basis)] if self.basis else []
+        rows += [(self.weight_label, self._said(self.weight, self.units.weight))] if self.weight is not None else []
         rows += [("least wall", f"{self._length(self.min_wall)} at {where}"),
                  ("mean wall", self._length(self.mean_wall)),
                  ("evenness (least over mean wall)", f"{self.uniformity:.4g}"),

@@ -64,10 +64,13 @@ class Path(States):
         state = state or self.last
         return self._view(self.segment(state)).stresses.of(state)
 
-    def to_csv(self, file: Any) -> None:
-        """Write one row per state: stage (of a process), kind, iterations and every measure (rank 0 writes)."""
+    def to_csv(self, file: Any, units: Units | None = None) -> None:
+        """Write one row per state: stage (of a process), kind, iterations and every measure (rank 0 writes).
+
+        units: a `formingx.Units`, for the header, as in "tool_force [N]"; in plane strain "tool_force [N/mm]".
+        """
         from . import files
-        files.write_path(self, file)
+        files.write_path(self, file, units or NONE)
 
     def save(self, folder: Any) -> None:
         """Write every state to a checkpoint folder, to look at later or to go on from (`formingx.load`).
@@ -174,6 +177,8 @@ class Path(States):
              units: Units | None = None) -> Any:
         """The formed part in numbers (`Part`): volume, weight, area, least wall and where, evenness; print it.
 
+        They are those of the whole part, also where a half or a quarter is modelled; in plane strain per unit depth.
+
         Args:
             state: default the last.
             density: of the material at rest (under `ThermalExpansion` where it is free of stress), in g/cm3, for the
@@ -188,10 +193,10 @@ class Path(States):
         """
         if self._in_space:
             from ..extensions.space.part import part as part_in_space
-            return part_in_space(self.wall(state), density, trim, heights, units or NONE)
+            return part_in_space(self.wall(state), density, trim, heights, units or NONE, self.scene.symmetry)
         from .evaluate.part import part
-        axisymmetric = self.problem.scene.kinematics.axisymmetric
-        return part(self.wall(state), axisymmetric, density, trim, heights, units or NONE)
+        return part(self.wall(state), self.scene.kinematics.axisymmetric, density, trim, heights, units or NONE,
+                    self.scene.symmetry)
 
     def filling(self, tool: Any = None) -> Any:
         """The gap that is left in each corner of a tool, state by state (`Filling`), and the pressure to fill it.
@@ -228,12 +233,17 @@ class Path(States):
             return problem.temperature.at(problem.followed(as_points("Path.temperature: points", points)))
 
     def tool_forces(self) -> dict[str, np.ndarray]:
-        """{tool: its force at all states}: positive when it resists its travel; of a tool that stays, along Z."""
+        """{tool: force on the whole tool at all states}, shape (states,), stress length^2 (plane strain: per depth).
+
+        Positive when it resists its travel; of a tool that stays, along Z.
+        """
         from .evaluate.contact_face import tool_forces
         return tool_forces(self)
 
     def work(self) -> dict[str, np.ndarray]:
         """The energy balance: {what: energy up to each state, shape (states,)}, stress length^3 (per depth: length^2).
+
+        It is that of the whole part, with the tools of all its images where a half or a quarter is modelled.
 
         Work done on the body by each load (its column; of a fixed one "pressure_on_bottom"), each driven support (its
         name, or "support") and each tool that moves; by forces that a stage leaves without balance, as they fade
@@ -265,10 +275,13 @@ class Path(States):
             raise InputError(f"to_inp: parts = {parts!r}: must be at least 3, of an axisymmetric body")
         to_inp(self.profile(state), parts, file, self.problem.comm)
 
-    def to_gltf(self, file: Any, state: State | None = None) -> None:
-        """Write the part at a state (default: the last) as binary glTF (.glb), coloured by its wall (rank 0 writes)."""
+    def to_gltf(self, file: Any, state: State | None = None, *, units: Units | None = None) -> None:
+        """Write the part at a state (default: the last) as binary glTF (.glb), coloured by its wall (rank 0 writes).
+
+        units: a `formingx.Units`; glTF is in metres, and a length that is not said is taken for m.
+        """
         from .files.solid import to_gltf
-        to_gltf(self._solid(state), file, self.problem.comm)
+        to_gltf(self._solid(state), file, self.problem.comm, units or NONE)
 
     def shell_model(self, file: Any, state: State | None = None) -> None:
         """Write a part in space as shells, each with its wall, for a structural code (.inp; rank 0 writes)."""

@@ -14,7 +14,7 @@ from ..errors import InputError, count, known, several, together
 from ..materials.constants import Sample
 from ..materials.hyperelastic import Material
 from ..mesh.mesh import Mesh
-from ..mesh.nodes import of_mesh
+from ..mesh.nodes import of_mesh, span
 from ..physics.contact import Contact
 from ..physics.kinematics import Axisymmetric, Kinematics, ThreeD
 from ..physics.loads import Load
@@ -25,6 +25,7 @@ from ..ranks import gathered
 from . import tool_width
 from .sampling import sample
 from .summary import summary
+from .symmetry import NO_PLANES, MirrorPlanes, mirror_planes
 from .temperature import Expansion, GivenTemperature
 
 _HIGHEST = 30
@@ -85,7 +86,7 @@ class Scene:
         if preformed is not None and not hasattr(preformed, "gradient"):
             raise InputError(f"Scene: preformed = {preformed!r}: must be what trace(remesh=) makes, or None")
         self.mesh, self.preformed = mesh, preformed
-        self._extent = _extent(mesh)
+        self._extent = np.ptp(span(mesh.domain, mesh.comm), axis=0)
         self.materials = dict(materials)
         self.supports = _all_of(Support, "supports", supports, "supports, such as Clamped('rim')")
         self.loads = _all_of(Load, "loads", loads, "loads, such as Pressure('bottom')")
@@ -118,6 +119,8 @@ class Scene:
         self._check_names()
         self._check_materials()
         self._check_boundaries()
+        if (planes := mirror_planes(self)).planes:
+            self.symmetry = planes
         self.check_held(self.supports)
         self.model.check(self)
         if self.model.solid:
@@ -137,6 +140,12 @@ class Scene:
     heat: Any = None
     expansion: Mapping[str, Expansion] = MappingProxyType({})
     thickness: Mapping[str, Any] = MappingProxyType({})
+    symmetry: MirrorPlanes = NO_PLANES
+
+    @property
+    def symmetry_factor(self) -> int:
+        """How many images of the body make the whole part, which results are of: 4 of a quarter (`Symmetry`)."""
+        return self.symmetry.factor
 
     @property
     def first(self) -> Scene:
@@ -430,13 +439,6 @@ class Scene:
         lines = summary(self)
         width = max(map(len, lines))
         return "\n".join(f"{part:{width}}  {line}" for part, line in lines.items())
-
-
-def _extent(mesh: Mesh) -> np.ndarray:
-    X, comm = of_mesh(mesh.domain), mesh.comm
-    high = np.array([comm.allreduce(X[:, i].max(initial=-np.inf), MPI.MAX) for i in (0, 1)])
-    low = np.array([comm.allreduce(X[:, i].min(initial=np.inf), MPI.MIN) for i in (0, 1)])
-    return high - low
 
 
 def _all_of(kind: type, name: str, things: Any, what: str) -> list[Any]:

@@ -17,7 +17,8 @@ from ...mesh import text as grid
 from ...results import files
 from ...results.show import plots
 
-_COMPONENTS = ("u_r", "u_z")
+_REST = {2: ("R", "Z"), 3: ("X", "Y")}
+"""Columns of reference coordinates, by the components of a displacement; a sheet in space is flat at rest."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +26,10 @@ class NodalComparison:
     """What `compare_nodes` found; `str` of it is a report.
 
     Attributes:
-        nodes: their numbers, shape (n,). points: reference (R, Z), shape (n, 2), our unit of length.
-        ours, theirs: displacements (u_r, u_z), shape (n, 2), our unit of length.
+        nodes: their numbers, shape (n,).
+        points: reference (R, Z), in space (X, Y), shape (n, 2), our unit of length.
+        ours, theirs: displacements (u_r, u_z), shape (n, 2), in space (u_x, u_y, u_z), shape (n, 3), our unit of
+            length.
         largest: our largest displacement: the scale of the differences.
     """
 
@@ -39,7 +42,7 @@ class NodalComparison:
     @property
     def difference(self) -> np.ndarray:
         """Length of theirs minus ours at each node, shape (n,)."""
-        return np.hypot(*(self.theirs - self.ours).T)
+        return np.linalg.norm(self.theirs - self.ours, axis=1)
 
     @property
     def maximum(self) -> float:
@@ -53,22 +56,25 @@ class NodalComparison:
 
     def __str__(self) -> str:
         k = int(np.argmax(self.difference))
-        (R, Z), (a, b), (c, d) = self.points[k], self.ours[k], self.theirs[k]
-        size = self.largest or 1.0
+        at, ours, theirs = (", ".join(f"{v:.{digits}g}" for v in row[k]) for row, digits in (
+            (self.points, 6), (self.ours, 8), (self.theirs, 8)))
+        size, rest = self.largest or 1.0, ", ".join(_REST[self.ours.shape[1]])
         return (f"{len(self.nodes)} nodes; our largest displacement is {self.largest:.6g}\n"
                 f"largest difference {self.maximum:.5g} ({100 * self.maximum / size:.2g} %), at node {self.nodes[k]},"
-                f" (R, Z) = ({R:.6g}, {Z:.6g}): ours ({a:.8g}, {b:.8g}), theirs ({c:.8g}, {d:.8g})\n"
+                f" ({rest}) = ({at}): ours ({ours}), theirs ({theirs})\n"
                 f"root mean square {self.rms:.5g} ({100 * self.rms / size:.2g} %)")
 
     __repr__ = __str__
 
     def plot(self) -> Any:
-        """The deformed nodes of both; returns the figure."""
+        """Draw the deformed nodes of both, z over r (in space over x); returns the figure."""
         figure, axes = plots.figure()
+        rest = np.pad(self.points, ((0, 0), (0, self.ours.shape[1] - 2)))               # flat in space
         for u, style, label in ((self.ours, {"marker": "o", "fillstyle": "none"}, "ours"),
                                 (self.theirs, {"marker": "x", "color": "k"}, "theirs")):
-            axes.plot(*(self.points + u).T, linestyle="none", markersize=5, label=label, **style)
-        axes.set(xlabel="r", ylabel="z", title=f"largest difference {self.maximum:.3g}")
+            axes.plot(*(rest + u)[:, [0, -1]].T, linestyle="none", markersize=5, label=label, **style)
+        axes.set(xlabel="r" if self.ours.shape[1] == 2 else "x", ylabel="z",
+                 title=f"largest difference {self.maximum:.3g}")
         axes.set_aspect("equal")
         axes.legend(frameon=False)
         return figure
@@ -76,6 +82,8 @@ class NodalComparison:
 
 def write_nodes(path: Any, file: Any, *, state: Any = None, mesh: str | os.PathLike | None = None) -> None:
     """Write node, R, Z, u_r, u_z of every node of a state as CSV, in the user's unit of length (rank 0 writes).
+
+    Of a sheet in space: node, X, Y, u_x, u_y, u_z.
 
     Args:
         state: of the path; default: the last.
@@ -92,7 +100,7 @@ def write_nodes(path: Any, file: Any, *, state: Any = None, mesh: str | os.PathL
     plain = meshes.to_grid(path.problem.scene.mesh) if mesh is None else grid.read(mesh)
     u = _displacements(path, state, plain.points)
     rows = [[int(n), *X, *v] for n, X, v in zip(plain.numbers, plain.points.tolist(), u.tolist())]
-    files.write_rows(file, ["node", "R", "Z", *_COMPONENTS], rows, path.problem.comm)
+    files.write_rows(file, ["node", *_columns(path)], rows, path.problem.comm)
 
 
 def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.PathLike | None = None,
@@ -101,7 +109,8 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
     """Compare a state with another program's nodal displacements, at its nodes, wherever in our mesh they lie.
 
     Args:
-        theirs: a CSV file or {column: values} with u_r, u_z and either R, Z or, with `mesh`, node.
+        theirs: a CSV file or {column: values} with u_r, u_z and either R, Z or, with `mesh`, node; of a sheet in space
+            with u_x, u_y, u_z and X, Y.
         state: of the path; default: the last. To compare at a pressure: `path.at(formingx.pressure(...))`.
         mesh: a text mesh file (`formingx.mesh.Grid`) that gives the coordinates of the numbered nodes, in our unit.
         columns: {our name: their name} for columns that are called otherwise.
@@ -119,7 +128,7 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
              else csv_files.read(theirs))
     names, units = dict(columns or {}), dict(units or {})
     for name in (*names, *units):
-        known("compare_nodes: column", name, ("node", "R", "Z", *_COMPONENTS))
+        known("compare_nodes: column", name, ("node", *_columns(path)))
 
     def take(name: str) -> np.ndarray:
         return table.take(names.get(name, name), units.get(name))
@@ -129,7 +138,7 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
             raise InputError(f"{table.name}: column {names.get('node', 'node')!r}: node numbers must be whole numbers")
         return numbers.astype(int)
     if mesh is None:
-        points = np.column_stack([take("R"), take("Z")])
+        points = np.column_stack([take(name) for name in _columns(path)[:2]])
         numbered = names.get("node", "node") in table.columns
         nodes = take_nodes() if numbered else np.arange(1, len(points) + 1)
     else:
@@ -141,12 +150,18 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
                 raise InputError(f"{table.name}: node {node} is not in the mesh file {os.fspath(mesh)!r}")
         points = plain.points[[at[int(n)] for n in nodes]]
     ours = _displacements(path, state, points)
-    return NodalComparison(nodes, points, ours, np.column_stack([take(c) for c in _COMPONENTS]),
-                           float(np.hypot(*ours.T).max()))
+    return NodalComparison(nodes, points, ours, np.column_stack([take(c) for c in _columns(path)[2:]]),
+                           float(np.linalg.norm(ours, axis=1).max()))
+
+
+def _columns(path: Any) -> list[str]:
+    """Of files of nodal displacements: reference coordinates, then components."""
+    axes = path.problem.scene.kinematics.axes
+    return [*_REST[len(axes)], *(f"u_{axis}" for axis in axes)]
 
 
 def _displacements(path: Any, state: Any, points: np.ndarray) -> np.ndarray:
-    """u at reference points in a state (default: the last), shape (n, 2)."""
+    """u at reference points in a state (default: the last), shape (n, components)."""
     problem, state = path.problem, state or path.last
     with problem.state_context(state):
         return probe(problem, points).displacement(problem.x)

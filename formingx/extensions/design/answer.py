@@ -12,6 +12,7 @@ import numpy as np
 from ...errors import InputError
 from ...findings import alarming
 from .confidence import Confidence, confidence
+from ...units import NONE, Units
 from .run import DesignRun
 
 _SCATTER = 6e-5
@@ -140,15 +141,17 @@ class Answer:
         axes.legend()
         return axes
 
-    def report(self, file: Any = "design.html", title: str = "", *, deviations: Any = None) -> FilePath:
+    def report(self, file: Any = "design.html", title: str = "", *, deviations: Any = None,
+               units: Units | None = None) -> FilePath:
         """Write one HTML file: what was found, how sure it is, walls before and after, the pattern, and which parameter
         changes the wall where (rank 0 writes); returns where it is.
 
         deviations: as of `DesignRun.spread`: the wall is drawn with its standard deviation, and a table has those of
             the wall, the volume, pressures and forces.
+        units: a `formingx.Units`, for the labels.
 
         Raises:
             InputError: the best run has no derivative. OSError: the file cannot be written.
         """
         from .report import of_answer
-        return of_answer(self, file, title, deviations)
+        return of_answer(self, file, title, deviations, units or NONE)

@@ -12,20 +12,22 @@ from ...figures import figure, tools
 from ...findings import alarming
 from ...results import files
 from ...results.show import page, plots
+from ...units import Units
 from .scatter import covariance_of
 from .scatter import deviations as deviations_of
 
 
-def of_answer(answer: Any, file: Any, title: str, deviations: Any) -> FilePath:
+def of_answer(answer: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
     """See `Answer.report`."""
+    units = _of_scene(answer.best, units)
     before, best, (a, b) = answer.before, answer.best, answer.cv
     effects, spread = best.sensitivities("wall"), best.spread(deviations) if deviations else None
     attainable, met, none = answer.attainable(), answer.at_bounds(), answer.without_effect()
     walls = [run.wall[answer.inside] for run in (before, best)]
     off = abs(answer.foretold - best.wall)[answer.inside].max() / walls[1].mean()
     cards = [(f"{a:.3g} → {b:.3g}", "unevenness, standard deviation over mean of the wall"),
-             (f"{walls[0].min():.4g} → {walls[1].min():.4g}", "least wall"),
-             (f"{before.volume:.4g} → {best.volume:.4g}", "volume of the body at rest"),
+             (f"{walls[0].min():.4g} → {walls[1].min():.4g}", units.label("wall", "least wall")),
+             (f"{before.volume:.4g} → {best.volume:.4g}", units.label("volume", "volume of the whole part at rest")),
              (str(answer.paths), "runs were taken")]
     said = [("bad", text) for text in [answer.lack, *(f.text for f in alarming(best.path.findings()))]]
     said += [("", f"A run failed: {text}") for text in answer.failed]
@@ -38,31 +40,39 @@ def of_answer(answer: Any, file: Any, title: str, deviations: Any) -> FilePath:
     rows = [[str(k), *(page.number(v) for v in (one.wall[answer.inside].std() / one.wall[answer.inside].mean(),
              one.wall[answer.inside].min(), one.wall[answer.inside].mean(), one.volume))]
             for k, one in enumerate(answer.runs, 1)]
-    runs = page.table(["run", "unevenness", "least wall", "mean wall", "volume"], rows)
+    runs = page.table(["run", "unevenness", units.label("wall", "least wall"), units.label("wall", "mean wall"),
+                       units.label("volume")], rows)
 
     def pictures() -> list[str]:
-        return [_sections([before, best], ["before", "after"]), _walls(answer, spread, deviations),
-                _patterns(before, best), _heat_map(effects)]
-    tail = [*_sure(best, deviations), "<h2>Runs of the search</h2>", runs]
-    return _write(file, title or "Report of a design", how, cards, said, pictures, _effects(best, effects, before),
-                  tail, best.path.problem.comm)
+        return [_sections([before, best], ["before", "after"], units),
+                _walls(answer, spread, deviations, units), _patterns(before, best), _heat_map(effects, units)]
+    tail = [*_sure(best, deviations, units), "<h2>Runs of the search</h2>", runs]
+    return _write(file, title or "Report of a design", how, cards, said, pictures,
+                  _effects(best, effects, units, before), tail, best.path.problem.comm)
 
 
-def of_run(run: Any, file: Any, title: str, deviations: Any) -> FilePath:
+def of_run(run: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
     """See `DesignRun.report`."""
+    units = _of_scene(run, units)
     effects, spread = run.sensitivities("wall"), run.spread(deviations) if deviations else None
     wall = run.wall
     cards = [(f"{wall.std() / wall.mean():.3g}", "unevenness, standard deviation over mean of the wall"),
-             (f"{wall.min():.4g}", "least wall"), (f"{run.volume:.4g}", "volume of the body at rest")]
+             (f"{wall.min():.4g}", units.label("wall", "least wall")),
+             (f"{run.volume:.4g}", units.label("volume", "volume of the whole part at rest"))]
     said = [("bad", found.text) for found in alarming(run.path.findings())]
 
     def pictures() -> list[str]:
         drawing, axes = figure(1, width=9, height=4)
-        _line(axes, run, "C0", "wall", spread, deviations)
-        return [_sections([run], ["the part"]), page.figure(drawing, "Wall over the reference length."),
-                _heat_map(effects)]
+        _line(axes, run, "C0", "wall", spread, deviations, units)
+        return [_sections([run], ["the part"], units), page.figure(drawing, "Wall over the reference length."),
+                _heat_map(effects, units)]
     return _write(file, title or "Report of a run", ["One run and what changes it."], cards, said, pictures,
-                  _effects(run, effects), _sure(run, deviations), run.path.problem.comm)
+                  _effects(run, effects, units), _sure(run, deviations, units), run.path.problem.comm)
+
+
+def _of_scene(run: Any, units: Units) -> Units:
+    """The units of the labels: in plane strain per unit depth."""
+    return units.per_depth() if run.path.scene.kinematics.dimension_of_volume == 2 else units
 
 
 def _write(file: Any, title: str, how: list[str], cards: list, said: list, pictures: Any, table: str, tail: list[str],
@@ -81,7 +91,7 @@ def _write(file: Any, title: str, how: list[str], cards: list, said: list, pictu
     return FilePath(file)
 
 
-def _sections(runs: list[Any], names: list[str]) -> str:
+def _sections(runs: list[Any], names: list[str], units: Units) -> str:
     """The parts side by side, coloured by their wall."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -95,13 +105,14 @@ def _sections(runs: list[Any], names: list[str]) -> str:
         tooling, last = Tooling.of_problem(run.path.problem), run.path.last
         tools(one, tooling.placed(tooling.travels(last.setting, last.control)), low, high)
         plots.section(one, shape, (1, 1), colormaps["viridis_r"](colours(shape.wall_thickness)))
-        one.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="r", ylabel="z", title=name)
-    bar = drawing.colorbar(ScalarMappable(colours, "viridis_r"), ax=axes, shrink=0.8, label="wall")
+        one.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal",
+                xlabel=units.label("r"), ylabel=units.label("z"), title=name)
+    bar = drawing.colorbar(ScalarMappable(colours, "viridis_r"), ax=axes, shrink=0.8, label=units.label("wall"))
     bar.outline.set_visible(False)
     return "<h2>The part</h2>" + page.figure(drawing, "Sections, coloured by the wall.")
 
 
-def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations: Any) -> None:
+def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations: Any, units: Units) -> None:
     s = run.profile.reference_length
     axes.plot(s, run.wall, color=colour, label=label)
     if spread is not None:
@@ -109,11 +120,11 @@ def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations:
         said = ", ".join(f"{name} ± {size:.3g}" for name, size in zip(run.parameters.names, sizes) if size)
         axes.fill_between(s, run.wall - spread, run.wall + spread, color=colour, alpha=0.2, linewidth=0,
                           label=f"± standard deviation, of {said}")
-    axes.set(xlabel="reference length", ylabel="wall", ylim=(0, None))
+    axes.set(xlabel=units.label("reference_length"), ylabel=units.label("wall"), ylim=(0, None))
     axes.legend()
 
 
-def _walls(answer: Any, spread: Any, deviations: Any) -> str:
+def _walls(answer: Any, spread: Any, deviations: Any, units: Units) -> str:
     drawing, axes = figure(1, width=9, height=4)
     s = answer.best.profile.reference_length
     axes.plot(s, answer.before.wall, color="0.6", label="before")
@@ -122,7 +133,7 @@ def _walls(answer: Any, spread: Any, deviations: Any) -> str:
         axes.plot(s[answer.inside], answer.wanted, "k--", linewidth=1, label="wanted")
     if not np.all(answer.inside):
         axes.axvspan(*s[answer.inside][[0, -1]], color="0.96", zorder=0, label="what counts")
-    _line(axes, answer.best, "C0", "after", spread, deviations)
+    _line(axes, answer.best, "C0", "after", spread, deviations, units)
     return "<h2>The wall</h2>" + page.figure(drawing, "Wall over the reference length, before and after.")
 
 
@@ -146,26 +157,28 @@ def _patterns(before: Any, best: Any) -> str:
     return "<h2>The pattern</h2>" + page.figure(drawing, "Profiles and their knots, before and after; dotted: bounds.")
 
 
-def _heat_map(effects: Any) -> str:
+def _heat_map(effects: Any, units: Units) -> str:
     drawing, axes = figure(1, width=9, height=float(np.clip(1.6 + 0.28 * len(effects.names), 2.6, 9)))
     effects.plot(axes)
     return "<h2>What changes the wall, and where</h2>" + page.figure(
-        drawing, "Change of the wall that the derivatives predict where a parameter changes by a tenth of its range.")
+        drawing, f"Change of the wall{f' in {units.length}' if units.length else ''} that the derivatives predict where"
+                 f" a parameter changes by a tenth of its range.")
 
 
-def _sure(run: Any, deviations: Any) -> list[str]:
+def _sure(run: Any, deviations: Any, units: Units) -> list[str]:
     """A table of the standard deviations of walls, volume, pressures and forces, where parameters are uncertain."""
     if not deviations:
         return []
     covariance = covariance_of("report", run.parameters, deviations)
     wall, by = run.derivative("wall")
     thin = int(np.argmin(wall))
-    rows = [("mean wall", wall.mean(), by.mean(0)), ("least wall", wall[thin], by[thin])]
+    rows = [(units.label("wall", "mean wall"), wall.mean(), by.mean(0)),
+            (units.label("wall", "least wall"), wall[thin], by[thin])]
     names = [name for name in run.path.columns if name.endswith(("force", "pressure"))]
     for name in ("volume", *names):
         value, slope = run.derivative(name)
         if np.all(np.isfinite([value[0], *slope[0]])):
-            rows.append((name.replace("_", " "), value[0], slope[0]))
+            rows.append((units.label(name), value[0], slope[0]))
     table = [[name, page.number(value), f"{size:.3g}", f"{100 * size / abs(value):.2g} %" if value else ""]
              for name, value, slope in rows for size in [deviations_of(slope[None], covariance)[0]]]
     return ["<h2>How sure</h2>", page.table(["", "value", "standard deviation", ""], table),
@@ -174,12 +187,12 @@ def _sure(run: Any, deviations: Any) -> list[str]:
             "</p>"]
 
 
-def _effects(run: Any, effects: Any, before: Any = None) -> str:
+def _effects(run: Any, effects: Any, units: Units, before: Any = None) -> str:
     """A row for every parameter."""
     p, tenth = run.parameters, effects.by * effects.sizes / 10
     thin, grows = int(np.argmin(effects.value)), run.derivative("volume")[1][0] * p.size / 10
-    head = ["", *(["before", "after"] if before else ["value"]), "least", "most", "mean wall", "least wall",
-            "largest change", "volume"]
+    head = ["", *(["before", "after"] if before else ["value"]), "least", "most", units.label("wall", "mean wall"),
+            units.label("wall", "least wall"), units.label("wall", "largest change"), units.label("volume")]
     most = tenth[abs(tenth).argmax(0), np.arange(len(p))]
     rows = [[name, *([page.number(before.vector[k])] if before else []),
              *(page.number(v) for v in (run.vector[k], p.low[k], p.high[k])),

@@ -17,6 +17,7 @@ from ...results.path import Path
 from ...solve.arc_length import Curve
 from ...solve.newton import Failure, Tolerances
 from ...solve.record import Record
+from ...units import NONE, Units
 from . import scatter
 from .carry import carry
 from .neighbours import Apart, Neighbour
@@ -102,8 +103,8 @@ class DesignRun:
 
     @property
     def volume(self) -> float:
-        """Of the whole body at rest."""
-        return float(self.path.problem.forms.volume)
+        """Of the whole part at rest, length^3 (in plane strain per unit depth)."""
+        return _volume(self.path.problem)
 
     @cached_property
     def _neighbours(self) -> list[tuple[list[Neighbour], float]]:
@@ -185,17 +186,19 @@ class DesignRun:
         """
         return scatter.band(self, deviations, measure, confidence)
 
-    def report(self, file: Any = "design.html", title: str = "", *, deviations: Any = None) -> FilePath:
+    def report(self, file: Any = "design.html", title: str = "", *, deviations: Any = None,
+               units: Units | None = None) -> FilePath:
         """Write one HTML file: the part, its wall, and what changes it (rank 0 writes); returns where it is.
 
         deviations: as of `spread`: the wall is drawn with its standard deviation, and a table has those of the wall,
             the volume, pressures and forces.
+        units: a `formingx.Units`, for the labels.
 
         Raises:
             InputError: the run has no derivative. OSError: the file cannot be written.
         """
         from .report import of_run
-        return of_run(self, file, title, deviations)
+        return of_run(self, file, title, deviations, units or NONE)
 
     def _here(self, measure: Any) -> np.ndarray:
         if isinstance(measure, str):
@@ -218,7 +221,7 @@ class DesignRun:
 
     def _at(self, one: Neighbour, measure: Any) -> Any:
         if measure == "volume":
-            return one.problem.forms.volume
+            return _volume(one.problem)
         state = one.state(self.path.last)
         if measure == "wall":
             mine, its = (problem.scene.mesh.domain.geometry.x for problem in (self.path.problem, one.problem))
@@ -227,6 +230,11 @@ class DesignRun:
         if one.path is None:
             one.path = _of_one(state, Record(one.problem, Curve(one.problem, self._tolerances)))
         return one.path[measure] if isinstance(measure, str) else np.asarray(measure(one.path), dtype=float)
+
+
+def _volume(problem: Any) -> float:
+    """Of the whole part at rest, length^3."""
+    return float(problem.scene.symmetry_factor * problem.forms.volume)
 
 
 def _of_one(state: Any, record: Record) -> Path:

@@ -11,20 +11,25 @@ from ...errors import InputError, finite, positive
 from ...mesh.nodes import COORDINATES
 from ...results.files.sheet import Sheet
 from ...results.numbers import PartNumbers
+from ...scene.symmetry import MirrorPlanes
 from ...units import NONE, Units
 from .wall import WallInSpace
 
 
 @dataclass(frozen=True, repr=False)
 class PartInSpace(PartNumbers):
-    """A part as modelled (a quarter of a sheet is a quarter of the part).
+    """A whole part, also where a half or a quarter is modelled.
 
     Attributes:
-        volume, area: length^3, of the surface length^2; draw_ratio: area over that at rest; mean_wall: volume/area.
+        volume: length^3.
+        area: of the surface, length^2.
+        draw_ratio: area over that in the reference configuration; mean_wall: volume/area.
         min_wall: length; min_wall_at: (x, y, z) where; min_wall_reference: (x, y) where it was on the flat sheet.
-        uniformity: least over mean wall; variation: standard deviation of the wall over the surface, over its mean.
+        uniformity: minimum over mean wall; variation: standard deviation of the wall over the surface, over its mean.
         weight: grams if a density in g/cm3 was given; else None. scrap: volume beyond the trim over that of the sheet.
-        wrinkled: share of the area at rest that is in compression. units: of the labels.
+        wrinkled: share of the area at rest that is in compression.
+        basis: what volume, area and weight are given for, as text; "" of a part that was modelled as a whole.
+        units: of the labels.
     """
 
     volume: float
@@ -39,6 +44,7 @@ class PartInSpace(PartNumbers):
     weight: float | None
     scrap: float
     wrinkled: float
+    basis: str = ""
     units: Units = field(repr=False, default=NONE)
 
     @property
@@ -49,8 +55,12 @@ class PartInSpace(PartNumbers):
             [("in compression, of the sheet", f"{100 * self.wrinkled:.3g} %")] if self.wrinkled else [])
 
 
-def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, units: Units) -> PartInSpace:
-    """See `Path.part`; trim: the z of the plane beyond which, seen from the flat sheet, the part lies."""
+def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, units: Units,
+         planes: MirrorPlanes) -> PartInSpace:
+    """See `Path.part`; trim: the z of the plane beyond which, seen from the flat sheet, the part lies.
+
+    planes: of symmetry, that cut the body.
+    """
     if len(tuple(heights)):
         raise InputError("part: heights: in space use path.wall().section(point, normal)")
     share = np.ones(len(wall.wall))
@@ -62,15 +72,16 @@ def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, unit
         share = _beyond((z - level)[wall.triangles] * np.sign(z[np.argmax(np.abs(z))] - level))
     kept = share > 0
     h, area, rest = wall.wall[kept], (wall.area * share)[kept], (wall.area_at_rest * share)[kept]
-    volume = float((h * area).sum())
+    volume, images = float((h * area).sum()), planes.factor
     mean, k = volume / area.sum(), int(np.flatnonzero(kept)[np.argmin(h)])
     whole = float((wall.wall * wall.area).sum())
-    weight = None if density is None else units.mass(volume, positive("part: density", density))
-    return PartInSpace(volume, float(area.sum()), float(area.sum() / rest.sum()), mean, float(wall.wall[k]),
-                       tuple(wall.middle[k].tolist()),
+    weight = None if density is None else units.mass(images * volume, positive("part: density", density))
+    return PartInSpace(images * volume, images * float(area.sum()), float(area.sum() / rest.sum()), mean,
+                       float(wall.wall[k]), tuple(wall.middle[k].tolist()),
                        tuple(wall.rest[wall.triangles[k], :COORDINATES].mean(0).tolist()), float(wall.wall[k] / mean),
                        float(np.sqrt(np.average((h - mean) ** 2, weights=area)) / mean),
-                       weight, 1 - volume / whole, float(rest[wall.wrinkled[kept]].sum() / rest.sum()), units)
+                       weight, 1 - volume / whole, float(rest[wall.wrinkled[kept]].sum() / rest.sum()),
+                       planes.basis(None), units)
 
 
 def _beyond(d: np.ndarray) -> np.ndarray:

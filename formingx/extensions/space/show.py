@@ -12,13 +12,20 @@ import numpy as np
 from ...errors import InputError
 from ...mesh.nodes import COORDINATES
 from ...results import files
-from ...results.show import page
+from ...results.show import interactive, page
+from ...results.show.interactive import rounded
+from ...results.show.record import of_path
+from ...results.show.report import PROCESS, scripts
 from ...results.show.views import look, plotted, shading
 from ...scene.summary import summary
 from ...units import Units
-from .wall import WallInSpace, wall_of
+from .wall import wall_of
 
-_SIDE = ((0, "x0"), (1, "y0"))
+_DRAWN, _FRAMES = 200_000, (10, 100)
+"""Nodes of all drawn states of a report together; and the least and the most states."""
+
+_LARGEST_TOOL = 20_000
+"""Triangles of a tool that is drawn in a report."""
 
 
 def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
@@ -31,7 +38,7 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
     """
     file, wall = files.named("view3d", file, ".png"), wall_of(path, state)
     lines = wall.printed(grid) if grid else []
-    mirrored = _mirrors(path, wall)
+    images = path.scene.symmetry.images(3)
 
     def draw():
         import pyvista
@@ -41,40 +48,53 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
         values = wall.at_nodes / wall.to_nodes(wall.thickness_at_rest)
         faces = np.column_stack([np.full(len(wall.triangles), 3), wall.triangles]).ravel()
         with plotted(file) as plotter:
-            for side in mirrored:
-                surface = pyvista.PolyData(wall.now * side, faces)
+            for scale, shift in images:
+                surface = pyvista.PolyData(wall.now * scale + shift, faces)
                 surface["ratio"] = values
                 plotter.add_mesh(surface, **shading(values), specular=0.2, split_sharp_edges=False)
                 for line in lines:
-                    plotter.add_mesh(pyvista.lines_from_points(line * side + lift), color="black", line_width=1.5)
-            look(plotter, camera, np.vstack([wall.now * side for side in mirrored]))
+                    plotter.add_mesh(pyvista.lines_from_points(line * scale + shift + lift), color="black",
+                                     line_width=1.5)
+            look(plotter, camera, np.vstack([wall.now * scale + shift for scale, shift in images]))
     files.on_root(path.problem.comm, draw)
 
 
 def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(points, shape (n, 3), triangles that look outward, (m, 3), wall ratio at the points) of the part as modelled.
+    """(points, shape (n, 3), triangles that look outward, (m, 3), wall ratio at the points) of the whole part.
 
     The wall is put half to each side of the surface, along the normals at the nodes.
     """
-    wall = wall_of(path, state)
+    wall, planes = wall_of(path, state), path.scene.symmetry
+    on = [np.abs(wall.rest[:, plane.axis] - plane.position) < planes.near for plane in planes.planes]
     corners = wall.now[wall.triangles]
     normal, n = np.zeros_like(wall.now), len(wall.now)
     each = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     np.add.at(normal, wall.triangles.ravel(), np.repeat(each, 3, axis=0))
+    for plane, there in zip(planes.planes, on):
+        normal[there, plane.axis] = 0.0
     normal *= wall.at_nodes[:, None] / 2 / np.linalg.norm(normal, axis=1, keepdims=True)
     ends = np.concatenate([wall.triangles[:, [i, (i + 1) % 3]] for i in range(3)])
     _, which, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
-    rim = ends[times[which.ravel()] == 1]
+    rim = ends[(times[which.ravel()] == 1) & ~np.any([there[ends].all(1) for there in on] or [False], axis=0)]
     side = np.concatenate([np.column_stack([rim[:, 1], rim[:, 0], rim[:, 0] + n]),
                            np.column_stack([rim[:, 1], rim[:, 0] + n, rim[:, 1] + n])])
     triangles = np.concatenate([wall.triangles[:, ::-1], wall.triangles + n, side[:, ::-1]])
-    ratio = wall.to_nodes(wall.ratio)
-    return np.vstack([wall.now - normal, wall.now + normal]), triangles, np.concatenate([ratio, ratio])
+    points, ratio = np.vstack([wall.now - normal, wall.now + normal]), np.tile(wall.to_nodes(wall.ratio), 2)
+    kept = [np.tile(there, 2) for there in on]
+    for k, plane in enumerate(planes.planes):                # the image, which shares the nodes in the plane
+        image, away = np.arange(len(points)), ~kept[k]
+        image[away] = len(points) + np.arange(away.sum())
+        unit = np.eye(3)[plane.axis]
+        points = np.vstack([points, points[away] * (1 - 2 * unit) + 2 * plane.position * unit])
+        triangles = np.vstack([triangles, image[triangles][:, ::-1]])
+        ratio, kept = np.append(ratio, ratio[away]), [np.append(there, there[away]) for there in kept]
+    return points, triangles, ratio
 
 
 def shell_model(path: Any, file: Any, state: Any = None) -> None:
     """Write the part as shells with a thickness each, as an input file (.inp) for Abaqus or CalculiX (rank 0 writes).
 
+    It is the body as modelled: a half or a quarter, to be held at its planes of symmetry there.
     Each triangle is an S3 with its wall as the section's thickness; the material must be given there.
     """
     file, wall = files.named("shell_model", file, ".inp"), wall_of(path, state or path.last)
@@ -90,10 +110,13 @@ def shell_model(path: Any, file: Any, state: Any = None) -> None:
 
 
 def report(path: Any, file: Any, title: str, failure: Any, units: Units, density: float | None, trim: Any) -> FilePath:
-    """See `Path.report`: pictures, the part in numbers, stages, inputs, warnings."""
+    """See `Path.report`: the process in three dimensions, pictures, the part in numbers, stages, inputs, warnings."""
     from .part import part
     wall, last, comm = path.wall(), path.last, path.problem.comm
-    found = part(wall, density, trim, (), units)
+    planes, record = path.scene.symmetry, of_path(path)
+    found = part(wall, density, trim, (), units, planes)
+    record.drawn = int(np.clip(_DRAWN // len(wall.rest), *_FRAMES))
+    drawn = interactive.data([record], [title or "run"], units, {"mesh": _mesh(path, record, units)})
     size = np.ptp(wall.rest[:, :COORDINATES], axis=0).max() / 12
     pictures: list[str] = []
     with TemporaryDirectory() as folder:
@@ -107,31 +130,42 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
                 break
             if comm.rank == 0:
                 pictures.append(page.picture(target.read_bytes(), caption, "wide"))
-    counts = path.counts
+    counts, basis = path.counts, planes.basis(None)
     body = [f"<h1>{html.escape(title or 'Report of a run')}</h1>",
             f"<p class=lead>{counts.steps} states after the start, {counts.iterations} Newton iterations,"
-            f" {counts.seconds:.1f} s. A sheet in space, as a membrane.</p>"]
+            f" {counts.seconds:.1f} s. A sheet in space, as a membrane."
+            f"{f' Forces, energies, volumes and areas are given for {basis}.' * bool(basis)}</p>"]
     if failure is not None:
         body.append(f"<div class='note bad'><h2>The run could not go on</h2><p>{page.lines(str(failure))}</p></div>")
-    body += [f"<p class=note>{html.escape(found.text)}</p>" for found in path.findings()]
-    body += ["<div class=grid>", *pictures, "</div><h2>The answer</h2>",
-             page.table(["", ""], [list(row) for row in found.rows])]
+    body += [f"<p class=note>{html.escape(one.text)}</p>" for one in path.findings()]
+    body += [PROCESS, "<div class=grid>", *pictures, "</div><h2>The answer</h2>",
+             page.table(["", ""], [list(row) for row in found.rows]), "<h2>Curves</h2><div id=charts class=grid></div>"]
     names = list(dict.fromkeys(state.stage for state in path.states))
     columns = [c for c in path.columns if not c.endswith("error")]
     ends = [next(s for s in reversed(path.states) if s.stage == name) for name in names]
     body += ["<h2>Stages</h2>", page.table(["stage", *(units.label(c) for c in columns)], [
         [state.stage or "run", *(page.number(state.measures[c]) for c in columns)] for state in ends])]
     body += ["<h2>Inputs</h2>", page.table(["", ""], [[k, v] for k, v in summary(path.problem.scene).items()])]
-    text = page.page(title or "Report of a run", body, "")
-    files.on_root(comm, lambda: files.replace(file, lambda stream: stream.write(text)))
+
+    def make() -> None:
+        text = page.page(title or "Report of a run", body, scripts(drawn))
+        files.replace(file, lambda stream: stream.write(text))
+    files.on_root(comm, make)
     return FilePath(file)
 
 
-def _mirrors(path: Any, wall: WallInSpace) -> list[np.ndarray]:
-    """Factors by which the part and its mirror images make the whole."""
-    sides = [np.ones(3)]
-    for axis, name in _SIDE:
-        at = wall.rest[:, axis]
-        if name in path.problem.scene.mesh.boundaries and min(abs(at.min()), abs(at.max())) < 1e-9 * np.ptp(at):
-            sides += [side * np.where(np.arange(3) == axis, -1.0, 1.0) for side in sides]
-    return sides
+def _mesh(path: Any, record: Any, units: Units) -> dict[str, Any]:
+    """The triangles of the sheet, drawn state by drawn state, and the tools, as `report.js` takes them."""
+    walls = [wall_of(path, path.states[k]) for k in record.frames]
+    ratio = [wall.to_nodes(wall.ratio) for wall in walls]
+    shown = {units.label("wall"): [wall.at_nodes for wall in walls], "wall / original": ratio}
+    tools = []
+    for k, (contact, name) in enumerate(zip(record.tooling.contacts, record.tooling.names)):
+        points, triangles = contact.tool.surface()
+        if len(triangles) > _LARGEST_TOOL:
+            continue
+        images = [[*scale, *shift] for scale, shift in record.planes.images(3, contact.tool.bounds)]
+        tools.append({"name": name, "points": rounded(points.T), "triangles": triangles.T.tolist(), "images": images,
+                      "moves": contact.way.tolist(), "travel": [record.travels[i][k] for i in record.frames]})
+    return {"triangles": walls[0].triangles.T.tolist(), "points": [rounded(wall.now.T) for wall in walls],
+            "fields": {name: [rounded(values) for values in each] for name, each in shown.items()}, "tools": tools}

@@ -65,9 +65,10 @@ class Surface(Formulation):
         """A small stretch in all directions."""
         self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X)
 
-    def area_row(self) -> Any:
-        """Linear form whose vector is, at the first component of a node, the area that belongs to it."""
-        return ufl.split(self.test_function())[0][0] * self.dx(metadata={"quadrature_degree": 1})
+    def area_row(self, deformed: bool = False) -> Any:
+        """Linear form whose vector is, at the first component of a node, the area that belongs to it, length^2."""
+        ratio = self.F[0, 0] * self.F[1, 1] if deformed else 1
+        return ratio * ufl.split(self.test_function())[0][0] * self.dx(metadata={"quadrature_degree": 1})
 
     def _make_mesh(self) -> Any:
         return self.scene.mesh

@@ -21,6 +21,7 @@ from ...runs import trace
 from ...scene.scene import Scene
 from ...solve.stepping import StepControl
 from ...tools import Tool, plane
+from ...units import NONE, Units
 from .instability import CriticalPoint, Stability, wave_numbers
 
 _FOOT: dict[str, Any] = {"points": 16, "penalty": 2.0, "ramp": 1e-4}
@@ -42,6 +43,7 @@ class TopLoad:
         peak: False if the force is largest in the last state: it may grow further.
         ended: why the path ended before the travel that was asked for, in words, or "".
         energy: up to the first buckling, or to the largest force, length force.
+        units: of the labels.
     """
 
     path: Path
@@ -49,6 +51,7 @@ class TopLoad:
     travel: np.ndarray
     force: np.ndarray
     ended: str
+    units: Units = NONE
 
     @property
     def largest_force(self) -> float:
@@ -91,14 +94,19 @@ class TopLoad:
         return float(np.trapezoid(F, x))
 
     def __str__(self) -> str:
+        def said(value: float, of: str, digits: int = 5) -> str:
+            return f"{value:.{digits}g} {self.units.of(of)}".rstrip()
+
+        def at(force: float, travel: float, between: str = ", ") -> str:
+            return f"{said(force, 'force')}{between}travel {said(travel, 'travel', 4)}"
         what = "" if self.peak else " (the last state: it may grow further)"
         lines = ["top load, elastic:",
-                 f"  axisymmetric path: largest force {self.largest_force:.5g} at travel {self.at_travel:.4g}{what}"]
+                 f"  axisymmetric path: largest force {at(self.largest_force, self.at_travel, ' at ')}{what}"]
         for n in self.stability.numbers:
             if (found := self.buckling(n)) is not None:
-                lines.append(f"  n = {n:g}: buckles at force {found[0]:.5g}, travel {found[1]:.4g}")
+                lines.append(f"  n = {n:g}: buckles at force {at(*found)}")
         lines.append("  no mode buckles" if self.first is None else
-                     f"  first: n = {self.first.number:g}; energy to it {self.energy:.4g}")
+                     f"  first: n = {self.first.number:g}; energy to it {said(self.energy, 'energy', 4)}")
         return "\n".join([*lines, f"  the path ended before: {self.ended}"] if self.ended else lines)
 
     __repr__ = __str__
@@ -106,7 +114,7 @@ class TopLoad:
 
 def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = None,
              modes: Iterable[float] = range(2, 9), neck: str = "neck", foot: str = "outer",
-             step: StepControl | None = None) -> TopLoad:
+             step: StepControl | None = None, units: Units | None = None) -> TopLoad:
     """Push a body, free of stress, down on a frictionless plate by its neck; look where it buckles round the axis.
 
     The neck is held radially and round the axis. Contact gives way by about a thousandth of the wall, so that the ring
@@ -120,6 +128,7 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
         modes: waves round the axis that are looked for.
         neck, foot: the boundaries that are pushed and that stand.
         step: default `StepControl(largest=0.004)`.
+        units: a `formingx.Units`, for the labels.
 
     Raises:
         InputError: an argument that is not allowed; the foot does not come to the floor.
@@ -150,4 +159,5 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
         path, ended = error.path, str(error).split(". ")[0]
     if not path["contact_length"].any():
         raise InputError(f"top_load: floor = {floor!r}: {foot!r} does not reach it within travel = {travel:g}")
-    return TopLoad(path, path.stability(modes, "all"), -path["travel"], path["support_force"], ended)
+    return TopLoad(path, path.stability(modes, "all"), -path["travel"], path["support_force"], ended,
+                   units or NONE)

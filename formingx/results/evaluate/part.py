@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...errors import InputError, finite, known, positive, several
+from ...scene.symmetry import NO_PLANES, MirrorPlanes
 from ...units import NONE, Units
 from ..numbers import PartNumbers, without_round_off
 from .profile import fine
@@ -16,7 +17,7 @@ from .wall import Wall
 
 @dataclass(frozen=True, repr=False)
 class Part(PartNumbers):
-    """A part, from the axis to the rim or to where it is trimmed; in plane strain per unit of depth, as modelled.
+    """A whole part, also where a half is modelled, to its rim or its trim; in plane strain per unit depth.
 
     Attributes:
         volume: between the two faces, length^3 (a rim that bulges is left out).
@@ -33,6 +34,8 @@ class Part(PartNumbers):
         capacity: that the part holds, length^3: within its inner face, between planes across its ends (of a closed
             bottle: all of it; of a pot: to its rim, or to the trim).
         scrap: volume beyond the trim over the volume of the whole sheet.
+        basis: what volume, area, weight and capacity are given for, as text: the whole part of which a half was
+            modelled, a unit of depth; "" of a round part.
         units: of the labels.
     """
 
@@ -51,6 +54,7 @@ class Part(PartNumbers):
     walls: dict[float, float]
     scrap: float
     capacity: float
+    basis: str = ""
     units: Units = field(repr=False, default=NONE)
 
     @property
@@ -64,9 +68,11 @@ class Part(PartNumbers):
 
 
 def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: float | tuple[str, float] | None = None,
-         heights: Sequence[float] = (), units: Units = NONE) -> Part:
-    """See `Path.part`."""
-    profile = wall.profile
+         heights: Sequence[float] = (), units: Units = NONE, planes: MirrorPlanes = NO_PLANES) -> Part:
+    """See `Path.part`; planes: of symmetry, that cut the body."""
+    profile, images = wall.profile, planes.factor
+    basis = planes.basis(None if axisymmetric else units.length or "unit")
+    units = units if axisymmetric else units.per_depth()
     strips = _strips(fine(profile.bottom), fine(profile.top), axisymmetric)
     middle = _surface(fine(profile.middle), axisymmetric)
     rest = _surface(fine((profile.rest_bottom + profile.rest_top) / 2), axisymmetric)
@@ -82,13 +88,14 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     of_strip = (wall.wall[1:] + wall.wall[:-1]) / 2
     average = (of_strip * area * inside).sum() / kept[1]
     spread = ((of_strip - average) ** 2 * area * inside).sum() / kept[1]
-    weight = None if density is None else units.mass(kept[3], positive("part: density", density))
+    weight = None if density is None else units.mass(images * kept[3], positive("part: density", density))
     at = {finite("part: heights", h): wall.at_height(h) for h in several("part: heights", heights, "numbers")}
-    return Part(kept[0], kept[1], kept[1] / kept[2], mean, float(wall.wall[k]), float(wall.reference_radius[k]),
+    return Part(images * kept[0], images * kept[1], kept[1] / kept[2], mean, float(wall.wall[k]),
+                float(wall.reference_radius[k]),
                 without_round_off((wall.r[k], wall.z[k]), profile.middle), float(wall.height[k]),
                 ("RZ"[along], float(profile.rest_bottom[k, along])), float(wall.wall[k] / mean),
                 float(np.sqrt(spread) / average), weight, at, float(1 - kept[0] / volume.sum()),
-                _content(wall, inside, axisymmetric), units)
+                images * _content(wall, inside, axisymmetric), basis, units)
 
 
 def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndarray:

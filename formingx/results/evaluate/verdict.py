@@ -77,6 +77,7 @@ class Verdict:
 
     def __init__(self, problem: Any):
         self._problem, self._solid = problem, problem.scene.model.solid
+        self._images = problem.scene.symmetry_factor
         if self._solid:
             self._outline = Outline(problem.forms)
             self._faces = [self._outline.of(contact.contact.on) for contact in problem.contacts]
@@ -95,7 +96,7 @@ class Verdict:
         with self._problem.state_context(state):
             edges, found = self._outline.edges(), []
             for contact in self._problem.present:
-                off = _off(contact, state)
+                off = _off(contact, state, self._images)
                 if off > _LIMITS.warns:
                     name = _name(contact)
                     found.append(Finding("warning", name, f"Penetration changes the force on the tool of {name!r} by"
@@ -136,7 +137,7 @@ class Verdict:
                        f" it, {100 * sunk.share * _LIMITS.sunk:.2g} % of the wall that is left there: give Contact a"
                        f" penalty of {50 * sunk.share * sunk.contact.contact.penalty:.1g}")
             for contact in problem.present:
-                off = _off(contact, state)
+                off = _off(contact, state, self._images)
                 felt = resultants.penetration(contact, state.x, state.control) > _LIMITS.felt * contact.thickness
                 if off > _LIMITS.ends and felt:
                     yield (f"the body did not follow the tool of {_name(contact)!r}: penetration changes the force by"
@@ -200,16 +201,16 @@ def _most_inside(contact: Any) -> np.ndarray:
     return np.where(contact.area < contact.rule.area, np.inf, most)
 
 
-def _off(contact: Any, state: State) -> float:
+def _off(contact: Any, state: State, images: int) -> float:
     """By how much penetration changes the force F on a tool, relative; collective.
 
     What the tool gains on the body, 2 E/F (E: energy of penetration), times dF/dtravel, over F. On one that stays air
-    presses: it is as large as that.
+    presses: it is as large as that. images: of the body in the part, whose energy the state tells.
     """
     if not contact.contact.driven:
         return 0.0
     energy = resultants.energy(contact, state.x, state.control)
-    share = energy / (state.measures.get("strain_energy") or np.inf)
+    share = images * energy / (state.measures.get("strain_energy") or np.inf)
     if share < 0.1 * _LIMITS.warns:
         return share
     along = contact.contact.way / np.hypot(*contact.contact.way)

@@ -77,7 +77,7 @@ class _Reaction(NamedTuple):
 
 
 class Ledger:
-    """The energy balance of the states of one problem.
+    """The energy balance of the states of one problem, of the whole part.
 
     Args:
         segment: the `Segment`.
@@ -147,10 +147,14 @@ class Ledger:
 
     def _between(self, a: Any, b: Any) -> dict[str, float]:
         """What is added from a state to the next."""
+        images = self._problem.scene.symmetry_factor
+        found = {name: images * value for name, value in self._of_body(a, b).items()}
+        return ({"jumps": b.jump.get("dissipated", 0.0)} if b.kind == "jump" else {}) | found
+
+    def _of_body(self, a: Any, b: Any) -> dict[str, float]:
+        """The same of the body as modelled, without what jumps lose."""
         found: dict[str, float] = {}
-        if b.kind == "jump":
-            found["jumps"] = b.jump.get("dissipated", 0.0)
-        elif any(c.law.has_friction for c in self._problem.contacts):
+        if b.kind != "jump" and any(c.law.has_friction for c in self._problem.contacts):
             found["friction"] = self._friction(a, b)
         if self._problem.scene.heat is not None:
             found["heat"] = self._warmed(a, b)

@@ -68,7 +68,7 @@ class Sheet:
         return str(self)
 
     def _header(self, units: Units) -> list[str]:
-        return [f"{name} [{unit}]" if (unit := units.of(name)) else name for name in self.columns]
+        return [units.heading(name) for name in self.columns]
 
     def _rows(self) -> list[tuple]:
         return list(zip(*self.columns.values(), strict=True))

@@ -1,6 +1,6 @@
 """The part as a solid of triangles: STL, for CAD and 3-D printing, and binary glTF, coloured, for viewers and pages.
 
-STL: 3D Systems (1988), binary. glTF 2.0: Khronos, ISO/IEC 12113:2022, binary (GLB); lengths are those of the script.
+STL: 3D Systems (1988), binary. glTF 2.0: Khronos, ISO/IEC 12113:2022, binary (GLB), in metres.
 """
 
 import json
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...io.stl import volume, write_stl
+from ...units import LENGTHS, NONE, Units
 from ..evaluate.profile import fine
 from . import tabular
 
@@ -60,14 +61,17 @@ def to_stl(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: 
     tabular.on_root(comm, lambda: write_stl(*surface[:2], file))
 
 
-def to_gltf(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: Any) -> None:
-    """Write what `coloured` gives as a binary glTF file (.glb), coloured by the wall ratio (rank 0 writes)."""
+def to_gltf(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: Any, units: Units = NONE) -> None:
+    """Write what `coloured` gives as a binary glTF file (.glb), coloured by the wall ratio (rank 0 writes).
+
+    units: of the script; a length that is not said is taken for m.
+    """
     from matplotlib import colormaps
     file = tabular.named("to_gltf", file, ".glb")
     points, triangles, ratio = surface
     shade = (ratio - ratio.min()) / (np.ptp(ratio) or 1.0)
     colours = colormaps["viridis_r"](shade)[:, :3]
-    upright = points[:, [0, 2, 1]] * (1, 1, -1)              # glTF has y up
+    upright = LENGTHS[units.length or "m"] * points[:, [0, 2, 1]] * (1, 1, -1)              # glTF has y up
     arrays = [("POSITION", upright.astype("<f4"), 5126, 34962), ("COLOR_0", colours.astype("<f4"), 5126, 34962),
               ("indices", triangles.astype("<u4").ravel(), 5125, 34963)]
     data = b""

@@ -12,14 +12,20 @@ import numpy as np
 
 from ...errors import InputError, place
 from ...io.output import replace
+from ...units import NONE, Units
 
 
-def write_path(path: Any, file: Any) -> None:
-    """One row per state: stage (of a process), kind, iterations, then every measure of the path."""
+def write_path(path: Any, file: Any, units: Units = NONE) -> None:
+    """One row per state: stage (of a process), kind, iterations, then every measure of the path.
+
+    units: of the header; in plane strain per unit depth.
+    """
+    units = units.per_depth() if path.scene.kinematics.dimension_of_volume == 2 else units
     staged = any(s.stage for s in path.states)
     rows = [[*[s.stage] * staged, s.kind, max(len(s.history) - 1, 0), *(s.measures[c] for c in path.columns)]
             for s in path.states]
-    write_rows(file, [*["stage"] * staged, "kind", "iterations", *path.columns], rows, path.problem.comm)
+    write_rows(file, [*["stage"] * staged, "kind", "iterations", *map(units.heading, path.columns)], rows,
+               path.problem.comm)
 
 
 def write_profile(profile: Any, file: Any, comm: Any) -> None:

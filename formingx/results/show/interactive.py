@@ -38,9 +38,9 @@ def packed(text: str) -> str:
     return base64.b64encode(gzip.compress(text.encode(), 6, mtime=0)).decode()
 
 
-def data(records: list[Record], names: list[str], units: Units) -> str:
-    """Everything that `report.js` draws, as JSON."""
-    runs = [_run(record, name, units) for record, name in zip(records, names)]
+def data(records: list[Record], names: list[str], units: Units, more: dict[str, Any] | None = None) -> str:
+    """Everything that `report.js` draws, as JSON; more: of each run, as the "mesh" of a sheet in space."""
+    runs = [_run(record, name, units) | (more or {}) for record, name in zip(records, names)]
     charts = [chart for chart in (*_loading(records, names, units), *_in_time(records, names, units),
                                   _filling(records, names, units), *_walls(records, names, units)) if chart]
     return json.dumps({"runs": runs, "charts": charts, "length": units.length or ""}, allow_nan=False,
@@ -54,9 +54,10 @@ def _run(record: Record, name: str, units: Units) -> dict[str, Any]:
     stages = [{"name": words(record.stages[a]), "from": float(at[a]), "to": float(at[b - 1])}
               for a, b in zip([0, *ends], [*ends, len(at)])]
     shown = [c for c in record.measures if c.endswith(("pressure", "travel", "pole_height", "process_time"))]
-    found = {"name": name, "axisymmetric": record.axisymmetric, "stages": stages, "progress": _rounded(at[frames]),
+    found = {"name": name, "axisymmetric": record.axisymmetric, "stages": stages, "progress": rounded(at[frames]),
              "stage": [record.stages[k] for k in frames],
-             "numbers": {units.label(c): _rounded(record.measures[c][frames]) for c in shown},
+             "numbers": {units.label(c): rounded(record.measures[c][frames]) for c in shown},
+             "images": [[*scale, *shift] for scale, shift in record.planes.images(3 if record.space else 2)],
              "tools": _tools(record), "sheet": None}
     if record.profiles[-1] is not None:
         found["sheet"] = _sheet(record, units)
@@ -73,12 +74,12 @@ def _sheet(record: Record, units: Units) -> dict[str, Any]:
         values = {units.label("wall"): wall, "wall / original": wall / profile.original_thickness}
         values |= {_label(record, units, key): v for key, v in more.items()}
         for key, v in values.items():
-            fields.setdefault(key, []).append(_rounded(v[some], each=True))
+            fields.setdefault(key, []).append(rounded(v[some], each=True))
     last = record.profiles[-1]
     along = int(np.argmax(np.ptp(last.rest_bottom, axis=0)))          # of a parison: Z
-    return {"from": "RZ"[along], "material": _rounded(last.rest_bottom[some, along]), "fields": fields,
-            "bottom": [_rounded(p.bottom[some].T) for p in profiles],
-            "top": [_rounded(p.top[some].T) for p in profiles]}
+    return {"from": "RZ"[along], "material": rounded(last.rest_bottom[some, along]), "fields": fields,
+            "bottom": [rounded(p.bottom[some].T) for p in profiles],
+            "top": [rounded(p.top[some].T) for p in profiles]}
 
 
 def _label(record: Record, units: Units, key: str) -> str:
@@ -96,7 +97,7 @@ def _tools(record: Record) -> list[dict[str, Any]]:
             continue
         line = contact.tool.surface()[0]
         shell = line + 0.02 * size * contact.tool.nearest(line).normal
-        found.append({"name": name, "line": _rounded(line.T), "shell": _rounded(shell.T),
+        found.append({"name": name, "line": rounded(line.T), "shell": rounded(shell.T),
                       "moves": contact.way.tolist(),
                       "travel": [None if t[k] is None else float(f"{t[k]:.7g}")
                                  for t in (record.travels[i] for i in record.frames)]})
@@ -165,7 +166,7 @@ def _in_time(records: list[Record], names: list[str], units: Units) -> list[dict
 
 def _trace(x: np.ndarray, y: np.ndarray, name: str) -> dict[str, Any]:
     """A curve; the states on it as dots, where they are not too many."""
-    return {"x": _rounded(x), "y": _rounded(y), "name": name, "marker": {"size": 4},
+    return {"x": rounded(x), "y": rounded(y), "name": name, "marker": {"size": 4},
             "mode": "lines+markers" if len(x) <= 60 else "lines"}
 
 
@@ -200,8 +201,8 @@ def _walls(records: list[Record], names: list[str], units: Units) -> list[dict[s
             lines |= {f"{name}: {layer}" if len(records) > 1 else layer: share * wall.wall
                       for layer, share in record.layers.items()}
         for label, values in lines.items():
-            by_height.append({"x": _rounded(values), "y": _rounded(wall.height), "name": label, "mode": "lines"})
-            by_length.append({"x": _rounded(wall.arc_length), "y": _rounded(values), "name": label, "mode": "lines"})
+            by_height.append({"x": rounded(values), "y": rounded(wall.height), "name": label, "mode": "lines"})
+            by_length.append({"x": rounded(wall.arc_length), "y": rounded(values), "name": label, "mode": "lines"})
     label = units.label("wall")
     return [_chart("Wall against height above the base", label, units.label("height"), by_height, zero="x"),
             _chart("Wall against arc length from the axis", units.label("arc_length"), label, by_length, zero="y")]
@@ -214,10 +215,10 @@ def _chart(title: str, x: str, y: str, traces: list[dict], zero: str = "") -> di
             "traces": [{"type": "scatter", **trace} for trace in traces]}
 
 
-def _rounded(values: Any, each: bool = False) -> list:
+def rounded(values: Any, each: bool = False) -> list:
     """Numbers with `DIGITS` digits, `each` or those of the largest of them, as lists."""
     values = np.asarray(values, dtype=float)
     size = np.abs(values) if each else np.abs(values).max(initial=0.0)
     unit = 10.0 ** (np.floor(np.log10(np.where(size > 0, size, 1.0))) + 1 - DIGITS)
     return [float(f"{v:.{DIGITS + 1}g}") for v in (np.round(values / unit) * unit).tolist()] if values.ndim == 1 else [
-        _rounded(row, each) for row in values]
+        rounded(row, each) for row in values]

@@ -10,6 +10,7 @@ import numpy as np
 from ...contact.tooling import Tooling
 from ...errors import InputError
 from ...findings import Finding, worst_first
+from ...scene.symmetry import NO_PLANES, MirrorPlanes
 from .. import files
 from ..evaluate import volume
 from ..evaluate.contact_face import ContactFace, ContactTable, tool_forces
@@ -49,6 +50,7 @@ class Record:
         layers: of the last state, as in `Wall`; script: the file that ran; or "".
         findings: `Path.findings`; of a checkpoint those with which the run ended, as is failure: what ended it, or "".
         verdicts: of the n states, `State.verdict`.
+        planes: of symmetry, that cut the body; drawn: about so many states are.
     """
 
     summary: dict[str, str]
@@ -73,6 +75,13 @@ class Record:
     heat: dict[str, tuple[float, str]] = field(default_factory=dict)
     unit: str = ""
     space: bool = False
+    planes: MirrorPlanes = NO_PLANES
+    drawn: int = FRAMES
+
+    @property
+    def per_depth(self) -> bool:
+        """True in plane strain: forces, energies, volumes and areas are per unit depth."""
+        return not (self.axisymmetric or self.space)
 
     @property
     def control(self) -> str:
@@ -92,7 +101,7 @@ class Record:
     @property
     def frames(self) -> list[int]:
         """Numbers of the states that are drawn, see `frames`."""
-        return frames(self.progress, self.kinds, self.stages)
+        return frames(self.progress, self.kinds, self.stages, self.drawn)
 
     @property
     def shown(self) -> list[int]:
@@ -206,7 +215,8 @@ def of_path(path: Any) -> Record:
                       aimed(stepping, measures), tooling, [tooling.travels(s.setting, s.control) for s in states],
                       tool_forces(path), shown, dict(wall.layers) if wall else {}, sys.argv[0],
                       path.findings(), verdicts=[s.verdict for s in states],
-                      space=problem.scene.kinematics.components == 3, **_heat(plain(problem.scene.heat)))
+                      space=problem.scene.kinematics.components == 3, planes=problem.scene.symmetry,
+                      **_heat(plain(problem.scene.heat)))
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:
@@ -223,7 +233,8 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
                   [tooling.travels(s.get("setting", {}), s["control"]) for s in states],
                   {name: measures[column] for name, column in tooling.force_columns.items() if column in measures},
                   _temperatures(states, profiles[-1]), {}, verdicts=[s["verdict"] for s in states],
-                  space=about["scene"]["kinematics"]["kind"] == "ThreeD", **ended, **_heat(about["scene"].get("heat")))
+                  space=about["scene"]["kinematics"]["kind"] == "ThreeD",
+                  planes=MirrorPlanes.of_description(about["scene"]), **ended, **_heat(about["scene"].get("heat")))
 
 
 def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
@@ -252,16 +263,16 @@ def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np
     return found
 
 
-def frames(at: np.ndarray, kinds: list[str], stages: list[str]) -> list[int]:
-    """Numbers of about `FRAMES` of n states at which a process has come so far (`progress`), shape (n,).
+def frames(at: np.ndarray, kinds: list[str], stages: list[str], most: int = FRAMES) -> list[int]:
+    """Numbers of about `most` of n states at which a process has come so far (`progress`), shape (n,).
 
     Ends of stages and limit points are among them; others are spread over the process and over the states alike.
     """
     n = len(at)
     marked = {k for k in range(n) if kinds[k] == "limit point" or stages[k:k + 2] != [stages[k]] * 2} | {0, n - 1}
     way = (at + np.linspace(0, 1, n)) / 2
-    even = np.searchsorted(way, np.linspace(0, 1, max(FRAMES - len(marked), FRAMES // 2)))
-    return sorted({*marked, *map(int, even.clip(0, n - 1))}) if n > FRAMES else list(range(n))
+    even = np.searchsorted(way, np.linspace(0, 1, max(most - len(marked), most // 2)))
+    return sorted({*marked, *map(int, even.clip(0, n - 1))}) if n > most else list(range(n))
 
 
 def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray:

@@ -22,9 +22,11 @@ function place(run, s) {
 }
 
 function frame(run, s, field) {
-  const {k, j, f} = place(run, s), sheet = run.sheet, values = sheet.fields[field];
-  const line = of => [0, 1].map(i => mix(sheet[of][k][i], sheet[of][j][i], f));
-  return {bottom: line("bottom"), top: line("top"), values: mix(values[k], values[j], f),
+  const {k, j, f} = place(run, s), sheet = run.sheet || run.mesh, values = sheet.fields[field];
+  const line = of => (sheet[of] ? sheet[of][k] : []).map((v, i) => mix(v, sheet[of][j][i], f));
+  const between = (a, b) => f < 1 && a !== null && b !== null ? a + f * (b - a) : f < 1 ? a : b;
+  return {bottom: line("bottom"), top: line("top"), points: line("points"), values: mix(values[k], values[j], f),
+    moved: (sheet.tools || []).map(tool => between(tool.travel[k], tool.travel[j])),
     all: Object.fromEntries(Object.entries(sheet.fields).map(([name, v]) => [name, mix(v[k], v[j], f)])),
     numbers: Object.fromEntries(Object.entries(run.numbers).map(([n, v]) => [n, v[k] + f * (v[j] - v[k])])),
     travel: run.tools.map(t => t.travel[f < 1 ? k : j] === null ? null
@@ -33,31 +35,34 @@ function frame(run, s, field) {
 }
 
 function limits(run, field) {
-  const v = run.sheet.fields[field].flat().filter(x => x !== null).sort((a, b) => a - b);
+  const v = (run.sheet || run.mesh).fields[field].flat().filter(x => x !== null).sort((a, b) => a - b);
   const out = field.startsWith("wall") ? 0 : Math.floor(0.01 * v.length);     // stresses have peaks at sharp corners
   return [v[out], v[v.length - 1 - out]];
 }
 
+// Maps of a section, (r, z) -> (sr r + dr, sz z + dz), to all that is drawn of it: images in mirrors, and across the axis.
+const maps = run => run.images.flatMap(([sr, sz, dr, dz]) => (run.axisymmetric ? [1, -1] : [1])
+  .map(side => [v => v.map(r => side * (sr * r + dr)), v => v.map(z => sz * z + dz)]));
+
 const format = x => x === null || x === undefined ? "" : Number(x.toPrecision(4)).toString();
 
 function sectionTraces(run, at, field, range) {
-  const sides = run.axisymmetric ? [1, -1] : [1], traces = [];
-  run.tools.forEach((tool, i) => sides.forEach(side => {
+  const sides = maps(run), traces = [];
+  run.tools.forEach((tool, i) => sides.forEach(([across, up]) => {
     const t = at.travel[i], dr = (t ?? 0) * tool.moves[0], dz = (t ?? 0) * tool.moves[1];
-    const x = [...tool.line[0], ...[...tool.shell[0]].reverse()].map(r => side * (r + dr));
-    const y = [...tool.line[1], ...[...tool.shell[1]].reverse()].map(z => z + dz);
+    const x = across([...tool.line[0], ...[...tool.shell[0]].reverse()].map(r => r + dr));
+    const y = up([...tool.line[1], ...[...tool.shell[1]].reverse()].map(z => z + dz));
     traces.push({type: "scatter", x, y, mode: "lines", fill: "toself", fillcolor: "#cfd5dd", hoverinfo: "name",
       line: {color: GREY, width: 1}, name: tool.name, showlegend: false, visible: t !== null});
   }));
-  sides.forEach(side => traces.push({type: "scatter", mode: "lines", fill: "toself", fillcolor: "#30405a",
+  sides.forEach(([across, up]) => traces.push({type: "scatter", mode: "lines", fill: "toself", fillcolor: "#30405a",
     line: {color: "#30405a", width: 0.5}, hoverinfo: "skip", showlegend: false,
-    x: [...at.bottom[0], ...[...at.top[0]].reverse()].map(r => side * r),
-    y: [...at.bottom[1], ...[...at.top[1]].reverse()]}));
+    x: across([...at.bottom[0], ...[...at.top[0]].reverse()]), y: up([...at.bottom[1], ...[...at.top[1]].reverse()])}));
   const parts = 6, dense = v => v.flatMap((a, i) => i + 1 < v.length         // or thin walls would be a row of dots
     ? Array.from({length: parts}, (_, k) => a === null ? a : a + k / parts * ((v[i + 1] ?? a) - a)) : [a]);
   const r = dense(at.bottom[0].map((r, i) => (r + at.top[0][i]) / 2)), z = dense(at.bottom[1].map((z, i) => (z + at.top[1][i]) / 2));
-  sides.forEach((side, n) => traces.push({type: "scatter", mode: "markers", showlegend: false, hovertemplate: "%{text}<extra></extra>",
-    x: r.map(r => side * r), y: z,
+  sides.forEach(([across, up], n) => traces.push({type: "scatter", mode: "markers", showlegend: false, hovertemplate: "%{text}<extra></extra>",
+    x: across(r), y: up(z),
     text: r.map((_, k) => Math.round(k / parts)).map(i => `from ${run.sheet.from} ${format(run.sheet.material[i])}<br>` +
       Object.entries(at.all).map(([name, v]) => `${name}: ${format(v[i])}`).join("<br>")),
     marker: {size: 6, color: dense(at.values), colorscale: field.startsWith("temperature") ? "Portland" : "Viridis", reversescale: field.startsWith("wall"), cmin: range[0],
@@ -66,29 +71,49 @@ function sectionTraces(run, at, field, range) {
   return traces;
 }
 
+const paint = (field, range) => ({colorscale: field.startsWith("temperature") ? "Portland" : "Viridis",
+  reversescale: field.startsWith("wall"), cmin: range[0], cmax: range[1], lighting: {ambient: 0.6, diffuse: 0.6, specular: 0.15}});
+
+// A sheet in space: its triangles and their images, and the tools.
+function mesh(run, at, field, range) {
+  const image = (points, [sx, sy, sz, dx, dy, dz]) => ({x: points[0].map(x => sx * x + dx), y: points[1].map(y => sy * y + dy),
+    z: points[2].map(z => sz * z + dz)}), [i, j, k] = run.mesh.triangles;
+  const sheets = run.images.map((map, n) => ({type: "mesh3d", ...image(at.points, map), i, j, k, intensity: at.values,
+    ...paint(field, range), showscale: n === 0, colorbar: {thickness: 12, len: 0.85, title: {text: field, side: "right"}},
+    text: at.values.map(v => `${field}: ${format(v)}`), hovertemplate: "%{text}<extra></extra>"}));
+  const tools = run.mesh.tools.flatMap((tool, n) => tool.images.map(map => {
+    const points = tool.points.map((v, axis) => v.map(x => x + (at.moved[n] ?? 0) * tool.moves[axis]));
+    return {type: "mesh3d", ...image(points, map), i: tool.triangles[0], j: tool.triangles[1], k: tool.triangles[2], color: GREY,
+      opacity: 0.25, hoverinfo: "name", name: tool.name, visible: at.moved[n] !== null};
+  }));
+  return [...tools, ...sheets];
+}
+
 function surface(run, at, field, range) {
   const r = [...at.bottom[0], ...[...at.top[0]].reverse()], z = [...at.bottom[1], ...[...at.top[1]].reverse()];
   const v = [...at.values, ...[...at.values].reverse()];
   const turn = Array.from({length: 49}, (_, i) => 1.5 * Math.PI * i / 48), size = Math.max(...r);
   const x = run.axisymmetric ? turn.map(a => r.map(q => q * Math.cos(a))) : [-1, 1].map(() => r);
   const y = run.axisymmetric ? turn.map(a => r.map(q => q * Math.sin(a))) : [-1, 1].map(s => r.map(() => s * size));
-  return [{type: "surface", x, y, z: x.map(() => z), surfacecolor: x.map(() => v), colorscale: field.startsWith("temperature") ? "Portland" : "Viridis",
-    reversescale: field.startsWith("wall"), cmin: range[0], cmax: range[1], showscale: false, hoverinfo: "skip",
-    lighting: {ambient: 0.6, diffuse: 0.6, specular: 0.15}}];
+  return run.images.map(([sr, sz, dr, dz]) => ({type: "surface", x: x.map(line => line.map(r => sr * r + dr)), y,
+    z: x.map(() => z.map(v => sz * v + dz)), surfacecolor: x.map(() => v), ...paint(field, range), showscale: false, hoverinfo: "skip"}));
 }
 
+// Lowest and highest coordinates of all that is drawn: (r, z), of a sheet in space (x, y, z).
 function box(run) {
-  let low = [Infinity, Infinity], high = [-Infinity, -Infinity];
-  for (const of of ["bottom", "top"]) for (const points of run.sheet[of]) for (const i of [0, 1]) {
-    low[i] = Math.min(low[i], ...points[i]); high[i] = Math.max(high[i], ...points[i]);
-  }
-  if (run.axisymmetric) low[0] = -high[0];
-  const room = 0.06 * Math.max(high[0] - low[0], high[1] - low[1]);
-  return [0, 1].map(i => [low[i] - room, high[i] + room]);
+  const axes = run.mesh ? [0, 1, 2] : [0, 1], n = axes.length, low = axes.map(() => Infinity), high = axes.map(() => -Infinity);
+  for (const of of run.mesh ? ["points"] : ["bottom", "top"]) for (const points of (run.mesh || run.sheet)[of])
+    for (const map of run.images) for (const i of axes) for (const v of points[i]) {
+      const at = map[i] * v + map[n + i];
+      low[i] = Math.min(low[i], at); high[i] = Math.max(high[i], at);
+    }
+  if (run.axisymmetric && !run.mesh) low[0] = -high[0];
+  const room = 0.06 * Math.max(...axes.map(i => high[i] - low[i]));
+  return axes.map(i => [low[i] - room, high[i] + room]);
 }
 
 function process(data) {
-  const runs = data.runs.filter(run => run.sheet);
+  const runs = data.runs.filter(run => run.sheet || run.mesh);
   if (!runs.length) { element("process").remove(); return; }
   const pick = element("run"), colour = element("colour"), slider = element("slider"), play = element("play");
   runs.forEach((run, i) => pick.add(new Option(run.name, i)));
@@ -100,26 +125,30 @@ function process(data) {
     height: Math.min(narrow() ? 470 : 520, (narrow() ? 280 : 480) * tall() + (narrow() ? 180 : 110)), xaxis: {title: `r${unit}`, range: box(run)[0], zeroline: false, gridcolor: "#eceff3",
     constrain: "domain"}, yaxis: {title: `z${unit}`, range: box(run)[1], scaleanchor: "x", zeroline: false,
     gridcolor: "#eceff3", constrain: "domain"}, plot_bgcolor: "white"});
-  const scene = () => { const [r, z] = box(run), deep = run.axisymmetric ? r : [-r[1], r[1]], height = narrow() ? 340 : 420;
+  const scene = () => { const all = box(run), r = all[0], z = all[all.length - 1], deep = run.mesh ? all[1] : run.axisymmetric ? r : [-r[1], r[1]], height = narrow() ? 340 : 420;
     const [x, y, up] = [r, deep, z].map(v => v[1] - v[0]), unit = Math.cbrt(x * y * up);
     const half = (run.axisymmetric ? x : 0.78 * x + 0.63 * y) / unit / 2, high = 0.9 * up / unit / 2 + 0.4 * half;     // as they are seen
     const wide = Math.min((element("solid").clientWidth || height) / height, 1);
     const far = Math.max(half / wide, high) / 0.41 + half / 2;
-    return {font, margin: {l: 0, r: 0, t: 0, b: 0},
+    return {font, margin: {l: 0, r: 0, t: 0, b: 0}, uirevision: run.name,
     height, scene: {aspectmode: "manual", aspectratio: {x: x / unit, y: y / unit, z: up / unit}, camera: {eye: {x: 0.57 * far, y: -0.71 * far, z: 0.42 * far}},
     xaxis: {visible: false, range: r}, yaxis: {visible: false, range: deep}, zaxis: {visible: false, range: z}}}; };
   function show(solid) {
     const s = slider.value / 1000, field = colour.value, range = limits(run, field), at = frame(run, s, field);
-    Plotly.react("section", sectionTraces(run, at, field, range), layout(), config);
+    if (run.mesh) { Plotly.react("solid", mesh(run, at, field, range), scene(), config); }
+    else Plotly.react("section", sectionTraces(run, at, field, range), layout(), config);
     element("now").textContent = [at.stage.replaceAll("_", " "), ...Object.entries(at.numbers).map(([n, v]) => `${n}: ${format(v)}`)]
       .filter(Boolean).join(" · ");
-    if (solid) Plotly.react("solid", surface(run, at, field, range), scene(), config);
+    if (solid && !run.mesh) Plotly.react("solid", surface(run, at, field, range), scene(), config);
   }
   function choose() {
     run = runs[pick.value || 0];
     const before = colour.value;
-    colour.replaceChildren(...Object.keys(run.sheet.fields).map(f => new Option(f, f)));
-    if (run.sheet.fields[before]) colour.value = before;
+    const fields = (run.sheet || run.mesh).fields;
+    element("section").hidden = !run.sheet;
+    element("section").parentElement.style.gridTemplateColumns = run.sheet ? "" : "minmax(0, 1fr)";
+    colour.replaceChildren(...Object.keys(fields).map(f => new Option(f, f)));
+    if (fields[before]) colour.value = before;
     element("marks").replaceChildren(...run.stages.map(stage => {
       const mark = document.createElement("span");
       mark.style.flexGrow = Math.max(stage.to - stage.from, 0.002);

@@ -63,6 +63,8 @@ def write(records: Record | list[Record], file: Any, title: str, failure: Any, c
     records = [records] if isinstance(records, Record) else records
     names, file = names or [title or "run"], files.named("report", file, ".html", ".htm")
 
+    units = units.per_depth() if all(record.per_depth for record in records) else units
+
     def make():
         parts = [_part(record, units, density, trim) for record in records]
         text = _page(records, names, parts, title or "Report of a run", failure, units)
@@ -77,7 +79,8 @@ def _part(record: Record, units: Units, density: float | None, trim: Any) -> Par
             raise InputError(f"report: {'density' if density is not None else 'trim'}: "
                              + (_NO_MESH if record.space else "the mesh is no sheet: it has no wall, nor a part"))
         return None
-    return part(Wall(record.profiles[-1], record.layers, None), record.axisymmetric, density, trim, (), units)
+    return part(Wall(record.profiles[-1], record.layers, None), record.axisymmetric, density, trim, (), units,
+                record.planes)
 
 
 def _page(records: list[Record], names: list[str], parts: list, title: str, failure: Any, units: Units) -> str:
@@ -86,8 +89,7 @@ def _page(records: list[Record], names: list[str], parts: list, title: str, fail
     for record, name in zip(records, names):
         body += _trouble(failure or record.failure, "" if alone else f"{name}: ")
     body += [_warnings(record, "" if alone else f"{name}: ") for record, name in zip(records, names)]
-    body += ["<p id=trouble class='note bad' hidden>This browser cannot draw what follows (it needs DecompressionStream"
-             " and WebGL: Chrome 80, Firefox 113, Safari 16.4 or later); the tables need nothing.</p>", _PROCESS]
+    body.append(PROCESS)
     if alone:
         body.append(_cards(records[0], parts[0], units))
     body += ["<h2>The answer</h2>", _answers(records, names, parts, units),
@@ -96,15 +98,22 @@ def _page(records: list[Record], names: list[str], parts: list, title: str, fail
         body += [] if alone else [f"<h2>{html.escape(name)}</h2>"]
         body += _behind(record, units)
     body += ["<h2>Made with</h2>", page.table(["", ""], _made(records))]
-    packed = (("library", interactive.library()), ("data", interactive.packed(interactive.data(records, names, units))))
+    return page.page(title, body, scripts(interactive.data(records, names, units)))
+
+
+def scripts(data: str) -> str:
+    """The end of a page that draws `interactive.data` where `PROCESS` and an element "charts" are."""
+    packed = (("library", interactive.library()), ("data", interactive.packed(data)))
     code = resources.files(__package__).joinpath("report.js").read_text()
     tail = "".join(f"\n<script type='text/plain' id={name}>{text}</script>" for name, text in packed)
-    return page.page(title, body, f"{tail}\n<script>{code}</script>")
+    return f"{tail}\n<script>{code}</script>"
 
 
 _NO_MESH = ("a run in space keeps its states without the mesh: its part and pictures are in the report of the path,"
             " fx.load(folder, scene).report()")
-_PROCESS = """<div id=process><div class=controls><button id=play>Play</button>
+PROCESS = """<p id=trouble class='note bad' hidden>This browser cannot draw what follows (it needs DecompressionStream
+and WebGL: Chrome 80, Firefox 113, Safari 16.4 or later); the tables need nothing.</p>
+<div id=process><div class=controls><button id=play>Play</button>
 <label>Colour: <select id=colour></select></label>
 <label>Run: <select id=run></select></label></div>
 <input id=slider type=range min=0 max=1000 value=1000 aria-label='how far the process has come'>
@@ -178,7 +187,7 @@ def _cards(record: Record, found: Part | None, units: Units) -> str:
         length = f" {units.length}" if units.length else ""
         cards = [(f"{found.min_wall:.4g}{length}", f"least wall, at r = {found.min_wall_at[0]:.4g}{length}"),
                  (f"{found.uniformity:.3g}", "least over mean wall"),
-                 (f"{found.weight:.4g} g", found.rows[0][0]) if found.weight is not None else
+                 (f"{found.weight:.4g} {found.units.weight}", found.weight_label) if found.weight is not None else
                  (f"{found.volume:.{4 if found.volume < 1e4 else 6}g} {units.volume}", "volume of the part")]
     cards += [(value, what) for what, value in _peaks(record, units)]
     return "<div class=cards>" + "".join(f"<div class=card><b>{html.escape(value.strip())}</b><span>{html.escape(what)}"
@@ -213,7 +222,9 @@ def _lead(record: Record, units: Units) -> str:
     said = f"Lengths in {units.length}, stresses in {units.stress}, forces in {units.force}." if units.force else \
         "Units are those of the script."
     kind = "A sheet in space" if record.space else "Axisymmetric" if record.axisymmetric else "Plane strain"
-    return html.escape(f"{how}. {kind}. {said}")
+    basis = record.planes.basis((units.length or "unit") if record.per_depth else None)
+    basis = f" Forces, energies, volumes and areas are given for {basis}." if basis else ""
+    return html.escape(f"{how}. {kind}. {said}{basis}")
 
 
 def _key_numbers(record: Record, units: Units) -> str:

@@ -1,0 +1,132 @@
+"""Planes of symmetry of a scene: how many images of the body that is modelled make the whole part."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..mesh.nodes import COORDINATES, span
+from ..physics.supports import Symmetry
+
+_NEAR = 1e-6
+"""A node lies in a plane, a tool reaches it, to this part of the body's largest extent."""
+
+_PARTS = {1: "half", 2: "quarter", 3: "eighth"}
+
+
+class MirrorPlane(NamedTuple):
+    """A plane across which the part goes on as the image of the body.
+
+    Attributes:
+        axis: number of the coordinate that is constant in the plane.
+        position: value of that coordinate, length.
+        above: True if the body lies on the side of larger coordinates.
+        on: name of the boundary in the plane.
+    """
+
+    axis: int
+    position: float
+    above: bool
+    on: str
+
+
+class MirrorPlanes:
+    """The planes of symmetry that cut the body: the whole part is `factor` images of the body.
+
+    A `Symmetry` is such a plane if its boundary is flat, lies at an end of the body, and is no guide. The axis of an
+    axisymmetric body is none: results are those of the whole ring. Two parallel planes are none: the body is a strip of
+    an endless one, and results are those of the strip.
+
+    Attributes:
+        planes: of different normals.
+        near: tolerance of positions, length.
+    """
+
+    def __init__(self, planes: tuple[MirrorPlane, ...] = (), near: float = 0.0):
+        self.planes, self.near = planes, near
+
+    @classmethod
+    def of_description(cls, scene: dict[str, Any]) -> MirrorPlanes:
+        """Those of a scene as plain data (`description.describe`)."""
+        found = scene.get("symmetry")
+        return cls(tuple(MirrorPlane(*plane) for plane in found["planes"]), found["near"]) if found else cls()
+
+    @property
+    def factor(self) -> int:
+        """Number of images of the body in the whole part: 2 for every plane."""
+        return 2 ** len(self.planes)
+
+    @property
+    def words(self) -> str:
+        """The part of the body that is modelled: "half", "quarter" or "eighth"; "" without a plane."""
+        return _PARTS.get(len(self.planes), "")
+
+    def basis(self, depth: str | None) -> str:
+        """Return in words what results are given for; "" for a body that is modelled as a whole, in three dimensions.
+
+        Args:
+            depth: in plane strain the unit of depth, such as "mm", or "unit"; else None.
+        """
+        part = f"the whole part (a {self.words} was modelled)" if self.planes else "the part"
+        return f"{part}, per {depth} of depth" if depth else part * bool(self.planes)
+
+    def factor_of(self, extent: np.ndarray, direction: np.ndarray) -> int:
+        """Return the factor by which a force on the body as modelled is that on a whole tool or support.
+
+        A plane counts if the tool reaches it: then the other half of the tool is on the other side. It does not count
+        if the force has a component across it, as the images of that component cancel: the force is that on one side.
+
+        Args:
+            extent: lowest and highest coordinates of the tool or of the support's boundary, shape (2, components).
+            direction: along which the force counts, shape (components,).
+        """
+        low, high = extent
+        cut = [plane for plane in self.planes if abs(direction[plane.axis]) < 1e-9 and (
+            low[plane.axis] <= plane.position + self.near if plane.above
+            else high[plane.axis] >= plane.position - self.near)]
+        return int(2 ** len(cut))
+
+    def images(self, components: int, extent: np.ndarray | None = None) -> list[tuple[np.ndarray, np.ndarray]]:
+        """(scale, shift), shapes (components,), of the maps x -> scale x + shift that make the whole part.
+
+        Args:
+            components: of x.
+            extent: lowest and highest coordinates of a tool, shape (2, components): planes are left out beyond which
+                it lies already.
+        """
+        found = [(np.ones(components), np.zeros(components))]
+        for plane in self.planes:
+            sign = 1 if plane.above else -1
+            if extent is not None and (sign * (extent[:, plane.axis] - plane.position)).min() < -self.near:
+                continue
+            unit = np.eye(components)[plane.axis]
+            found += [(scale * (1 - 2 * unit), shift * (1 - 2 * unit) + 2 * plane.position * unit)
+                      for scale, shift in found]
+        return found
+
+
+NO_PLANES = MirrorPlanes()
+"""Those of a body that is modelled as a whole."""
+
+
+def mirror_planes(scene: Any) -> MirrorPlanes:
+    """Return the planes of symmetry that cut the body of a scene; collective."""
+    if scene.preformed is not None:
+        return scene.first.symmetry
+    mesh, kinematics, found = scene.mesh, scene.kinematics, []
+    body, near = span(mesh.domain, mesh.comm), _NEAR * float(max(scene.extent))
+    for support in scene.supports:
+        if not isinstance(support, Symmetry) or support.guide:
+            continue
+        (held,) = kinematics.in_axes(support, support.constraints())
+        axis = held.component
+        if kinematics.axisymmetric and axis == 0 or axis >= COORDINATES:      # a flat sheet lies in z = 0
+            continue
+        low, high = body[:, axis]
+        at = mesh.nodes_of(support.on)[:, axis]
+        ends = [end for end in (low, high) if np.ptp(at) < near and abs(at.mean() - end) < near < high - low]
+        found += [MirrorPlane(axis, float(end), bool(end == low), support.on) for end in ends]
+    first = {(plane.axis, plane.above): plane for plane in reversed(found)}.values()
+    alone = [plane for plane in first if not any(o.axis == plane.axis and o.above != plane.above for o in first)]
+    return MirrorPlanes(tuple(sorted(alone)), near) if alone else NO_PLANES
