@@ -11,8 +11,8 @@ import numpy as np
 
 from ...errors import InputError
 from ...findings import alarming
-from .confidence import Confidence, confidence
 from ...units import NONE, Units
+from .confidence import Confidence, confidence
 from .run import DesignRun
 
 _SCATTER = 6e-5
