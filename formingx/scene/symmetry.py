@@ -126,7 +126,7 @@ def mirror_planes(scene: Any) -> MirrorPlanes:
         low, high = body[:, axis]
         at = mesh.nodes_of(support.on)[:, axis]
         ends = [end for end in (low, high) if np.ptp(at) < near and abs(at.mean() - end) < near < high - low]
-        found += [MirrorPlane(axis, float(end), bool(end == low), support.on) for end in ends]
+        found += [MirrorPlane(axis, float(end), bool(end == low), str(support.on)) for end in ends]
     first = {(plane.axis, plane.above): plane for plane in reversed(found)}.values()
     alone = [plane for plane in first if not any(o.axis == plane.axis and o.above != plane.above for o in first)]
     return MirrorPlanes(tuple(sorted(alone)), near) if alone else NO_PLANES
