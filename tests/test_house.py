@@ -13,7 +13,7 @@ EXTENSIONS = {"contact_events", "heat", "space", "stability", "design", "remeshi
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 
-ARROWS_LEFT = 3
+ARROWS_LEFT = 0
 
 
 def name_of(file):

@@ -192,8 +192,8 @@ def test_solid_is_that_of_the_whole_part_and_closed(parts, part, tmp_path):
     """Every edge belongs to two triangles, run both ways; inside is the volume of the part."""
     parts[part].to_stl(tmp_path / "tray.stl")
     found = fx.tools.solid(tmp_path / "tray.stl")
-    points, triangles, ratio = parts[part]._solid(None)
-    whole = volume(*parts["whole"]._solid(None)[:2])
+    points, triangles, ratio = parts[part]._reader.solid(parts[part].last)
+    whole = volume(*parts["whole"]._reader.solid(parts["whole"].last)[:2])
     assert found.volume == pytest.approx(whole, rel=1e-4) and whole == pytest.approx(160 * 100, rel=0.05)
     assert np.ptp(found.bounds, axis=0)[:2] == pytest.approx([160, 100], abs=2.0)
     edges = {tuple(edge) for k in range(3) for edge in triangles[:, [k, (k + 1) % 3]].tolist()}

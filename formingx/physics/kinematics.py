@@ -30,6 +30,7 @@ class Kinematics:
         axisymmetric: True if the section turns about R = 0.
         dimension_of_volume: 3; of a volume per unit depth 2.
         formulation: class of the forms, made from a scene; None: the formulation of the model. An extension sets it.
+        reader: class of the `Reader` of a path; None: `SectionReader`. An extension sets it.
         scene_checks: checks of a scene (`SceneChecks`); None: those of a section. An extension sets it.
     """
 
@@ -39,6 +40,7 @@ class Kinematics:
     axisymmetric = False
     dimension_of_volume = 3
     formulation: Any = None
+    reader: Any = None
     scene_checks: Any = None
 
     def in_axes(self, support: Any, items: list[Any]) -> list[Any]:

@@ -15,6 +15,7 @@ from ..solve.state import State
 from ..units import NONE, Units
 from .evaluate.profile import Profile
 from .evaluate.stress import StressField
+from .reader import Reader, SectionReader
 from .show.picture import Picture
 from .states import States
 
@@ -34,6 +35,7 @@ class Path(States):
     """
 
     pilot: Path | None = None
+    _made_reader: Reader | None = None
 
     if TYPE_CHECKING:
         def __getattr__(self, name: str) -> Any:
@@ -130,11 +132,7 @@ class Path(States):
             InputError: plotly is not installed.
             OSError: the file cannot be written.
         """
-        if self._in_space:
-            from ..extensions.space import show
-            return show.report(self, file, title, failure, units or NONE, density, trim)
-        from .show import report
-        return report.write(report.of_path(self), file, title, failure, self.problem.comm, units or NONE, density, trim)
+        return self._reader.report(file, title, failure, units or NONE, density, trim)
 
     def plot(self, y: str, x: str, axes: Axes | None = None, **style: Any) -> Any:
         """Draw column `y` over column `x`; returns the matplotlib axes."""
@@ -152,13 +150,7 @@ class Path(States):
         It is revolved about the axis, or, in plane strain, extruded; in space it is drawn whole, and with `grid` the
         squares of that size (length) that were printed on the flat sheet.
         """
-        if self._in_space:
-            from ..extensions.space import show
-            show.view(self, state or self.last, file, grid)
-            return Picture(file)
-        from .show import views
-        axisymmetric = self.problem.scene.kinematics.axisymmetric
-        (views.revolved if axisymmetric else views.extruded)(self.profile(state), file, self.problem.comm)
+        self._reader.view(file, state or self.last, grid)
         return Picture(file)
 
     def wall(self, state: State | None = None) -> Any:
@@ -166,12 +158,7 @@ class Path(States):
 
         A `Wall`, from the axis to the rim; in space a `WallInSpace`, triangle by triangle.
         """
-        if self._in_space:
-            from ..extensions.space.wall import wall_of
-            return wall_of(self, state or self.last)
-        from .evaluate.wall import Walls
-        self._walls = self._walls or Walls(self)
-        return self._walls.of(state or self.last)
+        return self._reader.wall(state or self.last)
 
     def part(self, state: State | None = None, *, density: float | None = None, trim: Any = None, heights: Any = (),
              units: Units | None = None) -> Any:
@@ -191,12 +178,7 @@ class Path(States):
         Raises:
             InputError: the mesh is no sheet, or the part does not reach the trim or a height.
         """
-        if self._in_space:
-            from ..extensions.space.part import part as part_in_space
-            return part_in_space(self.wall(state), density, trim, heights, units or NONE, self.scene.symmetry)
-        from .evaluate.part import part
-        return part(self.wall(state), self.scene.kinematics.axisymmetric, density, trim, heights, units or NONE,
-                    self.scene.symmetry)
+        return self._reader.part(state or self.last, density, trim, heights, units or NONE)
 
     def filling(self, tool: Any = None) -> Any:
         """The gap that is left in each corner of a tool, state by state (`Filling`), and the pressure to fill it.
@@ -208,14 +190,7 @@ class Path(States):
             InputError: there is no such tool, or it has no corner that the body must fill.
         """
         from .evaluate.contact_face import contact_of
-        if self._in_space:
-            from ..extensions.space.part import filling as filling_in_space
-            return filling_in_space(self, contact_of(self, tool, "filling")[0])
-        if len(self.segments) > 1:
-            raise InputError("filling: is not available for a remeshed run as a whole: take that of one mesh,"
-                             " path.alone(state).filling()")
-        from .evaluate.filling import filling
-        return filling(self, contact_of(self, tool, "filling")[0])
+        return self._reader.filling(contact_of(self, tool, "filling")[0])
 
     def contact(self, tool: Any = None, state: State | None = None) -> Any:
         """Contact pressure, friction and gap along the face that meets a tool (`ContactTable`): to_csv, to_excel."""
@@ -259,7 +234,7 @@ class Path(States):
     def to_stl(self, file: Any, state: State | None = None) -> None:
         """Write the part at a state (default: the last) as a solid of triangles, STL (rank 0 writes)."""
         from .files.solid import to_stl
-        to_stl(self._solid(state), file, self.problem.comm)
+        to_stl(self._reader.solid(state or self.last), file, self.problem.comm)
 
     def to_inp(self, file: Any, state: State | None = None, parts: int = 60) -> None:
         """Write the part as shells, walls their section, for CalculiX (.inp), `parts` round the axis (rank 0 writes).
@@ -281,28 +256,16 @@ class Path(States):
         units: a `formingx.Units`; glTF is in metres, and a length that is not said is taken for m.
         """
         from .files.solid import to_gltf
-        to_gltf(self._solid(state), file, self.problem.comm, units or NONE)
-
-    def shell_model(self, file: Any, state: State | None = None) -> None:
-        """Write a part in space as shells, each with its wall, for a structural code (.inp; rank 0 writes)."""
-        if not self._in_space:
-            raise InputError("shell_model: is for a sheet in space; of a section use to_stl, or formed()")
-        from ..extensions.space.show import shell_model
-        shell_model(self, file, state)
+        to_gltf(self._reader.solid(state or self.last), file, self.problem.comm, units or NONE)
 
     def section_only(self, what: str, instead: str = "") -> None:
         """Raise an InputError if the body is a sheet in three dimensions, for which `what` is not available."""
-        if self._in_space:
+        if self.scene.kinematics.components == 3:
             raise InputError(f"{what}: is not available yet for a sheet in space" + (f": {instead}" if instead else ""))
 
     @property
-    def _in_space(self) -> bool:
-        return bool(self.problem.scene.kinematics.components == 3)
-
-    def _solid(self, state: State | None) -> Any:
-        """Points, triangles and wall ratios of the part as a solid."""
-        if self._in_space:
-            from ..extensions.space.show import solid as solid_in_space
-            return solid_in_space(self, state or self.last)
-        from .files.solid import coloured
-        return coloured(self.profile(state), self.problem.scene.kinematics.axisymmetric)
+    def _reader(self) -> Reader:
+        """Return the reader of the kinematics, made once."""
+        if self._made_reader is None:
+            self._made_reader = (self.scene.kinematics.reader or SectionReader)(self)
+        return self._made_reader

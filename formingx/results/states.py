@@ -48,7 +48,6 @@ class States:
                  views: dict[int, _View] | None = None):
         self.record, self._timed, self._own = record, timed, {} if columns is None else columns
         self._views = {} if views is None else views         # by id(problem)
-        self._walls: Any = None
         self._view(record.segments[-1])                      # so that nothing is compiled on the way
         record.on_state.append(self._measure)
         record.judge = lambda state: self._view(record.segments[-1]).verdict.of(state)

@@ -5,6 +5,7 @@ from typing import Any
 from ...contact.tooling import register_tools, tool_of
 from ...physics.kinematics import ThreeD
 from . import scene_checks
+from .reader import SheetReader
 from .sheet import circle, rectangle, sheet
 from .solid_tool import SolidTool, Swept, box, extruded, revolved, solid
 from .surface import Surface
@@ -27,5 +28,6 @@ def _tool(shape: dict[str, Any]) -> SolidTool:
 
 
 ThreeD.formulation = Surface
+ThreeD.reader = SheetReader
 ThreeD.scene_checks = scene_checks
 register_tools(_tool)
