@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 from .errors import ConvergenceError, InputError
 from .tools.tool import PlaneTool, RigidTool
 
-_SAID = (InputError, ConvergenceError, OSError)              # in words already
+_SAID = (InputError, ConvergenceError, OSError)              # as text already
 _WORDS = {float: "a number", int: "a whole number", str: "a word", bool: "True or False", type(None): "None"}
 _PACKAGE = __name__.partition(".")[0]
 _SOLVER = {"physics", "contact", "forms", "problem", "measures", "solve"}
@@ -107,7 +107,7 @@ def _explained(call: Callable, name: str, skip: int) -> Callable:
 
 
 def _wrong(call: Callable, name: str, skip: int, args: tuple, given: dict[str, Any]) -> str | None:
-    """What is wrong with the arguments of a call, in words; None: nothing that its signature tells."""
+    """Return what is wrong with the arguments of a call, as text; None: the signature finds no fault."""
     signature = inspect.signature(call)
     try:
         bound = signature.bind(*args, **given).arguments
@@ -150,7 +150,7 @@ def _short(value: Any) -> str:
 
 
 def _is(value: Any, kind: Any) -> bool:
-    """Whether a value is of the kind that an annotation names; where that cannot be told, it is."""
+    """Tell whether a value is of the kind that an annotation names; True where it cannot be told."""
     origin, of = typing.get_origin(kind) or kind, typing.get_args(kind)
     if kind is Any or isinstance(kind, typing.TypeVar):
         return True

@@ -75,7 +75,7 @@ def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges:
 
     Args:
         cells, edges: indices of points, shapes (m, 3 or 6) and (k, 2 or 3), as DOLFINx orders them; a tag for each.
-        points: shape (n, 2), or in space (n, 3).
+        points: shape (n, 2), or in three dimensions (n, 3).
     """
     import basix.ufl
     from dolfinx import graph, mesh

@@ -15,7 +15,7 @@ class InputError(ValueError):
     """Something that the user gave is not allowed: the message names it, its value and what is allowed.
 
     Attributes:
-        path: of a process that refuses a stage when it comes to it, what was computed before; else None.
+        path: of a process that refuses a stage when it reaches it, what was computed before; else None.
 
     >>> fx.NeoHookean(c10=-1.0)
     Traceback (most recent call last):

@@ -29,7 +29,7 @@ class Finding(NamedTuple):
     Attributes:
         severity: "serious", "warning" or "note", see `SEVERITIES`.
         about: the part of the scene or of the result that it concerns.
-        text: the finding in words, with numbers and the place.
+        text: the finding as text, with numbers and the place.
         advice: what to try, or "".
     """
 

@@ -1,4 +1,4 @@
-"""What every rank has of an array, put together."""
+"""Arrays gathered from all ranks."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What a user runs: a path with one control, Newton's method at fixed control, a process in stages.
+"""Runs: a path with one control, Newton's method at fixed control, a process in stages.
 
 The solvers emit states; a `Path` and, if asked for, a `Checkpoint` are told of each.
 """
@@ -53,27 +53,28 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
         tolerances: when a state counts as converged; default `Tolerances()`.
         max_steps: accepted states before the run gives up; None: it gives up when it comes no nearer to its target.
         progress: show a progress bar on runs of more than two seconds (rank 0).
-        start: a path of this scene to go on from, also one that `formingx.load` read; it stays as it is. Its steps go
-            on as they were, unless `step` is given; targets that it has met count as met. It goes back where another
-            target lies behind (but for a pressure, which may come again ahead).
+        start: a path of this scene to continue from, also one that `formingx.load` read; it stays as it is. Its
+            steps go on as they were, unless `step` is given; targets that it has met count as met. It goes back
+            where another target lies behind (but for a pressure, which may come again ahead).
         checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
         record: {name: measure} of columns of your own: a function of the `Problem`, called while it stands at the
             state, that returns a number; or a target such as `displacement(0, at=(1, 0))`, whose measure is recorded.
-        at_limit_point: what to do at a limit point of what is driven. "continue": go on along the path, on which it
-            turns back (in contact, or with a history, the body jumps where no state is left on it).
+        at_limit_point: what to do at a limit point of the controlled quantity. "continue": go on along the path, on
+            which it turns back (in contact, or with a history, the body jumps where no state is left on it).
             "snap_through": it goes on, and the body snaps to its next equilibrium, see `Path.jumps`; also where no
             other state is near. "stop": end there. None: "snap_through" where it can go one way only: it is time, or
             there is a history (friction); but a pressure is followed, for what an air supply makes grow is the
             volume (in contact, or with a history: as long as the volume grows).
-        resume: go on from what the checkpoint holds, which must be of this scene; if it holds nothing, begin.
+        resume: continue from what the checkpoint holds, which must be of this scene; if it holds nothing, begin.
         allow_inadmissible: go on, with a warning, where a state is none that a body can have: folded, inside a tool,
             elements inside out. (`State.verdict` says so; by default the run ends there.)
-        adapt_mesh: run twice: on the scene's mesh, which may be coarse, and from rest again on `mesh.adapted(path)`,
-            which has columns of elements as the first run asks for. True, or arguments of that, such as {"error":
-            0.02}. `Path.pilot` is the first run; a first run that did not reach the target counts as far as it came.
+        adapt_mesh: run twice: on the scene's mesh, which may be coarse, and from the unloaded state again on
+            `mesh.adapted(path)`, which has columns of elements as the first run asks for. True, or arguments of
+            that, such as {"error": 0.02}. `Path.pilot` is the first run; a first run that did not reach the target
+            counts as far as it came.
         remesh: a `Remesh`: the mesh is made again, of the body as it is, where elements are crushed; states of kind
-            "remesh", whose `jump` says by how much force, energy and volume changed. For solids of one layer, on one
-            rank.
+            "remesh", whose `jump` says the amount by which force, energy and volume changed. For solids of one
+            layer, on one rank.
         stop_at: `unstable(modes=range(2, 9))`: end, as a result, once the body is unstable in one of these modes;
             `Path.ended` says which.
 
@@ -145,7 +146,7 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     -formingx_0_snes_monitor (0: the first such run of a script) reach the SNES.
 
     Args:
-        to: pressure (stress) or travel (length) of what is driven.
+        to: pressure (stress) or travel (length) of the controlled quantity.
         increments: number of equal increments; one that fails is halved, and new contact shortens them.
         tolerances: when a state counts as converged; default `Tolerances()`.
         max_steps: accepted states before the run gives up.
@@ -218,12 +219,12 @@ class Process:
             max_steps: accepted states of a stage (of a straight piece of its tables) before the run gives up; None: it
                 gives up when it comes no nearer to its target.
             progress: show a progress bar on what takes more than two seconds (rank 0).
-            start: a path of these stages to go on from, also one that `formingx.load` read, or a state of one.
+            start: a path of these stages to continue from, also one that `formingx.load` read, or a state of one.
             checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
             record: {name: measure} of columns of your own, see `trace`.
             accuracy: of the steps in time of a material that relaxes, "draft", "standard" or "fine" (1, 0.2, 0.03 % of
                 stress and thickness), or such an error as a number.
-            resume: go on from what the checkpoint holds, which must be of this process; if it holds nothing, begin.
+            resume: continue from what the checkpoint holds, which must be of this process; if it holds nothing, begin.
             allow_inadmissible, adapt_mesh, remesh: see `trace`.
 
         Raises:
@@ -299,7 +300,7 @@ def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
     Args:
         folder: what `trace(..., checkpoint=folder)` or `Path.save(folder)` wrote, on any number of ranks.
         scene: the same scene, made by the same script.
-        state: go on from this state (0: the start), and leave out what came after; default the last.
+        state: continue from this state (0: the start), and leave out what came after; default the last.
 
     Raises:
         InputError: there is no checkpoint, it is damaged, or it is of another mesh or scene; the message says what
@@ -383,7 +384,7 @@ def _keep(path: Path, checkpoint: Any) -> None:
 
 
 def _from_checkpoint(who: str, resume: bool, checkpoint: Any, scene: Scene, start: Any) -> Any:
-    """What a run starts from: `start`, or with `resume` what its checkpoint holds."""
+    """Return the start of a run: `start`, or with `resume` the states of its checkpoint."""
     if not resume:
         return start
     if checkpoint is None or start is not None:

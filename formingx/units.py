@@ -22,7 +22,7 @@ _COORDINATES = {*"rzxyRZXY", "r_bottom", "z_bottom", "r_top", "z_top", "sag"}
 
 @dataclass(frozen=True)
 class Units:
-    """What the numbers of a script are in.
+    """Units of the numbers of a script.
 
     Args:
         length: "m", "cm", "mm", "um", "in" or "ft"; None: it is not said.

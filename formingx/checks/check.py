@@ -18,7 +18,7 @@ __all__ = ["Report", "before_run", "check", "ended", "ranges", "scenes", "touche
 
 
 class Report:
-    """What `check` found, worst first; prints in plain words.
+    """Findings of `check`, the worst first; prints as text.
 
     Attributes:
         findings: list of `Finding`; empty for a good scene.

@@ -36,5 +36,5 @@ def _of_cap(target: Any, radius: float) -> float | None:
 
 
 def _area(line: np.ndarray) -> float:
-    """That a line, shape (n, 2), sweeps about the axis."""
+    """Return the area that a line, shape (n, 2), sweeps about the axis."""
     return float(np.sum((line[1:, 0] + line[:-1, 0]) * np.hypot(*np.diff(line, axis=0).T)))

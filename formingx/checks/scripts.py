@@ -26,7 +26,7 @@ class _Looked(BaseException):
 
 
 def look_over(script: Any, arguments: Sequence[str] = ()) -> Report:
-    """What `check` says of the first scene that a script runs, by whichever way; nothing is solved.
+    """Check the first scene that a script runs; nothing is solved.
 
     Args:
         script: a Python file; what it does before its first run is done, also heating (`heat`).

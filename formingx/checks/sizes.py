@@ -130,7 +130,7 @@ class Pushed:
         return points, np.where(np.isfinite(gone), points + np.where(np.isfinite(gone), gone, 0.0) * way, np.inf)
 
     def peak(self) -> Peak | None:
-        """Where the free sheet bears most; None: there is no such place, or it is not known."""
+        """Return the state of the free sheet at its maximum pressure; None: there is none, or it is not known."""
         materials = self._body.scene.materials
         if not self.round or not (self.tall or self.flat) or any(m.varies for m in materials.values()):
             return None

@@ -1,4 +1,4 @@
-"""Which tools are moulds before a face, and on which side of them a pressure acts."""
+"""Tools that are moulds before a face, and the side of them on which a pressure acts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the points of a face come to their tool in a step: where they arrive, and whether the step was too long."""
+"""The approach of contact points to their tool in a step: gap closures, and steps that are too long."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .face import FaceContact
 
 @dataclass(frozen=True)
 class StepLimits:
-    """What of contact limits a step.
+    """Limits that contact sets to a step.
 
     Attributes:
         as_good: part of a step within which a point is as good as in touch.
@@ -56,7 +56,7 @@ LIMITS = StepLimits()
 
 
 class Approach:
-    """The step ahead of one contact. For each step: `reach`, `prepare`; of the state that it came to the others.
+    """The step ahead of one contact. For each step: `reach`, `prepare`; of the state that it reached the others.
 
     Args:
         face: the contact.
@@ -64,8 +64,8 @@ class Approach:
 
     Attributes:
         points: of the face, all ranks.
-        at_once: so many points a step may bring into contact along the tangent. (Where it does not matter when they
-            come, the convergence of contact limits steps.)
+        at_once: this number of points a step may bring into contact along the tangent. (Where it does not matter
+            when they come, the convergence of contact limits steps.)
     """
 
     def __init__(self, face: FaceContact, conducts: bool):
@@ -80,14 +80,14 @@ class Approach:
         return bool(self._comm.allreduce(bool(self.face.touching(fields, control).any()), MPI.LOR))
 
     def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
-        """How long a step along a tangent may be: to the first touch, or until enough new points touch.
+        """Return the length of a step along a tangent up to the first touch, or until enough new points touch.
 
         A step that would bring a whole region into contact at once would decide by its own length where it sticks.
         """
         face = self.face
         start, velocity = face.positions(fields, control), face.moved(direction, slope)
         free = ~face.law.touching(start, face.touch)
-        if face.contact.lagged:                             # a tangent of a long step foretells no arrivals
+        if face.contact.lagged:                             # a tangent of a long step predicts no arrivals
             most = LIMITS.nearer * np.maximum(-face.law.distance(start), 0.0) + face.rule.lengths
             speed = np.linalg.norm(velocity, axis=1)
             most = np.divide(most, speed, out=np.full(len(speed), length), where=free & (speed > 0))
@@ -125,7 +125,7 @@ class Approach:
             face.expect_arrivals(places)
 
     def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
-        """More than twice the new points that a step is meant, or foreseen, to bring into contact.
+        """More than twice the new points that a step is meant, or predicted, to bring into contact.
 
         Of lagged contact: one that is further inside its tool than twice the length of face that is its own.
         """
@@ -169,7 +169,8 @@ class Approach:
         return length * min(LIMITS.lag / change, 1.0) if change else length
 
     def _part_of_pressure(self, normal: np.ndarray, other: np.ndarray | None = None) -> float:
-        """How far another pressure, by default that at the last state, is from `normal` (stress), over the pressure.
+        """Return the relative difference of another pressure, by default that at the last state, from `normal`
+        (stress).
 
         Of points that were pressed at the last state.
         """

@@ -20,10 +20,11 @@ _SAME_STIFFNESS = 1e-3
 
 
 class Memory(NamedTuple):
-    """What the points of a face remember of the last accepted state.
+    """History variables of the points of a face at the last accepted state.
 
     touch: of the law of friction; arrived: which points came into contact in the step that ended there, shape (n,).
-    penalty: over that at rest, which the state was found with, shape (n,) (`Contact.present_area`).
+    penalty: over that in the reference configuration, which the state was found with, shape (n,)
+        (`Contact.present_area`).
     """
 
     touch: Touch
@@ -77,7 +78,8 @@ class FaceContact:
         self.law = self._law(self._penalty)
 
     def _temperatures(self) -> np.ndarray | None:
-        """Of the body at the points now, shape (n,); None where friction does not depend on them."""
+        """Return the temperatures of the body at the points, shape (n,); None where friction does not depend on
+        them."""
         return None if self._warm is None else self.rule.at_points(self._solid.temperature.at_nodes(self._warm))
 
     def take_temperature(self) -> None:
@@ -99,7 +101,7 @@ class FaceContact:
         return self.points + self._length * self.displacement(fields) - self.travelled(control)
 
     def travelled(self, control: float) -> np.ndarray:
-        """How far the tool has moved, shape (components,), length."""
+        """Return the travel of the tool, shape (components,), length."""
         return (self._base + self._rate * control) * self._way
 
     def moved(self, dx: np.ndarray, step: float) -> np.ndarray:
@@ -107,16 +109,16 @@ class FaceContact:
         return self._length * self.displacement(dx) - self._rate * step * self._way
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
-        """What the law gives at a state."""
+        """Return the tractions of the contact law at a state."""
         return self.increment.tractions(self.positions(fields, control))
 
     def touching(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Which points touch, or are held, shape (n,)."""
+        """Return a mask of the points that touch or stick, shape (n,)."""
         return self.law.touching(self.positions(fields, control), self.touch)
 
     @property
     def area(self) -> np.ndarray:
-        """That forces act on, shape (n,). (Lagged: none of points that have just arrived: they are held from now.)"""
+        """Area on which the forces act, shape (n,). (Lagged: 0 for points that touch since this step.)"""
         if self._memory is None or not self.contact.lagged:
             return self.rule.area
         return np.where(self._memory.arrived, 0.0, self.rule.area)
@@ -125,12 +127,13 @@ class FaceContact:
 
     @property
     def scale(self) -> np.ndarray:
-        """Of the forces in F by tractions, shape (n,)."""
+        """Factor of the tractions in the forces of F, shape (n,)."""
         return self._scale
 
     @property
     def stiffness_in_tangent(self) -> np.ndarray:
-        """Of the forces in F by positions, as in the tangent last made, shape (n, components, components), 1/length."""
+        """Derivative of the forces in F by positions, as in the last tangent, shape (n, components, components),
+        1/length."""
         return self._scale[:, None, None] * self._in_tangent
 
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
@@ -167,7 +170,8 @@ class FaceContact:
         return self._of_unknowns(self._stiffness(fields, control, False))
 
     def stiffness_round(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """As `stiffness`, of forces round the axis by motions there, shape (n, m/2, m/2), see the law."""
+        """Return the stiffness of circumferential forces against circumferential motions, shape (n, m/2, m/2), see
+        the law."""
         radius = np.full(len(self.points), np.inf)
         if self._solid.scene.kinematics.axisymmetric:
             radius = self.points[:, 0] + self._length * self.displacement(fields)[:, 0]
@@ -203,7 +207,7 @@ class FaceContact:
 
     @property
     def _penalty_at_rest(self) -> float:
-        """Of the contact, stress/length."""
+        """Penalty of the contact in the reference configuration, stress/length."""
         return self.contact.penalty * self._solid.stress / self.thickness
 
     def _law(self, penalty: np.ndarray | float) -> Any:
@@ -227,7 +231,7 @@ class FaceContact:
 
     @property
     def touch(self) -> Touch | None:
-        """What the law of friction remembers; None without friction."""
+        """Return the history variables of the law of friction; None without friction."""
         return self._memory and self._memory.touch
 
     def start(self) -> None:
@@ -242,7 +246,7 @@ class FaceContact:
         self._take(Memory(self.law.start(x), np.zeros(len(x), dtype=bool), np.ones(len(x))) if self.remembers else None)
 
     def expect_arrivals(self, arrival: np.ndarray, guessed: np.ndarray | None = None) -> None:
-        """Where points will be when they touch in the step ahead (`Touch.arrival`).
+        """Store the positions at which points touch in the step ahead (`Touch.arrival`).
 
         guessed: which are going to be guessed where their forces want them, shape (n,).
         """
@@ -277,7 +281,7 @@ class FaceContact:
         return found
 
     def hold_late(self, fields: np.ndarray, control: float, most: float) -> bool:
-        """Hold the points that came deeper than `most` (length) into a tool in space in the step to a state.
+        """Hold the points that came deeper than `most` (length) into a tool in three dimensions in the step to a state.
 
         Each sticks, or slides, from where its way met the tool. False if there are none; collective.
         """

@@ -36,7 +36,7 @@ class Increment:
         self._last: tuple[np.ndarray, Tractions] | None = None
 
     def tractions(self, x: np.ndarray) -> Tractions:
-        """What the law gives at positions x, computed once for them; after `linearise` at them, linearised."""
+        """Compute the tractions of the law at positions x, once; after `linearise` at them, linearised."""
         if self._last is None or not np.array_equal(x, self._last[0]):
             self._last = x, self._law.tractions(x, self._touch)
         return self._last[1]
@@ -62,7 +62,7 @@ class Increment:
 
     @property
     def arrivals(self) -> np.ndarray:
-        """Which points touch at the positions last looked at that did not where Newton's method began, shape (n,)."""
+        """Mask of points that touch now but did not where Newton's method began, shape (n,)."""
         if self._touched is None:
             return np.zeros(len(self._now[0]), dtype=bool)
         return self._law.touching(self._now[0], self._touch) & ~self._touched
@@ -87,7 +87,7 @@ class Increment:
         return lambda by: law.tractions(x, touch, None, there(by))
 
     def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        """What gives how deep m points are in the ramp of the law if they move on, shape (m, c): over its width, shape
+        """Return a function for the depth of m points in the ramp after motions, shape (m, c): over its width, shape
         (m,), and the way through it, shape (m, c), length, 0 where no friction grows in it: without any, or where the
         body may pull at the tool."""
         width, there = 2 * self._law.theta, self._foreseen(points)
@@ -99,13 +99,13 @@ class Increment:
         return found
 
     def _foreseen(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Motion]:
-        """What gives the motion of points, to first order, if they move on."""
+        """Return a function for the motion of points along the tool, to first order."""
         assert self._before is not None
         before, x = Motion(*(part[points] for part in self._before)), self._now[0][points]
         return lambda by: before.to(x + by)
 
     def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
-        """Which way points (a mask, shape (n,)) are going to slide."""
+        """Return the direction in which points (a mask, shape (n,)) begin to slide."""
         self._sense = np.where(points, sense, 0.0 if self._sense is None else self._sense)
 
     @property

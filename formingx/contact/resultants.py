@@ -1,4 +1,4 @@
-"""What a contact comes to in a state (fields: owned unknowns; control), of all ranks; collective."""
+"""Resultants of a contact in a state (fields: locally owned unknowns; control), of all ranks; collective."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def penetration(face: FaceContact, fields: np.ndarray, control: float) -> float:
 
 
 def length(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """Reference length of the face that is in touch; in space its area.
+    """Reference length of the face that is in touch; in three dimensions its area.
 
     The node on the axis bears hardly anything, and stands a little off where its neighbours stick: it counts with them.
     """
@@ -49,7 +49,7 @@ def pressing(face: FaceContact, fields: np.ndarray, control: float) -> float:
 
 
 def energy(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """What the normal tractions hold, stress length^3 (per depth: length^2)."""
+    """Return the energy of the normal tractions, stress length^3 (per depth: length^2)."""
     return _sum(face, face.rule.area * face.law.energy(face.positions(fields, control), face.touch))
 
 

@@ -1,6 +1,6 @@
-"""Where the contact of a face acts, and how those points move with the unknowns: a rule on its facets.
+"""Quadrature of contact on the facets of a face, and the motion of its points with the unknowns.
 
-Gauss-Lobatto's points are the nodes of six-node triangles; at Gauss points a face lets go more smoothly.
+Gauss-Lobatto's points are the nodes of six-node triangles; at Gauss points a face separates more smoothly.
 """
 
 from __future__ import annotations
@@ -35,11 +35,13 @@ class Rule:
 
     @property
     def extent(self) -> np.ndarray:
-        """Of the face that belongs to each point, as `contact_length` counts it, shape (n,); in space an area."""
+        """Reference length of the face of each point, as in `contact_length`, shape (n,); in three dimensions an
+        area."""
         return self.lengths
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
-        """Of the points, shape (n, components), for owned unknowns, in their units; collective."""
+        """Return the displacement of the points, shape (n, components), in the units of the owned unknowns;
+        collective."""
         raise NotImplementedError
 
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
@@ -102,7 +104,7 @@ class Lobatto(Rule):
 
     @property
     def extent(self) -> np.ndarray:
-        """As it was on the body's first mesh."""
+        """Length of the face of each point on the first mesh of the body."""
         return self._first_lengths
 
     @cached_property
@@ -117,7 +119,7 @@ class Lobatto(Rule):
 
     @property
     def has_area(self) -> np.ndarray:
-        """Which points have a `lumped` area: all but a node on the axis, shape (n,)."""
+        """Mask of the points with a `lumped` area: all but a node on the axis, shape (n,)."""
         return self.lumped > 1e-9 * self.lumped.max()
 
     @cached_property
@@ -157,7 +159,7 @@ class Vertices(Lobatto):
         self._now = surface.compile(surface.area_row(deformed=True))
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
-        """Of the triangles around each node together."""
+        """Return the present over the reference area of the triangles around each node."""
         w = self._surface.w.x
         before = w.array.copy()
         w.array[: len(fields)] = fields
@@ -221,7 +223,7 @@ class Gauss(Rule):
         return grown * weight(now.T) / weight(self.points.T)
 
     def _at_nodes(self, values: np.ndarray) -> np.ndarray:
-        """Of the three nodes of each point, shape (n, 3, components), from owned unknowns."""
+        """Return the displacement of the three nodes of each point, shape (n, 3, components), from owned unknowns."""
         unknowns, n = self._unknowns, self._owned
         unknowns.array[:n] = values[:n]
         unknowns.scatter_forward()
@@ -239,7 +241,7 @@ def _along(edges: np.ndarray) -> np.ndarray:
 
 
 def without_area(lumped: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Which nodes of a face are on the axis, of all ranks, shape (n,)."""
+    """Return a mask of the nodes of a face on the axis, of all ranks, shape (n,)."""
     return (lumped < 1e-9 * lumped.max()) & (lengths > 0)
 
 

@@ -1,5 +1,5 @@
-"""How much contact one step may bring: a step that brings a whole region into contact decides by its length where it
-sticks."""
+"""Limits to the contact that one step may bring: a step that brings a whole region into contact decides by its
+length where it sticks."""
 
 from __future__ import annotations
 
@@ -55,7 +55,8 @@ class EventPredictor(Protocol):
 
 
 class Way(NamedTuple):
-    """A straight piece of a path: from (x, control) along (direction, slope), so long. Arrays: own part, shape (n,).
+    """A straight piece of a path: from (x, control) along (direction, slope), so long. Arrays: locally owned
+    entries, shape (n,).
 
     events: predicted ahead of it, or None.
     """
@@ -69,14 +70,14 @@ class Way(NamedTuple):
 
 
 class Cut(NamedTuple):
-    """Why a step is too long, and the part of it that will do; 0: not known."""
+    """Reason for which a step is too long, and the admissible part of it; 0: not known."""
 
     why: str
     part: float = 0.0
 
 
 class StepLimit:
-    """What the contacts of a problem allow. For each step, in this order: `length`, `prepare`, `check`.
+    """Limits that the contacts of a problem set to each step, in this order: `length`, `prepare`, `check`.
 
     Args:
         problem: the `Problem`.
@@ -117,7 +118,7 @@ class StepLimit:
         return self._predictor.predict(curve, state) if self._predictor else None
 
     def length(self, way: Way) -> float:
-        """How long a step may be: up to where contact begins, or enough new nodes touch."""
+        """Return the admissible length of a step: up to where contact begins, or enough new nodes touch."""
         found = way.events.step_length(way.length) if way.events else None
         if found is not None:
             return found
@@ -128,7 +129,7 @@ class StepLimit:
     def prepare(self, way: Way, ends: bool = False) -> tuple[np.ndarray, float] | None:
         """A step is about to be taken; `ends`: it is to end where something comes into contact, see `check`.
 
-        Returns the change of (x, control) at its end by predicted events, own part; None: zero.
+        Returns the change of (x, control) at its end by predicted events, locally owned entries; None: zero.
         """
         n, found = self._n, way.events.closures(way.length) if way.events else None
         for k, approach in enumerate(self.present):
@@ -138,7 +139,7 @@ class StepLimit:
         return way.events.bend(way.length) if way.events and found else None
 
     def check(self, old: Any, new: Any, length: float, ends: bool = False) -> Cut | None:
-        """Why the step between two states is too long, or None.
+        """Return the reason for which the step between two states is too long, or None.
 
         `ends`: what comes into contact in it sticks or slides from where it touches, which a long step gets wrong.
         """
@@ -164,7 +165,8 @@ class StepLimit:
         return any([c.face.let_go(new.x[: self._n], new.control) for c in self.present])
 
     def hold_late(self, new: Any, at_target: bool, sweep: int) -> bool:
-        """Take up in a state that was found what its step brought into tools in space; False if nothing is left.
+        """Take up in a state that was found what its step brought into tools in three dimensions; False if nothing
+        is left.
 
         Points that came into a tool are held: at a target all, else on tools with friction, which begins then. That is
         limited by the pressure of the state. sweep: how often it was done before.

@@ -16,7 +16,7 @@ from ..tools.shapes import Arc, Line, Tool
 class Tooling(NamedTuple):
     """All contacts of a scene.
 
-    contacts: in the order of the scene; before: how many of its things come before them (`Scene.things`); length: that
+    contacts: in the order of the scene; before: how many of its items come before them (`Scene.things`); length: that
     of a problem's forms, which makes amplitudes of travels.
     """
 
@@ -26,19 +26,19 @@ class Tooling(NamedTuple):
 
     @classmethod
     def of_problem(cls, problem: Any) -> Tooling:
-        """Those of a `Problem`."""
+        """Return the tools of a `Problem`."""
         scene = problem.scene
         return cls(scene.contacts, len(scene.loads) + len(scene.supports), problem.forms.length)
 
     @classmethod
     def of_description(cls, scene: dict[str, Any]) -> Tooling:
-        """Those of a scene as plain data (`description.describe`)."""
+        """Return the tools of a scene as plain data (`description.describe`)."""
         return cls([_contact(dict(data)) for data in scene["contacts"]], len(scene["loads"]) + len(scene["supports"]),
                    scene["mesh"]["length"])
 
     @property
     def names(self) -> list[str]:
-        """Of the tool of each contact; one without a name is "tool 1" and so on, by its (first) contact."""
+        """Name of the tool of each contact; one without a name is "tool 1" and so on, by its (first) contact."""
         first: dict[Any, int] = {}
         # what moves alike is one
         alike = [k if c.direction is None else c.direction for k, c in enumerate(self.contacts)]
@@ -51,7 +51,7 @@ class Tooling(NamedTuple):
         return {name: "tool_force" if len(names) == 1 else f"{name}_force".replace(" ", "_") for name in names}
 
     def travels(self, setting: dict[str, Any], control: float) -> list[float | None]:
-        """How far each has come (length) in a state of this setting and control; None: it takes no part."""
+        """Return the travel of each tool (length) in a state of this setting and control; None: it takes no part."""
         if not setting:
             return [0.0] * len(self.contacts)
         there = Setting(**setting)

@@ -49,7 +49,7 @@ def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
         c10: stress; a number, or a smooth function of R (length).
 
     Raises:
-        InputError: a size or constant that is not allowed; no pressure leads from rest to this stretch.
+        InputError: a size or constant that is not allowed; no pressure leads from the unloaded state to this stretch.
 
     >>> from formingx.exact.inflation import membrane_inflation
     >>> state = membrane_inflation(2.0, radius=1.25, thickness=0.082, c10=2.0)

@@ -53,7 +53,7 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
 
     Raises:
         InputError: a size or constant that is not allowed; a travel at which the membrane would touch the plug's side,
-            or that a frictionless plug does not come to.
+            or that a frictionless plug does not reach.
 
     >>> from formingx.exact.plug import membrane_under_plug
     >>> state = membrane_under_plug(0.5, radius=1.0, plug_radius=0.4, thickness=0.02, c10=1.0)
@@ -149,7 +149,7 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
         face_stretch: under the flat of the plug, above 1: it grows with the travel. mu: coefficient of friction.
 
     Raises:
-        InputError: a size or constant that is not allowed; a stretch that this plug does not come to.
+        InputError: a size or constant that is not allowed; a stretch that this plug does not reach.
     """
     from scipy.optimize import brentq
     l0, c10, mu = positive("face_stretch", face_stretch), positive("c10", c10), non_negative("mu", mu)
@@ -166,7 +166,7 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
     edge = _integrated(2 * (f + h0), flat, _touching(mu, h0, f), events=upright, dense_output=True)
     whole = edge.t[-1]                        # of the arc length, around the edge
 
-    def left(u):                              # where the membrane lets go, u of arc length up the edge and the side
+    def left(u):                              # where the membrane separates, u of arc length up the edge and the side
         return _along(max(u - whole, 0.0), edge.sol(min(u, whole)), _touching(mu))
 
     def misses(u):                            # the rim
@@ -199,7 +199,7 @@ def _along(length: float, y: np.ndarray, slopes: Callable) -> np.ndarray:
 
 
 def _integrated(length: float, y: np.ndarray, slopes: Callable, **options: Any) -> Any:
-    """What `solve_ivp` finds from y on; options: of it."""
+    """Return the solution of `solve_ivp` from y on; options: of `solve_ivp`."""
     from scipy.integrate import solve_ivp
     return solve_ivp(lambda s, y: slopes(*y), (0, length), y, rtol=1e-9, atol=1e-12, **options)
 

@@ -120,7 +120,7 @@ def _pressure(ratio: float, inner: float, stretch: float) -> float:
 
 
 def _determinant(ratio: float, inner: float, n: int, k: float, outside: bool) -> float:
-    """Of the tractions on the outer face, of three motions that leave the inner one as it should be."""
+    """Return the determinant of the tractions on the outer face for three motions that leave the inner face free."""
     A, a = ratio, inner * ratio
     b = np.sqrt(a**2 + 1 - A**2)
     delta = _pressure(ratio, inner, 1.0)                             # outside less inside

@@ -9,7 +9,7 @@ points, c(s) T::
     block under a nominal stress P:  P = T/l,  s = ln l
     thick wall, r^n = R^n + s, s = a^n - A^n, n = 2 (tube in plane strain) or 3 (sphere), 1 = hoop, 3 = radial:
         p = integral of (n - 1) T R^(n-1)/r^n dR, by Gauss's rule
-    thin balloon, R0 and H0 at rest:  p R0/H0 = 2 T/l^3,  s = ln l, 3 = through the wall
+    thin balloon, R0 and H0 in the reference configuration:  p R0/H0 = 2 T/l^3,  s = ln l, 3 = through the wall
 
 Where s is driven the branches are integrated; where the load is held, its rate, zero, gives ds/dt.
 """
@@ -30,7 +30,7 @@ _TOLERANCES = {"rtol": 1e-12, "atol": 1e-13}
 
 @dataclass
 class Body:
-    """A body of one degree of freedom s, and its state. All at rest at s = 0.
+    """A body of one degree of freedom s, and its state. All in the reference configuration at s = 0.
 
     Attributes:
         c10, branches: of the material, stress and (stress, time).
@@ -104,7 +104,7 @@ class Body:
     def creep_through(self, targets: Any, end: float) -> tuple[np.ndarray, float | None]:
         """(times at which s grows to the targets under the load of now, time at which no state follows).
 
-        A target that is passed already has the present time, one that is not met nan; the second is None if s comes to
+        A target that is passed already has the present time, one that is not met nan; the second is None if s reaches
         `end`. There must be no s up to `end` at which the body stays.
         """
         from scipy.integrate import solve_ivp

@@ -7,7 +7,7 @@ import numpy as np
 
 @runtime_checkable
 class Axes(Protocol):
-    """What is drawn into: axes of matplotlib, which is imported where something is drawn."""
+    """Axes of matplotlib, which is imported where something is drawn."""
 
     def plot(self, *args: Any, **style: Any) -> Any:
         """Draw a line."""

@@ -1,4 +1,4 @@
-"""Whether a body has a shape: lengths along the hoop and areas in the plane are positive.
+"""Admissibility of a body: lengths along the hoop and areas in the plane are positive.
 
 det F > 0 at the quadrature points is not enough: beyond the axis the hoop stretch and the in-plane determinant are both
 negative, and between those points a strongly bent edge may turn an element inside out.

@@ -25,7 +25,8 @@ class Carrier:
     go beyond it by less than a tenth.
 
     Args:
-        comm: communicator; source, target: own points, shapes (m, components), (n, components), length; collective.
+        comm: communicator; source, target: locally owned points, shapes (m, components), (n, components), length;
+            collective.
     """
 
     def __init__(self, comm: Any, source: np.ndarray, target: np.ndarray):
@@ -111,7 +112,7 @@ def carry(source: Any, state: Any, problem: Any, x: np.ndarray, control: float, 
     Where it has not the same contacts, what these remember is left out.
 
     Args:
-        x, control: the state of it that this belongs to, own part.
+        x, control: the state of it that this belongs to, locally owned entries.
         moved: its mesh is one of the body as it is in the state (and contacts are seen to elsewhere).
     """
     problem.look_at(x, control)

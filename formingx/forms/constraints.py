@@ -1,4 +1,4 @@
-"""What supports hold: unknowns, and means over boundaries; and which of it holds in a stage."""
+"""Constraints by supports: of unknowns, and of means over boundaries; and the active ones of a stage."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class Entry(NamedTuple):
 
 
 class Active(NamedTuple):
-    """What holds when some things take no part.
+    """Constraints that are active while some items take no part.
 
     bcs: DirichletBCs; dofs: local numbers of the held unknowns, ghosts too, ascending, shape (n,); owned: which of them
-    this rank owns, shape (n,); driver: number of the thing that moves each, or -1, shape (n,); rows: of the means that
+    this rank owns, shape (n,); driver: number of the item that moves each, or -1, shape (n,); rows: of the means that
     could be held, each the owned part, 0 where it does not hold; present: which of the means hold.
     """
 
@@ -50,7 +50,7 @@ class Constraints:
         forms: the `Formulation`. assemble: gives the owned part of a compiled linear form.
 
     Attributes:
-        entries: list of `Entry`; means: [(number of the thing, row: owned part, shape (n,))].
+        entries: list of `Entry`; means: [(number of the item, row: owned part, shape (n,))].
     """
 
     def __init__(self, forms: Any, assemble: Callable[[Any], np.ndarray]):
@@ -80,7 +80,7 @@ class Constraints:
         return dofs[dofs < self._n]
 
     def without(self, off: set[int]) -> Active:
-        """What holds when these things take no part."""
+        """Return the constraints that are active without these items."""
         entries = [entry for entry in self.entries if entry.thing not in off]
         numbers = np.concatenate([np.zeros(0, dtype=np.int32), *(e.dofs for e in entries)])
         drivers = np.concatenate([np.zeros(0, dtype=int),

@@ -22,7 +22,7 @@ class Body(NamedTuple):
     points, moved: reference and deformed, shape (m, k, 2), length; J, I1: det F and tr F^T F there, shape (m, k);
     section: F within the section, shape (m, k, 2, 2); layers: tag of each element, shape (m,);
     outline: deformed nodes around each, shape (m, 6, 2), length; quality,
-    at_rest: shape of its corner triangle deformed and at rest (`shape_quality`), shape (m,).
+    at_rest: shape of its corner triangle deformed and in the reference configuration (`shape_quality`), shape (m,).
     """
 
     points: np.ndarray

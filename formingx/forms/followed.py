@@ -1,4 +1,4 @@
-"""What depends on the temperature, in the forms: as it is at the beginning of a step, and as it goes on in it."""
+"""Temperature-dependent coefficients in the forms: at the beginning of a step, and their change in it."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ class Formulation(ABC):
         elastic_supports: [(support with an energy, 1 where it is there, else 0 (`Constant`))].
         load_works: of each load of the scene its virtual work at the value that it has (UFL, rank 1, user's units).
         temperature: the `Temperature` of the body, or None.
-        slack_at_rest: True if the body at rest has no stiffness in some direction.
+        slack_at_rest: True if the body in the reference configuration has no stiffness in some direction.
     """
 
     slack_at_rest, ratio_before = False, 1.0
@@ -104,7 +104,7 @@ class Formulation(ABC):
 
     @abstractmethod
     def constraints(self, support: Any) -> list[Any]:
-        """What a support holds: a list of Held or MeanHeld."""
+        """Return the constraints of a support: a list of Held or MeanHeld."""
 
     @abstractmethod
     def nearest(self, points: np.ndarray) -> np.ndarray:
@@ -182,7 +182,7 @@ class Formulation(ABC):
                    for terms in self.terms if terms.internal)
 
     def elastic(self, F: Any) -> Any:
-        """What strains the material of a deformation gradient F (UFL, shape (3, 3)): all but thermal expansion."""
+        """Return the mechanical part of a deformation gradient F (UFL, shape (3, 3)), without thermal expansion."""
         return F if self._free is None else self._free.elastic(F)
 
     def temperatures(self, terms: MaterialTerms) -> np.ndarray:
@@ -203,7 +203,7 @@ class Formulation(ABC):
         return np.sort(np.concatenate([self.mesh.cells.find(self.mesh.layers[name]) for name in layers]))
 
     def admissible(self) -> Any:
-        """What tells whether the body has a shape."""
+        """Return the check of the admissibility of the body."""
         return Admissible(self)
 
     def probe(self, problem: Any, points: Any) -> Probe:

@@ -1,4 +1,4 @@
-"""Which formulation a model has."""
+"""Formulation of each kind of model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a body without stress is stretched by its temperature."""
+"""Thermal stretch of a body without stress."""
 
 from __future__ import annotations
 

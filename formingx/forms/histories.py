@@ -1,4 +1,4 @@
-"""What F(x, control) depends on besides x and control: the histories of a problem, and the time."""
+"""Histories of a problem, and the time: the arguments of F besides x and control."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .history import ConstitutiveHistory, History, Start
 
 
 class Histories:
-    """Of a problem with forms: what contact remembers first, then what its forms do (materials, then heat)."""
+    """Histories of a problem: contact first, then materials, then heat."""
 
     forms: Any
     histories: list[History]
@@ -71,7 +71,7 @@ class Histories:
 
     @property
     def memory(self) -> list[Any]:
-        """What each history remembers of the last accepted state."""
+        """History variables of the last accepted state."""
         return [history.get() for history in self.histories]
 
     @memory.setter
@@ -92,7 +92,7 @@ class Histories:
         self._foretold = None, []
 
     def foretell(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
-        """What the histories of the forms remember if a state is accepted; who asks puts them back.
+        """Return the history variables of the forms after the state; the caller restores them.
 
         start: the state that the step begins at.
         """

@@ -1,4 +1,4 @@
-"""What F depends on besides unknowns, control and time, and what only accepted states change: one protocol for all."""
+"""One protocol for history variables: arguments of F that change when a state is accepted."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ class Start(Protocol):
 
 
 class History(Protocol):
-    """What one part of a scene remembers of the states that were accepted: materials, contacts, the temperature.
+    """History variables of one part of a scene: materials, contacts, the temperature.
 
     The order of calls, contacts first, then materials, the temperature last, which takes the heat that they dissipate:
 
-        start                   the body is at rest;
+        start                   the body is in equilibrium;
         get, advance, put       a step is tried: what would be remembered; back to what was;
         advance                 a state is accepted;
         get, put                to another accepted state, and back;

@@ -1,4 +1,4 @@
-"""What a load or an elastic support sees of the body: the fields, and the integrals that it may take."""
+"""The body as loads and elastic supports use it: the fields, and its integrals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What materials remember: internal variables at quadrature points."""
+"""Internal variables of materials at quadrature points."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from .history import Start
 
 
 class Memory(NamedTuple):
-    """Of a material: the process time of the last accepted state, and {name: values in the owned cells of the layers,
-    shape (cells, points, components)}."""
+    """History of a material: the process time of the last accepted state, and {name: values in the owned cells of
+    the layers, shape (cells, points, components)}."""
 
     time: float
     values: dict[str, np.ndarray]

@@ -131,7 +131,7 @@ class MaterialTerms:
         return self.material.equilibrium_energy(F, **self.constants)
 
     def elastic_stretches(self, F: Any) -> list[Any]:
-        """Of each relaxing branch its largest principal elastic stretch (UFL)."""
+        """Return the largest principal elastic stretch of each relaxing branch (UFL)."""
         return self.material.elastic_stretches(F, self.internal, **self.constants)
 
     def dissipation(self, F: Any) -> Any:

@@ -42,7 +42,7 @@ class ExtendedMatrix:
             self.mat.setOption(PETSc.Mat.Option.SYMMETRIC, True)
 
     def hold(self, bcs: list, rows: list[np.ndarray]) -> None:
-        """What is held from now on.
+        """Constrain these unknowns from now on.
 
         bcs: held unknowns (their rows and columns become those of the identity); rows: of C, each the owned part,
         shape (n,); one that is 0 on all ranks leaves its multiplier alone, as unknowns held are.

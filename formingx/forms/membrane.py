@@ -34,7 +34,8 @@ class MidSurface(Formulation):
     """The forms of a scene as a membrane; the only field is the displacement of the mid-surface.
 
     Attributes:
-        thicknesses: {layer: its thickness normal to the mid-surface at rest (`Function`, length)}.
+        thicknesses: {layer: its thickness normal to the mid-surface in the reference configuration (`Function`,
+            length)}.
 
     Raises:
         InputError: the sheet is not a graph over R, or a load or support is where a membrane has neither face nor end.
@@ -44,7 +45,7 @@ class MidSurface(Formulation):
 
     @property
     def bodies(self) -> list[tuple[Any, list[str]]]:
-        """Not there: raises an InputError."""
+        """Raise an InputError: a membrane has none."""
         raise InputError("a membrane has no stress through its thickness, nor between its layers: use a solid model,"
                          " MixedPressure()")
 
@@ -88,7 +89,7 @@ class MidSurface(Formulation):
         return np.arange(topology.index_map(1).size_local + topology.index_map(1).num_ghosts, dtype=np.int32)
 
     def temperatures(self, terms: Any) -> np.ndarray:
-        """That halfway between the faces of the layer; it does not change."""
+        """Return the temperature halfway between the faces of the layer; it does not change."""
         nodes = of_cells(self.domain, terms.cells)
         geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(self.domain).degree)
         shapes: Any = geometry.tabulate(0, terms.places)
@@ -161,7 +162,7 @@ class MidSurface(Formulation):
         return self.scene.kinematics.weight(self.X) * self._tangent[0]
 
     def _deformation_gradient(self) -> Any:
-        """In principal axes (meridian, normal, hoop)."""
+        """Return the deformation gradient in principal axes (meridian, normal, hoop)."""
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)         # of the surface: its normal is kept
         t = F * ufl.as_vector([self._tangent[0], self._tangent[1], 0])
         l1, l2 = ufl.sqrt(ufl.inner(t, t)), F[2, 2]

@@ -24,7 +24,7 @@ class Outline:
         forms: the `Solid`; its `w` is what is looked at.
 
     Attributes:
-        rest: end, other end and middle of each edge at rest, shape (m, 3, 2), length.
+        rest: end, other end and middle of each edge in the reference configuration, shape (m, 3, 2), length.
         ends: numbers of the corners at its two ends, the same of edges that meet, shape (m, 2).
     """
 
@@ -51,11 +51,11 @@ class Outline:
         self.rest = self._gathered(self._own)
 
     def edges(self) -> np.ndarray:
-        """Where the edges are now, as `rest`; collective."""
+        """Return the deformed edges, as `rest`; collective."""
         return self._gathered(self._own + self._forms.length * self._forms.w.x.array[self._dofs])
 
     def of(self, boundary: str) -> np.ndarray:
-        """Which edges are of a boundary of the mesh, shape (m,); collective."""
+        """Return a mask of the edges of a boundary of the mesh, shape (m,); collective."""
         return self._gathered(np.isin(self._facets, self._forms.scene.mesh.facets_of(boundary)))
 
     def around(self, who: str) -> list[int]:

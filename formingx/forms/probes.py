@@ -20,7 +20,7 @@ class Probe:
 
     Args:
         problem: the `Problem`.
-        points: reference coordinates (R, Z), in space (x, y), shape (n, 2), the same on all ranks.
+        points: reference coordinates (R, Z), in three dimensions (x, y), shape (n, 2), the same on all ranks.
 
     Attributes:
         so_far: displacement of the points before this mesh was made, shape (n, components), length.
@@ -123,7 +123,7 @@ class MidSurfaceProbe(Probe):
         self._take_ends(element, geometry)
 
     def _take_ends(self, element: Any, geometry: Any) -> None:
-        """Of points where two elements meet, whose slopes differ, the mean of both counts."""
+        """Average the slopes of both elements at points where two elements meet."""
         forms, domain = self._problem.forms, self._problem.forms.domain
         nodes = of_cells(domain, own_cells(domain))
         R = forms.nearest(self.points)[:, 0]

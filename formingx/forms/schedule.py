@@ -1,4 +1,4 @@
-"""What a stage of a process sets: how everything that can be driven follows the control, and what takes no part."""
+"""Step data of a stage: amplitudes of the controls, and inactive items."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ class Setting:
 
     Attributes:
         base, rate: one number for each thing (0 unless it can be driven), then those of the process time.
-        off: numbers of the things that take no part.
+        off: numbers of the items that take no part.
         fading: the control takes away, from 0 to 1, the forces that what has changed left without balance.
         stage, piece: number of the stage in its process, and of the piece of it that has one control.
-        changed: numbers of the things that leave or come in while it fades.
+        changed: numbers of the items that leave or come in while it fades.
         mesh: how often the mesh was made again before (`formingx.extensions.remeshing.remeshing`).
     """
 
@@ -48,7 +48,7 @@ class Setting:
         return not any(self.rate[:-1])
 
     def amplitude(self, number: int, control: float) -> float:
-        """Of a thing, or with -1 the process time."""
+        """Return the amplitude of an item, or with -1 the process time."""
         return self.base[number] + self.rate[number] * control
 
     def acting(self, number: int, control: float) -> float:

@@ -1,4 +1,4 @@
-"""How far the stress at the end of a step in time is off: against two steps of half the length.
+"""Time integration error of the stress at the end of a step: against two steps of half the length.
 
 What materials remember is advanced once more, in two halves, along the displacements that the states before and the new
 one make likely, at the temperatures that the step has led to. The stress that this leaves at the end is compared with
@@ -27,7 +27,7 @@ than 0.5 %: tests/test_kbkz_scenes.py.)"""
 
 
 class StepError:
-    """Of the steps in time of a problem.
+    """Time integration error of the steps of a problem.
 
     Args:
         problem: the `Problem`.

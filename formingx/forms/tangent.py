@@ -43,7 +43,7 @@ class Tangent:
             self._lift.x.array[active.dofs] = np.append(rate, 0.0)[active.driver]
 
     def by_control(self, rate: list[float], assemble: Callable[[Any], np.ndarray], n: int) -> np.ndarray:
-        """Of n owned fields, by loads, by way of the time, and by held unknowns that move."""
+        """Return the derivative of n owned fields by the control: by loads, the time, and driven supports."""
         values = assemble(self._by_load) if self._by_load else np.zeros(n)
         if self._by_time and rate[-1]:
             values += assemble(self._by_time)

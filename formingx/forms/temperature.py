@@ -29,7 +29,8 @@ class Temperature:
         self.limits = (-np.inf, np.inf)
 
     def now_and_before(self, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """As `GivenTemperature.in_cells`, those now and, if there are any, those before: (1 or 2, cells, q)."""
+        """Return the temperatures of `GivenTemperature.in_cells`, and those of the step before if there are any: (1
+        or 2, cells, q)."""
         values = [self.T.x.array] if self.before is None else [self.T.x.array, self.before]
         return np.clip(self._given.in_cells(cells, places, np.array(values)), *self.limits)
 

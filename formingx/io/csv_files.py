@@ -57,7 +57,7 @@ class Table(NamedTuple):
 
 
 def conversion(unit: str, wanted: str) -> float:
-    """How many `wanted` one `unit` is.
+    """Return the number of `wanted` units in one `unit`.
 
     Raises:
         InputError: a unit is not known, or they are of different kinds.

@@ -30,7 +30,7 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
         accuracy: of a step in time, relative; a test keeps about a hundredfold of it.
 
     Raises:
-        ConvergenceError: the integration came to an end before.
+        ConvergenceError: the integration reached an end before.
     """
     from scipy.integrate import solve_ivp
     known("elastic_strains: mode", mode, MODES)

@@ -20,7 +20,7 @@ from ..values.temperature import ABSOLUTE_ZERO, FunctionOfTemperature
 
 
 class Sample(NamedTuple):
-    """Where constants are looked at before anything is solved: points of this rank's own cells of a layer.
+    """Sample of the body for the check of constants: points of the locally owned cells of a layer.
 
     points: reference (R, Z), shape (m q, 2), length; cells: their numbers, shape (m,); places: of the q points in the
     reference cell, shape (q, 2); domain: the `dolfinx.mesh.Mesh`; temperature: there, shape (m q,), None: not given.

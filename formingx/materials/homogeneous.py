@@ -89,7 +89,7 @@ def _three(stretches: Any) -> np.ndarray:
 
 
 class Stability(NamedTuple):
-    """Where a material is stable.
+    """Ranges of stretch in which a material is stable.
 
     stretches: the range that was asked for.
     finite, load, drucker: {mode: (lowest, highest)}, the part of it around l = 1 where the stress is finite, and where

@@ -118,7 +118,7 @@ class Yeoh(Material):
 
 
 class Gent(Material):
-    """W = -(mu Jm / 2) ln(1 - (I1 - 3)/Jm), Gent (1996): stress grows without bound as I1 - 3 comes to Jm.
+    """W = -(mu Jm / 2) ln(1 - (I1 - 3)/Jm), Gent (1996): stress grows without bound as I1 - 3 reaches Jm.
 
     Args:
         mu: shear modulus, stress, greater than 0.
@@ -160,7 +160,8 @@ class ArrudaBoyce(Material):
     and 1. It integrates, with s = y^2, to W = mu N (s/2 - s^2/20 - s^3/15 - ln(1 - s)), zero at s = 1/N.
 
     Args:
-        mu: n k T, stress, greater than 0. The shear modulus at rest is larger: mu (1 + 3/(5 N) + ...).
+        mu: n k T, stress, greater than 0. The shear modulus in the reference configuration is larger: mu (1 + 3/(5
+            N) + ...).
         N: segments in a chain, greater than 1: I1 stays below 3 N. In uniaxial tension the largest stretch is about
             sqrt(3 N).
 

@@ -1,4 +1,4 @@
-"""What materials have in common that relax to an equilibrium, and their tests in time."""
+"""Common base of materials that relax to an equilibrium, and their tests in time."""
 
 import copy
 from collections.abc import Callable
@@ -19,7 +19,7 @@ def checked_shift(name: str, shift: Any) -> Callable:
 
 
 def checked_pairs(name: str, pairs: Any, what: str) -> list[list[Any]]:
-    """At least one pair, such as "mu, tau", or an InputError."""
+    """Return at least one pair, such as "mu, tau"; raise an InputError otherwise."""
     found = several(name, pairs, f"({what})")
     if not found:
         raise InputError(f"{name} = {pairs!r}: must be at least one ({what})")
@@ -62,18 +62,18 @@ class Relaxing(Material):
 
     @property
     def shear_modulus(self) -> float:
-        """That of the instantaneous response; stress."""
+        """Shear modulus of the instantaneous response; stress."""
         self._numbers()
         return float(self.relaxation_modulus(0.0))
 
     @property
     def rest_stress(self) -> float:
-        """That of the equilibrium: what relaxes has none; stress."""
+        """Reference stress of the equilibrium; relaxing branches have none; stress."""
         return 0.0 if (rest := self.equilibrium) is None else rest.rest_stress
 
     @property
     def largest_I1(self) -> float:
-        """That of the equilibrium."""
+        """Largest I1 of the equilibrium energy."""
         return np.inf if (rest := self.equilibrium) is None else rest.largest_I1
 
     def check_constants(self, **constants: Any) -> None:

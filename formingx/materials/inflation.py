@@ -25,8 +25,8 @@ class Inflated:
     """A thin body, inflated freely.
 
     Args:
-        layers: (material, thickness at rest) of each; constants are numbers.
-        radius: at rest: of the tube's middle, or of the opening that a disc is held at.
+        layers: (material, thickness in the reference configuration) of each; constants are numbers.
+        radius: in the reference configuration: of the tube's middle, or of the opening that a disc is held at.
     """
 
     def __init__(self, layers: Sequence[tuple[Material, float]], radius: float):

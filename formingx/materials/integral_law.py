@@ -8,7 +8,8 @@ class IntegralLaw(Protocol):
     """The law of a stress that depends on all past states (`Material.integral`).
 
     Attributes:
-        coefficients: {name: value at rest}, tuples for tensors: the functions that the forms hold at quadrature points.
+        coefficients: {name: value in the reference configuration}, tuples for tensors: the functions that the forms
+            hold at quadrature points.
     """
 
     coefficients: Mapping[str, object]

@@ -1,9 +1,10 @@
-"""What every incompressible, isotropic material can do; the materials are in `hyperelastic`.
+"""Interface of every incompressible, isotropic material; the materials are in `hyperelastic`.
 
 A material has named constants and one energy, and may have a history: internal variables at every quadrature point,
-which advance from one accepted state to the next. What an energy of F leaves as stress at rest, an isotropic pressure,
-is removed where it is used: W(F) - rest_stress ln J. (On a thin sheet Newton's method takes half as many iterations
-with that form than with the isochoric part of F: see the notes on incompressibility.)
+which advance from one accepted state to the next. What an energy of F leaves as stress in the reference
+configuration, an isotropic pressure, is removed where it is used: W(F) - rest_stress ln J. (On a thin sheet Newton's
+method takes half as many iterations with that form than with the isochoric part of F: see the notes on
+incompressibility.)
 """
 
 from __future__ import annotations
@@ -38,10 +39,10 @@ class Material:
 
     Attributes:
         parameters: {name: constant}.
-        internal: {name: value at rest}, a number or nested tuples, whose shape is that of the variable; of a quantity
-            per quadrature point. Empty: no history.
+        internal: {name: value in the reference configuration}, a number or nested tuples, whose shape is that of the
+            variable; of a quantity per quadrature point. Empty: no history.
         of_motion: names of internal variables that tell how the body moved in the last step, for its rate in the next;
-            as at rest they tell nothing.
+            as in the reference configuration they tell nothing.
         shapes: {name: 1 or -1} of internal variables that are positive tensors, as C or as its inverse, of entries 11,
             22, 12, 33: on another mesh the body as it is sees them as it did. (Others are carried as numbers.)
         rate_dependent: False: its history follows the strain alone, as damage does, and time is nothing to it.
@@ -64,7 +65,8 @@ class Material:
     def strain_energy(self, F: Any, *args: Any, **constants: Any) -> Any:
         """Energy per reference volume of F, shape (3, 3); a UFL scalar, zero at F = I.
 
-        Of a material with a history: that of a body at rest until now which is strained in no time.
+        Of a material with a history: that of a body in the reference configuration until now which is strained in no
+        time.
         """
         if not self.internal:
             raise NotImplementedError
@@ -94,7 +96,7 @@ class Material:
         return None if self.internal else self.strain_energy(F, **constants)
 
     def elastic_stretches(self, F: Any, internal: dict[str, Any], **constants: Any) -> list[Any]:
-        """Of each relaxing branch its largest principal elastic stretch, with the internal variables as they are then.
+        """Return the largest principal elastic stretch of each relaxing branch, with the present internal variables.
 
         UFL scalars; 1 when the branch has relaxed, and that of F itself (without change of volume) before it does.
         """
@@ -205,7 +207,7 @@ class Material:
         return brentq(lambda l: l**2 + l**(2 * k) + l**(-2 - 2 * k) - self.largest_I1, 1, math.sqrt(self.largest_I1))
 
     def check_stability(self, stretches: Any) -> Stability:
-        """Where the material is stable, in each of the three tests.
+        """Return the ranges of stretch in which the material is stable, in each of the three tests.
 
         Two criteria, each with the part of the range around l = 1 in which it holds:
         "load": dP/dl > 0, a test under a growing force goes on (P nominal);
@@ -255,7 +257,8 @@ class Material:
         return write(self, file, temperatures, rates, unit, unit_of_time)
 
     def check(self, sample: Sample | None = None) -> None:
-        """Raise an InputError unless the constants are admissible: finite, with a positive stiffness at rest.
+        """Raise an InputError unless the constants are admissible: finite, with a positive stiffness in the
+        reference configuration.
 
         What is a number, of whatever type, is kept as a float.
         sample: where to look at constants that vary; None: only those that do not vary are checked.

@@ -15,7 +15,7 @@ def isochoric(F: Any) -> Entries:
 
 
 def entries(vector: Any) -> Entries:
-    """Those of a vector."""
+    """Return the entries of a vector."""
     return vector[0], vector[1], vector[2], vector[3]
 
 
@@ -30,7 +30,7 @@ def inner(A: Entries, B: Entries) -> Any:
 
 
 def determinant(A: Entries) -> Any:
-    """Of A."""
+    """Return the determinant of A."""
     return A[3] * (A[0] * A[1] - A[2] ** 2)
 
 

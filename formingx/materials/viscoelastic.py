@@ -1,10 +1,10 @@
 """Materials that relax: an equilibrium energy and branches, each a spring that flows.
 
 Every branch has a modulus mu and a relaxation time tau, and the energy (mu/2) [tr(Cbar A) - 3] of its elastic strain;
-Cbar = J^(-2/3) C keeps the branches free of a stress at rest. The state of a branch is the tensor Cv, or A, of its law.
-A step of length dt from a known state has a potential whose derivative by F is the stress at its end, so its tangent
-is symmetric and consistent, and nothing is iterated at a point. With x = dt/tau it is regular at dt = 0, where it is
-the elastic energy, and for dt without bound it has no branch.
+Cbar = J^(-2/3) C keeps the branches free of a stress in the reference configuration. The state of a branch is the
+tensor Cv, or A, of its law. A step of length dt from a known state has a potential whose derivative by F is the
+stress at its end, so its tangent is symmetric and consistent, and nothing is iterated at a point. With x = dt/tau it
+is regular at dt = 0, where it is the elastic energy, and for dt without bound it has no branch.
 
 A symmetric tensor with the block structure of F (`physics.kinematics`) is kept as its entries (11, 22, 12, 33).
 """
@@ -156,8 +156,8 @@ class RelaxingMaterial(Relaxing):
             mode: "uniaxial", "pure_shear" or "equibiaxial"; without times "biaxial" too.
             stretches: of any shape without times, (n,) with them.
             times: when the stretches are met, shape (n,), not falling; a step from one stretch to another at the same
-                time is put on at once, and so is the first stretch, to a body at rest. None: every stretch is put on
-                at once.
+                time is put on at once, and so is the first stretch, to a body in the reference configuration. None:
+                every stretch is put on at once.
             between: what grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
 
         Raises:
@@ -204,7 +204,7 @@ class RelaxingMaterial(Relaxing):
         return drawn
 
     def coordinates(self):
-        """Those of the equilibrium energy, then the logarithms of mu and tau."""
+        """Return the coordinates of the equilibrium energy, then the logarithms of mu and tau."""
         first = [] if (rest := self.equilibrium) is None else rest.coordinates()
         return first + [(math.log(value), -math.inf, math.inf) for pair in self.branches for value in pair]
 
@@ -221,11 +221,11 @@ class RelaxingMaterial(Relaxing):
             yield k, constants[f"mu_{k}"], constants[f"tau_{k}"]
 
     def _past(self, internal: dict[str, Any], time_step: Any) -> Any:
-        """What the branches of a step need of the states before, whatever their tau."""
+        """Return the data of the states before that the branches of a step need, whatever their tau."""
         return entries(internal["C"]) if self._remembers else None
 
     def _left(self, C: Entries, internal: dict[str, Any], time_step: Any) -> dict[str, Any]:
-        """What a step leaves of that for the next one."""
+        """Return the data of this step for the branches of the next one."""
         return {"C": C} if self._remembers else {}
 
     # the law of a branch: energies over mu/2, times over tau, tensors as entries, C with det C = 1; `_metric` is M of
@@ -263,9 +263,10 @@ class Viscoelastic(RelaxingMaterial):
     """Finite viscoelasticity with Gaussian springs.
 
     W = W_eq(C) + sum (mu_k/2) [tr(C Cv_k^-1) - 3], dCv_k/dt = (1/tau_k) [C - (1/3) tr(C Cv_k^-1) Cv_k],
-    det Cv_k = 1, Cv_k = I at rest: Leonov (1976), Simo and Miehe (1992), Le Tallec, Rahier and Kaiss (1993), Reese and
-    Govindjee (1998), Kumar and Lopez-Pamies (2016). In small strains G(t) = G_eq + sum mu_k exp(-t/tau_k); in steady
-    extension the stress of a branch grows in proportion to the rate, with the viscosity 3 mu tau.
+    det Cv_k = 1, Cv_k = I in the reference configuration: Leonov (1976), Simo and Miehe (1992), Le Tallec, Rahier
+    and Kaiss (1993), Reese and Govindjee (1998), Kumar and Lopez-Pamies (2016). In small strains G(t) = G_eq + sum
+    mu_k exp(-t/tau_k); in steady extension the stress of a branch grows in proportion to the rate, with the
+    viscosity 3 mu tau.
 
     A step of implicit Euler has a closed form (Shutov, Landgraf and Ihlemann 2013): with G = Cv_n, x' = dt/tau,
     a = det G, b = det(G + x' C) it is Cv = (G + x' C)/b^(1/3), and its potential is, regular at dt = 0,
@@ -323,9 +324,11 @@ class Viscoelastic(RelaxingMaterial):
 
 
 class TransientNetwork(RelaxingMaterial):
-    """Networks whose chains break and form again at rest: Green and Tobolsky (1946), the upper-convected Maxwell law.
+    """Networks whose chains break and form again in the reference configuration: Green and Tobolsky (1946), the
+    upper-convected Maxwell law.
 
-    Kirchhoff stress of a branch mu F A F^T (and a pressure), dA/dt = (C^-1 - A)/tau, A = I at rest. Linear in the
+    Kirchhoff stress of a branch mu F A F^T (and a pressure), dA/dt = (C^-1 - A)/tau, A = I in the reference
+    configuration. Linear in the
     memory: in steady extension faster than 1/(2 tau) the stress grows without bound.
 
     A step is exact where C^-1 goes along a parabola in time, through its value at the end of the step and the two

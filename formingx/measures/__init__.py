@@ -1,1 +1,1 @@
-"""What a run can aim at and what it records: pressures, travels, volumes, forces."""
+"""Output quantities and targets of a run: pressures, travels, volumes, forces."""

@@ -112,8 +112,8 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     (stress length^3), mass_error (volume over its original value, minus 1), volume_error (root mean square of J - 1),
     both over what thermal expansion makes of the volume. Pole and volume are there where the scene has an axis and a
     driven pressure. With `Gravity`: sag, the largest downward displacement (length). With contacts: contact_length
-    (reference length in touch), in space contact_area (of the deformed sheet) and reference_contact_area (of the flat
-    one), penetration (of the deepest node, length) and the force of the body on each tool: along
+    (reference length in touch), in three dimensions contact_area (of the deformed sheet) and reference_contact_area
+    (of the flat one), penetration (of the deepest node, length) and the force of the body on each tool: along
     its travel, positive when it resists; of a tool that stays along Z, positive when the body pushes it up. It is
     plug_force for one named "plug" (tool_1_force for one without a name), and tool_force where there is one tool. With
     a driven support: support_force (of the body on it, along its component). Where several things can be driven each

@@ -31,7 +31,7 @@ def support_factor(scene: Any, support: Any) -> int:
 
 
 def force(value: float, *, of: str | None = None) -> Target:
-    """The force on what is driven, or on what is called `of`, reaches `value` (stress length^2).
+    """The force on the controlled quantity, or on what is called `of`, reaches `value` (stress length^2).
 
     Of the body: on a driven support along its component; on a tool against its travel, positive when it resists. It is
     the force on the whole tool or support, also where a half or a quarter is modelled (`Scene.symmetry_factor`); in
@@ -60,7 +60,7 @@ def force(value: float, *, of: str | None = None) -> Target:
 
 
 class _SupportForce(Bound):
-    """Of the body on a driven support (by its number in the scene)."""
+    """Force of the body on a driven support (by its number in the scene)."""
 
     smooth = False
 
@@ -91,7 +91,7 @@ class _SupportForce(Bound):
 
 
 class _ToolForce(Bound):
-    """Of the body on a tool, against its travel."""
+    """Force of the body on a tool, against its travel."""
 
     smooth = False
 

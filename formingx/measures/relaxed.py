@@ -1,4 +1,4 @@
-"""How far a body has relaxed: its stress at the pole over that which is left, elastic strains of branches."""
+"""Relaxation of a body: its stress at the pole over the equilibrium stress, elastic strains of branches."""
 
 from typing import Any
 
@@ -48,7 +48,7 @@ class PoleStressRatio:
                                                        for t in forms.terms)
 
     def now(self) -> float:
-        """At the state that the forms hold; collective."""
+        """Return the value at the state of the forms; collective."""
         now, left, modulus = self._integrals()
         if left < _NONE * modulus:
             self._strain.value = _STRAIN
@@ -66,7 +66,7 @@ class PoleStressRatio:
         return self._problem.comm.allreduce(totals, MPI.SUM)
 
     def _expression(self, terms: Any) -> fem.Expression:
-        """What `_integrals` sums up of a material, with the weight of volumes."""
+        """Return the integrands of a material for `_integrals`, with the weight of volumes."""
         forms, e = self._problem.forms, self._strain
         F = ufl.variable(forms.elastic_F * ufl.diag(ufl.as_vector([1 + e, 1 - 2 * e, 1 + e])))
         deviators = [ufl.dev(ufl.diff(energy, F) * F.T) for energy in (terms.stored_energy(F),
@@ -103,7 +103,8 @@ class ElasticStretches:
             self._to_places = there @ np.linalg.pinv(root * basis) * root.T      # least squares: an L2 projection
 
     def now(self, cells: int) -> np.ndarray:
-        """At the state that the forms hold, in this rank's own cells, shape (cells, n, branches); nan: no branch."""
+        """Return the stretches at the state of the forms in locally owned cells, shape (cells, n, branches); nan: no
+        branch."""
         found = np.full((cells, self._n, self.count), np.nan)
         for expression, own, count in self._parts:
             if len(own):

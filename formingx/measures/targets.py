@@ -1,4 +1,4 @@
-"""What a run can aim at: pole height, stretch, volume, pressure, travel, time."""
+"""Targets of a run: pole height, stretch, volume, pressure, travel, time."""
 
 from typing import Any, NamedTuple
 
@@ -48,7 +48,7 @@ class OfWholePart(Bound):
 
 
 class Amplitude(Bound):
-    """Of a thing that can be driven (by its number in the scene), of the process time (-1), or the control (None).
+    """Amplitude of an item (by its number in the scene), of the process time (-1), or of the control (None).
 
     Of a load it is what acts: nothing of one that a stage leaves out.
     """
@@ -172,7 +172,7 @@ class Sag(Bound):
 
 
 class Target(NamedTuple):
-    """What a run aims at: a measure (by name), its value, and whether it changes sign with the control."""
+    """Target of a run: an output quantity (by name), its value, and whether it changes sign with the control."""
 
     name: str
     value: float
@@ -210,7 +210,7 @@ def process_time(value: float) -> Target:
 
 
 def changed() -> Target:
-    """What has left the scene, or come into it, has done so wholly (`Setting.fading`)."""
+    """Complete the change of the scene between two stages (`Setting.fading`)."""
     return Target("change", 1.0, lambda problem: Amplitude(problem, None))
 
 
@@ -255,8 +255,8 @@ def pole_stretch(value: float) -> Target:
 def enclosed_volume(value: float) -> Target:
     """The volume that the driven face has swept reaches `value` (length^3; per depth in plane strain).
 
-    It lies between the face at rest and now; where an end of the face has moved, straight lines close it. Where a half
-    or a quarter is modelled it is that of the whole part (`Scene.symmetry_factor`).
+    It lies between the face in the reference configuration and now; where an end of the face has moved, straight
+    lines close it. Where a half or a quarter is modelled it is that of the whole part (`Scene.symmetry_factor`).
 
     >>> round(float(path.at(fx.enclosed_volume(500.0)).measures["enclosed_volume"]), 6)
     500.0
@@ -267,7 +267,7 @@ def enclosed_volume(value: float) -> Target:
 def displacement(value: float, *, at: tuple[float, float], component: str = "z") -> Target:
     """The displacement component ("r" or "z") of the reference point `at` = (R, Z) reaches `value` (a length).
 
-    Of a sheet in space "x", "y" or "z", `at` = (x, y).
+    Of a sheet in three dimensions "x", "y" or "z", `at` = (x, y).
 
     >>> fx.displacement(3.0, at=(5.0, 0.0)).name
     'u_z_at_5_0'
@@ -313,7 +313,8 @@ def bind_volume(problem: Any) -> Bound:
 
 
 def _volume(problem: Any) -> Bound:
-    """That of the body as modelled: minus the integral of u . n da over the face of the (first) driven load.
+    """Return the volume of the body as modelled: minus the integral of u . n da over the face of the (first) driven
+    load.
 
     The face goes from X to X + u. The area vector of X + t u is of degree 2 in t (axisymmetric): Gauss's rule with two
     points in t is exact.

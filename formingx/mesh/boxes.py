@@ -1,4 +1,4 @@
-"""Which of many boxes overlap, found in a tree of boxes around boxes: n log n where few do, wherever they lie."""
+"""Overlaps among many boxes, found in a tree of boxes: n log n where few overlap."""
 
 from collections.abc import Iterator
 

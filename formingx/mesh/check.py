@@ -1,4 +1,4 @@
-"""Whether elements cover the body once: none flat or turned inside out, none over another, no gap, all in one piece."""
+"""Validity of a mesh: elements cover the body once; none is flat or inverted; none overlap; no gap; one piece."""
 
 from collections.abc import Iterator
 
@@ -13,7 +13,7 @@ _FLAT = 1e-12                          # of the square of the longest edge: an a
 
 
 def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
-    """Look a section over at rest.
+    """Look a section over in the reference configuration.
 
     Args:
         points: shape (n, 2), length.

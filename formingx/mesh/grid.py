@@ -21,7 +21,7 @@ class Grid(NamedTuple):
     """A mesh on one rank; rows of `layers` and `boundaries` hold indices of `points`.
 
     Attributes:
-        points: (R, Z) of the nodes, shape (n, 2), unit of length of the mesh; of a sheet in space (x, y, 0).
+        points: (R, Z) of the nodes, shape (n, 2), unit of length of the mesh; of a sheet in three dimensions (x, y, 0).
         numbers: their numbers in a file, shape (n,).
         layers: {name: triangles, shape (m, 6)}: corners counter-clockwise, then middles of edges 01, 12, 20 (of a
             first-order mesh: shape (m, 3)).

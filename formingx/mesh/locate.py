@@ -1,4 +1,4 @@
-"""Where points lie in a mesh: the cell and the place in it, on one rank each."""
+"""Location of points in a mesh: the cell and the place in it, on one rank each."""
 
 from typing import Any, NamedTuple
 

@@ -59,7 +59,7 @@ class Mesh:
     columns: Columns | None = None
 
     def __str__(self) -> str:
-        """What is there; edges and sizes only of a mesh on one rank: it is not collective."""
+        """Return a text on the mesh; edges and sizes only of a mesh on one rank: it is not collective."""
         cells, alone = self.domain.topology.index_map(2).size_global, self.comm.size == 1
         edges = {name: f" ({len(self.facets_of(name))} edges)" if alone else "" for name in self.boundaries}
         lines = [f"{cells} six-node triangles"]

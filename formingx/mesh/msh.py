@@ -36,7 +36,7 @@ class Block(NamedTuple):
 
 
 class Content(NamedTuple):
-    """What a file holds: node numbers, shape (n,); points, shape (n, 3); blocks; {(dimension, group): name}."""
+    """Content of a file: node numbers, shape (n,); points, shape (n, 3); blocks; {(dimension, group): name}."""
 
     numbers: np.ndarray
     points: np.ndarray

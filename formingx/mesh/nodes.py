@@ -1,4 +1,4 @@
-"""Where this rank's cells and facets of a DOLFINx mesh have their nodes, in as many coordinates as the mesh has."""
+"""Nodes of the locally owned cells and facets of a DOLFINx mesh, in as many coordinates as the mesh has."""
 
 from typing import Any
 
@@ -34,7 +34,7 @@ def span(domain: Any, comm: Any) -> np.ndarray:
 
 
 def of_space(space: Any) -> np.ndarray:
-    """Where the unknowns of a space are at rest (of blocks, the blocks), shape (n, COORDINATES)."""
+    """Return the reference positions of the unknowns of a space (of blocks, the blocks), shape (n, COORDINATES)."""
     return space.tabulate_dof_coordinates()[:, :COORDINATES]
 
 

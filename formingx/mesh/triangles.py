@@ -65,7 +65,7 @@ class Triangles:
         for name, tag in mesh.layers.items():
             found = mesh.cells.find(tag)
             names[found[found < n]] = name
-        self.corners = gathered(mesh.comm, of_cells(mesh.domain, own)[:, :3, :2])             # in space (x, y)
+        self.corners = gathered(mesh.comm, of_cells(mesh.domain, own)[:, :3, :2])  # in three dimensions (x, y)
         self.layer = gathered(mesh.comm, names).astype(str)
         edges = np.stack([np.hypot(*(self.corners[:, i] - self.corners[:, j]).T)
                           for i, j in ((0, 1), (1, 2), (2, 0))], 1)

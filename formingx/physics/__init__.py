@@ -1,1 +1,1 @@
-"""What a scene is made of: each object knows its own law and nothing of the others'."""
+"""Laws of a scene: each object knows only its own law."""

@@ -7,7 +7,7 @@ Song (1993), eqs. (5.7) to (5.14), per unit reference area, at a point whose sig
 
 g being the elastic slip: the tangential motion since the point touched (entered the ramp), less what has slid. Stick
 is mu = inf, frictionless mu = 0. A point that was out of touch at the last accepted state slips from where it arrives
-inside the step, which the tangent of the path foretells: taken from the end of the step, the slip would depend on its
+inside the step, which the tangent of the path predicts: taken from the end of the step, the slip would depend on its
 length. One that sticks, and that the tangent lets arrive at the very end of the step or later, is free until then.
 
 Coulomb's law is regularised so that points slide after the same small elastic slip g_s at every pressure: what holds
@@ -48,7 +48,7 @@ _ELASTIC_SLIP = 1e-3
 """g_s over thickness: forces hardly feel it (tests/test_compression.py), and Newton's method can still aim at it."""
 
 _SLIDES, _STICK, _HELD = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
-"""Penalty and ramp of what slides, of what sticks until pulled off, and of what never lets go, where stiffer costs
+"""Penalty and ramp of what slides, of what sticks until pulled off, and of what never separates, where stiffer costs
 iterations."""
 
 _MOST_POINTS = 100
@@ -63,27 +63,30 @@ class Contact(Part):
 
     Args:
         on: name of the boundary that faces the tool.
-        tool: a `Tool`, see `formingx.tools`; of a sheet in space `solid`, `box`, `revolved` or `extruded` there.
+        tool: a `Tool`, see `formingx.tools`; of a sheet in three dimensions `solid`, `box`, `revolved` or `extruded`
+            there.
         friction: "stick" (a point that touches stays where it touched), "none", or the coefficient mu of Coulomb's
             law (5.9), from 0 (none). One that depends on the temperature of the body where it touches: a `table`
             {T: mu}, or what `of_temperature` returns; it is that of the last accepted state.
         penalty: k over shear modulus / thickness of the sheet; default 2e5, with separates=False 2e4.
         ramp: theta over thickness of the sheet; default 1e-7 where points slide, 1e-5 where they stick or are held.
         elastic_slip: g_s over thickness of the sheet: how far a point goes under Coulomb's law before it slides.
-        separates: False: what has touched never lets go (a tacky sheet, a plug that the sheet is stuck to from the
-            start); with "stick" or "none". Default True; in space, with "stick", False: it is held until a stage
-            leaves the tool out, or, with True, until it pulls (of materials that do not relax).
-        nodes_per_step: so many nodes are to come into contact in a step (two to an element edge); in space so many
-            hundredths of all nodes, default 1. What sticks, slides under friction or gives off heat depends on when it
-            touched. None: of what sticks up to 5 % of the nodes, predicted one after the other, each held where it
-            arrives, and so what slides beside it; else of what slides under friction or gives off heat one.
-        present_area: the penalty is per area and over the wall as they are at the beginning of a step, not at rest:
-            what is drawn or pressed 20 times thinner is held as well as at rest. Without friction. (Then a state
-            depends, by its penetration, on the steps on the way to it.)
-        points: where it acts: at the "nodes" of the face, or at so many Gauss points of each facet, which let go one by
+        separates: False: what has touched never separates (a tacky sheet, a plug that the sheet is stuck to from the
+            start); with "stick" or "none". Default True; in three dimensions, with "stick", False: it is held until
+            a stage leaves the tool out, or, with True, until it pulls (of materials that do not relax).
+        nodes_per_step: this number of nodes are to come into contact in a step (two to an element edge); in three
+            dimensions this number of hundredths of all nodes, default 1. What sticks, slides under friction or gives
+            off heat depends on when it touched. None: of what sticks up to 5 % of the nodes, predicted one after the
+            other, each held where it arrives, and so what slides beside it; else of what slides under friction or
+            gives off heat one.
+        present_area: the penalty is per area and over the wall as they are at the beginning of a step, not in the
+            reference configuration: what is drawn or pressed 20 times thinner is held as well as in the reference
+            configuration. Without friction. (Then a state depends, by its penetration, on the steps on the way to it.)
+        points: where it acts: at the "nodes" of the face, or at this number of Gauss points of each facet, which
+            separate one by
             one: smoother where a sheet slides over an edge.
-        direction: (r, z), in space (x, y, z), of the tool's motion per unit of travel: the tool is what the run
-            controls;
+        direction: (r, z), in three dimensions (x, y, z), of the tool's motion per unit of travel: the tool is what
+            the run controls;
             None: it stays.
         name: what it is called in a process and in its columns.
 
@@ -270,11 +273,11 @@ class Law(NormalLaw):
         self.remembers = self.has_friction or self.pulls
 
     def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
-        """Which points at x touch, or are held, shape (n,)."""
+        """Return a mask of the points at x that touch or stick, shape (n,)."""
         return (self.distance(x) > -self.theta) | self._held(old)
 
     def _held(self, old: Touch | None) -> np.ndarray | bool:
-        """Which points may not let go, shape (n,)."""
+        """Return a mask of the points that cannot separate, shape (n,)."""
         return False if not self.pulls or old is None else old.distance > -self.theta
 
     def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
@@ -298,7 +301,7 @@ class Law(NormalLaw):
         return np.where(sticks, np.inf, grows)
 
     def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
-        """Of the normal traction, see `ContactLaw`."""
+        """Return the energy of the normal traction, see `ContactLaw`."""
         d, theta = self.distance(x), self.theta
         if self.pulls:
             return self.k * np.where(self._held(old) | (d > -theta), (d + theta) ** 2 / 2, 0.0)
@@ -306,18 +309,19 @@ class Law(NormalLaw):
         return self.k * np.where(d < theta, inside**3 / (12 * theta), d**2 / 2 + theta**2 / 6)
 
     def start(self, x: np.ndarray) -> Touch:
-        """What points at x remember before anything has happened."""
+        """Return the initial history variables of points at x."""
         d = self.distance(x)
-        if self.pulls:                                      # at the foot of the ramp it is held, free of stress
+        if self.pulls:                                      # at the outer edge of the ramp it is held, free of stress
             d = np.where(np.abs(d / self.theta + 1) < _AT_FOOT, -(1 - _AT_FOOT) * self.theta, d)
         return _touch(x.copy(), d, np.zeros(len(x)))
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """At points x, shape (n, 2), which remember `old` (not used without friction).
+        """Compute the tractions at points x, shape (n, 2), with the history variables `old` (not used without
+        friction).
 
         `expected`: where to linearise the law, at the points if None. Newton's method wants what the iteration before
-        foretold: tractions as unknowns of their own would be those. Taken from the points, the curvature of tool and
+        predicted: tractions as unknowns of their own would be those. Taken from the points, the curvature of tool and
         motion, times a stiff penalty, would drown them.
 
         `sense`: that of the iteration before. A point that would turn from sliding one way to sliding the other is
@@ -395,7 +399,8 @@ class Law(NormalLaw):
     def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
         """The stiffness with points that have just touched (`arrived`), or are about to, pressed halfway into the ramp.
 
-        At the foot of the ramp they have none, and the tangent of the path would let them slip where they will stick.
+        At the outer edge of the ramp they have none, and the tangent of the path would let them slip where they will
+        stick.
         """
         near, now = self.nearest(x), self.tractions(x, old)
         about = np.abs(near.distance / self.theta + 1.025) < 0.025 + 2 * _AT_FOOT       # a body may rest at the foot

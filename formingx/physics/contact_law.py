@@ -1,4 +1,4 @@
-"""What a law of contact between points of a face and a rigid tool gives, and what the points remember.
+"""Interface of a law of contact between points of a face and a rigid tool, and its history variables.
 
 Positions, motions and tractions of n points have c components each, 2 in the plane of a section: shape (n, c).
 """
@@ -30,7 +30,7 @@ class ContactStatus(IntEnum):
 
 
 class Touch(NamedTuple):
-    """What n points remember of the last accepted state, seen from the tool.
+    """History variables of n points at the last accepted state, relative to the tool.
 
     position: shape (n, c), length; distance: signed, shape (n,), length; slip: elastic slip g, shape (n,), length;
     arrival: where the point will be when it touches, if it does in the step ahead, shape (n, c), length; NaN if it has
@@ -63,7 +63,7 @@ class Tractions:
 
     @cached_property
     def touch(self) -> Touch:
-        """What to remember."""
+        """Return the history variables."""
         return self._touch()
 
     @property
@@ -73,7 +73,7 @@ class Tractions:
 
 
 class Motion(NamedTuple):
-    """Where n points are with respect to a tool, to first order.
+    """Position of n points relative to a tool, to first order.
 
     position: shape (n, c), length; distance, slip: shape (n,), length; normal, along: their gradients, shape (n, c).
     """
@@ -85,7 +85,7 @@ class Motion(NamedTuple):
     along: np.ndarray
 
     def to(self, x: np.ndarray) -> Motion:
-        """What it foretells for the points moved to x, shape (n, c)."""
+        """Return the predicted values for the points moved to x, shape (n, c)."""
         by = x - self.position
         distance = self.distance + np.einsum("ni,ni->n", self.normal, by)
         return self._replace(position=x, distance=distance, slip=self.slip + np.einsum("ni,ni->n", self.along, by))
@@ -97,10 +97,10 @@ class ContactLaw(Protocol):
     For each increment, in this order:
 
     * `motion`, `touching`, where it begins: each point's distance and slip to first order; which points touch;
-    * `tractions`, each iteration, linearised where the `Motion` of the iteration before foretells: forces, their
+    * `tractions`, each iteration, linearised where the `Motion` of the iteration before predicts: forces, their
       derivative (the tangent) and, of a state that is accepted, what to remember;
     * `stiffness_ahead`, there: the tangent of the path, with the points that have just touched;
-    * `distance`, `nearest`, `ramp`, for limits of the next step: when points arrive, and whether that was foreseen.
+    * `distance`, `nearest`, `ramp`, for limits of the next step: when points arrive, and whether that was predicted.
 
     Where it has `friction` and `depth`, too, as `formingx.physics.contact.Law`, a step may bring several points.
 
@@ -123,23 +123,25 @@ class ContactLaw(Protocol):
     def pulls(self) -> bool: ...
 
     def start(self, x: np.ndarray) -> Touch:
-        """What points at x remember before anything has happened."""
+        """Return the initial history variables of points at x."""
 
     def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
-        """Which points at x touch, or are held, shape (n,)."""
+        """Return a mask of the points at x that touch or stick, shape (n,)."""
 
     def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
         """Distance and slip of points at x, and their gradients."""
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """At points x; `expected`: where to linearise the law (at x if None); `sense`: of the iteration before."""
+        """Compute the tractions at points x; `expected`: where to linearise (at x if None); `sense`: of the
+        iteration before."""
 
     def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
         """Derivative of the tractions beyond a state, shape (n, c, c), stress/length; `arrived`: just now."""
 
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
-        """That of the traction round the axis by the motion there, shape (n,), stress/length."""
+        """Return the derivative of the circumferential traction by the circumferential motion, shape (n,),
+        stress/length."""
 
     def distance(self, x: np.ndarray) -> np.ndarray:
         """Signed, of points x, shape (n, c), or several places of each, (m, n, c), length; contact begins at -theta."""
@@ -151,7 +153,7 @@ class ContactLaw(Protocol):
         """Normal traction over the penalty at distances d, and its derivative."""
 
     def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
-        """What the normal tractions hold per unit reference area, shape (n,), stress length."""
+        """Return the energy of the normal tractions per unit reference area, shape (n,), stress length."""
 
     def part(self, points: np.ndarray | slice) -> ContactLaw:
         """The law of some of the points."""
@@ -169,8 +171,8 @@ class NormalLaw:
     Args:
         tool: with its signed distance.
         k: the penalty, stress/length, a number or one for each point, shape (n,).
-        theta, shift: see `ContactLaw`. With a shift a point that touches from the start begins at the foot of the ramp,
-            free of stress.
+        theta, shift: see `ContactLaw`. With a shift a point that touches from the start begins at the outer edge of
+            the ramp, free of stress.
     """
 
     has_friction = remembers = pulls = False

@@ -22,11 +22,11 @@ BLOCK = ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))
 
 
 class Kinematics:
-    """What the motion of a section of the body means in space.
+    """Kinematics of a section of the body.
 
     Attributes:
         axes: names of the coordinates; components: of a displacement and of a position now; coordinates: of a point
-            at rest, by which tables and functions look it up.
+            in the reference configuration, by which tables and functions look it up.
         axisymmetric: True if the section turns about R = 0.
         dimension_of_volume: 3; of a volume per unit depth 2.
         formulation: class of the forms, made from a scene; None: the formulation of the model. An extension sets it.
@@ -44,7 +44,7 @@ class Kinematics:
     scene_checks: Any = None
 
     def in_axes(self, support: Any, items: list[Any]) -> list[Any]:
-        """What a support holds (`Held`, `MeanHeld`), its components as the coordinates are numbered.
+        """Return the constraints of a support (`Held`, `MeanHeld`), its components as the coordinates are numbered.
 
         Raises:
             InputError: a component that the body does not have.
@@ -157,7 +157,7 @@ class PlaneStrain(Kinematics):
 
 
 class ThreeD(Kinematics):
-    """A sheet in space, coordinates (x, y, z): a surface with a thickness.
+    """A sheet in three dimensions, coordinates (x, y, z): a surface with a thickness.
 
     The gradient of a displacement is that along the surface; the normal goes with it unstretched in I + grad u, whose
     cofactor so gives the area vector, and `Surface` puts the thickness there.
@@ -240,7 +240,7 @@ def sum_of_powers(F, alpha):
 
 
 def _in_plane_determinant(F):
-    """Of C = F^T F."""
+    """Return the in-plane determinant of C = F^T F."""
     det = (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) ** 2
     if is_block(F):
         return det
@@ -248,7 +248,8 @@ def _in_plane_determinant(F):
 
 
 def _powers_across(F, b, a):
-    """What entries b = (C13, C23) add to tr C^a, to second order: b . g(A) b with the in-plane part A of C, C33 = c.
+    """Return the terms that entries b = (C13, C23) add to tr C^a, to second order: b . g(A) b with the in-plane part
+    A, C33 = c.
 
     An eigenvalue x of A becomes x + b^2/(x - c), and c less, so g(x) = a (x^s - c^s)/(x - c), s = a - 1, and that is
     a (x c)^(s - 1)/2 sinh(s y)/sinh(y), y = ln(x/c)/2: nothing is lost where stretches coincide. The term is exact
@@ -271,7 +272,7 @@ def _powers_across(F, b, a):
 
 
 def cofactor_change(F, H):
-    """By how much the cofactor of F, shape (3, 3), changes with F by H, to first order."""
+    """Return the first-order change of the cofactor of F, shape (3, 3), for a change H of F."""
     def entry(i, j):
         (a, b), (c, d) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)
         return F[a, c] * H[b, d] + H[a, c] * F[b, d] - F[a, d] * H[b, c] - H[a, d] * F[b, c]

@@ -42,12 +42,12 @@ class Load(Part):
         raise NotImplementedError
 
     def mode_work(self, body: Any, value: Any) -> Any:
-        """Of its virtual work, the change by a mode that varies round the body: a UFL form, or None of a dead load.
+        """Return the change of the virtual work by a circumferential mode: a UFL form, or None of a dead load.
 
         Bilinear in `body.dmode` and `body.mode`: amplitudes (u_r, u_z, u_hoop), shape (3,), length.
 
         Args:
-            body: as in `virtual_work`; `body.H`, shape (3, 3): by how much the mode changes F.
+            body: as in `virtual_work`; `body.H`, shape (3, 3): the amount by which the mode changes F.
         """
         raise InputError(f"{self!r}: stability: how it changes with a mode is not known: give the load a method"
                          f" mode_work(body, value) that returns a form, or None if it does not")
@@ -55,7 +55,8 @@ class Load(Part):
     def unit(self, body: Any) -> float:
         """The value at which a driven load counts as one: a run takes its steps in parts of it.
 
-        By default the forces at rest then add up to shear modulus times volume over length of the body.
+        By default the forces in the reference configuration then add up to shear modulus times volume over length of
+        the body.
         """
         return body.unit(self)
 
@@ -104,8 +105,8 @@ class Gravity(Load):
     """Weight along -Z: dW = -integral over the reference volume of density acceleration du_z. A dead load.
 
     Args:
-        density: of the body at rest, above 0, or {layer: density} for those that have weight: kg/m3 with Pa, m and s;
-            t/mm3 with MPa, mm and s.
+        density: of the body in the reference configuration, above 0, or {layer: density} for those that have weight:
+            kg/m3 with Pa, m and s; t/mm3 with MPa, mm and s.
         value: the acceleration, length/time^2 (9.81 m/s2 or 9810 mm/s2; below 0: upward); None: the run controls it.
         name: what it is called in a process and in its columns.
 

@@ -1,4 +1,4 @@
-"""How a scene is modelled: as a solid, and how its volume is kept there, or as a membrane.
+"""Models of a body: a solid, with the way its volume is kept, or a membrane.
 
 Both ways of the solid are the penalty of Song (1993), eq. (3.4.1), W + (mu/eps) (I3 - 1)^2, with eps dimensionless (mu
 is the layer's shear modulus). Where it keeps the pressure as an unknown p (tension positive), the same penalty reads
@@ -37,7 +37,7 @@ class Locking(NamedTuple):
 
 
 class Model:
-    """How a scene is modelled. Attributes: solid: True if the body has bending and a stress through its thickness;
+    """Model of a body. Attributes: solid: True if the body has bending and a stress through its thickness;
     volume_stiffness: see `MixedPressure`."""
 
     solid = True
@@ -63,8 +63,8 @@ class Membrane(Model):
     add up. It has no bending, so a rim cannot be clamped, and knows no stress through the thickness.
 
     Args:
-        wrinkles: in space: the part of the stiffness, up to 1, that is left where the membrane wrinkles (tension-field
-            theory, see `formingx.extensions.space.surface`), 0.01 for one; None: all of it.
+        wrinkles: in three dimensions: the part of the stiffness, up to 1, that is left where the membrane wrinkles
+            (tension-field theory, see `formingx.extensions.space.surface`), 0.01 for one; None: all of it.
 
     >>> thin = fx.Scene(mesh=sheet, materials=scene.materials, supports=scene.supports, loads=scene.loads,
     ...                 model=fx.Membrane())
@@ -129,11 +129,11 @@ class MixedPressure(Model):
             bubble (Crouzeix and Raviart 1973). Both of these keep the volume of each element. Triangles of "P1dg" must
             not be slim across a thick sheet: its inf-sup constant falls as their width over height, and it locks
             (`locking`); a scene whose triangles would make it wrong by 5 % is refused.
-        volume_stiffness: by so many shear moduli J is held at 1 at each point besides: an energy of k (J - 1)^2/2.
-            Pressures keep the volume of an element, not of its parts; where they differ in it by more than the shear
-            modulus, as in a block that is pressed very flat, they crush one part and open another. 10 for one; then
-            thin sheets on coarse meshes are stiffer. (The grad-div stabilisation of mixed methods: Olshanskii and
-            Reusken, Mathematics of Computation 73, 2004.)
+        volume_stiffness: by this number of shear moduli J is held at 1 at each point besides: an energy of k (J -
+            1)^2/2. Pressures keep the volume of an element, not of its parts; where they differ in it by more than
+            the shear modulus, as in a block that is pressed very flat, they crush one part and open another. 10 for
+            one; then thin sheets on coarse meshes are stiffer. (The grad-div stabilisation of mixed methods:
+            Olshanskii and Reusken, Mathematics of Computation 73, 2004.)
 
     >>> scene.model
     MixedPressure()
@@ -185,8 +185,8 @@ class DisplacementPenalty(Model):
         eps: dimensionless penalty parameter, above 0 (thesis: 2e-2 to 1e-7).
         points: 3 (interior, degree 2: the usable rule), 4 (degree 3, one weight negative: the tangent
             becomes indefinite in bending for eps <= 1e-3) or 7 (full: locks).
-        stress_free: False leaves the energy as printed in (3.4.1), not free of stress at rest: the unloaded body
-            then swells or shrinks to I3 - 1 of the order of eps.
+        stress_free: False leaves the energy as printed in (3.4.1), not free of stress in the reference
+            configuration: the unloaded body then swells or shrinks to I3 - 1 of the order of eps.
 
     >>> fx.DisplacementPenalty(eps=1e-4)
     DisplacementPenalty(eps=0.0001)

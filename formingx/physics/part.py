@@ -1,4 +1,4 @@
-"""What loads, supports and contacts have in common: the parts of a scene."""
+"""Common base of loads, supports and contacts: the items of a scene."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Part:
         symmetric: True if its part of the tangent is symmetric.
         direction: (r, z) of its motion per unit of travel; None: it does not move as a whole.
         holds_rotation: True if it holds the rotation of what it holds.
-        told: attributes of which its repr tells in words; a summary leaves their numbers out.
+        told: attributes of which its repr tells as text; a summary leaves their numbers out.
     """
 
     name: str | None = None
@@ -29,5 +29,5 @@ class Part:
     told: tuple[str, ...] = ()
 
     def constraints(self) -> list[Any]:
-        """What is held: a list of `Held` or `MeanHeld`."""
+        """Return the constraints: a list of `Held` or `MeanHeld`."""
         return []

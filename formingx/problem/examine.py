@@ -1,4 +1,4 @@
-"""What a body tells about an attempt that failed: where it is worst, how near to its limits, what is left over."""
+"""Examination of the body after a failed attempt: its worst place, its distance from limits, the residual."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], 
 
 
 def _moved(problem: Any, state: Any, point: np.ndarray) -> np.ndarray:
-    """Where a node at a reference point is in a state, shape (2,)."""
+    """Return the position in a state of the node at a reference point, shape (2,)."""
     vectors, numbers = problem.forms.space.sub(0).collapse()
     dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, problem.forms.domain.geometry.dim)
     points = of_space(vectors)[: len(dofs)]

@@ -36,7 +36,7 @@ from .units import Units
 
 
 class _Stage(NamedTuple):
-    """What a setting makes of the equations, from a state on.
+    """Equations of a setting, from a state on.
 
     setting: the `Setting`; active: what is held; place, rate: of the held owned unknowns, place + rate * control, shape
     (n,); means: values that the means are held at; left: forces without balance that a fading setting takes away, over
@@ -118,7 +118,7 @@ class Problem(Histories, Units):
 
     @property
     def setting(self) -> Setting:
-        """What the stage that the problem stands in has set."""
+        """Step data of the present stage."""
         return self._stage.setting
 
     @property
@@ -143,21 +143,22 @@ class Problem(Histories, Units):
 
     @property
     def active_set(self) -> Any:
-        """Which points touch and slide, of the residual last computed, the same on all ranks; hashable; None: none."""
+        """Active set of the last residual, the same on all ranks; hashable; None: no contact."""
         status = tuple(c.increment.status.tobytes() for c in self.present)
         return tuple(self.comm.allgather(status)) if self.present else None
 
     @property
     def temperature(self) -> Temperature | None:
-        """Of the body at the last accepted state, inside `at` that of the state; None: the scene has none."""
+        """Temperature of the body at the last accepted state, inside `state_context` of that state; None: there is
+        none."""
         return self.forms.temperature
 
     def examine(self, last: Any, attempt: Any) -> Examination:
-        """What the last good state (or None) and a failed attempt (or None) tell; collective."""
+        """Examine the last good state (or None) and a failed attempt (or None); collective."""
         return Examination(self, last, attempt)
 
     def bring_in(self, number: int, x: np.ndarray, control: float) -> None:
-        """A thing of the scene is going to take part, and remembers nothing. x: own part.
+        """An item of the scene is going to take part, and remembers nothing. x: locally owned entries.
 
         Raises:
             InputError: a tool comes in where the body is.
@@ -179,7 +180,8 @@ class Problem(Histories, Units):
     def state_context(self, state: Any) -> Iterator[Problem]:
         """Stand at a state: its setting, histories, unknowns (`x`, `forms.w`) and control; all restored on leaving.
 
-        state: anything with x (own part), control, setting (a `Setting` as plain data, or empty) and memory.
+        state: anything with x (locally owned entries), control, setting (a `Setting` as plain data, or empty) and
+            memory.
         """
         fields, control, clock = self.forms.w.x.array.copy(), self.control, self.forms.clock
         stage, memory, x, foretold = self._stage, self.memory, self.x.array_r.copy(), self._foretold
@@ -266,7 +268,8 @@ class Problem(Histories, Units):
         return not self.admissible.holds()
 
     def furthest_volume_ratio(self, state: Any) -> Least | None:
-        """Where J is furthest from 1 in a state, see `Admissible.furthest_volume_ratio`; collective."""
+        """Return the place where J is furthest from 1 in a state, see `Admissible.furthest_volume_ratio`;
+        collective."""
         with self.state_context(state):
             return self.admissible.furthest_volume_ratio()
 
@@ -303,7 +306,7 @@ class Problem(Histories, Units):
         return self._tangent.matrix.fill([(c.rule.dofs, c.tangent(fields, control, ahead)) for c in self.present])
 
     def viscosity(self) -> Viscosity:
-        """That of the body as it is held now; to be destroyed."""
+        """Return the viscosity of the body with its present constraints; to be destroyed."""
         return Viscosity(self._viscosity, self._stage.active.bcs)
 
     @cached_property
@@ -319,7 +322,7 @@ class Problem(Histories, Units):
         return self.forms.compile(self.forms.viscosity())
 
     def changes_ahead(self, x: PETSc.Vec, control: float) -> list[np.ndarray]:
-        """Of each contact that takes part: by how much the tangent `ahead` differs from the one last made."""
+        """Return for each active contact the difference of the tangent `ahead` from the last tangent."""
         return [contact.change_ahead(x.array_r[: self._n], control) for contact in self.present]
 
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, ahead: bool = False) -> None:
@@ -406,7 +409,7 @@ class Problem(Histories, Units):
         """Take a setting: from here on F is that of the setting, and (x, control) is a state on its path.
 
         What is held is held where x has it, now or, if it is driven, at this control; if the setting fades what is left
-        without balance, that is what makes (x, control) a state. x: own part.
+        without balance, that is what makes (x, control) a state. x: locally owned entries.
         """
         before = self._stage
         if before is not None and setting == before.setting:

@@ -1,4 +1,4 @@
-"""What the dimensionless numbers of a problem stand for, in words and in the user's units."""
+"""Meaning of the dimensionless numbers of a problem, as text and in the user's units."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from ..scene.scene import Scene
 
 
 class Units:
-    """Of a problem with a scene and its forms, in the setting that it stands in."""
+    """Units of a problem with a scene and its forms, in its present setting."""
 
     scene: Scene
     forms: Any
 
     @property
     def setting(self) -> Setting:
-        """What the stage that the problem stands in has set."""
+        """Step data of the present stage."""
         raise NotImplementedError
 
     @property
     def why_not_finite(self) -> str:
-        """What makes a residual infinite or not a number in this scene."""
+        """Reason for which a residual is infinite or not a number in this scene."""
         limits = {f"{m} was stretched beyond its limit, I1 < {m.largest_I1:.6g}": None
                   for m in self.scene.materials.values() if m.largest_I1 < np.inf}
         strained = limits or ["a material was strained beyond what its law allows"]
         return ", or ".join(["an element turned inside out", *strained])
 
     def shown(self, control: float) -> tuple[str, float]:
-        """What the control stands for, in words, and its value in the user's units."""
+        """Return the name of the controlled quantity and its value in the user's units."""
         number, things = self.setting.leading, self.scene.items
         if number is None:
             return "control", control
@@ -40,12 +40,12 @@ class Units:
         return name, self.forms.scales[number] * self.setting.amplitude(number, control)
 
     def absurd(self, control: float) -> str | None:
-        """Why no process comes to a control, in words, or None."""
+        """Return the reason for which no process reaches a control, as text, or None."""
         return beyond_all(self.scene, self.drives, self.shown(control)[1])
 
     @property
     def drives(self) -> str | None:
-        """What the control stands for: "pressure", "travel", "time" or, if it is none of them, None."""
+        """Kind of the control: "pressure", "travel", "time" or, if it is none of them, None."""
         number, things = self.setting.leading, self.scene.items
         return None if number is None else "time" if number == len(things) else things[number].quantity
 

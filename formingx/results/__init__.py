@@ -1,1 +1,1 @@
-"""What a run gives back: measures, path, profile, files, plots, views."""
+"""Results of a run: path, profile, files, plots, views."""

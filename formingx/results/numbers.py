@@ -38,7 +38,7 @@ class KeyNumbers:
 
 
 class PartNumbers(KeyNumbers):
-    """What a part of a section and one in space have in common."""
+    """Common base of a part of a section and of a sheet in three dimensions."""
 
     volume: float
     area: float

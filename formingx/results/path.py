@@ -1,4 +1,4 @@
-"""What a run gives back: its states, and what can be read off them, drawn and written."""
+"""Path of a run: its states, and their evaluation, pictures and files."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Path(States):
         files.write_path(self, file, units or NONE)
 
     def save(self, folder: Any) -> None:
-        """Write every state to a checkpoint folder, to look at later or to go on from (`formingx.load`).
+        """Write every state to a checkpoint folder, to look at later or to continue from (`formingx.load`).
 
         Raises:
             InputError: the folder holds another run.
@@ -147,8 +147,8 @@ class Path(States):
     def view3d(self, file: Any, state: State | None = None, grid: float | None = None) -> Picture:
         """Draw the sheet of a state (default: the last), coloured by thickness, as PNG; returns it, for a notebook.
 
-        It is revolved about the axis, or, in plane strain, extruded; in space it is drawn whole, and with `grid` the
-        squares of that size (length) that were printed on the flat sheet.
+        It is revolved about the axis, or, in plane strain, extruded; in three dimensions it is drawn whole, and with
+        `grid` the squares of that size (length) that were printed on the flat sheet.
         """
         self._reader.view(file, state or self.last, grid)
         return Picture(file)
@@ -156,20 +156,20 @@ class Path(States):
     def wall(self, state: State | None = None) -> Any:
         """The wall of the part at a state (default: the last), place by place: to_csv, to_excel.
 
-        A `Wall`, from the axis to the rim; in space a `WallInSpace`, triangle by triangle.
+        A `Wall`, from the axis to the rim; in three dimensions a `WallInSpace`, triangle by triangle.
         """
         return self._reader.wall(state or self.last)
 
     def part(self, state: State | None = None, *, density: float | None = None, trim: Any = None, heights: Any = (),
              units: Units | None = None) -> Any:
-        """The formed part in numbers (`Part`): volume, weight, area, least wall and where, evenness; print it.
+        """The formed part in numbers (`Part`): volume, weight, area, minimum wall and where, evenness; print it.
 
         They are those of the whole part, also where a half or a quarter is modelled; in plane strain per unit depth.
 
         Args:
             state: default the last.
-            density: of the material at rest (under `ThermalExpansion` where it is free of stress), in g/cm3, for the
-                weight in grams; say the unit of length with `units` (without, it is cm).
+            density: of the material in the reference configuration (under `ThermalExpansion` where it is free of
+                stress), in g/cm3, for the weight in grams; say the unit of length with `units` (without, it is cm).
             trim: the radius at which the part is cut off, or ("height", h), lengths: the last place from the axis where
                 the middle line goes beyond it. In space a z, beyond which the part lies.
             heights: give the wall at these heights too (`Wall.height`).
@@ -200,7 +200,8 @@ class Path(States):
         return ContactFace(alone, contact_of(alone, tool, "contact")[0]).of(state or self.last)
 
     def temperature(self, points: ArrayLike, state: State | None = None) -> np.ndarray:
-        """Of the body in a state (default: the last) at reference points (R, Z), shape (n, 2), length: shape (n,)."""
+        """Return the temperature in a state (default: the last) at reference points (R, Z), shape (n, 2), length:
+        shape (n,)."""
         if self.problem.temperature is None:
             raise InputError("temperature: the scene has none: give Scene a temperature=...")
         state = state or self.last

@@ -29,7 +29,7 @@ _WRITTEN = 5e-6
 
 
 class _View:
-    """What is read off the states of one problem: created once."""
+    """Evaluation of the states of one problem: created once."""
 
     def __init__(self, problem: Any, timed: bool, columns: Mapping[str, Any]):
         self.columns = standard_columns.standard(problem, timed)
@@ -64,7 +64,7 @@ class States:
 
     @property
     def counts(self) -> Counts:
-        """What the run cost."""
+        """Cost of the run."""
         return self.record.counts
 
     @property
@@ -112,7 +112,7 @@ class States:
 
     @property
     def ended(self) -> str:
-        """Why the run ended before its targets, as a result: the body snaps, and no state follows; "" if it did not."""
+        """Reason for which the run ended before its targets, as a result; "" if it did not."""
         return self.record.ended
 
     @property
@@ -209,7 +209,7 @@ class States:
 
     def _between(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
         """The state between two neighbours that meets a target; the problem stands at the first."""
-        if segment.problem.has_history:                      # what lies between depends on how it is come to
+        if segment.problem.has_history:                      # what lies between depends on how it is reach
             found = self._run_to(segment, left, right, target, bound)
         else:
             found = segment.curve.find(left, right, bound, target)
@@ -358,7 +358,7 @@ class States:
 
     @property
     def admissibility(self) -> Verdict:
-        """What judges the states of the last segment."""
+        """Admissibility check of the states of the last segment."""
         return self._view(self.segments[-1]).verdict
 
     def _view(self, segment: Segment) -> _View:

@@ -1,1 +1,1 @@
-"""What the user declares, checked before anything is solved."""
+"""Scenes as users declare them, checked before anything is solved."""

@@ -1,4 +1,4 @@
-"""Whether a run can come to what it aims at: before anything is solved."""
+"""Targets that a run cannot reach, found before anything is solved."""
 
 from collections.abc import Collection, Iterable
 from typing import Any
@@ -13,7 +13,7 @@ from .scene import Scene
 _NEAR = 1e-5           # of the body's length: a point is on a boundary
 _MOST = 1e9            # of the largest shear modulus, or of the body's length
 _SQUARES = 200         # along a mould's larger side
-_ROOMY = 1.05, 1.005   # by how much its volume by them may be wrong, over a flat body and around a tube
+_ROOMY = 1.05, 1.005   # the amount by which its volume by them may be wrong, over a flat body and around a tube
 
 
 def check(scene: Scene, targets: Iterable[Any], off: Collection[int] | None = None) -> None:
@@ -25,9 +25,10 @@ def check(scene: Scene, targets: Iterable[Any], off: Collection[int] | None = No
 
 
 def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -> str | None:
-    """Why no run can meet a target (its `name` and `value`), in words; None: nothing speaks against it.
+    """Return the reason for which no run meets a target (its `name` and `value`), as text; None: no reason is known.
 
-    off: numbers of the things that a stage leaves out; None: a run from rest that drives the only thing that can be.
+    off: numbers of the items that a stage leaves out; None: a run from the unloaded state that drives the only thing
+        that can be.
     """
     name, value, driven = target.name, target.value, scene.driven
     there = [thing for i, thing in enumerate(scene.items) if i not in (off or ())]
@@ -64,7 +65,7 @@ def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -
 
 
 def beyond_all(scene: Scene, quantity: str | None, value: float) -> str | None:
-    """What is absurd about a pressure or a travel, in words, or None."""
+    """Return the reason for which a pressure or a travel is absurd, as text, or None."""
     units = {"pressure": ("the shear modulus", max(scene.shear_modulus(name) for name in scene.mesh.layers)),
              "travel": ("the length of the body", float(max(scene.extent)))}
     if quantity not in units:
@@ -99,7 +100,8 @@ def _beyond(scene: Scene, contact: Any, height: float) -> bool:
 
 
 def _room(scene: Scene, contact: Any) -> tuple[float, float]:
-    """(volume, how many times as much it may be): between the lower face of a flat body at rest and the mould over it.
+    """(volume, how many times as much it may be): between the lower face of a flat body in the reference
+    configuration and the mould over it.
 
     Infinite if the mould is not closed.
 
@@ -132,7 +134,8 @@ def _room(scene: Scene, contact: Any) -> tuple[float, float]:
 def _room_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
     """Volume that a tube, closed below, can sweep in its mould, up to its upper end; infinite if that is not closed.
 
-    line: its outer face at rest, from one end to the other, shape (n, 2), length. What lies within keeps its volume.
+    line: its outer face in the reference configuration, from one end to the other, shape (n, 2), length. What lies
+        within keeps its volume.
     """
     from scipy.ndimage import label
     line = line if line[0, 1] < line[-1, 1] else line[::-1]

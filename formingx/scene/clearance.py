@@ -1,4 +1,4 @@
-"""Whether the tools of a process can move as its stages say: before anything is solved."""
+"""Clearance between the tools of a process in its stages, checked before anything is solved."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -10,7 +10,7 @@ from ..physics.contact import Contact
 from .scene import Scene
 
 _LOOKS = 50            # how often the tools are looked at on the way of a stage
-_MOST = 1000           # points of a tool in space that are looked at
+_MOST = 1000           # points of a tool in three dimensions that are looked at
 
 
 def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None) -> list[Any]:
@@ -43,7 +43,7 @@ def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None
 
 
 def _legs(plan: Any, stands: dict[int, float]) -> Iterator[dict[int, float]]:
-    """Where all tools are at the ends of the straight pieces of a stage."""
+    """Return the positions of all tools at the ends of the straight pieces of a stage."""
     if plan.tables:
         for time in sorted({t for _, table in plan.tables for t in table[:, 0]}):
             yield stands | {i: float(np.interp(time, *table.T)) for i, table in plan.tables

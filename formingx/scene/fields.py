@@ -27,7 +27,7 @@ def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperatu
             what `fx.heat` returned (its last state); a scalar DOLFINx Function on this mesh.
         name: what it is called in an error.
 
-    Of a sheet in space it is x and y instead of R and Z.
+    Of a sheet in three dimensions it is x and y instead of R and Z.
 
     Raises:
         InputError: something else, a value that is not finite, a point outside a table or a file.

@@ -1,4 +1,4 @@
-"""What the user declares, checked before anything is solved."""
+"""Scene as a user declares it, checked before anything is solved."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ class Scene:
             (Contacts of one tool with several faces, of the same `direction` and name, count as one.)
         contacts: faces of the body that rigid tools stop, see `formingx.Contact`.
         model: how the scene is modelled: `MixedPressure()` (default) or `DisplacementPenalty()`, a solid; `Membrane()`.
-        kinematics: `Axisymmetric()` (default) or `PlaneStrain()`; of a sheet in space `ThreeD()`.
-        quadrature_degree: of the energy, at most 30; default 5 (seven points), the thesis' rule; in space 1.
-        thickness: of a sheet in space: a length, a function of arrays (x, y), or {layer: either of them}.
+        kinematics: `Axisymmetric()` (default) or `PlaneStrain()`; of a sheet in three dimensions `ThreeD()`.
+        quadrature_degree: of the energy, at most 30; default 5 (seven points), the thesis' rule; in three dimensions 1.
+        thickness: of a sheet in three dimensions: a length, a function of arrays (x, y), or {layer: either of them}.
         temperature: of the body, which constants of materials may depend on: a number, a `table` over R, a function of
             arrays (R, Z), a CSV file with columns R, Z, T, what `formingx.heat` returned, or a DOLFINx Function.
         heat: `Cooling(...)`: the temperature changes as time goes by.
@@ -144,7 +144,7 @@ class Scene:
 
     @property
     def symmetry_factor(self) -> int:
-        """How many images of the body make the whole part, which results are of: 4 of a quarter (`Symmetry`)."""
+        """Number of images of the body that make the whole part: 4 for a quarter (`Symmetry`)."""
         return self.symmetry.factor
 
     @property
@@ -172,7 +172,7 @@ class Scene:
 
     @property
     def drivable(self) -> list[Any]:
-        """What can be driven; of a tool that meets several faces its first contact."""
+        """Items that can be controlled; of a tool that meets several faces its first contact."""
         return [thing for i, thing in enumerate(self.items)
                 if thing.driven and self.together(i)[0] == i]
 
@@ -186,7 +186,7 @@ class Scene:
 
     @property
     def driven(self) -> Any:
-        """What a run with one control drives: the only thing that can be driven, or None."""
+        """Controlled item of a run with one control: the only one that can be controlled, or None."""
         drivable = self.drivable
         return drivable[0] if len(drivable) == 1 else None
 
@@ -397,7 +397,7 @@ class Scene:
                              f" for one")
 
     def _check_hinges(self) -> None:
-        """What a hinge asks of the soft one of two layers must not be a hundred times too much for it.
+        """Raise an InputError if the soft one of two layers would carry a hinge more than a hundred times too strong.
 
         A plain mean pulls all layers with one traction; and a hinged rim face is free, so a pressure on a soft layer
         squeezes it out there.

@@ -34,7 +34,7 @@ def summary(scene: Any) -> dict[str, str]:
 
 
 def _temperatures(scene: Any) -> list[float]:
-    """Those that a scene says as numbers: of its tools, and of the body at first."""
+    """Return the temperatures that a scene gives as numbers: of its tools, and of the body at first."""
     tools = [given.tool for given in scene.heat.tools.values()] if hasattr(scene.heat, "tools") else []
     first = scene.temperature.T.x.array if scene.temperature is not None else []
     even = len(first) and np.ptp(first) == 0

@@ -48,7 +48,7 @@ class MirrorPlanes:
 
     @classmethod
     def of_description(cls, scene: dict[str, Any]) -> MirrorPlanes:
-        """Those of a scene as plain data (`description.describe`)."""
+        """Return the mirror planes of a scene as plain data (`description.describe`)."""
         found = scene.get("symmetry")
         return cls(tuple(MirrorPlane(*plane) for plane in found["planes"]), found["near"]) if found else cls()
 

@@ -1,4 +1,4 @@
-"""Whether the contact points of a face feel a tool: one that fits between two of them, or is deep in between first."""
+"""Tools that are too narrow for the contact points of a face, which fit between two points or are deep first."""
 
 from typing import Any
 
@@ -47,7 +47,7 @@ def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None
 
 
 def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> None:
-    """A tool that comes to the face as it is at rest meets a contact point before it is deep in it elsewhere.
+    """A tool that reaches the face as it is in equilibrium meets a contact point before it is deep in it elsewhere.
 
     It moves by its distance to the nearest point, again and again (sphere tracing): so it passes none. One that stays
     is thought to come straight to the middle of an edge.

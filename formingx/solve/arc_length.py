@@ -27,7 +27,7 @@ class Curve:
 
     Attributes:
         fixed_control: True if it cannot pass a limit point.
-        sweeps: solutions at a target, at most, until no point comes into a tool in space in the step to it.
+        sweeps: solutions at a target, at most, until no point comes into a tool in three dimensions in the step to it.
         control_weight: of the squared control against the mean squared displacement in arc length (dimensionless).
     """
 
@@ -51,7 +51,7 @@ class Curve:
         """The body at control 0, in equilibrium with whatever else acts on it, and the tangent there.
 
         Raises:
-            Failure: Newton's method does not find it from rest.
+            Failure: Newton's method does not find it from the unloaded state.
             ConvergenceError: the body has no stiffness.
         """
         history: list[Iteration] = []
@@ -83,7 +83,7 @@ class Curve:
         return self._iterations
 
     def moved(self, a: State, b: State) -> float:
-        """How far the body moves from a to b, in the mean (dimensionless)."""
+        """Return the mean motion of the body from a to b (dimensionless)."""
         self._x.array_w[:] = b.x - a.x
         return self.norm(self._x, 0.0)
 
@@ -121,7 +121,7 @@ class Curve:
         """The tangent of an accepted state once more: the problem remembers the state now.
 
         The factors of its last iteration serve, unless many contact points differ or materials have advanced; or
-        arrivals are foretold with them, as they have to be from a checkpoint, too.
+        arrivals are predicted with them, as they have to be from a checkpoint, too.
         """
         self._x.array_w[:] = state.x
         limit, at_hand = self.problem.limit, state is self._found and not self.problem.body_has_history
@@ -257,7 +257,7 @@ class Curve:
         return float(bound.value(self._b, control))
 
     def aim(self, bound: Measure, target: float, state: State) -> tuple[float, float]:
-        """What is left over of "measure = target" at a state, and its derivative by arc length along the tangent.
+        """Return the residual of "measure = target" at a state, and its derivative by arc length along the tangent.
 
         The measure may be stiff (a force of contact): its values a step ahead along the tangent tell nothing.
         """
@@ -315,7 +315,8 @@ class Curve:
         return found
 
     def hold_late(self, old: State, states: list[State], targets: Sequence[tuple[Target, Measure]]) -> list[State]:
-        """The states after `old`, the first of them solved for again with what came into a tool in space in the step.
+        """The states after `old`, the first of them solved for again with what came into a tool in three dimensions
+        in the step.
 
         That is held from where it met the tool: at a target, one of (target, its measure), all points are; in any other
         state those of tools with friction, at the same control.

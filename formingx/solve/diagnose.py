@@ -1,4 +1,4 @@
-"""Why a run could not go on, in numbers, words and a picture: found out once, when it has failed."""
+"""Diagnosis of a failed run, in numbers, text and a picture."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ log = logging.getLogger("formingx")
 
 @dataclass(frozen=True)
 class Limits:
-    """From where on a number of the last good state is told as a cause.
+    """Limits from which on a number of the last good state counts as a cause.
 
     Attributes:
         before: states before it at which the condition number of the tangent is looked at, too.
@@ -30,7 +30,8 @@ class Limits:
         round_off: a condition number that leaves next to nothing of 16 digits.
         slowing: slope of the control over its largest, below which the last slopes may tell of a limit point ahead.
         material: part of what a material's limit allows of I1 - 3.
-        volume, shape: J, and a deformed element's shape over that at rest, of one about to turn inside out.
+        volume, shape: J, and a deformed element's shape over that in the reference configuration, of one about to
+            turn inside out.
     """
 
     before: int = 10
@@ -68,7 +69,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What was found when a run could not go on. Numbers are None where they could not be had; a membrane has no J.
+    """Diagnosis of a failed run. Numbers are None where they could not be computed; a membrane has no J.
 
     Attributes:
         reason: how the last attempt ended.
@@ -80,7 +81,8 @@ class Diagnosis:
         worst: where the largest force was left over.
         smallest_J, at_J: det F at the quadrature points of the last good state, its smallest, and where.
         failed_J, at_failed_J: the same in the failed attempt.
-        shape: the worst shape of a deformed element of the last good state, over its shape at rest.
+        shape: the worst shape of a deformed element of the last good state, over its shape in the reference
+            configuration.
         shortened: (mean stretch, (R, Z) of both ends) of the longest piece of a sheet compressed along its section.
         I1, limit: (I1 - 3) / (limit - 3) of the point nearest to its material's limit, and where; None: no limit.
         turned: [(control before, after)] between which the determinant of the tangent changed its sign.
@@ -125,7 +127,7 @@ class Diagnosis:
 
     @property
     def advice(self) -> tuple[str, ...]:
-        """What to try."""
+        """Advice on further attempts."""
         return tuple(dict.fromkeys(finding.advice for finding in self.findings))
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""What the solver sees of a problem, F(x, control) = 0: typed interfaces, beyond which it reaches for nothing.
+"""Interfaces through which the solver sees a problem, F(x, control) = 0; it uses nothing else.
 
 x is dimensionless, its rows spread over the ranks ("own part"); so is the control. For each step, in this order:
 
@@ -6,7 +6,7 @@ x is dimensionless, its rows spread over the ranks ("own part"); so is the contr
     begin                               Newton's method begins at the predicted state
     residual, linearise, tangent,       each iteration: F; F and its active set as the iteration wants them; dF/dx
       control_derivative                and dF/dcontrol, at the (x, control) of that residual
-    folded, limit.check, step_error     whether the state that it came to will do
+    folded, limit.check, step_error     whether the state that it reached will do
     advance                             it is accepted: the histories take it up
     tangent(ahead=True)                 that of the next step, where F has a kink at the state
 
@@ -42,7 +42,7 @@ class Measure(Protocol):
     size: float
 
     def value(self, x: PETSc.Vec, control: float) -> float:
-        """At a state, in the user's units."""
+        """Return the value at a state, in the user's units."""
 
     def equation(self, target: float) -> Constraint:
         """The constraint measure = target."""
@@ -59,7 +59,7 @@ class Standing(Protocol):
 
 
 class Tractions(Protocol):
-    """What the law of contact gives at n points: force, shape (n, 2), stress; sense of sliding, shape (n,);
+    """Tractions of the law of contact at n points: force, shape (n, 2), stress; sense of sliding, shape (n,);
     stiffness, dforce/dposition, shape (n, 2, 2), stress/length; status: `ContactStatus` of each, shape (n,)."""
 
     force: Array
@@ -85,7 +85,7 @@ class Increment(Protocol):
 
     @property
     def arrivals(self) -> Array:
-        """Which points touch that did not where Newton's method began, shape (n,)."""
+        """Mask of points that touch now but did not where Newton's method began, shape (n,)."""
 
     def taken(self, points: Array) -> tuple[Array, Array]:
         """Forces and stiffnesses that `linearise` has taken, of some points, shapes (m, 2), (m, 2, 2)."""
@@ -97,8 +97,8 @@ class Increment(Protocol):
         """`foretold` of some of the points."""
 
     def in_ramp(self, points: Array) -> Callable[[Array], tuple[Array, Array]]:
-        """What gives how deep some points are in that ramp if they move on, over its width, shape (m,); the way through
-        it, shape (m, 2), length, 0 where no friction grows in it."""
+        """Return a function for the depth of points in the ramp after motions, over its width, shape (m,); the way
+        through it, shape (m, 2), length, 0 where no friction grows in it."""
 
     def expect(self, points: Array, sense: Array) -> None:
         """The next iteration takes this sense of sliding for the points in a mask, shape (n,)."""
@@ -111,11 +111,11 @@ class ContactFace(Protocol):
 
     @property
     def increment(self) -> Increment:
-        """Of the run of Newton's method that goes on: another after each `begin`."""
+        """Increment of the present run of Newton's method: another after each `begin`."""
 
     @property
     def scale(self) -> Array:
-        """Of the forces in F by tractions, shape (n,)."""
+        """Factor of the tractions in the forces of F, shape (n,)."""
 
     def add(self, values: Array, forces: Array) -> None:
         """Add forces at the points, shape (n, 2), to own rows of F."""
@@ -124,7 +124,8 @@ class ContactFace(Protocol):
         """Some points (a mask, shape (n,)) touch nothing, until another increment begins."""
 
     def moved(self, dx: Array, step: float) -> Array:
-        """How the points move, seen from the tool, by a correction of x (own part) and the control; (n, 2), length."""
+        """Return the motion of the points relative to the tool by a correction of x (locally owned) and the control;
+        (n, 2), length."""
 
 
 class Viscosity(Protocol):
@@ -141,7 +142,7 @@ class Viscosity(Protocol):
 
 
 class Attempt(NamedTuple):
-    """Where a failed Newton iteration ended: x (own part) and control, and the last correction of both."""
+    """End of a failed Newton iteration: x (locally owned) and control, and the last correction of both."""
 
     x: Array
     control: float
@@ -150,7 +151,7 @@ class Attempt(NamedTuple):
 
 
 class Examined(Protocol):
-    """What a body tells about a failed attempt: `facts` are fields of a `Diagnosis`."""
+    """Examination of a failed attempt: `facts` are fields of a `Diagnosis`."""
 
     facts: dict[str, Any]
 
@@ -200,7 +201,7 @@ class Residual(Protocol):
         return False
 
     def viscosity(self) -> Viscosity:
-        """That of a snap-through; to be destroyed."""
+        """Return the viscosity of a snap-through; to be destroyed."""
 
     @property
     def slack_at_rest(self) -> bool:
@@ -240,7 +241,7 @@ class ActiveSet(Protocol):
 
     @property
     def limit(self) -> StepLimit | None:
-        """What a step may bring; None: any."""
+        """Limits of a step; None: there are none."""
         return None
 
     def begin(self, old: Standing | None = None) -> None:
@@ -250,12 +251,12 @@ class ActiveSet(Protocol):
         """Ready the tangent at (x, control) for an iteration, and F, the residual there, for the solve with it."""
 
     def changes_ahead(self, x: PETSc.Vec, control: float) -> list[Array]:
-        """Of each face: stiffness `ahead` less that in the tangent last made, shape (n, 2, 2), stress/length."""
+        """Return for each face the stiffness `ahead` less that in the last tangent, shape (n, 2, 2), stress/length."""
         return []
 
 
 class Histories(Protocol):
-    """What F depends on besides x and control, and time.
+    """History variables: arguments of F besides x and control, and time.
 
     Attributes:
         memory: what each history remembers of the last accepted state.
@@ -297,11 +298,11 @@ class Histories(Protocol):
 
 
 class Stages(Protocol):
-    """What holds from one change of the problem to the next."""
+    """Step data between two changes of the problem."""
 
     @property
     def setting(self) -> Setting:
-        """How what can be driven follows the control, and what takes no part."""
+        """Step data: amplitudes of the controls, and inactive items."""
 
     def enter(self, setting: Setting, x: Array, control: float) -> None:
         """Take a setting, in which (x, control), own part, is a state."""
@@ -313,7 +314,7 @@ class Stages(Protocol):
         """Stand at a state, its x and control too, and come back on leaving."""
 
     def bring_in(self, number: int, x: Array, control: float) -> None:
-        """A thing (its number in the setting) is going to take part, and remembers nothing.
+        """An item (its number in the setting) is going to take part, and remembers nothing.
 
         Raises:
             InputError: a tool comes in where the body is.
@@ -321,7 +322,7 @@ class Stages(Protocol):
 
 
 class Units(Protocol):
-    """What the dimensionless numbers stand for."""
+    """Meaning of the dimensionless numbers."""
 
     @property
     def scales(self) -> Sequence[float]:
@@ -334,12 +335,12 @@ class Units(Protocol):
 
     @property
     def drives(self) -> str | None:
-        """What the control stands for: "pressure", "travel", "time" or, if it is none of them, None."""
+        """Kind of the control: "pressure", "travel", "time" or, if it is none of them, None."""
         return None
 
     @property
     def fixed_loads(self) -> list[str]:
-        """What acts already where nothing is driven yet, in words."""
+        """Loads that act already before anything is controlled, as text."""
         return []
 
     @property
@@ -348,20 +349,20 @@ class Units(Protocol):
         return []
 
     def shown(self, control: float) -> tuple[str, float]:
-        """What the control stands for, in words, and its value in the user's units."""
+        """Return the name of the controlled quantity and its value in the user's units."""
         return "control", control
 
     def absurd(self, control: float) -> str | None:
-        """Why no process comes to a control, in words, or None."""
+        """Return the reason for which no process reaches a control, as text, or None."""
         return None
 
     @property
     def why_not_finite(self) -> str:
-        """What makes a residual infinite or not a number."""
+        """Reason for which a residual is infinite or not a number."""
         return "the equations are not defined there"
 
     def examine(self, last: Standing | None, attempt: Attempt | None) -> Examined | None:
-        """What the last good state and a failed attempt tell, for a `Diagnosis`; collective."""
+        """Examine the last good state and a failed attempt, for a `Diagnosis`; collective."""
         return None
 
 

@@ -57,7 +57,7 @@ class DirectSolver:
 
     @property
     def scaling(self) -> int:
-        """How MUMPS scaled the matrix of the last factorisation: ICNTL(8), -1 as the one before."""
+        """Scaling of the matrix by MUMPS in the last factorisation: ICNTL(8), -1 as the one before."""
         return int(self._ksp.getPC().getFactorMatrix().getMumpsInfog(33))
 
     def solve(self, rhs: PETSc.Vec, out: PETSc.Vec) -> None:
@@ -80,7 +80,7 @@ class DirectSolver:
         return int(np.sign(self._ksp.getPC().getFactorMatrix().getMumpsRinfog(12)))
 
     def negative_pivots(self) -> int:
-        """Of D in L D L^T, all ranks (with `inertia`, of a symmetric matrix)."""
+        """Return the number of negative pivots of D in L D L^T, all ranks (with `inertia`, of a symmetric matrix)."""
         return int(self._ksp.getPC().getFactorMatrix().getMumpsInfog(12))
 
     def _create(self) -> None:

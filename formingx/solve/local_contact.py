@@ -29,13 +29,13 @@ Border: TypeAlias = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class LocalContact:
-    """How the local problem of a few contact points is solved.
+    """Settings of the local problem of a few contact points.
 
     Attributes:
         most: points that are solved for together; with more, the iteration is left to itself.
         few: points that change for which solutions with the factors at hand cost less than other factors.
-        iterations: at most so many, with `full` corrections at first (which may cycle), then with those that stop near
-            the foot of the ramp in which contact begins.
+        iterations: at most this number of, with `full` corrections at first (which may cycle), then with those that
+            stop near the outer edge of the ramp in which contact begins.
         stays: part of its depth in the ramp at which a point stops that would leave it; least: from this depth, over
             the width of the ramp, it leaves.
         behind: depth at which one stops that would come back, over the width; farther: times as deep from one time to
@@ -71,7 +71,7 @@ class LocalSolve:
         self.failed = 0
 
     def look(self) -> None:
-        """To be called once an iteration, after the problem was linearised."""
+        """Prepare an iteration, after the problem was linearised; called once each."""
         now = [contact.increment.status for contact in self._contacts]
         self._marked = self._marked or [contact.increment.arrivals for contact in self._contacts]
         for mark, a, b in zip(self._marked, self._status, now):
@@ -117,9 +117,10 @@ Update: TypeAlias = Callable[[Array, float], "Array | None"]
 
 
 def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> Update | None:
-    """What a tangent that differs from the factorised one at a few points makes of its solutions (Woodbury's formula).
+    """Return the update of solutions for a tangent that differs from the factorised one at a few points (Woodbury).
 
-    changes: of the stiffness per area of each contact's points, shape (n, 2, 2). None where so many points change that
+    changes: of the stiffness per area of each contact's points, shape (n, 2, 2). None where this number of points
+        change that
     factors of the other tangent cost less; the update gives None where that is singular.
     """
     chosen = [np.flatnonzero(change.any((1, 2))) for change in changes]
@@ -164,7 +165,7 @@ class _Points:
         counts = self._comm.allgather(self._c * sum(map(len, chosen)))
         first = sum(counts[: self._comm.rank])
         self._own = slice(first, first + counts[self._comm.rank])
-        self._columns = solver.solve_all(unit_forces(problem, contacts, chosen))        # own rows
+        self._columns = solver.solve_all(unit_forces(problem, contacts, chosen))        # locally owned rows
         self._steps = border(self._columns)
         scale = np.concatenate([np.repeat(c.scale[i], self._c) for c, i in zip(contacts, chosen)])
         self._scale = self._gather(scale)
@@ -172,7 +173,7 @@ class _Points:
         self._C = self._gather(np.array(moved).T.reshape(counts[self._comm.rank], len(moved))) * self._scale
 
     def solve(self, dx: PETSc.Vec, step: float) -> tuple[Array, float] | None:
-        """How a correction and its step change, own part; None if no consistent state was found."""
+        """Return the changes of a correction and of its step, locally owned; None if no consistent state was found."""
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._taken()
         laws, ramps = [c.increment.ahead(i) for c, i in self._some], [c.increment.in_ramp(i) for c, i in self._some]
@@ -192,7 +193,8 @@ class _Points:
         return None
 
     def _to_foot(self, ramps: list[Any], y: Array, new: Array, behind: Array) -> Array:
-        """Motions `new`, after y, that do not cross the foot of the ramp at once; `behind` grows of those that came in.
+        """Motions `new`, after y, that do not cross the outer edge of the ramp at once; `behind` grows of those that
+        came in.
 
         What holds a point that sticks, k s g, falls with the slope s of the ramp from all to nothing next to its foot.
         There a point is in equilibrium that is pulled along its tool and hardly pressed to it, and a correction from
@@ -214,7 +216,7 @@ class _Points:
         return V - self._columns @ (self._scale[:, None] * forces)
 
     def _within(self, more: Array, y: Array) -> Array | None:
-        """What motions y become if the points are stiffer by `more`, (1 + C more)^-1 y; None if there is no answer."""
+        """Return the motions y with points stiffer by `more`, (1 + C more)^-1 y; None if there is no answer."""
         n = len(y)
         J = np.eye(n) + np.einsum("mni,nij->mnj", self._C.reshape(n, -1, self._c), more).reshape(n, n)
         try:
@@ -240,12 +242,12 @@ class _Points:
         return force.ravel(), stiffness
 
     def _each(self, functions: list[Any], y: Array) -> list[Any]:
-        """What the functions of each contact's points give for motions y."""
+        """Return the values of the functions of each contact's points for motions y."""
         ends = np.cumsum([len(i) for _, i in self._some])[:-1]
         return [f(mine) for f, mine in zip(functions, np.split(y[self._own].reshape(-1, self._c), ends))]
 
     def _all(self, parts: list[tuple[Array, Array]], *shapes: tuple[int, ...]) -> list[Array]:
-        """Those of all contacts and ranks, of pairs with these shapes a point. (A rank may have no points.)"""
+        """Gather values of all contacts and ranks, of pairs with these shapes a point. (A rank may have no points.)"""
         found = zip(*parts) if parts else ([np.zeros((0, *shape))] for shape in shapes)
         return [self._gather(np.concatenate(part)) for part in found]
 

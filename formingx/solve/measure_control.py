@@ -1,4 +1,4 @@
-"""A flow: what is driven is the unknown that makes a measure follow a course in time.
+"""A flow: the controlled quantity is the unknown that makes a measure follow a course in time.
 
 A volume of air that is fed, a force that is held. Time is given, step by step, and the state solves F(x, control) = 0
 with the measure at its value for that time: so a pressure passes its maximum as it does in practice.
@@ -25,13 +25,13 @@ from .stepping import SAME_TIME, Cutback, StepControl
 
 @dataclass(frozen=True)
 class FlowSteps:
-    """How steps along a course in time are taken.
+    """Settings of steps along a prescribed amplitude in time.
 
     Attributes:
-        stretched: a step goes to the next time that must be hit if that is no more than so many steps away: no last
-            step is much shorter than the others.
+        stretched: a step goes to the next time that must be hit if that is no more than this number of steps away:
+            no last step is much shorter than the others.
         cut: largest part that is left of a step that is too long: more would be the same step again.
-        still: relative change of what is driven that is none, but for round-off.
+        still: relative change of the controlled quantity that is none, but for round-off.
         located: error of the time of a limit point, over the step that it lies in.
         met: deviation from a target, relative, of the state that is solved for where it was passed.
         contact: least part of the way of a step to where new contact limits it, else the step is too long.
@@ -121,9 +121,10 @@ class Flow(Run):
         return new
 
     def _limit_before(self, old: State, new: State) -> State:
-        """The state between two in time at which what is driven has a maximum or a minimum, if it has; else the second.
+        """The state between two in time at which the controlled quantity has a maximum or a minimum, if it has; else
+        the second.
 
-        Not where the course turns, or where what is driven stands still but for round-off.
+        Not where the course turns, or where the controlled quantity stands still but for round-off.
         """
         if len(self.states) < 2 or old.time in self._times or old.kind == "limit point":
             return new
@@ -156,7 +157,8 @@ class Flow(Run):
         return w @ [s.x for s in past], float(w @ [s.control for s in past])
 
     def _along(self, old: State, value: float) -> tuple[Array, float]:
-        """Where the tangent of a state has a value of the measure; the state itself if it has it nowhere near."""
+        """Return the point on the tangent of a state with a value of the quantity; the state itself if there is none
+        near."""
         def off(s: float) -> float:
             return self.curve.value(self._measure, old.x + s * old.direction, old.control + s * old.slope) - value
         now = off(0.0)
@@ -204,7 +206,7 @@ class Flow(Run):
 
 
 def _rate(states: Sequence[State]) -> float:
-    """Of the control in time, at the last of two or three states, on the polynomial through them."""
+    """Return the rate of the control at the last of two or three states, on the polynomial through them."""
     t = np.array([state.time - states[-1].time for state in states])
     return float(np.polynomial.Polynomial(np.polynomial.polynomial.polyfit(
         t, [state.control for state in states], len(t) - 1)).deriv()(0.0))

@@ -19,7 +19,7 @@ from .local_contact import LocalSolve, Update, woodbury
 
 @dataclass(frozen=True)
 class Newton:
-    """How Newton's method is carried out. `Tolerances` say when it ends.
+    """Settings of Newton's method. `Tolerances` say when it ends.
 
     Attributes:
         unloaded: floor of the support forces (over stress times volume over length) in the relative residual.
@@ -75,7 +75,7 @@ class Iteration(NamedTuple):
 
 
 def tangents(history: list[Iteration]) -> int:
-    """How many iterations had a tangent of their own; the last entry is the converged state."""
+    """Return the number of iterations with a new tangent; the last entry is the converged state."""
     return sum(not iteration.chord for iteration in history[:-1])
 
 
@@ -104,7 +104,7 @@ class _ActiveSet:
         self.changed, self.share, self.found, self.returns = 0, 1.0, 0, 0
 
     def look(self, moved: float) -> None:
-        """To be called once an iteration, after the residual was computed; moved: by the correction before."""
+        """Prepare an iteration, after the residual was computed; called once each; moved: by the correction before."""
         self._iteration += 1
         now = self._problem.active_set
         if now != self._last and self._last is not None:
@@ -122,11 +122,12 @@ class _ActiveSet:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """When a state counts as converged: all of these.
+    """Convergence criteria of a state: all of these.
 
     correction: the next correction that quadratic convergence predicts, over the norm of x (and `Newton.at_rest`).
     residual: norm of F over the norm of the support forces.
-    iterations: at most so many with one active set of contact; settling: and while it changes, see `Newton.small`.
+    iterations: at most this number of with one active set of contact; settling: and while it changes, see
+        `Newton.small`.
 
     Raises:
         InputError: a value that is not greater than 0.
@@ -148,7 +149,7 @@ class Tolerances:
     def met(self, corrections: list[float], residuals: list[float], chord: bool = False, smooth: bool = False) -> bool:
         """True if a state with these corrections behind it, and these residuals (its own last), has converged.
 
-        `chord`: the last correction was one of a chord iteration, which converges linearly: the next one is foretold
+        `chord`: the last correction was one of a chord iteration, which converges linearly: the next one is predicted
         from the fall of residuals and corrections, and doubled. `smooth`: F has no kinks, between which an iteration
         could go to and fro.
 
@@ -162,7 +163,7 @@ class Tolerances:
             return False
         residual, last, before = residuals[-1], corrections[-1], corrections[-2] if len(corrections) > 1 else 1.0
         if chord:
-            if residual == 0:                                # at rest, where nothing acts
+            if residual == 0:                                # in the reference configuration, where nothing acts
                 return True
             ahead = 2 * last * max(residual / residuals[-2], last / before)
             return ahead < self.correction and residual < self.residual
@@ -216,7 +217,7 @@ class Drag(Protocol):
     """Forces that are added to F, and their derivative."""
 
     def forces(self, x: Array) -> Array:
-        """At x, own part, shape (n,)."""
+        """Return the forces at x, locally owned, shape (n,)."""
 
     def add_to(self, tangent: PETSc.Mat) -> None:
         """Add their derivative by x."""

@@ -37,7 +37,7 @@ _TRY = (" Try a target within the range that was reached, a smaller first step (
 
 @dataclass(frozen=True)
 class PathFollowing:
-    """When a run cuts a step back, and when it gives up. The length of steps is that of its `StepControl`.
+    """Settings for cutbacks and for giving up. The length of steps is set by `StepControl`.
 
     Attributes:
         inaccurate: errors in time, over what is allowed, at which a step is taken again.
@@ -72,8 +72,8 @@ class Run:
         self._time_error = TimeError(self.problem, accuracy) if self.problem.relaxes else None
         self.aim = Aim(self.curve, targets, wanted)
         self._step, self._began = step, time.perf_counter()
-        self._ahead = self.settings.snap_through.ahead      # by how much the control goes on in a jump
-        self._no_rest_at = np.nan                           # control from which a body that jumped came to rest nowhere
+        self._ahead = self.settings.snap_through.ahead      # the amount by which the control goes on in a jump
+        self._no_rest_at = np.nan                           # control from which a body that jumped reached rest nowhere
         self._turned: list[State] = []                      # its first state, if it goes back from there
 
     def follow(self, max_steps: int | None, progress: bool, start: State | None, may_turn: bool = False) -> None:
@@ -129,7 +129,7 @@ class Run:
 
     @property
     def _driven(self) -> str:
-        """What the control stands for, in words."""
+        """Name of the controlled quantity."""
         return self.problem.shown(0.0)[0]
 
     @property
@@ -163,11 +163,11 @@ class Run:
 
     @property
     def states(self) -> list[State]:
-        """Those of this run."""
+        """States of this run."""
         return [*self._turned, *self.record.states[self._first + len(self._turned):]]
 
     def _go_on(self, may_turn: bool) -> dict[str, Any]:
-        """Take up the states with the last one's setting as those of this run; what they left to go on with.
+        """Take up the states with the last one's setting as those of this run; what they left to continue with.
 
         If it turns, its first state is the last one. (It does not turn to a pressure, which may come again ahead.)
         """
@@ -295,7 +295,7 @@ class Run:
 
     @property
     def _predictor(self) -> Predictor | None:
-        """Of a step in which a body relaxes: x at a control, or None where the tangent of the last state is better."""
+        """Predictor of a step in which a body relaxes: x at a control; None: the tangent is better."""
         if self._time_error is None or not self.problem.setting.rate[-1] or self.problem.has_kinks:
             return None
 
@@ -306,7 +306,7 @@ class Run:
         return x
 
     def _error_in_time(self, new: State) -> float:
-        """Of the step to a state, over what is allowed; raises `Cutback` if it is much more."""
+        """Return the time integration error of a step over its tolerance; raise `Cutback` if it is much more."""
         if self._time_error is None:
             return 0.0
         error = self._time_error.of(self.states, new.x, new.control)
@@ -325,7 +325,7 @@ class Run:
         try:
             return [self._jump(old, 0.0, onward=onward)]
         except Failure as failure:
-            if not self.problem.setting.rests:              # what is driven was to go on
+            if not self.problem.setting.rests:              # the controlled quantity was to go on
                 what = "the enclosed volume" if onward else "what is driven"
                 self._give_up(f"{what} has a limit point here, and {failure.reason}", failure.attempt)
             self.record.ended = f"the body snaps at {self.record.describe(old)}, and no equilibrium follows"
@@ -337,7 +337,7 @@ class Run:
         step: the length of the last step that went well; onward: see `snap_through`.
 
         From where the body is, contact that remembers may settle at one control and not at another next to it: others
-        are tried, too. What fades is let go of at once: on the way it is a load of its own, which no process has.
+        are tried, too. What fades is released of at once: on the way it is a load of its own, which no process has.
         """
         fading, settings = self.problem.setting.fading, self.settings.snap_through
         others = (settings.ahead, settings.furthest) if length == 0 and self.problem.has_history and not fading else ()
@@ -435,7 +435,7 @@ class Run:
         raise self._error(f"{why}.", found, hint)
 
     def _error(self, why: str, diagnosis: Diagnosis, hint: str) -> ConvergenceError:
-        """What happened, what was met, what to try: the diagnosis' advice, or a hint."""
+        """Return the error with the failure, the reached value and the advice of the diagnosis, or a hint."""
         record, states, values = self.record, self.states, self.aim.values
         best = int(np.argmin([abs(v - self.aim.until.value) for v in values]))
         at = f", at {record.describe(states[best])}" * (states[best] is not record.last)

@@ -13,7 +13,7 @@ CUBIC, QUADRATIC = 4, 3                             # states that a cubic, and a
 
 
 def before(states: Sequence[State], time: float, most: int, close: float = 0.1) -> list[State]:
-    """The last states, at most so many, on whose polynomial a time lies ahead: in order, from the last jump on.
+    """The last states, at most this number of, on whose polynomial a time lies ahead: in order, from the last jump on.
 
     Those closer than the part `close` of the step ahead are not told apart: what they are not exact in would be
     magnified.
@@ -41,7 +41,7 @@ def behind(states: Sequence[State], length: float, distance: Callable[[State, St
 
 
 def weights(states: Sequence[State], time: float) -> Array:
-    """Of each state, with times that grow, in the value at a time; shape (states,)."""
+    """Return the weight of each state, with growing times, in the value at a time; shape (states,)."""
     t = np.array([state.time for state in states])
     apart, ahead = t[:, None] - t, np.tile(time - t, (len(t), 1))
     np.fill_diagonal(apart, 1.0)

@@ -1,6 +1,6 @@
 """A process: stages in order, each with its own control, which go on where the one before ended.
 
-Everything is created once. A stage sets how the things of the scene follow the control (`Setting`): what it drives has
+Everything is created once. A stage sets how the items of the scene follow the control (`Setting`): what it drives has
 the control as its amplitude; what else can be driven keeps the value that it has. Tables against time make the time
 the control, piece by piece between their knots. What a stage leaves out (a grip that opens, a plug that is not there
 yet) leaves forces without balance: they are taken away gradually, which is one more path to follow.
@@ -44,7 +44,7 @@ class Execution:
 
     Args:
         record: where the states go. plans: of the stages. unsure: those whose tools are to be looked at again when
-            their turn comes; look: looks at one, given what tells the value of a thing (its number) then, the user's
+            their turn comes; look: looks at one, given what tells the value of an item (its number) then, the user's
             units. step: step control of stages that have none of their own.
         balanced: forces left over, relative to the support forces, that count as none.
         accuracy: the error in time that is allowed, relative.
@@ -127,7 +127,7 @@ class Execution:
         self.problem.enter(setting, self._standing()[1], control)
 
     def _resumed(self, control: float) -> State:
-        """Where the process stands, as the start of a piece."""
+        """Return the present state of the process, as the start of a piece."""
         if not self.record.states:
             return begin(self.curve)
         try:
@@ -148,7 +148,7 @@ class Execution:
         step = self._stage.step or self._step
         if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
             held = self.problem.has_kinks and not any(self.problem.setting.rate[:-1])
-            step = step or (_HELD if held else _IN_TIME)     # a piece that has begun goes on with its own steps
+            step = step or (_HELD if held else _IN_TIME)     # a piece that has begun continues with its own steps
         run = Run(self.record, targets, step, self._stage.at_limit_point, self._accuracy, self._label, wanted)
         start = None if control is None else self._resumed(control)
         run.follow(self._max_steps, self._progress, start)
@@ -194,7 +194,7 @@ class Execution:
         return f"stage {self._stage.name!r} ({self._k + 1} of {len(self.plans)}), "
 
     def _amplitudes(self) -> list[float]:
-        """Of all things, and the time, as they stand now."""
+        """Return the present amplitudes of all items, and the time."""
         setting, _, control = self._standing()
         return [*setting.standing(control)[:-1], self.problem.time_at(control)]
 
@@ -347,7 +347,7 @@ def next_knot(tables: list[tuple[int, Array]], now: float, end: float) -> float:
 def begin(curve: Curve) -> State:
     """The first state of a path: the body at control 0, in equilibrium with whatever else acts on it.
 
-    Fixed loads for which Newton's method finds no equilibrium from rest are brought in gradually.
+    Fixed loads for which Newton's method finds no equilibrium from the unloaded state are brought in gradually.
 
     Raises:
         ConvergenceError: there is none.

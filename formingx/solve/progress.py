@@ -1,4 +1,4 @@
-"""What a run aims at and how far it has come: its targets, a bar, and now and then a line in the log."""
+"""Progress of a run towards its targets: a bar, and now and then a line in the log."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Aim:
         return all(any(target is end for target, _ in self.open) for end in self._ends)
 
     def gained(self, value: float | None = None) -> float:
-        """How far a value, by default the last, has come from that of the first state (0) to the target (1)."""
+        """Return the progress of a value, by default the last, from the first state (0) to the target (1)."""
         value = self.values[-1] if value is None else value
         return (value - self.values[0]) / ((self.until.value - self.values[0]) or 1.0)
 
@@ -100,7 +100,7 @@ class Aim:
                 by *= now / (now - then) if now * then < 0 else 1.0
         return by
 
-    # why a run should give up, in words; "" if nothing speaks against going on
+    # why a run should give up, as text; "" if nothing speaks against going on
 
     def turned_back(self) -> str:
         """The target is further away than half of what had been gained.
@@ -134,7 +134,7 @@ class Aim:
         return ""
 
     def pace(self, max_steps: int) -> str:
-        """How far a run had come when its steps ran out."""
+        """Return the progress of a run at the end of its steps, as text."""
         aim, (before, now) = self.until.value, self.values[-2:]
         if not (aim - now) * (now - before) > 0:
             return f"max_steps = {max_steps} were used up, and the last step led away from the target"
@@ -144,7 +144,7 @@ class Aim:
 
 
 class Progress:
-    """Of a run to its target, on rank 0: a bar after two seconds, and a line after each `silence`.
+    """Progress of a run to its target, on rank 0: a bar after two seconds, and a line after each `silence`.
 
     Args:
         comm: of the run. words: what it is about. shown: False: no bar, and lines are of the level INFO.

@@ -22,7 +22,7 @@ log = logging.getLogger("formingx")
 
 @dataclass
 class Counts:
-    """What a run cost: accepted states (without the start), failed attempts, all Newton iterations (with a tangent that
+    """Cost of a run: accepted states (without the start), failed attempts, all Newton iterations (with a tangent that
     was kept, too), seconds; limits: {what made a step shorter, or fail: how often}."""
 
     steps: int = 0
@@ -88,7 +88,7 @@ class Record:
 
     @property
     def curve(self) -> Curve:
-        """What solves for its states."""
+        """Solver of its states."""
         return self.segments[-1].curve
 
     @property
@@ -122,7 +122,7 @@ class Record:
         self.counts = replace(other.counts, limits=dict(other.counts.limits))
 
     def accept(self, state: State) -> None:
-        """Take up a state: what has a history goes on from it.
+        """Take up a state: what has a history continues from it.
 
         Raises:
             Unusable: it is none that a body can have; the record is as it was before.

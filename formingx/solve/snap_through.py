@@ -1,14 +1,14 @@
 """Snap-through: the next state where there is none to go on to, and when a body goes there.
 
 Where a process drives one way, a body snaps at a fold of its path, and at a kink beyond which there is no state nearby.
-It comes to rest in the next equilibrium. The way there is followed with vanishing viscosity, at a fixed control,
+It reaches equilibrium in the next equilibrium. The way there is followed with vanishing viscosity, at a fixed control,
 
     F(x) + eta V (x - x_k) = 0,   V that of a viscous stress in proportion to dF, as in a Kelvin-Voigt solid,
 
 from one x_k to the next, the histories taken up at each. (Kelvin-Voigt damping holds waves of all lengths in proportion
-to their stiffness. Damping in proportion to the mass holds short ones least: what lets go at an edge then wants 1e4
-times the viscosity that lets the body come to rest.) eta falls where the body moves smoothly and grows where it does
-not; where it is 0 the body is at rest. What is out of balance on the way does work that is lost.
+to their stiffness. Damping in proportion to the mass holds short ones least: what separates at an edge then wants 1e4
+times the viscosity that lets the body reach equilibrium.) eta falls where the body moves smoothly and grows where it
+does not; where it is 0 the body is in equilibrium. What is out of balance on the way does work that is lost.
 """
 
 from __future__ import annotations
@@ -31,18 +31,19 @@ log = logging.getLogger("formingx")
 
 @dataclass(frozen=True)
 class SnapThrough:
-    """When a body snaps through, and how the way to its next state is followed.
+    """Criteria for snap-through, and settings of the path to the next state.
 
-    eta, over the shear modulus, begins low and grows to the least that gives a solution: where a state follows after
-    all, only a little viscosity finds it; much would hold the body back while contact lets go, and what slips meanwhile
-    changes where it ends. (At the brink of release two states may be near, and which is found still depends on eta.)
-    What is lost depends on how far the body moves in a viscous solution and, with friction, where it ends: both are
-    measured in tests/test_jumps.py. Distances are dimensionless, in the mean; forces over the support forces.
+    eta, over the shear modulus, begins low and grows to the smallest that gives a solution: where a state follows after
+    all, only a little viscosity finds it; much would hold the body back while contact separates, and what slips
+    meanwhile changes where it ends. (At the brink of release two states may be near, and which is found still
+    depends on eta.) What is lost depends on how far the body moves in a viscous solution and, with friction, where
+    it ends: both are measured in tests/test_jumps.py. Distances are dimensionless, in the mean; forces over the
+    support forces.
 
     Attributes:
         lengths: step lengths below which a second failure triggers a snap-through, once each. The last is also that of
             the predictor where a kink turns the path back, or where no shorter step is left.
-        ahead, furthest: by how much the control goes on, at first and at most.
+        ahead, furthest: the amount by which the control goes on, at first and at most.
         eta, least: the first eta, and where it is as good as 0.
         most, most_moving: largest eta before and after the body has begun to move.
         falls: factor of eta after a solution that took at most `few` iterations; grows, grows_moving: after none was
@@ -55,8 +56,8 @@ class SnapThrough:
             (Where a sheet is drawn over an edge point by point hundreds of short ones are needed.)
         iterations: Newton iterations of one step, failed tries and jumps included, after which it tries no jump and
             halves its length.
-        near_rest: viscous forces below which the state at rest is looked for.
-        sweeps: solutions in which a body lets go of a tool in space.
+        near_rest: viscous forces below which the state in the reference configuration is looked for.
+        sweeps: solutions in which a body releases a tool in three dimensions.
         at_rest: viscous forces below which the body rests, though where a point is at a kink of its law of friction the
             iteration without them may go to and fro.
     """
@@ -106,7 +107,7 @@ class ViscousDrag:
         self.origin: Array = np.zeros(0)
 
     def forces(self, x: Array) -> Array:
-        """At x, own part, shape (n,)."""
+        """Return the forces at x, locally owned, shape (n,)."""
         return self._viscosity.forces(x - self.origin, self.eta)
 
     def add_to(self, tangent: PETSc.Mat) -> None:
@@ -119,7 +120,7 @@ class ViscousDrag:
 
 
 class _Motion:
-    """From a state to the next: where the body is on the way, and what was lost."""
+    """Motion from a state to the next: the present position of the body, and the dissipated energy."""
 
     def __init__(self, curve: Curve, old: State, control: float, settings: SnapThrough, onward: float = 0.0,
                  passed: Sequence[State] = ()):
@@ -234,8 +235,8 @@ def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: Sna
         passed: states before, to whose path the body does not go back.
 
     Raises:
-        Failure: none was found, `NoEquilibrium` if the body comes to rest nowhere. The problem's histories are then
-            those of `old`.
+        Failure: none was found, `NoEquilibrium` if the body reaches equilibrium nowhere. The problem's histories are
+            then those of `old`.
     """
     problem, kept = curve.problem, curve.problem.memory
     motion = _Motion(curve, old, old.control + by, settings, onward, passed)
@@ -264,15 +265,15 @@ def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: Sna
 
 
 def at_limit_points(problem: Equations, falls: bool) -> str:
-    """What is done at limit points of the control: "continue", "snap_through", or "continue_volume".
+    """Return the rule at limit points of the control: "continue", "snap_through", or "continue_volume".
 
     The last follows the path while the volume of the air grows, as under volume control, and lets the body snap where
     that has its maximum, too.
 
-    Time goes one way. With a history so does whatever is driven, for to follow a fold would be to let it go back; but
-    where a pressure that is put on has its maximum it is the volume of the air that goes on growing. The same holds for
-    a pressure on a body in contact, with a history or without: where contact changes a path may end. `falls`: what is
-    driven is let off.
+    Time goes one way. With a history so does the controlled quantity, for to follow a fold would be to let it go
+    back; but where a pressure that is put on has its maximum it is the volume of the air that goes on growing. The
+    same holds for a pressure on a body in contact, with a history or without: where contact changes a path may end.
+    `falls`: what is driven is let off.
     """
     if problem.drives == "time":
         return "snap_through"
@@ -311,7 +312,8 @@ def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) ->
 
 
 def let_go(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callable[[State], State]) -> State:
-    """A new state at the same control, without what pulls at tools in space; by `jump` where the body snaps off.
+    """A new state at the same control, without what pulls at tools in three dimensions; by `jump` where the body
+    snaps off.
 
     Raises:
         Failure: no such state was found.

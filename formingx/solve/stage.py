@@ -35,14 +35,15 @@ class Stage:
             its value, and its column reads what acts of it: 0 while it is away.
         amplitudes: instead of `control`: {thing: [(time, value), ...]}, piecewise linear in time, values in the
             user's units (the last one stays). A table that begins later than the stage is reached in a straight line
-            from where the thing stands. With `control`, instead of a thing a function that makes targets, such as
-            `enclosed_volume`: what is driven is what makes that measure follow the table: a flow. Its course may
-            be a function of time, too; then `until` is the `process_time` of its end.
-        speed: of what is driven (its unit per time), greater than 0: time goes by while it moves.
-        duration: time that the stage takes: on the way to a target of what is driven, or while it stands still.
-        constant: with `control` and `duration`: a target, such as `force(2.0)`: what is driven gives way so that it
-            stays met. Process time is 0 at first; it runs in stages with a table, a speed or a duration; others are
-            instantaneous.
+            from where the item stands. With `control`, instead of an item a function that makes targets, such as
+            `enclosed_volume`: the controlled quantity is what makes that measure follow the table: a flow. Its
+            course may be a function of time, too; then `until` is the `process_time` of its end.
+        speed: of the controlled quantity (its unit per time), greater than 0: time goes by while it moves.
+        duration: time that the stage takes: on the way to a target of the controlled quantity, or while it stands
+            still.
+        constant: with `control` and `duration`: a target, such as `force(2.0)`: the controlled quantity deforms so
+            that it stays met. Process time is 0 at first; it runs in stages with a table, a speed or a duration;
+            others are instantaneous.
         step: step control of this stage; default that of the run.
         at_limit_point: see `formingx.trace`.
 
@@ -93,7 +94,7 @@ class Stage:
 
     @property
     def highest(self) -> Target | None:
-        """Of a flow along a table, the target with the largest value."""
+        """Target with the largest value, of a flow along a table."""
         if self.flow is None or callable(self.flow[1]):
             return None
         return self.flow[0](float(np.max(self.flow[1][:, 1])))
@@ -165,8 +166,8 @@ class Stage:
 
 
 class Plan(NamedTuple):
-    """A stage with the things of the scene by their numbers: what it drives, [(number, table)], what is left out; and
-    all of them in words."""
+    """A stage with the items of the scene by their numbers: what it drives, [(number, table)], what is left out; and
+    all of them as text."""
 
     stage: Stage
     numbers: list[int]
@@ -186,7 +187,7 @@ class Plan(NamedTuple):
 
 
 def plan(scene: Scene, stage: Stage) -> Plan:
-    """A stage by the numbers of the things of its scene.
+    """A stage by the numbers of the items of its scene.
 
     Raises:
         InputError: it drives or leaves out something that is not there, leaves the body free to move, or aims at what

@@ -26,11 +26,12 @@ class State:
         memory: what each history of the problem remembers from here on (`Problem.histories`); before: what it did while
             the state was solved for; empty if that is not known.
         stage: name of the stage of a process; setting: what the stage had set, as plain data (`Setting`).
-        stepping: what a run goes on with: its next step, its counts and its target; empty inside a step.
+        stepping: what a run continues with: its next step, its counts and its target; empty inside a step.
         time: process time.
         orientation: sign of the tangent's determinant times that of the slope: the same along a path, through limit
             points too, until another path branches off; 0 if it is not known.
-        verdict: why it is no state that a body can have, in words; "" but in a run that went on beyond (`Record`).
+        admissibility check: why it is no state that a body can have, as text; "" but in a run that went on beyond
+        (`Record`).
 
     >>> state = path.limit_points[0]
     >>> state.kind, round(float(state.measures["pressure"]), 4), len(state.history)

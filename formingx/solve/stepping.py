@@ -1,4 +1,4 @@
-"""How long the next step is, and whether the last one kept its accuracy in time."""
+"""Length of the next step, and the accuracy of the last one in time."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class StepControl:
         self.length = min(self.length, self.largest)
 
     def accepted(self, iterations: int, error: float = 0.0) -> None:
-        """A full step converged in so many iterations with a tangent of their own; error: in time, over what is
+        """A full step converged in this number of iterations with a tangent of their own; error: in time, over what is
         allowed."""
         factor = min(max(self.target / max(iterations, 1), 0.5), self.growth)
         factor = min(factor, 0.9 * max(error, 1e-9) ** (-1 / 3))

@@ -143,7 +143,7 @@ def _tag(tag: Any) -> int:
 
 
 def _factor(units: Any, kind: str, file: str) -> float:
-    """What the file's lengths are multiplied with."""
+    """Return the factor for the lengths of the file."""
     units = units.length if isinstance(units, Units) else units
     if not isinstance(units, str):
         return positive("tools.read: units (of length, or a factor)", units)

@@ -58,7 +58,7 @@ def curves(file: str | os.PathLike) -> dict[int, Line | Arc | str]:
 
 
 class _Drawing:
-    """What the statements have made so far."""
+    """Drawing as the statements have made it so far."""
 
     def __init__(self) -> None:
         self.values: dict[str, float] = {"Pi": math.pi}

@@ -71,7 +71,7 @@ class Arc(NamedTuple):
 
 
 class Nearest(NamedTuple):
-    """What a profile is like at the points of it that are closest to n given points.
+    """Surface of a profile at the closest points to n given points.
 
     distance: signed, positive inside the tool, shape (n,), length; normal: its gradient, into the tool, shape (n, 2);
     curvature: its second derivative is curvature t t^T, t the tangent (`tangent`), shape (n,), 1/length.
@@ -387,7 +387,7 @@ def _sampled(piece: Line | Arc, n: int) -> np.ndarray:
 
 
 def _straight_pieces(piece: Line | Arc) -> int:
-    """How many straight pieces stand for one where crossings are looked for: 64 for a quarter of a turn, at least 4."""
+    """Return the number of straight pieces in a search for crossings: 64 for a quarter of a turn, at least 4."""
     return 1 if isinstance(piece, Line) else max(4, math.ceil(256 * abs(piece.sweep) / TURN))
 
 

@@ -1,4 +1,4 @@
-"""What contact, checks and pictures ask of a rigid tool."""
+"""Interface of a rigid tool for contact, checks and pictures."""
 
 from typing import Protocol
 
@@ -8,7 +8,8 @@ from .profile import Nearest
 
 
 class RigidTool(Protocol):
-    """A rigid tool at rest, which moves as a whole: n points are seen from it. A `Tool` and a `SolidTool` are.
+    """A rigid tool in the reference configuration, which moves as a whole: n points are seen from it. A `Tool` and a
+    `SolidTool` are.
 
     Distances must be exact near the surface: a penalty 1e5 times as stiff as the body multiplies their errors.
     """
@@ -19,7 +20,7 @@ class RigidTool(Protocol):
     def surface(self) -> tuple[np.ndarray, np.ndarray]:
         """Points of the surface, shape (n, components), length, and its straight pieces, for drawing and for checks.
 
-        A piece is the numbers of its ends, shape (m, 2), in space of its corners, shape (m, 3).
+        A piece is the numbers of its ends, shape (m, 2), in three dimensions of its corners, shape (m, 3).
         """
 
     @property

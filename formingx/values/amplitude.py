@@ -14,7 +14,7 @@ def amplitude(function: Callable, until: float, start: float = 0.0, *, tolerance
     """[(time, value), ...] of a function of time, for `Stage(amplitudes={thing: ...})`; straight between its points.
 
     Args:
-        function: f(t), called with an array of times, or made of numbers; the value of what is driven then.
+        function: f(t), called with an array of times, or made of numbers; the value of the controlled quantity then.
         until, start: process times.
         tolerance: how far a straight piece may be off f, over the span of its values.
 

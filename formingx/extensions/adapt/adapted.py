@@ -26,16 +26,17 @@ _MOST = 20_000             # columns
 def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = None) -> Mesh:
     """The mesh of a run made again, with columns of elements as its states ask for: small where they matter, no more.
 
-    A column is as long, at rest, as the strictest of its states allows, and at most 1.25 times its neighbour; but not
-    shorter than an eighth of that of the run, as long ones know no better: then adapt again, to a run on the new mesh.
-    What lies through the sheet stays: elements, layers and their interfaces. For meshes of `disc`, `sphere`, `parison`
-    and `from_lines`; of a `sheet` in space triangles are made smaller, to a quarter at the least, never larger.
-    Collective.
+    A column is as long, in the reference configuration, as the strictest of its states allows, and at most 1.25
+    times its neighbour; but not shorter than an eighth of that of the run, as long ones know no better: then adapt
+    again, to a run on the new mesh. What lies through the sheet stays: elements, layers and their interfaces. For
+    meshes of `disc`, `sphere`, `parison` and `from_lines`; of a `sheet` in three dimensions triangles are made
+    smaller, to a quarter at the least, never larger. Collective.
 
     Args:
         path: a run, on coarse elements for one (a pilot run), as far as it came.
-        share: by how much a column may turn as the sheet bends, radians; where one lies on a fillet of a tool, its
-            length there over the radius of the fillet. In space: from triangle to triangle. None: it does not count.
+        share: the amount by which a column may turn as the sheet bends, radians; where one lies on a fillet of a
+            tool, its length there over the radius of the fillet. In space: from triangle to triangle. None: it does
+            not count.
         error: the estimated error of the stress, over all the body, relative (`StressError.relative`), that no state is
             to be above; columns share it, as an error of the second order. (More of them do not help where too few
             elements lie through the sheet.) In space: the change of the wall from triangle to triangle, relative. None:

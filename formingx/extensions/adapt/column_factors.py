@@ -1,4 +1,4 @@
-"""How long the columns of a mesh should be, over how long they are, by what the states of a run say."""
+"""Factors by which the columns of a mesh should become shorter, from the states of a run."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
 
 
 def _turns(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """By how much each column turns, half of the kinks at its ends included, radians, shape (n,)."""
+    """Return the rotation along each column, with half of the kinks at its ends, radians, shape (n,)."""
     way = np.zeros(edges.shape[-1])                          # directions at both ends, of both faces together
     for numbers, back in sides:
         a, b, m = edges[numbers].transpose(1, 0, 2)

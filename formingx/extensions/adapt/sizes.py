@@ -1,4 +1,4 @@
-"""How large the triangles of a sheet in space should be, by what the states of a run say."""
+"""Sizes of the triangles of a sheet in three dimensions, from the states of a run."""
 
 from __future__ import annotations
 

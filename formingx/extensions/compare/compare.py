@@ -39,7 +39,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What `compare` found; `str` of it is a report.
+    """Result of `compare`; its text is a report.
 
     Attributes:
         columns: the compared columns, by our names.
@@ -136,8 +136,8 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     Args:
         ours: a `Path`, a CSV file (of `Path.to_csv`, for one), or {column: values}.
         theirs: the same choice. In CSV a header names the columns; it may state units, as "pressure [psi]".
-        columns: {our name: their name}, or names that both sides share; at least two. Default: what is driven and the
-            next measure of ours that theirs also has.
+        columns: {our name: their name}, or names that both sides share; at least two. Default: the controlled
+            quantity and the next measure of ours that theirs also has.
         units: {our name: factor} that turns their values into our units, or {our name: our unit} where their header
             states theirs ("m", "cm", "mm", "in", "Pa", "MPa", "bar", "psi", "kg/cm2", "cm3", ...).
         along: our name of the independent variable, or "arc length"; default as said.
@@ -337,7 +337,8 @@ def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Differ
 
 
 def _limit_points(table: csv_files.Table, points: np.ndarray, names: list[str], control: str) -> list[dict[str, float]]:
-    """Those that the table marks; else where the control turns, on the parabola (by arc length) of three points."""
+    """Return the limit points that the table marks; else those where the control turns, on a parabola of three
+    points."""
     if table.kinds is not None and "start" in table.kinds:
         return [dict(zip(names, p.tolist())) for p, kind in zip(points, table.kinds) if kind == "limit point"]
     from scipy.signal import find_peaks
@@ -357,7 +358,8 @@ def _limit_points(table: csv_files.Table, points: np.ndarray, names: list[str], 
 
 
 def _resolution(points: np.ndarray, k: int | None) -> float:
-    """How far the dropped points lie from the curve through every other one (scaled), over column k or across it."""
+    """Return the distance of the dropped points from the curve through every other point, over column k or across
+    it."""
     if len(points) < 5:
         return float("inf")
     kept = np.unique(np.append(np.arange(0, len(points), 2), len(points) - 1))

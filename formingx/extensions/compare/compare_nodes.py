@@ -23,13 +23,13 @@ _REST = {2: ("R", "Z"), 3: ("X", "Y")}
 
 @dataclass(frozen=True)
 class NodalComparison:
-    """What `compare_nodes` found; `str` of it is a report.
+    """Result of `compare_nodes`; its text is a report.
 
     Attributes:
         nodes: their numbers, shape (n,).
-        points: reference (R, Z), in space (X, Y), shape (n, 2), our unit of length.
-        ours, theirs: displacements (u_r, u_z), shape (n, 2), in space (u_x, u_y, u_z), shape (n, 3), our unit of
-            length.
+        points: reference (R, Z), in three dimensions (X, Y), shape (n, 2), our unit of length.
+        ours, theirs: displacements (u_r, u_z), shape (n, 2), in three dimensions (u_x, u_y, u_z), shape (n, 3), our
+            unit of length.
         largest: our largest displacement: the scale of the differences.
     """
 
@@ -69,7 +69,7 @@ class NodalComparison:
     def plot(self) -> Any:
         """Draw the deformed nodes of both, z over r (in space over x); returns the figure."""
         figure, axes = plots.figure()
-        rest = np.pad(self.points, ((0, 0), (0, self.ours.shape[1] - 2)))               # flat in space
+        rest = np.pad(self.points, ((0, 0), (0, self.ours.shape[1] - 2)))               # flat in three dimensions
         for u, style, label in ((self.ours, {"marker": "o", "fillstyle": "none"}, "ours"),
                                 (self.theirs, {"marker": "x", "color": "k"}, "theirs")):
             axes.plot(*(rest + u)[:, [0, -1]].T, linestyle="none", markersize=5, label=label, **style)
@@ -83,7 +83,7 @@ class NodalComparison:
 def write_nodes(path: Any, file: Any, *, state: Any = None, mesh: str | os.PathLike | None = None) -> None:
     """Write node, R, Z, u_r, u_z of every node of a state as CSV, in the user's unit of length (rank 0 writes).
 
-    Of a sheet in space: node, X, Y, u_x, u_y, u_z.
+    Of a sheet in three dimensions: node, X, Y, u_x, u_y, u_z.
 
     Args:
         state: of the path; default: the last.
@@ -109,8 +109,8 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
     """Compare a state with another program's nodal displacements, at its nodes, wherever in our mesh they lie.
 
     Args:
-        theirs: a CSV file or {column: values} with u_r, u_z and either R, Z or, with `mesh`, node; of a sheet in space
-            with u_x, u_y, u_z and X, Y.
+        theirs: a CSV file or {column: values} with u_r, u_z and either R, Z or, with `mesh`, node; of a sheet in
+            three dimensions with u_x, u_y, u_z and X, Y.
         state: of the path; default: the last. To compare at a pressure: `path.at(formingx.pressure(...))`.
         mesh: a text mesh file (`formingx.mesh.Grid`) that gives the coordinates of the numbered nodes, in our unit.
         columns: {our name: their name} for columns that are called otherwise.
@@ -155,7 +155,7 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
 
 
 def _columns(path: Any) -> list[str]:
-    """Of files of nodal displacements: reference coordinates, then components."""
+    """Return the columns of files of nodal displacements: reference coordinates, then components."""
     axes = path.problem.scene.kinematics.axes
     return [*_REST[len(axes)], *(f"u_{axis}" for axis in axes)]
 

@@ -102,7 +102,7 @@ class MeasuredWall:
         """Return the walls of the last state of a path beside the measured ones; collective.
 
         Raises:
-            InputError: a length is more than a tenth beyond the end of the computed part; a sheet in space.
+            InputError: a length is more than a tenth beyond the end of the computed part; a sheet in three dimensions.
         """
         profile = path.profile()
         at, away = self._numbers(profile)

@@ -1,7 +1,7 @@
 """Points that a step brings to their tools, one after the other: each is held as it arrives, and turns the path.
 
 Along the tangent of a state, by a unit of arc length, points move by w0. A point that has arrived is held by what its
-law of friction says, and so are those that slid before: each sticks, slides against mu N, or lets go, which the
+law of friction says, and so are those that slid before: each sticks, slides against mu N, or separates, which the
 compliance of the body at these points tells (`held`). From one change to the next the path goes straight, and where a
 point arrives an iteration with the same factors brings it back to equilibrium: the path is curved, and where a point
 sticks depends on it.
@@ -24,19 +24,19 @@ from .response import Response
 
 @dataclass(frozen=True)
 class EventSettings:
-    """How far, and how exactly, arrivals are foretold.
+    """Number and accuracy of the predicted contact events.
 
     Attributes:
-        iterations: at most so many for an arrival.
+        iterations: at most this number of for an arrival.
         to_tools: iterations, of the contact alone, that bring points to their tools.
-        changes: at most so many points let go or begin to slide from one arrival to the next.
+        changes: at most this number of points separate or begin to slide from one arrival to the next.
         taken_over: points that slid before are held by forces of their own, if they are not more than these.
-        same_place: by how much an iteration may still move an arrival that sticks, over the length of face that
+        same_place: the amount by which an iteration may still move an arrival that sticks, over the length of face that
             is its own.
         about_there: the same of one that may slide.
         far: squares of positions beyond all bounds, length^2.
         soon: part of a step within which two points arrive together.
-        earlier: at most so many points turn out to have arrived before the one that is looked at.
+        earlier: at most this number of points turn out to have arrived before the one that is looked at.
         late: part of the way to an arrival by which an iteration may move it: beyond, where it is is not known.
         work: iterations to equilibrium and changes of direction, in all, for the events of one step. With more, the
             step takes one gap closure.
@@ -98,7 +98,7 @@ class _Piece(NamedTuple):
     off: tuple[np.ndarray, float]
 
     def after(self, time: float) -> _Piece:
-        """What is left of it from a time on, or it, and what was before that, on a straight line."""
+        """Return the rest of a piece of path from a time on, with the part before it replaced by a straight line."""
         by = time - self.begins
         return self._replace(begins=time, at=[x + by * w for x, w in zip(self.at, self.speed)],
                              force=self.force + by * self.rate, extra=self.extra + by * self.growth)
@@ -119,12 +119,12 @@ class ContactEventSequence:
 
     Args:
         faces: in contact (`FaceContact`), those that take part; n: owned unknowns of the fields.
-        x, control: the state, own part; direction, slope: of them by arc length.
+        x, control: the state, locally owned entries; direction, slope: of them by arc length.
         response: of the body; batch: points for which that is asked at a time.
 
     Attributes:
         touching: how many points of each face touch.
-        ends: arc length beyond which nothing is foretold; stops: no path goes on there.
+        ends: arc length beyond which nothing is predicted; stops: no path goes on there.
     """
 
     def __init__(self, faces: Sequence[Any], n: int, x: np.ndarray, control: float, direction: np.ndarray, slope: float,
@@ -167,8 +167,8 @@ class ContactEventSequence:
         return self._closures[k] if self._closures[k].time < length else None
 
     def closures(self, length: float) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
-        """Of each face: arc length at which own points arrive, `length` if they do not; where they are then; which
-        are where their forces want them at the end."""
+        """Return for each face the arc length at which locally owned points touch, `length` if they do not; where
+        they are then; which are where their forces want them at the end."""
         piece = self._piece(length)
         times, at = [np.full(len(x), length) for x in piece.at], piece.after(length).at
         for arrival in self._closures:
@@ -184,7 +184,7 @@ class ContactEventSequence:
         return self._piece(length).after(length).at
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
-        """What is added to (x, control) at a length along the tangent; None: nothing."""
+        """Return the change of (x, control) at a length along the tangent by the events; None: zero."""
         piece, m = self._piece(length), len(self._points.who)
         if self._end is not None and piece.begins < self._end.begins <= length:
             piece = self._end                               # in equilibrium there
@@ -199,7 +199,8 @@ class ContactEventSequence:
                 piece.off[1] - float(self._points.steps @ piece.extra.ravel()))
 
     def _held(self, piece: _Piece, moved: Sequence[np.ndarray] = ()) -> _Piece:
-        """Where a piece begins with its points brought to where they stick and to their tools; moved: first, by face.
+        """Return the start of a piece, its points moved onto their tools and to where they stick; moved: first, by
+        face.
 
         (Tools are curved: it takes a few such iterations.)
         """
@@ -347,7 +348,7 @@ class ContactEventSequence:
         return False
 
     def _back(self, end: _Piece, last: _Piece, but: GapClosure | None = None) -> list[np.ndarray]:
-        """When points that are inside their tools at an end of the last piece of path came there, else its time."""
+        """Return the times at which points that end a piece inside their tools passed the surface, else its time."""
         times = [np.full(len(free), end.begins) for free in self._free]
         for f, (t, face, x, w, free) in enumerate(zip(times, self._faces, end.at, last.speed, self._free)):
             near = face.law.nearest(x)
@@ -360,7 +361,7 @@ class ContactEventSequence:
         return times
 
     def _mixed(self, tried: list[tuple[_Piece, _Piece]]) -> _Piece | None:
-        """What iterations, (before, after) each, lead to: their mean that is nearest to a fixed point (Anderson 1965).
+        """Return the mean of iterates, (before, after) each, that is nearest to a fixed point (Anderson 1965).
 
         None: they lead beyond all bounds.
 

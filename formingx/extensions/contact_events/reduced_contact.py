@@ -25,14 +25,14 @@ from .response import Response
 
 @dataclass(frozen=True)
 class Agreement:
-    """When what points do, and the forces on them, agree.
+    """Tolerances for the equilibrium of contact points with their law.
 
     Attributes:
         all_at_once: of the sets of statuses that are looked at, the first: in them all that disagree change,
             then one at a time.
-        tries: at most so many sets of statuses.
+        tries: at most this number of sets of statuses.
         rough: a coefficient of friction beyond all others that is still finite.
-        none: of the largest, a rate that is as good as none.
+        none: of the largest, a rate that is negligible.
         soon: arc length in which what a force grows to counts beside it.
         limit: how far below the limit of friction, or above no pressure (over the largest), counts as there.
     """
@@ -59,7 +59,7 @@ class Near(NamedTuple):
 
 
 class Small(NamedTuple):
-    """What m points do, held by nothing: free: dx, flat; by: dx by each force; turn: how forces that turn grow by dx,
+    """Motion of m free points: free: dx, flat; by: dx by each force; turn: how forces that turn grow by dx,
     shape (m, 2, 2)."""
 
     free: np.ndarray
@@ -76,7 +76,7 @@ class Points:
 
     Attributes:
         who: (rank, face, point) of each.
-        columns, steps: of x (own rows) and of the control by forces -1, shapes (n, 2 m), (2 m,).
+        columns, steps: of x (locally owned rows) and of the control by forces -1, shapes (n, 2 m), (2 m,).
         by: how all points of each face move by them, (points, 2, 2 m).
         friction: T/N where a point slides, infinite: it sticks; elastic_slip: before; shape (m,).
     """
@@ -132,7 +132,7 @@ class Points:
                 among[f][i] = value
 
     def back(self, at: Sequence[np.ndarray], place: np.ndarray, near: Near) -> np.ndarray:
-        """How points go from where they are to their places on their tools, shape (m, 2)."""
+        """Return the motion of points onto their tools, shape (m, 2)."""
         along = np.einsum("ni,ni->n", near.tangent, place - self.at(at))
         return along[:, None] * near.tangent + near.beyond[:, None] * near.normal
 
@@ -157,14 +157,15 @@ class Points:
         return np.einsum("ni,ni->n", force, near.normal), np.einsum("ni,ni->n", force, near.tangent)
 
     def moved_by(self, by: np.ndarray, f: int) -> np.ndarray:
-        """How all own points of a face move by forces -1 times `by`, shape (m, 2)."""
+        """Return the motion of all locally owned points of a face by forces -1 times `by`, shape (m, 2)."""
         return self.by[f] @ by.ravel()
 
     def held(self, u: np.ndarray, status: np.ndarray, near: Near, force: np.ndarray,
              to: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """New forces F of points that the body would move by u, and dF - S dx; shapes (m, 2).
 
-        to: by how much those that stick are to move, shape (m, 2), but for their elastic slip g_s T/(mu N); those that
+        to: the amount by which those that stick are to move, shape (m, 2), but for their elastic slip g_s T/(mu N);
+            those that
         slide go to their tools. NaN: there are no such forces.
         """
         N, mu = self.parts(force, near)[0], np.where(self.friction < np.inf, self.friction, 0.0)
@@ -258,7 +259,7 @@ class Points:
         return float(times[first]), after
 
     def _small(self, u: np.ndarray, near: Near, force: np.ndarray) -> Small:
-        """By u and by each force, with no stiffness of points but that of forces that turn."""
+        """Return the motion by u and by each force without the stiffness of points, except for forces that turn."""
         N, T = self.parts(force, near)
         n, t = near.normal, near.tangent
         turn = near.curvature[:, None, None] * ((N[:, None] * t - T[:, None] * n)[:, :, None] * t[:, None, :])

@@ -1,4 +1,4 @@
-"""How a body gives way ahead of an accepted state, to first order, by the factors that are at hand."""
+"""First-order response of the body ahead of an accepted state, with the LU factors of its tangent."""
 
 from __future__ import annotations
 
@@ -31,14 +31,18 @@ class Response:
         return self._made == self._newton.solver.count
 
     def to_points(self, chosen: list[Array]) -> tuple[Array, Array] | None:
-        """By -1 at own points (numbers) of each face: of x, own rows, (n, m), and of the control, (m,).
+        """Return the response to -1 at locally owned points (numbers) of each face.
+
+        It consists of the changes of x, locally owned rows, (n, m), and of the control, (m,).
 
         m: point by point, way by way, of all ranks.
         """
         return self._by(unit_forces(self._problem, self._problem.present, chosen)) if self.at_hand else None
 
     def to_equilibrium(self, x: Array, control: float, forces: list[Array]) -> tuple[Array, float] | None:
-        """From (x, control), no state, to one: by what is left over there, of x, own part, and of the control.
+        """Return the correction from (x, control) to equilibrium by the residual there.
+
+        It consists of the changes of x, locally owned entries, and of the control.
 
         forces: at the points of each face, NaN where the law of contact says it, shape (n, 2).
         """

@@ -1,1 +1,1 @@
-"""What should be made: derivatives of a run by the numbers of its script, and searches that use them."""
+"""Design: derivatives of a run by the parameters of its script, and searches that use them."""

@@ -1,4 +1,4 @@
-"""What a search for a wall aims at, and how far its answer is from that."""
+"""Target of a search for a wall, and the distance of its answer from the target."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .run import DesignRun
 
 @dataclass(frozen=True)
 class Search:
-    """How searches weigh what they look for, and when they end.
+    """Weights of searches and their stopping criteria.
 
     Attributes:
         held: weight of the volume that is held, relative, beside relative walls.
         spare: part by which a volume that is to be kept is aimed lower, so that round-off does not exceed it.
-        kept: a volume or a least wall that is missed by more than this part is said.
+        kept: a volume or a minimum wall that is missed by more than this part is said.
         reached: a wanted wall is reached where it deviates by less than this part of it.
         less: what stops a search is told if the deviation without it would be less than this part of what it is.
         damped: Levenberg's damping over the largest singular value of the sensitivities: less effect counts as none.
@@ -42,7 +42,7 @@ SEARCH = Search()
 
 
 def lack(what: str, wanted: float | None, found: float) -> str:
-    """What was asked for and not reached, in words, or ""."""
+    """Return the part of the target that was not reached, as text, or ""."""
     if wanted is None or abs(found / wanted - 1) < SEARCH.kept:
         return ""
     return f"the {what} that was asked for, {wanted:.5g}, was not reached: {found:.5g}"
@@ -112,7 +112,7 @@ class Aim:
                 f" deviation is {100 * off[worst]:+.3g} %, at reference length {s[worst]:.4g}. {self._stop(run)}.")
 
     def _stop(self, run: DesignRun) -> str:
-        """Which bounds, or the held volume, keep the wall from what is wanted, by the derivatives of a run."""
+        """Return the bounds, or the kept volume, that prevent the wanted wall, by the derivatives of a run."""
         try:
             left, by = self.residual(run)
         except InputError as error:

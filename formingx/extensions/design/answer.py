@@ -1,4 +1,4 @@
-"""What a search came to: before and after, and how sure it is."""
+"""Result of a search: before and after, and its confidence."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class Answer:
 
     Attributes:
         before, best: the first and the best `DesignRun`; runs: all that were taken, in order; failed: why others made
-            no path, in words; inside: which places of the wall counted, shape (k,); why: the search ended; foretold:
-            the wall that the run before the best foretold for it, shape (k,), length; lack: a volume, a wall or a least
-            wall that was asked for and not reached, and what stops it, in words, or ""; wanted: the wall that was asked
-            for at the places that count, shape (m,), length, or None; measured: the `MeasuredWall` that was fitted to,
-            or None.
+            no path, as text; inside: which places of the wall counted, shape (k,); why: the search ended; predicted:
+            the wall that the run before the best predicted for it, shape (k,), length; lack: a volume, a wall or a
+            least wall that was asked for and not reached, and what stops it, as text, or ""; wanted: the wall that
+            was asked for at the places that count, shape (m,), length, or None; measured: the `MeasuredWall` that
+            was fitted to, or None.
     """
 
     before: DesignRun
@@ -50,7 +50,7 @@ class Answer:
 
     @cached_property
     def confidence(self) -> Confidence:
-        """How sure the parameters are after a fit to a measured wall, and which it does not tell.
+        """Confidence of the parameters after a fit to a measured wall, and parameters that it leaves undetermined.
 
         Raises:
             InputError: no measured wall was fitted to, or it has no more points than there are parameters.
@@ -61,7 +61,7 @@ class Answer:
 
     @property
     def values(self) -> dict[str, Any]:
-        """Of the parameters, by name."""
+        """Values of the parameters, by name."""
         return self.best.values
 
     @property

@@ -32,7 +32,7 @@ def carry(path: Path, end: Any, neighbours: Sequence[Neighbour]) -> None:
     end: the `Target` of a run with one control, or the stages of a process.
 
     Raises:
-        Failure: the run has no derivative, in words.
+        Failure: the run has no derivative, as text.
     """
     _Carrier(path, end, neighbours).run()
 
@@ -57,7 +57,7 @@ class _Carrier:
                 raise Failure(f"parameter {one.name} changes what the stages drive or how they end", [])
 
     def run(self) -> None:
-        """From the first state to the last."""
+        """Compute the sensitivities from the first state to the last."""
         states = self.path.states
         history = self.problem.has_history
         if history and any(state.kind == "jump" for state in states):
@@ -141,7 +141,7 @@ class _Carrier:
             self._velocity = [face.moved(b, 1.0) for face in self.problem.contacts]
 
     def _leave_out(self, state: State) -> None:
-        """What the run's points have not touched before the end of the step, the neighbours' do not either."""
+        """Keep points open in the perturbed runs that are open in the base run at the end of the step."""
         n = self.problem.n_owned
         for face, late, *others in zip(self.problem.contacts, self._late,
                                        *(one.problem.contacts for one in self.neighbours)):
@@ -260,7 +260,7 @@ def _gap(problem: Any, face: Any, point: int | None, sloped: bool) -> Any:
 
 
 def _kind(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[int]]:
-    """What a stage drives, its tables and their lengths, what it leaves out."""
+    """Return the controls of a stage, its tables and their lengths, and its inactive items."""
     return p.numbers, [(i, len(table)) for i, table in p.tables], p.off
 
 

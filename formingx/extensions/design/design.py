@@ -26,7 +26,7 @@ log = logging.getLogger("formingx")
 
 
 class Design:
-    """What may be changed in a run, and the search for the best of it.
+    """Parameters of a run, and the search for their best values.
 
     Args:
         build: a function of the parameters, by name, that returns (scene, target) or (scene, stages), as `trace` or
@@ -104,10 +104,10 @@ class Design:
                 which the parameters are fitted (`Answer.confidence`); or
             even: True: as even as can be; least standard deviation over mean.
             within: reference lengths (of the middle line, from the axis) that count; default all.
-            volume: "kept": the body's at rest stays that of the start (with a measured wall it is free); a number: it
-                is that, length^3; None: free.
-            runs: at most so many.
-            good: relative change of the wall, in the mean square, that is foretold and not worth another run.
+            volume: "kept": the body's in the reference configuration stays that of the start (with a measured wall
+                it is free); a number: it is that, length^3; None: free.
+            runs: at most this number of.
+            good: relative change of the wall, in the mean square, that is predicted and not worth another run.
             start: values to start from, by name, or a run of this design.
 
         Raises:
@@ -180,14 +180,15 @@ class Design:
                       aim.measured)
 
     def minimum_weight(self, min_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
-        """Search for the least volume of the body with a wall nowhere less than so much (successive linear programs).
+        """Search for the smallest volume of the body with a wall nowhere less than so much (successive linear
+        programs).
 
-        Each iteration minimises the volume along its derivative with the wall as its derivatives foretell it, within a
+        Each iteration minimises the volume along its derivative with the wall as its derivatives predict it, within a
         range that shrinks where a run is worse (Palacios-Gomez, Lasdon and Engquist 1982): the wall at every node is a
-        bound, and its least value, which has kinks, is not differentiated.
+        bound, and its smallest value, which has kinks, is not differentiated.
 
         Args:
-            min_wall: length; within: reference lengths that count; runs: at most so many.
+            min_wall: length; within: reference lengths that count; runs: at most this number of.
 
         Raises:
             InputError, ConvergenceError: as `fit`.

@@ -25,12 +25,12 @@ from ...solve.state import State
 
 @dataclass(frozen=True)
 class Solved:
-    """When a neighbour counts as solved for: corrections of Newton's method over its distance from the state.
+    """Convergence criterion of a perturbed run: corrections of Newton's method over its distance from the state.
 
     Attributes:
         enough, enough_in_contact: without contact, and with it.
         good: of one that is taken as it is after all iterations.
-        iterations: at most so many.
+        iterations: at most this number of.
         none: corrections over the unknowns that are round-off.
     """
 
@@ -69,7 +69,7 @@ class Neighbour:
         if self.problem.x.getSize() != base.x.getSize():
             raise InputError(f"Design: {name} changes the number of unknowns: there is no derivative by that")
         self.F, self.gradient = self.problem.x.duplicate(), self.problem.x.duplicate()
-        self.x: Any = None                                   # own part, shape (n,)
+        self.x: Any = None                                   # locally owned entries, shape (n,)
         self.control, self.memory = 0.0, self.problem.memory
         self.plans: list[Any] = []
         self.then = 0.0
@@ -102,7 +102,7 @@ class Neighbour:
                 F[numbers] = 0.0                                 # a node between two tools counts once
 
     def constraint(self, equation: Any) -> float:
-        """What is left over of an equation at its state."""
+        """Return the residual of an equation at its state."""
         self.problem.x.array_w[:] = self.x
         return float(equation(self.problem.x, self.control, self.gradient)[0])
 
@@ -115,7 +115,8 @@ class Neighbour:
 
 def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: Any,
            equations: Sequence[Any]) -> np.ndarray:
-    """Solve for the neighbours beside a state of the run, at which its problem stands; its residual, own part.
+    """Solve for the neighbours beside a state of the run, at which its problem stands; its residual, locally owned
+    entries.
 
     equation: the constraint of the run's state; None: the neighbours are in the plane normal to its path; equations: of
     the neighbours.

@@ -53,7 +53,8 @@ class Spline:
 
 
 def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, smooth: bool = False) -> Spline:
-    """A parameter of a design that is a profile of so many equidistant knots: of thickness, temperature, a constant.
+    """A parameter of a design that is a profile of this number of equidistant knots: of thickness, temperature, a
+    constant.
 
     The function that makes the scene gets it as a function of a length from 0 to 1, see `Knots`.
 
@@ -81,14 +82,14 @@ def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, s
 
 
 class Parameters:
-    """Those of a design, one after the other in a vector of n numbers.
+    """Parameters of a design, one after the other in a vector of n numbers.
 
     Args:
         given: {name: (start, low, high), a number, or what `along` returned}.
 
     Attributes:
         names: of the numbers, such as "travel" or "wall[3]"; start, low, high: shape (n,); size: what counts as one of
-            each: by how much a bounded one may change, else its start, else 1, shape (n,).
+            each: the amount by which a bounded one may change, else its start, else 1, shape (n,).
     """
 
     def __init__(self, given: Mapping[str, Any]):
@@ -117,7 +118,7 @@ class Parameters:
         return {name: (one.low, one.high) for name, one in self._given.items() if one.profile}
 
     def values(self, vector: np.ndarray) -> dict[str, Any]:
-        """What the user's function is called with."""
+        """Return the arguments of the user's function."""
         parts = np.split(vector, np.cumsum([len(one.start) for one in self._given.values()])[:-1])
         return {name: Knots(part, one.smooth) if one.profile else float(part[0])
                 for (name, one), part in zip(self._given.items(), parts)}

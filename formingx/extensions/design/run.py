@@ -57,8 +57,8 @@ class Effects:
     __repr__ = __str__
 
     def plot(self, axes: Any = None) -> Any:
-        """Draw a heat map: by how much the measure changes, to first order, where a parameter goes over a tenth of its
-        range; returns the matplotlib axes."""
+        """Draw a heat map: the amount by which the measure changes, to first order, where a parameter goes over a
+        tenth of its range; returns the matplotlib axes."""
         from ...figures import figure
         axes = axes if axes is not None else figure()[1]
         tenth, n = (self.by * self.sizes / 10).T, len(self.names)
@@ -89,7 +89,7 @@ class DesignRun:
 
     @cached_property
     def profile(self) -> Profile:
-        """Of the last state."""
+        """Profile of the last state."""
         return self.path.profile()
 
     @cached_property
@@ -103,7 +103,7 @@ class DesignRun:
 
     @property
     def volume(self) -> float:
-        """Of the whole part at rest, length^3 (in plane strain per unit depth)."""
+        """Reference volume of the whole part, length^3 (in plane strain per unit depth)."""
         return _volume(self.path.problem)
 
     @cached_property
@@ -141,8 +141,8 @@ class DesignRun:
         """A measure of the last state, shape (m,), and its derivatives by the parameters, shape (m, n).
 
         Args:
-            measure: "wall" (thickness at the nodes of the bottom face), "volume" (of the body at rest), a column of the
-                path, or a function of a path that looks at its last state.
+            measure: "wall" (thickness at the nodes of the bottom face), "volume" (of the body in the reference
+                configuration), a column of the path, or a function of a path that looks at its last state.
 
         Raises:
             InputError: the run has no derivative, or the measure looks at more than the last state.
@@ -233,7 +233,7 @@ class DesignRun:
 
 
 def _volume(problem: Any) -> float:
-    """Of the whole part at rest, length^3."""
+    """Return the reference volume of the whole part, length^3."""
     return float(problem.scene.symmetry_factor * problem.forms.volume)
 
 

@@ -25,7 +25,7 @@ _PER_DECADE = 16
 
 
 class TimedTest(NamedTuple):
-    """A homogeneous test in time, the body at rest before.
+    """A homogeneous test in time, the body in the reference configuration before.
 
     Args:
         mode: "uniaxial", "pure_shear" or "equibiaxial".

@@ -45,7 +45,7 @@ def read_tests(file: Path) -> list[tuple[str, np.ndarray]]:
 
 
 def _columns(who: str, head: list[str]) -> list[int]:
-    """Where test, stretch, stress, and time if there is any, are, by their names in the first line."""
+    """Return the columns of test, stretch, stress and, if there is one, time, by their names in the first line."""
     found: dict[str, int] = {}
     for k, cell in enumerate(head):
         words, unit = name_and_unit(cell)

@@ -1,4 +1,4 @@
-"""What a body is made of for heat, and what its faces and its inside receive: one law each.
+"""Thermal properties of a body, and the heat that its faces and its interior receive: one law each.
 
 A flux is heat into the body per area of the deformed face and time. All numbers are in one consistent set of units, the
 mesh's unit of length among them. What is said to be "a number or a table over R" may be a `formingx.table` of the
@@ -15,7 +15,7 @@ STEFAN_BOLTZMANN = 5.670374419e-8
 
 
 class ThermalProperties:
-    """What heat needs to know of a material.
+    """Thermal properties of a material.
 
     Args:
         conductivity: k, heat per time, length and degree.

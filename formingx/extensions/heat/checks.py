@@ -95,7 +95,7 @@ def springs_back(body: Any) -> Iterator[Finding]:
                 continue
             try:
                 cold, hot = value.clamped(np.array([low, high]))
-            except InputError:                              # it says so itself, if it comes to that
+            except InputError:                              # it says so itself, if it reaches that
                 continue
             if cold > _RISES * hot > 0:
                 yield Finding("warning", f"layer {layer!r}",

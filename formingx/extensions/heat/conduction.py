@@ -34,7 +34,7 @@ _MOST_ITERATIONS = 20      # of Newton's method, of radiation and of constants b
 
 
 class Stage(NamedTuple):
-    """Where an implicit stage came to: changes of T and of the lines of each touch, and the rates there.
+    """Result of an implicit stage: changes of T and of the lines of each touch, and the rates there.
 
     changes, rates: [of T, owned part, shape (n,), then of each touch, shape (its nodes, m)]; rates are those of heat,
     M dT/dt. heats: rate of heat through each boundary and source, of the whole body.
@@ -316,7 +316,7 @@ class Conduction:
         return self._form(make(self._scale * self._v))
 
     def assembled(self, form: Any) -> np.ndarray:
-        """What such a form gives now, as `power`."""
+        """Evaluate such a form, as `power`."""
         return self._assemble(form)
 
     def _form(self, form: Any) -> Any:

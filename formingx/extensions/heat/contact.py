@@ -101,7 +101,7 @@ class ContactWithTool:
 
 
 class Answer(NamedTuple):
-    """How lines answer in a stage: q = g (free - T); their change is `change` - q `column`.
+    """Response of the lines in a stage: q = g (free - T); their change is `change` - q `column`.
 
     free, g: shape (n,); change: shape (n, m); column: shape (m,).
     """

@@ -40,7 +40,7 @@ _TOOLS = "a dict of (conductance, tool) by the names of contacts"
 
 
 class ToolHeat(NamedTuple):
-    """How a tool of the scene takes heat from the body where, and while, it touches it.
+    """Heat exchange of a tool of the scene with the body while, and where, it touches it.
 
     conductance: of the contact, heat per time, area and degree; tool: a temperature, or a `ConductingTool`.
     """
@@ -131,7 +131,7 @@ class Cooling:
         return thickness**2 / min(m.diffusivity for m in checked_materials(mesh, self.materials).values())
 
     def history(self, problem: Any) -> CoolingHistory:
-        """What a problem remembers of the temperature (`formingx.forms.history.History`)."""
+        """History variables of the temperature (`formingx.forms.history.History`)."""
         return CoolingHistory(self, problem)
 
     def extremes(self, scene: Any) -> tuple[float, float]:
@@ -164,9 +164,9 @@ class Cooling:
 
 
 class Memory(NamedTuple):
-    """Process time, and the state of the heat equation: the temperature, own part, shape (n,), and the lines of each
-    tool; the step in time to go on with, if there is one; heat of dissipated work (`Conduction.power`), own part, or
-    None; an earlier time, and the temperature then, or None."""
+    """Process time, and the state of the heat equation: the temperature, locally owned entries, shape (n,), and the
+    lines of each tool; the step in time to continue with, if there is one; heat of dissipated work
+    (`Conduction.power`), locally owned entries, or None; an earlier time, and the temperature then, or None."""
 
     time: float
     temperature: np.ndarray
@@ -256,7 +256,7 @@ class CoolingHistory:
         self._take()
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """See `History`; heat flows in the body as it is half-way, and half the step through what comes to touch, or
+        """See `History`; heat flows in the body as it is half-way, and half the step through what reaches touch, or
         ceases to, in it: which makes the step one of second order."""
         until = self._forms.time_at(control)
         if self._power is not None:                         # the materials have advanced
@@ -332,7 +332,7 @@ class CoolingHistory:
         comm, before = self._problem.comm, memory.before
         to_body = Carrier(comm, there(source._body.points), self._body.points).fitted
         touched = zip(source._body.touches, memory.lines, strict=True) if self._body.touches else ()
-        lines = [Carrier(comm, there(other.points), touch.points).fitted(kept)  # what is let go touches nothing
+        lines = [Carrier(comm, there(other.points), touch.points).fitted(kept)  # what is released touches nothing
                  for touch, (other, kept) in zip(self._body.touches, touched, strict=True)]
         power = None if memory.power is None else self._cooling.work_to_heat * self._body.assembled(self._dissipated)
         return Memory(memory.time, to_body(memory.temperature), lines, memory.step, power,
@@ -364,7 +364,7 @@ def _look_where_it_touches(body: Conduction, touches: Sequence[tuple[Any, Any, n
 
 
 def _such_as(scene: Any, times: float, duration: float) -> str:
-    """What to write for elements that bring down an error that is so many times what is allowed (of third order)."""
+    """Return the advice on elements that reduce an error by a factor (of third order)."""
     laws = {law.on for law in [*scene.heat.boundaries, *scene.heat._touches(scene)]}
     faces = [face for face in ("bottom", "top") if face in laws]
     if not faces or len(scene.mesh.layers) > 1:

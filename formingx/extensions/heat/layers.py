@@ -31,7 +31,8 @@ def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callab
 
     Args:
         depths: {boundary: depths that heat from there has gone at the first and the last time of interest}, lengths.
-        moved: where points of the body, shape (n, 2), are in the deformed body, in which depths are; None: at rest.
+        moved: where points of the body, shape (n, 2), are in the deformed body, in which depths are; None: in the
+            reference configuration.
     """
     grid = gathered(mesh)
     cuts = _cuts(grid, depths, moved(grid.points) if moved else grid.points)

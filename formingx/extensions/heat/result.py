@@ -1,4 +1,4 @@
-"""What a heating run gives back."""
+"""Result of a heating run."""
 
 from typing import Any, NamedTuple
 
@@ -24,7 +24,7 @@ class Spot(NamedTuple):
 
 
 class Window(NamedTuple):
-    """When the whole body came between two temperatures, and when some of it left them again; None: it did not."""
+    """Time at which the whole body is between two temperatures, and time at which a part leaves them; None: never."""
 
     reached: float | None
     left: float | None
@@ -40,7 +40,7 @@ class HeatRun:
         outputs: times asked for.
         errors_in_space: estimated largest error of the temperature that is due to the mesh, at these times, degrees.
         unit: of temperatures, "C" or "K".
-        states: [[T of the nodes, own part, then the lines of each conducting tool]] of the steps.
+        states: [[T of the nodes, locally owned entries, then the lines of each conducting tool]] of the steps.
     """
 
     def __init__(self, body: Conduction, unit: str, outputs: np.ndarray):
@@ -130,7 +130,7 @@ class HeatRun:
         return self._extreme(self._at(time)[0], -1)
 
     def time_to_reach(self, low: float, high: float) -> Window:
-        """When the whole body is first between two temperatures, and when it is so no longer.
+        """Return the times at which the whole body enters a range of temperatures and at which it leaves it.
 
         Raises:
             InputError: low is not below high.

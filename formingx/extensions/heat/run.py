@@ -46,7 +46,8 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
         times: when to look at it, times above 0 that grow, the last one the end; or the end alone. Steps end there.
         unit: of all temperatures, "C" or "K".
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
-        displacement: (u_r, u_z) of a deformed body, a Function or UFL expression on the mesh, length; None: at rest.
+        displacement: (u_r, u_z) of a deformed body, a Function or UFL expression on the mesh, length; None: in the
+            reference configuration.
         tolerance: the largest estimated error of one step, degrees.
         max_steps: more are not taken.
 
@@ -111,7 +112,7 @@ class _Displaced:
         self._mesh, self._parts = mesh, [u.sub(k).collapse() for k in (0, 1)]
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
-        """Where points, shape (n, 2), are in the deformed body."""
+        """Return the positions of points, shape (n, 2), in the deformed body."""
         return points + np.column_stack([fields.values_at(part, points, self._mesh, "heat: displacement")
                                          for part in self._parts])
 

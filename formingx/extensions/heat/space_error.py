@@ -1,4 +1,4 @@
-"""An estimate of the error in space of a temperature: what a space of one degree more would change.
+"""An estimate of the error in three dimensions of a temperature: what a space of one degree more would change.
 
 The residual of the temperature and of its change in time, tested by cubics, drives a correction over the time that the
 run has taken: (M + t K) e = t (R(T) - M dT/dt). For what varies on a short length this is the elliptic reconstruction

@@ -1,4 +1,4 @@
-"""How much of a past state's stress is left, h(I1, I2), for `KBKZ`."""
+"""Damping of the stress of a past state, h(I1, I2), for `KBKZ`."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -144,7 +144,7 @@ class SoskeyWinter(Damping):
 
 
 def _exponential(alpha: float, terms: list[tuple[float, float]], I1: Any, I2: Any) -> tuple[Any, Any, Any]:
-    """Of the sum of f exp(-n s)."""
+    """Return the derivatives of the sum of f exp(-n s)."""
     s = np.sqrt(np.maximum(alpha * I1 + (1 - alpha) * I2 - 3, 0))
     each = [f * np.exp(-n * s) for f, n in terms]
     slope = -sum(n * h for (_, n), h in zip(terms, each)) / (2 * np.maximum(s, _NEAR))

@@ -127,13 +127,14 @@ class Integral:
         return (linear + sum(D[i, j] * change[i] * change[j] for i in range(4) for j in range(4)) / 2) / 2
 
     def unsymmetric_work(self, C: Any, dC: Any, held: dict[str, Any]) -> Any:
-        """What is left of the virtual work for the entries dC of a virtual change of Cbar (UFL); 0 where refreshed."""
+        """Return the virtual work of the earlier states for the entries dC of a virtual change of Cbar (UFL); 0
+        where refreshed."""
         D, change = held["past_D"], _change(C, held)
         return sum((D[i, j] - D[j, i]) * change[j] * dC[i] for i in range(4) for j in range(4)) / 4
 
 
 def _inverse(C: np.ndarray) -> np.ndarray:
-    """Of tensors of determinant 1, shape (..., 4, n)."""
+    """Return the inverse of tensors of determinant 1, shape (..., 4, n)."""
     return np.stack(cofactor(entries(np.moveaxis(C, -2, 0))), axis=-2)
 
 

@@ -34,7 +34,7 @@ _STRAIN = 0.25
 
 
 class KBKZ(Relaxing):
-    """The factorised K-BKZ equation, the body at rest before.
+    """The factorised K-BKZ equation, the body in the reference configuration before.
 
     In small strains G(t) = G_equilibrium + sum G_k exp(-t/tau_k); after a step of strain the stress is G(t) h times
     that of a neo-Hookean body of unit modulus, so that time and strain separate. A damped material stores no
@@ -45,7 +45,7 @@ class KBKZ(Relaxing):
         damping: `PSM`, `Wagner`, ... or None: h = 1.
         equilibrium: a material that does not relax, beside it, or None.
         shift: how relaxation times depend on the temperature of the scene, see `Viscoelastic`.
-        irreversible: h of a past state is the least that it has been since then.
+        irreversible: h of a past state is the smallest that it has been since then.
 
     >>> melt = fx.KBKZ([(0.1, 0.5), (0.02, 10.0)], damping=fx.PSM(alpha=14.4, beta=0.05))
     >>> round(melt.shear_modulus, 12)
@@ -89,7 +89,8 @@ class KBKZ(Relaxing):
         return np.atleast_1d(sum(G for G, _ in self.spectrum) + rest)
 
     def strain_energy(self, F, **constants):
-        """That at once, of the network without damping: for moduli and stresses at rest."""
+        """Return the instantaneous energy of the undamped network: for moduli and stresses in the reference
+        configuration."""
         G = sum(G for G, _ in self.spectrum)
         return G / 2 * (inner(isochoric(F), (1, 1, 0, 1)) - 3) + self._relaxed_energy(F, constants)
 
@@ -98,7 +99,7 @@ class KBKZ(Relaxing):
         return self.integral.potential(isochoric(F), internal, time_step) + self._relaxed_energy(F, constants)
 
     def stored_energy(self, F, internal, **constants):
-        """As `step_energy` where no time passes: its derivative is the stress; its value means nothing."""
+        """Return `step_energy` where no time passes: its derivative is the stress; its value has no meaning."""
         return self.step_energy(F, internal, 0.0, **constants)
 
     def _modulus(self, times):

@@ -32,7 +32,7 @@ class Past(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Process time of the last accepted state; the states up to it, which memories share; of each state the least h
+    """Process time of the last accepted state; the states up to it, which memories share; of each state the smallest h
     since, shape (K, n), or None."""
 
     time: float

@@ -36,10 +36,10 @@ _THROUGH = 1.0
 
 @dataclass(frozen=True, repr=False)
 class Springback(KeyNumbers):
-    """A part before and after it was let go.
+    """A part before and after it was released.
 
     Attributes:
-        path: the run from the part in its tools to the part at rest (`Path`).
+        path: the run from the part in its tools to the part in the reference configuration (`Path`).
         before, after: its `Wall` then.
         trimmed: radius of the middle line in the tools where it was cut off, length.
         units: of the labels.
@@ -78,7 +78,7 @@ class Springback(KeyNumbers):
 
     @property
     def flange_angle(self) -> float:
-        """By how much the end of its middle line has turned upward (along Z), degrees: its warpage."""
+        """Rotation of the end of the middle line upward (along Z), degrees: the warpage."""
         turned = _end(self.after) - _end(self.before)
         return (turned + 180) % 360 - 180
 

@@ -1,4 +1,4 @@
-"""What a face in contact takes over from the same face of the body on another mesh, of which its own is what it is now.
+"""Transfer of contact tractions from the old to the new mesh of a remeshed body.
 
 On one rank. Values are linear between neighbouring points of the other face. At a node on the axis, whose share of the
 area is a rule's choice (`Lobatto`), the pressure is that beside it, and there is no friction.
@@ -47,7 +47,7 @@ class Worn(NamedTuple):
         return cls(x, d, touches, traction, pairs, slip)
 
     def moved_in(self, x: np.ndarray, d: np.ndarray) -> np.ndarray:
-        """How far points, shape (n, 2), at distances d, are to be moved out of the tool, length.
+        """Return the motion out of the tool of points, shape (n, 2), at distances d, length.
 
         No point of the body lies deeper in it than what touches beside it; between two that touch as deep as they.
         """
@@ -97,5 +97,5 @@ def take_over(face: FaceContact, worn: Worn, fields: np.ndarray, control: float)
 
 
 def _between(values: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Of pairs, shape (n, 2, ...)."""
+    """Return the values between pairs, shape (n, 2, ...)."""
     return values[:, 0] + share * (values[:, 1] - values[:, 0])

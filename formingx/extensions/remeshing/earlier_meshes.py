@@ -35,7 +35,8 @@ class FollowedProbe(Probe):
 
 
 def first_places(preformed: Any, points: np.ndarray) -> np.ndarray:
-    """Where points of a new mesh, shape (n, 2), are on the first one: fitted to the nodes of the one before."""
+    """Return the positions on the first mesh of points of a new mesh, shape (n, 2): fitted to the nodes of the mesh
+    before."""
     old, state = preformed.before
     nodes = of_mesh(old.forms.domain)
     first = nodes if old.scene.preformed is None else first_places(old.scene.preformed, nodes)
@@ -57,7 +58,7 @@ def scene_on(mesh: Any, preformed: Any) -> Any:
 
 
 def followed(problem: Any, points: np.ndarray) -> np.ndarray:
-    """Where points of the first mesh, shape (n, 2), are in that of a problem."""
+    """Return the positions in the mesh of a problem of points of the first mesh, shape (n, 2)."""
     if problem.scene.preformed is None:
         return points
     old, state = problem.scene.preformed.before

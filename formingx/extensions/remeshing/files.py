@@ -1,4 +1,4 @@
-"""In a checkpoint: a mesh that a run has made on the way, and what its body has brought to it."""
+"""Checkpoints of remeshed runs: a mesh made during the run, and the data transferred to it."""
 
 from __future__ import annotations
 

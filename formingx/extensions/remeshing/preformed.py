@@ -1,4 +1,4 @@
-"""A body whose mesh is what it was deformed to: F = grad x . F_old, and how a state goes on from there.
+"""A body whose mesh is what it was deformed to: F = grad x . F_old, and how a state continues from there.
 
 What is carried is b = F F^T/J, in which stress and energy of a neo-Hookean body are linear: in each new element the
 quadratic field that is nearest to it in the mean over its volume. So the stress does the same virtual work as before in
@@ -43,7 +43,7 @@ _LEAST = 0.3
 
 
 class Preformed(NamedTuple):
-    """What a body brings from its mesh before, of m cells; on one rank.
+    """State transfer from the mesh before, of m cells; on one rank.
 
     Attributes:
         x, rest: where corners, middles and centres are now, and were without displacement, shape (m, 7, 2), length.
@@ -63,7 +63,7 @@ class Preformed(NamedTuple):
 
     @classmethod
     def of(cls, problem: Any, state: Any) -> Preformed:
-        """What the body of a state brings."""
+        """Return the transfer data of the body of a state."""
         forms = problem.forms
         with problem.state_context(state):
             both = in_own_cells(forms.domain, ufl.as_vector([*(forms.X + forms.u), *forms.X]), _PLACES)
@@ -91,7 +91,7 @@ class Preformed(NamedTuple):
         return save(problem)
 
     def first_places(self, points: np.ndarray) -> np.ndarray:
-        """Where points of the new mesh, shape (n, 2), are on the first one."""
+        """Return the positions on the first mesh of points of the new mesh, shape (n, 2)."""
         return first_places(self, points)
 
     def gradient(self, forms: Any) -> tuple[Any, Any]:

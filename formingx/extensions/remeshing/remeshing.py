@@ -2,7 +2,7 @@
 
 For blocks that are crushed: where the volume ratio J at a quadrature point leaves its range, a new mesh is made of the
 outline as it is now, and takes over what the body carries: deformation so far, pressures, what touches and with which
-pressure and friction. The state that the new mesh comes to at the same travel is one of kind "remesh".
+pressure and friction. The state that the new mesh reaches at the same travel is one of kind "remesh".
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ _WORN = "the mesh is worn"
 
 @dataclass(frozen=True)
 class Remesh:
-    """When a mesh is made again, and of which elements: for `formingx.trace`.
+    """Criterion for a new mesh, and the sizes of its elements: for `formingx.trace`.
 
     Args:
         size: length of an edge of an element, as the body is then.
@@ -137,7 +137,7 @@ def _follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[]
     """Follow a path with as many meshes as it takes.
 
     Args:
-        part: goes on from the last state, on the mesh of that, as a run that was interrupted does.
+        part: continues from the last state, on the mesh of that, as a run that was interrupted does.
         done: True if nothing is left to do.
 
     Raises:
@@ -339,7 +339,7 @@ def _outside(x: np.ndarray, names: frozenset[str], worn: list[tuple[Any, Worn, n
 
 
 def _corners(edges: np.ndarray, names: list[frozenset[str]], touched: list[tuple[str, np.ndarray]]) -> np.ndarray:
-    """Where two faces meet that tools may press on, and the ends of what they do press on, shape (k, 2)."""
+    """Return the corners between two faces under tools, and the ends of the areas in contact, shape (k, 2)."""
     faces = {on for on, _ in touched}
     found = []
     press = np.zeros(len(edges), dtype=bool)

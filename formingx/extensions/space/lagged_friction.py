@@ -1,4 +1,5 @@
-"""Friction in space, and sliding without it, lagged by a step: what touches stays on the surface of its tool.
+"""Friction in three dimensions, and sliding without it, lagged by a step: what touches stays on the surface of its
+tool.
 
 Which points touch is lagged as in `lagged_stick`. The traction of a point that touches, per unit reference area, is
 
@@ -11,7 +12,7 @@ the last accepted state, changed as the tangent of the path predicts, then the p
 with it, until both agree (`StepLimits.behind`). It is 0 for a point that has touched since the last state: steps are
 short enough for the pressure to change little in each (`StepLimits.lag`).
 
-In a step a point pulls as well as it pushes, so that Newton's method meets no kink; at its end what pulls lets go.
+In a step a point pulls as well as it pushes, so that Newton's method meets no kink; at its end what pulls separates.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ _SLIDES_ON = 1 + 1e-9      # kept slip of what slides, over g_s: it goes on slid
 
 
 class Near(NamedTuple):
-    """Where n points stand to a tool in space.
+    """Distances, normals and Hessians of n points relative to a tool in three dimensions.
 
     Attributes:
         distance: to its surface, positive inside the tool, shape (n,), length.
@@ -68,7 +69,7 @@ class LaggedFriction(LaggedStick):
         return LaggedFriction(self.tool, self.mu, self.k, self.theta, self.elastic_slip)
 
     def pulling(self, x: np.ndarray, old: Touch) -> np.ndarray:
-        """Which points that touch pull, shape (n,): they are outside the tool."""
+        """Return a mask of touching points in tension, shape (n,): they are outside the tool."""
         return self.held(old) & (self.distance(x) < -SMALL_GAP * self.theta)
 
     def start(self, x: np.ndarray) -> Touch:

@@ -1,4 +1,4 @@
-"""Contact in space, lagged by a step: what touches is held where it crossed the tool, from the next step on.
+"""Contact in three dimensions, lagged by a step: what touches is held where it crossed the tool, from the next step on.
 
 A point whose straight way between two accepted states leads into the tool is held by an isotropic penalty, in the
 steps after, at the place where that way crossed the surface (as the user's guide of Polyflow describes of its contact).
@@ -6,10 +6,10 @@ Within a step nothing changes: the law is linear, and Newton's method meets no k
 asks the tool. The price is an error of first order in how far points move in the step in which they arrive: with 1 % of
 the points to a step, walls are within 0.1 % of those of exact stick. The tool must give its signed distance alone.
 
-What is held stays so until a stage leaves the tool out. With `separates=True` points that pull at it are let go of
-at the end of each step, until none does, the control standing still; a body that snaps off comes to rest by a jump.
-That is proven of elastic sheets. Of relaxing ones it is refused: slack under the plug, points let go and touch again
-at each step, and the run comes to a stop.
+What is held stays so until a stage leaves the tool out. With `separates=True` points that pull at it are released of
+at the end of each step, until none does, the control standing still; a body that snaps off reaches equilibrium by a
+jump. That is proven of elastic sheets. Of relaxing ones it is refused: slack under the plug, points separate and
+touch again at each step, and the run reaches a stop.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from ...tools.tool import RigidTool
 _BISECTIONS = 30           # of a chord, to where it crosses a tool: 1e-9 of it
 
 _PULLS = 0.01
-"""Part, out of the tool, of the way by which the penalty gives way, from which on a point pulls (sheared along a facet
+"""Part, out of the tool, of the way by which the penalty deforms, from which on a point pulls (sheared along a facet
 it goes out round its edges)."""
 
 SMALL_GAP = 1e-3
@@ -41,7 +41,7 @@ class LaggedStick:
     Args:
         tool: with its signed distance.
         k: penalty, stress/length; theta: distance from which on a point counts as touching, length.
-        separates: points let go that pull, see `pulling`.
+        separates: points separate that pull, see `pulling`.
     """
 
     has_friction = False
@@ -65,11 +65,12 @@ class LaggedStick:
         return self
 
     def held(self, old: Touch) -> np.ndarray:
-        """Which points are held, shape (n,)."""
+        """Return a mask of the sticking points, shape (n,)."""
         return old.distance > -self.theta
 
     def pulling(self, x: np.ndarray, old: Touch) -> np.ndarray:
-        """Which held points pull at a tool that separates, shape (n,): the penalty gives way, they are outside."""
+        """Return a mask of sticking points in tension on a separating tool, shape (n,): they are outside, by the
+        penalty."""
         away = np.linalg.norm(x - old.position, axis=1)
         most = np.maximum(_PULLS * away, SMALL_GAP * self.theta)
         return self.separates & self.held(old) & (-self.distance(x) > most)
@@ -88,7 +89,7 @@ class LaggedStick:
         return found
 
     def start(self, x: np.ndarray) -> Touch:
-        """What touches from the start is held from the start."""
+        """Let the points that touch at the start stick from the start."""
         d = self.distance(x)
         held = d > -self.theta
         return Touch(x.copy(), np.where(held, 0.0, d), np.zeros(len(x)), x.copy())
@@ -129,7 +130,7 @@ class LaggedStick:
         return np.zeros(len(x))
 
     def _touch(self, x: np.ndarray, old: Touch, held: np.ndarray) -> Touch:
-        """What to remember of an accepted state."""
+        """Return the history variables of an accepted state."""
         d = self.distance(x)
         new = ~held & (d > -self.theta)
         position = np.where(held[:, None], old.position, x)

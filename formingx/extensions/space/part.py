@@ -27,7 +27,7 @@ class PartInSpace(PartNumbers):
         min_wall: length; min_wall_at: (x, y, z) where; min_wall_reference: (x, y) where it was on the flat sheet.
         uniformity: minimum over mean wall; variation: standard deviation of the wall over the surface, over its mean.
         weight: grams if a density in g/cm3 was given; else None. scrap: volume beyond the trim over that of the sheet.
-        wrinkled: share of the area at rest that is in compression.
+        wrinkled: share of the area in the reference configuration that is in compression.
         basis: what volume, area and weight are given for, as text; "" of a part that was modelled as a whole.
         units: of the labels.
     """
@@ -95,8 +95,9 @@ def _beyond(d: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, repr=False)
 class FillingInSpace(Sheet):
-    """How far a tool is filled, state by state: touching: share of the sheet's area at rest that is held or nearer to
-    the tool than a tenth of its thickness; gap: the largest distance from it, length; control, states: of the run."""
+    """Filling of a tool, state by state: touching: share of the sheet's area in the reference configuration
+    that is held or nearer to the tool than a tenth of its thickness; gap: the largest distance from it, length;
+    control, states: of the run."""
 
     control: tuple[str, np.ndarray]
     touching: np.ndarray

@@ -1,4 +1,4 @@
-"""What a scene in space may have, and what is not proven there and so refused."""
+"""Checks of a scene in three dimensions; unproven combinations are refused."""
 
 from collections.abc import Callable, Mapping
 from functools import partial

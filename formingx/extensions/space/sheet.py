@@ -22,7 +22,8 @@ _PARTS = ("whole", "half", "quarter")
 
 @dataclass(frozen=True)
 class Sheet(Mesh):
-    """A sheet in space: plane triangles at rest, coordinates (x, y, z). Its layers are all over it.
+    """A sheet in three dimensions: plane triangles in the reference configuration, coordinates (x, y, z). Its layers
+    are all over it.
 
     Beside the boundaries that its outline names there are its faces, "bottom" and "top" (towards +z): as a boundary
     each has all edges. A membrane has one surface only; on which face a pressure acts says which way it pushes.
@@ -178,7 +179,7 @@ def _chords(edges: list[Edge]) -> np.ndarray:
 
 
 class _Size:
-    """What a user asks for; as a function for gmsh, which swallows errors: the first is kept in `refused`."""
+    """Size that a user asks for, as a function for gmsh, which swallows errors: the first is kept in `refused`."""
 
     def __init__(self, size: Any):
         self._size = size

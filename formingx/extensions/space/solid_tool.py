@@ -1,4 +1,5 @@
-"""Rigid tools in space: profiles swept about an axis, along a line or round a box, and closed surfaces of triangles.
+"""Rigid tools in three dimensions: profiles swept about an axis, along a line or round a box, and closed surfaces of
+triangles.
 
 Distances to swept profiles are exact where the profile's are, off the edges at which a profile ends.
 """
@@ -210,10 +211,10 @@ class Triangulated(SolidTool):
         return self._points, self._triangles
 
     def undercuts(self, along: tuple[float, float, float] = (0, 0, 1)) -> dict[str, float]:
-        """How a part comes out of a mould along a direction: {"undercut_area", "least_draft"} (area; degrees).
+        """Compute undercuts and draft of a mould along a direction: {"undercut_area", "least_draft"} (area; degrees).
 
         Of the faces that look into the hull of the tool, and lie in no other of its bodies: the area of those that look
-        against the direction, and the least angle of the others to it (90: a floor).
+        against the direction, and the smallest angle of the others to it (90: a floor).
         """
         from scipy.spatial import ConvexHull
         way = direction("undercuts: along", along)

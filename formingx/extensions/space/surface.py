@@ -1,4 +1,5 @@
-"""A scene in space as a membrane: triangles of a flat sheet that deform in three dimensions, its thickness as data.
+"""A scene in three dimensions as a membrane: triangles of a flat sheet that deform in three dimensions, its
+thickness as data.
 
 With the columns f1, f2 of the deformed sheet's gradient and J = |f1 x f2|, F = [[|f1|, f1.f2/|f1|, 0],
 [0, J/|f1|, 0], [0, 0, 1/J]] is, up to a rotation, the deformation gradient of the material, whose volume is kept
@@ -29,10 +30,10 @@ _REGULAR = 1e-7
 
 
 class Surface(Formulation):
-    """The forms of a sheet in space; the only field is its displacement.
+    """The forms of a sheet in three dimensions; the only field is its displacement.
 
     Attributes:
-        thicknesses: {layer: its thickness at rest (`Function`, length)}.
+        thicknesses: {layer: its thickness in the reference configuration (`Function`, length)}.
     """
 
     slack_at_rest = True
@@ -85,7 +86,7 @@ class Surface(Formulation):
         return sum(self.thicknesses.values())
 
     def _deformation_gradient(self) -> Any:
-        """In a basis of the tangent plane."""
+        """Return the deformation gradient in a basis of the tangent plane."""
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)
         f1, f2 = (ufl.as_vector([F[i, k] for i in range(3)]) for k in (0, 1))
         n = ufl.cross(f1, f2)
@@ -110,7 +111,7 @@ class Surface(Formulation):
 
 
 class _Always:
-    """In place of `Admissible`."""
+    """Replacement of `Admissible` for a membrane."""
 
     def holds(self) -> bool:
         return True
@@ -138,5 +139,6 @@ def relaxed(F: Any) -> Any:
 
 
 def wrinkled(stretches: np.ndarray) -> np.ndarray:
-    """Where a membrane of these principal stretches, the larger first, shape (n, 2), is in compression, shape (n,)."""
+    """Return a mask of compression for a membrane of principal stretches, the larger first, shape (n, 2), shape
+    (n,)."""
     return (stretches[:, 1] < stretches[:, 0] ** -0.5 * (1 - 1e-9)) | (stretches[:, 0] < 1 - 1e-9)

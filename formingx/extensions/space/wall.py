@@ -21,9 +21,9 @@ class WallInSpace(Sheet):
     """The wall of m triangles in one state; all ranks hold all of it.
 
     Attributes:
-        rest, now: of the n nodes, shape (n, 3), length; triangles: nodes of each, shape (m, 3), seen from +z at rest
-            counter-clockwise.
-        layers: {name: thickness at rest, in the middle of each triangle, shape (m,)}.
+        rest, now: of the n nodes, shape (n, 3), length; triangles: nodes of each, shape (m, 3), seen from +z in the
+            reference configuration counter-clockwise.
+        layers: {name: thickness in the reference configuration, in the middle of each triangle, shape (m,)}.
         comm: of the run.
     """
 
@@ -35,17 +35,17 @@ class WallInSpace(Sheet):
 
     @cached_property
     def area_at_rest(self) -> np.ndarray:
-        """Of each triangle, shape (m,), length^2."""
+        """Reference area of each triangle, shape (m,), length^2."""
         return np.linalg.norm(_normals(self.rest[self.triangles]), axis=1)
 
     @cached_property
     def area(self) -> np.ndarray:
-        """Of each triangle now, shape (m,), length^2."""
+        """Deformed area of each triangle, shape (m,), length^2."""
         return np.linalg.norm(_normals(self.now[self.triangles]), axis=1)
 
     @property
     def thickness_at_rest(self) -> np.ndarray:
-        """Of all layers, shape (m,), length."""
+        """Reference thickness of all layers, shape (m,), length."""
         return np.sum(list(self.layers.values()), axis=0)
 
     @property
@@ -55,25 +55,25 @@ class WallInSpace(Sheet):
 
     @property
     def wall(self) -> np.ndarray:
-        """Of each triangle, shape (m,), length."""
+        """Deformed thickness of each triangle, shape (m,), length."""
         return self.thickness_at_rest * self.ratio
 
     @cached_property
     def middle(self) -> np.ndarray:
-        """Of each triangle now, shape (m, 3), length."""
+        """Deformed position of the middle of each triangle, shape (m, 3), length."""
         return self.now[self.triangles].mean(1)
 
     @cached_property
     def stretches(self) -> np.ndarray:
         """Principal, in the surface, the larger first, shape (m, 2)."""
         a, b = (x[self.triangles[:, 1:]] - x[self.triangles[:, :1]] for x in (self.rest, self.now))
-        inverse = np.linalg.inv(a[..., :COORDINATES])                             # the sheet is flat at rest
+        inverse = np.linalg.inv(a[..., :COORDINATES])  # the sheet is flat in the reference configuration
         F = np.einsum("mij,mjk->mki", inverse, b)
         return np.linalg.svd(F, compute_uv=False)
 
     @property
     def wrinkled(self) -> np.ndarray:
-        """Which triangles are in compression, shape (m,): a membrane wrinkles there."""
+        """Mask of triangles in compression, shape (m,): a membrane wrinkles there."""
         return wrinkled(self.stretches)
 
     @cached_property
@@ -99,7 +99,7 @@ class WallInSpace(Sheet):
     def around(self, point: tuple[float, float, float], radius: float) -> float:
         """Mean wall ratio of the triangles whose middle is now within a radius of a point; else of the nearest one.
 
-        Weighted by their areas at rest.
+        Weighted by their areas in the reference configuration.
         """
         away = np.linalg.norm(self.middle - triple("around: point", point), axis=1)
         near = away <= positive("around: radius", radius)
@@ -147,7 +147,7 @@ class WallInSpace(Sheet):
         return dict(zip(("arc_length", "x", "y", "z", "wall"), np.array(found).T))
 
     def printed(self, size: float) -> list[np.ndarray]:
-        """Where the lines of a square grid printed on the flat sheet are now: lines, shape (k, 3) each, length.
+        """Return the deformed lines of a square grid printed on the flat sheet: shape (k, 3) each, length.
 
         Lines x = i size and y = j size; nodes between where they cross edges of triangles.
         """
@@ -201,5 +201,5 @@ def wall_of(path: Any, state: Any) -> WallInSpace:
 
 
 def _normals(corners: np.ndarray) -> np.ndarray:
-    """Of triangles, shape (m, 3, 3): half the cross product of two edges, shape (m, 3)."""
+    """Return half the cross product of two edges of triangles, shape (m, 3, 3): shape (m, 3)."""
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2

@@ -26,9 +26,10 @@ class HoopResultants(Sheet):
     which has no bending stiffness, wrinkles there.
 
     Attributes:
-        points: of the middle line at rest, (R, Z), in the middle of its elements, shape (n, 2), length.
-        resultant: N = the integral of P (first Piola-Kirchhoff, hoop) through the sheet at rest, shape (n,): force by
-            length of the middle line at rest.
+        points: of the middle line in the reference configuration, (R, Z), in the middle of its elements, shape (n,
+            2), length.
+        resultant: N = the integral of P (first Piola-Kirchhoff, hoop) through the sheet in the reference
+            configuration, shape (n,): force by length of the middle line in the reference configuration.
         comm: of the run.
     """
 
@@ -38,7 +39,7 @@ class HoopResultants(Sheet):
 
     @property
     def compressed(self) -> np.ndarray:
-        """Where it is below 0, shape (n,)."""
+        """Mask of places in hoop compression, shape (n,)."""
         return self.resultant < 0
 
     @property

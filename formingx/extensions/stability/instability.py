@@ -1,4 +1,4 @@
-"""What a run's states say about their stability: which modes are unstable, from where on, and what they look like."""
+"""Stability of the states of a run: unstable modes, their critical points, and their shapes."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class CriticalPoint:
         flipped: name of the mirror that turns its image round, or None.
         left, right: the states of the path before and behind; state: where it happens, with `measures`.
         gained: False if the body is stable again behind.
-        control, driven: what is driven there, the user's units (pressure, travel, time), and what it is.
-        limit_point: True if it is that of what is driven (n = 0): expected, no branch begins there.
+        control, driven: the controlled quantity there, the user's units (pressure, travel, time), and what it is.
+        limit_point: True if it is that of the controlled quantity (n = 0): expected, no branch begins there.
         solved: True if `state` is a solution; False if it lies on the smooth path between its neighbours.
         points, amplitudes: reference positions (R, Z) of nodes, shape (m, 2), length, and amplitudes (U, W, V) of
             u_r = U cos, u_z = W cos, u_hoop = V sin there, the largest 1, shape (m, 3); of all ranks.
@@ -197,7 +197,7 @@ class Watch:
         return Stability(self._path, numbers, chosen, counts, losses)
 
     def _between(self, a: State, b: State, kind: Kind, count_at: Any) -> list[CriticalPoint]:
-        """What happens between two states: found between neighbours of the path, however far these are."""
+        """Return the critical points between two states, located between neighbours of the path."""
         if count_at(a, kind) == count_at(b, kind):
             return []
         segment = self._path.segment(a)
@@ -270,7 +270,7 @@ class InstabilityCondition:
         self.modes = modes
 
     def watch(self, path: Any) -> None:
-        """From now on look at the last state whenever a step of the path is complete."""
+        """Examine the last state whenever a step of the path is complete."""
         watch, numbers = Watch(path), wave_numbers(path.problem.scene, self.modes)
         first: dict[Kind, int] = {}
 

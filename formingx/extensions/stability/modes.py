@@ -21,7 +21,7 @@ from .second_variation import SecondVariation
 
 @dataclass(frozen=True)
 class Lanczos:
-    """How modes are computed, by Lanczos' method with the inverse.
+    """Settings of Lanczos' method with the inverse, which computes the modes.
 
     Attributes:
         steps: at most, each a solve with factors that are there.
@@ -37,7 +37,7 @@ class Lanczos:
 
 @dataclass(frozen=True)
 class Locating:
-    """How the state at which a mode ceases to be stable is located between two others.
+    """Settings for the location of a critical point between two states.
 
     Attributes:
         states: solved for at most.
@@ -65,11 +65,12 @@ class Kind(NamedTuple):
 
 
 class Located(NamedTuple):
-    """Where a mode begins, or ceases, to be unstable.
+    """Critical point at which a mode becomes unstable, or stable again.
 
     kind: of the mode; left, right: the states before and behind; state: there; mode: amplitudes (U, W, V) at `nodes` of
-    the second variation, own part; x: its U and W as unknowns of the problem, own part; fraction: where it is from left
-    (0) to right (1); gained: True if the body is less stable behind; solved: True if `state` was solved for, else it
+    the second variation, locally owned entries; x: its U and W as unknowns of the problem, locally owned entries;
+    fraction: where it is from left (0) to right (1); gained: True if the body is less stable behind; solved: True if
+        `state` was solved for, else it
     lies on the cubic between left and right.
     """
 
@@ -124,9 +125,9 @@ class Modes:
         return self._solver.negative_pivots() - self.variation.negative
 
     def locate(self, a: State, b: State, kind: Kind, index: int) -> Located:
-        """Where between two states the eigenvalue with so many below it changes its sign.
+        """Locate the sign change of the eigenvalue with this number of lower ones between two states.
 
-        Counts bracket it; inside the bracket it is foretold by the eigenvalues of one mode, which is followed by its
+        Counts bracket it; inside the bracket it is predicted by the eigenvalues of one mode, which is followed by its
         shape: others cross it on their way.
         """
         looks = [self._look(0.0, a, kind, index), self._look(1.0, b, kind, index)]
@@ -258,7 +259,7 @@ class Modes:
 
 
 def _root(values: list[tuple[float, float]], low: float, high: float) -> float | None:
-    """Where the polynomial (of the fraction over the eigenvalue) through those nearest to 0 has its root, if inside."""
+    """Return the root of the polynomial (of the fraction over the eigenvalue) through those nearest to 0, if inside."""
     known = sorted(values, key=lambda one: abs(one[1]))[:4]
     for n in range(len(known), 1, -1):
         s, f = (np.array([one[k] for one in known[:n]]) for k in (0, 1))

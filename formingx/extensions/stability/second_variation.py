@@ -42,7 +42,7 @@ class _ModedBody(LoadedBody):
 
 
 class SecondVariation:
-    """That of a problem, at the state that the problem stands at; created once.
+    """Second variation of the energy of a problem at its present state; created once.
 
     Args:
         problem: of a solid.
@@ -115,7 +115,7 @@ class SecondVariation:
         return np.column_stack([x[U], x[W], x[V] - self._turned.value * x[U]])
 
     def plane(self, x: np.ndarray) -> np.ndarray:
-        """What a mode is to the problem: its U, W and pressures as unknowns, own part, shape of the problem's x."""
+        """Return U, W and pressures of a mode as locally owned unknowns, shape of the problem's x."""
         found = np.zeros(self.problem.x.getLocalSize())
         found[: self.problem.n_owned] = x[self._to_mode[: self.problem.n_owned]]
         return found

@@ -25,7 +25,7 @@ from ...units import NONE, Units
 from .instability import CriticalPoint, Stability, wave_numbers
 
 _FOOT: dict[str, Any] = {"points": 16, "penalty": 2.0, "ramp": 1e-4}
-"""Contact of the foot: a line on a rigid plate hops from point to point; this many, on a plate that gives way by a
+"""Contact of the foot: a line on a rigid plate hops from point to point; this many, on a plate that deforms by a
 thousandth of the wall or so, roll."""
 
 _STEP = 0.004
@@ -34,14 +34,14 @@ _STEP = 0.004
 
 @dataclass(eq=False, repr=False)
 class TopLoad:
-    """What a body bears that is pushed down on a plate; print it.
+    """Top load of a body pushed down on a plate; prints a table.
 
     Attributes:
         path: its axisymmetric path; stability: modes that are lost along it.
         travel, force: of the neck, positive downwards, at all states, shape (n,) each, length and force.
         largest_force, at_travel: the peak of the force of the axisymmetric path.
         peak: False if the force is largest in the last state: it may grow further.
-        ended: why the path ended before the travel that was asked for, in words, or "".
+        ended: why the path ended before the travel that was asked for, as text, or "".
         energy: up to the first buckling, or to the largest force, length force.
         units: of the labels.
     """
@@ -70,11 +70,11 @@ class TopLoad:
 
     @property
     def first(self) -> CriticalPoint | None:
-        """Where it buckles first, or None."""
+        """First buckling point, or None."""
         return self.stability.first
 
     def of(self, number: float) -> CriticalPoint | None:
-        """Where it buckles first in so many waves, or None; `buckling` has its force and travel."""
+        """Return the first buckling point with a number of waves, or None; `buckling` has its force and travel."""
         return self.stability.first_of(number)
 
     def buckling(self, number: float) -> tuple[float, float] | None:
@@ -117,7 +117,7 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
              step: StepControl | None = None, units: Units | None = None) -> TopLoad:
     """Push a body, free of stress, down on a frictionless plate by its neck; look where it buckles round the axis.
 
-    The neck is held radially and round the axis. Contact gives way by about a thousandth of the wall, so that the ring
+    The neck is held radially and round the axis. Contact deforms by about a thousandth of the wall, so that the ring
     on which a bottle stands rolls on.
 
     Args:
@@ -131,7 +131,7 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
         units: a `formingx.Units`, for the labels.
 
     Raises:
-        InputError: an argument that is not allowed; the foot does not come to the floor.
+        InputError: an argument that is not allowed; the foot does not reach the floor.
         ConvergenceError: not even the first state was found.
 
     >>> tube = fx.mesh.disc(radius=1.0, inner_radius=0.8, thickness=4.0, elements=(1, 8))

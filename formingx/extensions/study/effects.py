@@ -1,4 +1,4 @@
-"""What a study found, drawn: main effects, Pareto fronts, and a page of both."""
+"""Pictures of a study: main effects, Pareto fronts, and a page of both."""
 
 import html
 import itertools

@@ -1,4 +1,4 @@
-"""Many runs of one script with other numbers: tables, main effects, what is best; in parallel, and to go on with.
+"""Many runs of one script with other numbers: tables, main effects, what is best; in parallel, and to continue with.
 
     def pot(depth, radius):                                  # importable: a function of a script or of a module
         ...
@@ -65,7 +65,7 @@ class StudyRun:
 
 
 class _Task(NamedTuple):
-    """What a process runs."""
+    """Task of one process."""
 
     build: Callable[..., Any]
     measure: dict[str, Measure]
@@ -183,7 +183,7 @@ class Study(Sheet):
         variables whose effect is smooth. A run that fails counts as worse than all others.
 
         Args:
-            evaluations: at most so many more runs, one after the other.
+            evaluations: at most this number of more runs, one after the other.
             within: {variable: (lowest, highest)}; what is not named stays at its best. Default: all that vary, within
                 what was run.
             executor: as in `study`; default: a process of its own.

@@ -1,1 +1,1 @@
-"""What can be read off a state: profile, stress."""
+"""Evaluation of a state: profile, stress."""

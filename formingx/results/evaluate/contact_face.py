@@ -1,4 +1,4 @@
-"""What a tool and a face of the body do to each other, point by point: pressure, friction, gap; the tool's force."""
+"""Contact of a tool with a face of the body, point by point: pressure, friction, gap; the tool's force."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from ..files.sheet import Sheet
 
 @dataclass(frozen=True, repr=False)
 class ContactTable(Sheet):
-    """A face that meets a tool, at the n points where contact acts (nodes or Gauss points), by R at rest.
+    """A face that meets a tool, at the n points where contact acts (nodes or Gauss points), by R in the reference
+    configuration.
 
     Attributes:
         rest: (R, Z), shape (n, 2), length.
@@ -47,9 +48,9 @@ class ContactFace:
     """The face of one contact of a problem (`FaceContact`), its points from all ranks in one order; collective.
 
     Attributes:
-        rest: the points at rest, shape (n, 2), length, by R, then Z.
-        nodes, nearest: nodes of the face at rest, edge by edge, shape (m, 2), length, and the numbers of the points
-            that stand for them: they themselves, or the nearest Gauss points, shape (m,).
+        rest: the points in the reference configuration, shape (n, 2), length, by R, then Z.
+        nodes, nearest: nodes of the face in the reference configuration, edge by edge, shape (m, 2), length, and the
+            numbers of the points that stand for them: they themselves, or the nearest Gauss points, shape (m,).
     """
 
     def __init__(self, path: Any, contact: Any):

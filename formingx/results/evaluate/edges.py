@@ -1,4 +1,4 @@
-"""Whether elements are small enough for the edges of tools that a body slides over."""
+"""Size of elements at the edges of tools over which a body slides."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _TURN = 40.0
 
 
 class Edge(NamedTuple):
-    """Where a convex edge of a tool turns most between two neighbouring contact points, one of which slides over it.
+    """Convex edge of a tool that turns most between two neighbouring contact points, one of which slides over it.
 
     turn: degrees; tool: its name, or the face that touches it; point: (r, z) now, length.
     """

@@ -1,4 +1,4 @@
-"""How far a mould is filled: the gap that is left in each corner, state by state."""
+"""Filling of a mould: the remaining gap in each corner, state by state."""
 
 from __future__ import annotations
 

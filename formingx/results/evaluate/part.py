@@ -22,14 +22,15 @@ class Part(PartNumbers):
     Attributes:
         volume: between the two faces, length^3 (a rim that bulges is left out).
         area: of the middle surface, length^2.
-        draw_ratio: area over the area that it had at rest (areal draw ratio).
+        draw_ratio: area over the area that it had in the reference configuration (areal draw ratio).
         mean_wall: volume over area, length.
         min_wall: length; and where: reference radius, (r, z) of the middle line, height (as in `Wall`);
-            min_wall_reference: ("R", radius at rest), of a parison ("Z", height of its inner face at rest).
-        uniformity: least wall over mean wall, 1 for an even part.
+            min_wall_reference: ("R", radius in the reference configuration), of a parison ("Z", height of its inner
+                face in the reference configuration).
+        uniformity: minimum wall over mean wall, 1 for an even part.
         variation: standard deviation of the wall over the middle surface, over its mean: coefficient of variation.
-        weight: grams if a density in g/cm3 was given; else None: of what the material was at rest, before anything
-            expanded, so that it does not change with the temperature.
+        weight: grams if a density in g/cm3 was given; else None: of what the material was in equilibrium, before
+            anything expanded, so that it does not change with the temperature.
         walls: {height: wall there}, lengths.
         capacity: that the part holds, length^3: within its inner face, between planes across its ends (of a closed
             bottle: all of it; of a pot: to its rim, or to the trim).
@@ -99,7 +100,7 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
 
 
 def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndarray:
-    """How much of each of the n - 1 strips between nodes belongs to the part, 0 to 1."""
+    """Return the share of each of the n - 1 strips between nodes that belongs to the part, 0 to 1."""
     inside = np.ones(len(wall.r) - 1)
     if trim is None:
         return inside
@@ -147,5 +148,5 @@ def _surface(line: np.ndarray, axisymmetric: bool) -> np.ndarray:
 
 
 def _sums(fine_values: np.ndarray, nodes: int) -> np.ndarray:
-    """What belongs to each piece between two of n nodes, of values on equal parts of it, shape (n - 1,)."""
+    """Return the sums of values over each piece between two of n nodes, on equal parts of it, shape (n - 1,)."""
     return fine_values.reshape(nodes - 1, -1).sum(1)

@@ -54,7 +54,7 @@ class Patches:
         return found
 
     def _operator(self, some: slice) -> np.ndarray:
-        """What makes coefficients of values at the points of the patches of some cells, shape (cells, 10, points)."""
+        """Return the operator from values at the points of patches to coefficients, shape (cells, 10, points)."""
         if some.start in self._kept:
             return self._kept[some.start]
         patch = self._patch[some]

@@ -21,7 +21,8 @@ class Profile:
     The wall of a parison or a sphere has its inner face for a bottom, and its outer face for a top.
 
     Attributes:
-        rest_bottom, rest_top: points (R, Z) of the two faces, opposite each other at rest, shape (n, 2), length.
+        rest_bottom, rest_top: points (R, Z) of the two faces, opposite each other in the reference configuration,
+            shape (n, 2), length.
         bottom, top: where they are now, (r, z), shape (n, 2), length.
 
     >>> wall = path.profile().thickness                                                   # from the pole to the rim

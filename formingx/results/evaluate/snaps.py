@@ -29,12 +29,12 @@ class Snap(NamedTuple):
 
     @property
     def change(self) -> float:
-        """Of the wall, over the wall before."""
+        """Change of the wall, over the wall before."""
         return abs(self.after / self.before - 1)
 
 
 def largest(path: Any) -> Snap | None:
-    """Of the jumps of a path with friction or relaxing material; None: there is none, or no wall; collective."""
+    """Return the largest jump of a path with friction or relaxing material; None: no jump, or no wall; collective."""
     jumps = [k for k, state in enumerate(path.states) if state.kind == "jump" and k]
     if not jumps or not path.problem.has_history:
         return None

@@ -102,7 +102,7 @@ class Stress:
         return np.sort(np.column_stack([mean + radius, mean - radius, s[:, 2, 2]]))[:, ::-1]
 
     def on_face(self, normal: Any) -> FaceStress:
-        """What acts on the deformed faces whose reference normals are `normal`, shape (2,) or (n, 2)."""
+        """Return the tractions on the deformed faces whose reference normals are `normal`, shape (2,) or (n, 2)."""
         N = np.broadcast_to(np.asarray(normal, dtype=float), self.points.shape)
         n = np.linalg.solve(self.deformation_gradient[:, :2, :2].transpose(0, 2, 1), N[..., None])[..., 0]
         n /= np.linalg.norm(n, axis=1)[:, None]
@@ -167,7 +167,7 @@ class StressField:
         return self._recovery.raw(self._state, self._recovery.layer(layer))
 
     def error(self, layer: str | None = None, exact: Callable | None = None) -> StressError:
-        """How far the stresses at the quadrature points are off, by estimate: in each cell and in all; collective.
+        """Estimate the error of the stresses at the quadrature points: in each cell and in all; collective.
 
         sigma_h is the stress there, sigma* that of the fitted F and S (see the module); the integrals are sums over
         the quadrature points. Where the solution is smooth, the estimate tends to the true error as meshes are refined;
@@ -239,7 +239,7 @@ class Stresses:
         return StressField(self, state)
 
     def locate(self, points: np.ndarray, layer: str) -> Place:
-        """Where points lie in a layer; those of the last call are not looked for again; collective."""
+        """Locate points in a layer; the points of the last call are kept; collective."""
         before = self._located.get(layer)
         if before is None or not np.array_equal(before[0], points):
             forms, there = self.problem.forms, self.problem.followed(points)
@@ -310,7 +310,7 @@ class Stresses:
         return largest[top], X[top]
 
     def of_layer(self, name: str | None) -> np.ndarray:
-        """Which of this rank's own cells are of a layer (None: of any), shape (m,)."""
+        """Return the locally owned cells of a layer (None: of all), shape (m,)."""
         own = own_cells(self.problem.forms.domain)
         return np.isin(own, self.cells[self.layer(name)]) if name is not None else np.ones(len(own), dtype=bool)
 

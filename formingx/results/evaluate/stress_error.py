@@ -1,4 +1,4 @@
-"""How far the stresses of a state are off, by estimate: cell by cell, in all, and at their peak."""
+"""Estimated error of the stresses of a state: cell by cell, in all, and at their peak."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def _show(point: np.ndarray) -> str:
 
 
 class Fitted(NamedTuple):
-    """What the fitted F and S of this rank's m cells say, at q quadrature points of each.
+    """Recovered F and S of m locally owned cells, at q quadrature points of each.
 
     Attributes:
         points: reference points (R, Z), shape (m, q, 2), length.

@@ -1,4 +1,4 @@
-"""Whether a membrane is in tension: in compression it wrinkles, and has no state, as nothing in it resists bending.
+"""Tension of a membrane: in compression it wrinkles, and has no state, since it does not resist bending.
 
 (Tension field theory begins there: Steigmann, Proc. R. Soc. London A 429 (1990) 141.)
 """
@@ -35,7 +35,7 @@ class Resultant(NamedTuple):
 
 
 class Tension:
-    """Finds the least principal resultant of a membrane in a state, per deformed length.
+    """Finds the smallest principal resultant of a membrane in a state, per deformed length.
 
     With F = diag(l1, l3, l2) and P = dW/dF of the stored energy, that of a layer of thickness h is
     h l3 (l_i P_ii - l3 P_33).
@@ -58,7 +58,7 @@ class Tension:
         self._found = _compat.compile_expression(values, forms.terms[0].places)
 
     def least(self, state: Any) -> Resultant:
-        """Of a state; in plane strain along the section alone: nothing wrinkles across it; collective."""
+        """Return the smallest resultant of a state; in plane strain along the section alone; collective."""
         values = self._values(state)
         n = 2 if self._problem.scene.kinematics.axisymmetric else 1
         k, i = np.unravel_index(np.argmin(values[:, :n]), (len(values), n))

@@ -1,4 +1,4 @@
-"""Whether a state is one that a body can have: looked at while the run goes, before it is accepted."""
+"""Admissibility of a state, checked during the run before it is accepted."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ...solve.state import State
 
 @dataclass(frozen=True)
 class Limits:
-    """What a state may have, and when a run warns.
+    """Limits of an admissible state, and limits from which a run warns.
 
     Attributes:
         volume: root mean square of J - 1. (Creases at clamped rims, and at corners of coarse blocks, stay below 0.17.)
@@ -27,9 +27,9 @@ class Limits:
         inside: depth of the body in a tool, over the thickness and over the length of an edge: beyond both it stands in
             the tool.
         sunk: penetration of contact points over the wall that is left there: above it the body did not follow the tool.
-            (Williams' plug on coarse elements comes to 0.051.)
-        warns: by how much penetration may change a force before a run warns: that is its accuracy.
-        ends: by how much it may before a run ends.
+            (Williams' plug on coarse elements reaches 0.051.)
+        warns: the amount by which penetration may change a force before a run warns: that is its accuracy.
+        ends: the amount by which it may before a run ends.
         stiffest: that change over the part of the body's energy that penetration holds: at most, of a body pressed
             flat.
         small: of arc length: half of a difference quotient.
@@ -56,7 +56,7 @@ _LIMITS = Limits()
 
 
 class Depth(NamedTuple):
-    """How deep a body is in a tool: over what is allowed, depth (length), place (r, z), the contact, its name."""
+    """Penetration of a body into a tool: over the allowed one, depth (length), place (r, z), the contact, its name."""
 
     share: float
     depth: float
@@ -67,7 +67,7 @@ class Depth(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Of a contact point in space."""
+        """Text on a contact point in three dimensions."""
         at = ", ".join(f"{v:.5g}" for v in self.place)
         return f"A contact point is {self.depth:.4g} deep in the tool of {self.name!r} at (x, y, z) = ({at})"
 
@@ -84,7 +84,8 @@ class Verdict:
             self._rest = _lengths(self._outline.rest)
 
     def of(self, state: State) -> str:
-        """Why a state, whose `measures` are known, is none that a body can have; "" if it is one; collective."""
+        """Return the reason for which a state with known `measures` is inadmissible; "" if it is admissible;
+        collective."""
         return next(self._reasons(state), "")
 
     def findings(self, state: State) -> list[Finding]:
@@ -150,7 +151,7 @@ class Verdict:
             yield f"the body folds: its boundary goes through itself near (r, z) = ({place[0]:.5g}, {place[1]:.5g})"
 
     def _deepest(self, edges: np.ndarray, state: State, own: bool) -> Iterator[Depth]:
-        """Where the body is too deep in tools: `own`: the face of the contact, for a warning; or any face."""
+        """Return the deepest points in tools: `own`: on the face of the contact, for a warning; or on any face."""
         points, length = along(edges), _lengths(edges)
         for contact, face in zip(self._problem.contacts, self._faces):
             if not contact.present:
@@ -190,19 +191,20 @@ class Verdict:
 
 
 def _depths(contact: Any, points: np.ndarray, state: State) -> np.ndarray:
-    """How deep points, shape (m, n, components), are in a tool, shape (m, n), length."""
+    """Return the penetration of points, shape (m, n, components), into a tool, shape (m, n), length."""
     at = points - contact.travelled(state.control)
     return contact.contact.tool.signed_distance(at.reshape(-1, at.shape[-1])).reshape(at.shape[:2])
 
 
 def _most_inside(contact: Any) -> np.ndarray:
-    """How deep the points of a contact may be in its tool, shape (n,), length: those that it holds already."""
+    """Return the allowed penetration of the points of a contact, shape (n,), length: of the sticking ones, as they
+    are."""
     most = _LIMITS.inside * np.maximum(contact.thickness, contact.rule.lengths)
     return np.where(contact.area < contact.rule.area, np.inf, most)
 
 
 def _off(contact: Any, state: State, images: int) -> float:
-    """By how much penetration changes the force F on a tool, relative; collective.
+    """the amount by which penetration changes the force F on a tool, relative; collective.
 
     What the tool gains on the body, 2 E/F (E: energy of penetration), times dF/dtravel, over F. On one that stays air
     presses: it is as large as that. images: of the body in the part, whose energy the state tells.

@@ -1,4 +1,4 @@
-"""Whether elements keep their volumes: what a reader of a run should know of J."""
+"""Volume ratio J of the elements, and findings on it."""
 
 from __future__ import annotations
 

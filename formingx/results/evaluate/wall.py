@@ -23,7 +23,7 @@ class Wall(Sheet):
     """The wall at the n nodes of the bottom (inner) face of a sheet, from the axis to the rim, in one state.
 
     Attributes:
-        profile: both faces, at rest and now.
+        profile: both faces, in the reference configuration and now.
         layers: {name of a layer: its share of the wall, shape (n,)}, from the bottom up: of the material line across
             the sheet there.
         comm: of the run.
@@ -35,7 +35,7 @@ class Wall(Sheet):
 
     @property
     def reference_radius(self) -> np.ndarray:
-        """Where the material was: R at rest, shape (n,), length."""
+        """Reference radius R of the material, shape (n,), length."""
         return self.profile.reference_radius
 
     @property
@@ -158,7 +158,8 @@ def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
 
 
 def _crossing(start: np.ndarray, across: np.ndarray, pieces: np.ndarray) -> np.ndarray:
-    """Where the lines start + s across, 0 <= s <= 1, meet straight pieces, shape (m, 2, 2): s, (n,), nan if nowhere."""
+    """Intersect the lines start + s across, 0 <= s <= 1, with straight pieces, shape (m, 2, 2): s, (n,), nan if
+    nowhere."""
     a, along = pieces[:, 0], pieces[:, 1] - pieces[:, 0]
     from_start = a - start[:, None]
     det = across[:, None, 0] * along[:, 1] - across[:, None, 1] * along[:, 0]

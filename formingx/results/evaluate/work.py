@@ -50,7 +50,7 @@ class _Line(NamedTuple):
 
 
 def _through(a: Any, b: Any, start: Any = None, end: Any = None) -> _Line:
-    """From a to b, with slopes at the ends that have one."""
+    """Return the cubic from a to b, with the slopes at the ends that have one."""
     by = b - a
     if start is None and end is None:
         return _Line((a, by))
@@ -62,12 +62,12 @@ def _through(a: Any, b: Any, start: Any = None, end: Any = None) -> _Line:
 
 
 def _integral(f: _Line, y: _Line) -> float:
-    """Of f dy, exact for two cubics."""
+    """Return the integral of f dy, exact for two cubics."""
     return float(sum(w * np.sum(f.at(s) * y.slope(s)) for s, w in zip(*_GAUSS)))
 
 
 class _Reaction(NamedTuple):
-    """What a driven support or a tool does to the body at a state: force along its travel, and the travel, length;
+    """Reaction of a driven support or a tool at a state: force along its travel, and the travel, length;
     slope and by_arc: their slopes by arc length."""
 
     force: float
@@ -108,7 +108,7 @@ class Ledger:
 
     def _halved(self, a: Any, b: Any, whole: dict[str, float], small: float,
                 times: int = _HALVINGS) -> dict[str, float]:
-        """What is added from a state to the next, `whole` at a first look, by way of states between."""
+        """Return the energies from a state to the next, `whole` at a first look, by way of states between."""
         middle = self._middle(a, b) if times and a.setting == b.setting and b.kind != "jump" else None
         if middle is None:
             return whole
@@ -146,7 +146,7 @@ class Ledger:
         return bool(b.time != a.time and not b.setting["rate"][-1])
 
     def _between(self, a: Any, b: Any) -> dict[str, float]:
-        """What is added from a state to the next."""
+        """Return the energies added from a state to the next."""
         images = self._problem.scene.symmetry_factor
         found = {name: images * value for name, value in self._of_body(a, b).items()}
         return ({"jumps": b.jump.get("dissipated", 0.0)} if b.kind == "jump" else {}) | found
@@ -163,12 +163,13 @@ class Ledger:
         if a.setting != b.setting:                          # the same body, seen under another setting
             if self._problem.forms.elastic_supports:
                 found["change"] = self._energy_at(b) - self._energy_at(a)
-            if "bonds" in found:                            # what is left out lets go of what it held
+            if "bonds" in found:                            # what is left out releases what it held
                 found["change"] = found.get("change", 0.0) + found["bonds"]
             return found
         straight = b.kind == "jump" or self._flows(a, b)    # no tangents of the way
         h = self._curve.distance(a, b)
-        start = None if straight or a.kind == "start" and self._kinked(a) else h           # a body at rest on a tool
+        # a body in the reference configuration on a tool
+        start = None if straight or a.kind == "start" and self._kinked(a) else h
         end = None if straight else h
         x = _through(a.x, b.x, start and h * a.direction, end and h * b.direction)
         control = _through(a.control, b.control, start and h * a.slope, end and h * b.slope)
@@ -199,7 +200,7 @@ class Ledger:
         return found
 
     def _reactions(self, state: Any) -> dict[str, _Reaction]:
-        """Of driven supports and tools at a state; computed once."""
+        """Return the reactions of driven supports and tools at a state; computed once."""
         if id(state) not in self._ends:
             self._ends[id(state)] = state, self._found(state) if self._driven else {}
         return self._ends[id(state)][1]
@@ -251,7 +252,7 @@ class Ledger:
                               for c in at.present]) > 0
 
     def _friction(self, a: Any, b: Any) -> float:
-        """What friction has dissipated: mean traction times what has slid, not elastically, while the point touched."""
+        """Return the energy dissipated by friction: mean traction times inelastic slip, while the point touched."""
         problem, lost, before = self._problem, 0.0, {}
         contacts = [c for c in problem.contacts if c.law.has_friction and not c.contact.sticks]
         if a.setting != b.setting or not contacts:
@@ -270,7 +271,7 @@ class Ledger:
         cold, warm = a.memory[-1], b.memory[-1]        # that of the temperature is last
 
         def stored(state: Any, temperature: Any) -> float:
-            still = temperature._replace(before=None)                         # it does not go on from there
+            still = temperature._replace(before=None)                         # it does not continue from there
             return self._energy_at(replace(state, memory=[*state.memory[:-1], still]))
         return sum(stored(state, warm) - stored(state, cold) for state in (a, b)) / 2
 
@@ -280,7 +281,7 @@ class Ledger:
             return self._energy * problem.assemble_scalar(self._stored)
 
     def _bonds(self, state: Any) -> float:
-        """What tools hold that the body may pull at."""
+        """Return the energy of tools that the body may pull at."""
         with self._problem.state_context(state) as at:
             return sum(resultants.energy(c, state.x[: at.n_owned], state.control) for c in at.present if c.law.pulls)
 
@@ -289,12 +290,12 @@ class Ledger:
 
 
 def _gains(row: dict[str, float]) -> list[float]:
-    """What is put in, less what is lost, of a row."""
+    """Return the work put in less the losses of a row."""
     return [-value if name in _LOSSES else value for name, value in row.items()]
 
 
 def _left(row: dict[str, float], a: Any, b: Any) -> float:
-    """What a row leaves unbalanced between two states."""
+    """Return the unbalanced energy of a row between two states."""
     by = [b.measures.get(name, 0.0) - a.measures.get(name, 0.0) for name in ("strain_energy", "dissipated_energy")]
     return sum(_gains(row)) - sum(by)
 
@@ -315,7 +316,7 @@ def _slid(law: Any, x: np.ndarray, touch: Any, end: np.ndarray) -> np.ndarray:
 
 
 def _called(scene: Any, thing: Any) -> str:
-    """What a thing is called in the energy balance."""
+    """Return the name of an item in the energy balance."""
     if thing in scene.contacts:
         return Tooling(scene.contacts, 0, 1.0).names[scene.contacts.index(thing)]
     if thing in scene.supports:

@@ -31,7 +31,7 @@ def pack(data: Any) -> tuple[Any, bytes]:
 
 
 def unpack(data: Any, content: bytes) -> Any:
-    """What `pack` was given; its arrays cannot be written to.
+    """Return the argument of `pack`; its arrays are read-only.
 
     Raises:
         ValueError: the two do not belong together.

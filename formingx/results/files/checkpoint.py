@@ -380,7 +380,7 @@ def _states(folder: FilePath) -> list[FilePath]:
 
 
 def _read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
-    """What a state's state.json says; an InputError unless it is that of the state, whole and as it was written."""
+    """Return the data of a state's state.json; raise an InputError unless they are complete and unchanged."""
     one = folder / _name(number)
     data = _read_json(one / "state.json")
     content: dict[str, bytes] = {}
@@ -418,7 +418,7 @@ def _read_json(file: FilePath) -> Any:
 
 
 def _instead(file: FilePath) -> str:
-    """What is found in place of a file that is not there."""
+    """Return a text on the files found in place of a missing one."""
     folder = file.parent
     if file.name != "scene.json":
         return f"{str(file)!r} is not there"

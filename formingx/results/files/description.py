@@ -16,7 +16,7 @@ _PARTS = ("materials", "supports", "loads", "contacts", "model", "kinematics", "
 
 
 def describe(problem: Any) -> dict[str, Any]:
-    """What defines a problem, as JSON can hold it; the same on any number of ranks; collective.
+    """Describe a problem as plain data for JSON; the same on any number of ranks; collective.
 
     "mesh": counts, and sums over its cells that change with any coordinate, order of the cells or tag; "unknowns":
     their number; then every part of the scene by its public attributes.

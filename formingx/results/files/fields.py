@@ -2,7 +2,7 @@
 
 Every triangle gets six nodes of its own, so that nothing is smeared over an interface. The fields:
 
-    displacement            (u_r, u_z), in space (u_x, u_y, u_z), length
+    displacement            (u_r, u_z), in three dimensions (u_x, u_y, u_z), length
     stretches               the larger and the smaller in the plane, and the hoop stretch (`Stress.principal_stretches`)
     principal_stresses      of the Cauchy stress, from the largest to the smallest, stress
     cauchy_rr, _zz, _rz, _hoop  its components; hydrostatic_pressure: minus a third of its trace, stress
@@ -91,7 +91,7 @@ class Fields:
         except InputError:
             profile = None                                  # not a sheet
         if profile is not None:
-            if self._between is None:                           # a point stays on the line across that it is on at rest
+            if self._between is None:  # a point stays on the line across that it is on in the reference configuration
                 points = self.points.reshape(-1, self.points.shape[-1])
                 self._between = _across(points, profile.rest_bottom, profile.rest_top)
             k, part = self._between

@@ -19,7 +19,7 @@ _PARTS = 4          # straight pieces for an element's edge
 def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarray, np.ndarray]:
     """(points, shape (n, 3), triangles, shape (m, 3), seen from outside counter-clockwise) of a sheet.
 
-    It is turned about the axis in so many `parts`, or, in plane strain, extruded as far as it is wide.
+    It is turned about the axis in this number of `parts`, or, in plane strain, extruded as far as it is wide.
     """
     line = np.vstack([fine(profile.bottom, _PARTS), fine(profile.top, _PARTS)[::-1]])      # its edges are curved
     n = len(line)

@@ -1,4 +1,4 @@
-"""Where a run stands that writes a checkpoint: read from its last states, while it goes on."""
+"""Status of a run that writes a checkpoint: read from its last states, while it runs."""
 
 import time
 from collections.abc import Container, Iterator
@@ -76,7 +76,7 @@ class Status:
         return "\n".join([*lines, *(map(str, self.findings) if self.findings else ["findings: none"])])
 
     def _without_pace(self) -> str:
-        """Why the time left is not known."""
+        """Return the reason for which the remaining time is not known."""
         if self.target is None:
             return "the time left is not known, as no column holds what the stage aims at"
         if self.begun:

@@ -123,7 +123,7 @@ def _save_gif(pictures: list[Any], seconds: float, stream: Any) -> None:
 
 
 def _save_mp4(pictures: list[Any], seconds: float, stream: Any) -> None:
-    """As H.264, which every player knows; the last frame stands for a second more."""
+    """Write H.264, which every player reads; the last frame stands for a second more."""
     width, height = (2 * (n // 2) for n in pictures[0].size)              # H.264 wants even numbers
     rate = len(pictures) / seconds
     stream.close()                                           # ffmpeg writes the file by its name

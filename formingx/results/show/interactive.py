@@ -83,7 +83,7 @@ def _sheet(record: Record, units: Units) -> dict[str, Any]:
 
 
 def _label(record: Record, units: Units, key: str) -> str:
-    """Of a field, with its unit."""
+    """Return the label of a field, with its unit."""
     return f"{key}, {record.unit}" if key == "temperature" and record.unit else units.label(key.replace(" ", "_"), key)
 
 
@@ -105,7 +105,7 @@ def _tools(record: Record) -> list[dict[str, Any]]:
 
 
 def _loading(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any]]:
-    """What is driven, stage by stage: a tool's own force against its travel, a pressure against the pole's height."""
+    """Return the loading of each stage: a tool's own force against its travel, a pressure against the pole's height."""
     pairs: dict[tuple[str, str], list[dict]] = {}
     for record, name in zip(records, names):
         ends = [k for k in range(1, len(record.stages)) if record.stages[k] != record.stages[k - 1]]
@@ -141,7 +141,7 @@ def _driven(record: Record, stage: slice) -> list[tuple[str, str, np.ndarray, np
 
 
 def _in_time(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any] | None]:
-    """What is driven, the forces of all tools and the temperature of the body over process time, where it runs."""
+    """Return the controlled quantity, the forces of all tools and the temperature of the body over process time."""
     drawn: dict[str, tuple[str, list]] = {}
     for record, name in zip(records, names):
         if not record.timed:

@@ -36,7 +36,7 @@ def _is_number(text: str) -> bool:
 
 
 def details(title: str, content: str) -> str:
-    """What is folded until it is asked for."""
+    """Return a section that is folded until it is opened."""
     return f"<details><summary>{html.escape(title)}</summary>{content}</details>"
 
 

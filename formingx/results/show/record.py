@@ -46,11 +46,11 @@ class Record:
             along Z.
         fields: of the n states, {name: values at the nodes of the bottom face, or of both faces, shape (m,)}; more than
             the profiles say; of those that are drawn. (A checkpoint knows the temperature alone.)
-        heat: {tool: (conductance, its temperature in words)} where tools take heat; unit: of temperatures, or "".
+        heat: {tool: (conductance, its temperature as text)} where tools take heat; unit: of temperatures, or "".
         layers: of the last state, as in `Wall`; script: the file that ran; or "".
         findings: `Path.findings`; of a checkpoint those with which the run ended, as is failure: what ended it, or "".
-        verdicts: of the n states, `State.verdict`.
-        planes: of symmetry, that cut the body; drawn: about so many states are.
+        admissibility checks: of the n states, `State.verdict`.
+        planes: of symmetry, that cut the body; drawn: about this number of states are.
     """
 
     summary: dict[str, str]
@@ -90,7 +90,7 @@ class Record:
 
     @property
     def progress(self) -> np.ndarray:
-        """How far the process has come in each state, see `progress`, shape (n,)."""
+        """Progress of the process in each state, see `progress`, shape (n,)."""
         return progress(self.measures, self.profiles)
 
     @property
@@ -156,7 +156,7 @@ class Record:
         return found
 
     def _from(self, where: np.ndarray) -> str:
-        """In words, the first state at which something is so."""
+        """Return the first state at which a condition holds, as text."""
         k = int(np.argmax(where))
         stage = f"{words(self.stages[k])!r}, " if self.stages[k] else ""
         return f", from state {k} on ({stage}{words(self.control)} = {self.measures[self.control][k]:.5g})"
@@ -177,7 +177,7 @@ class Record:
                     f" used: {self.verdicts[k]}.")]
 
     def warnings(self) -> list[str]:
-        """What a reader should know before trusting the numbers, without how bad it is."""
+        """Return the warnings on the numbers of the run, without their severity."""
         return [finding.text for finding in self.all_findings()]
 
     def _smallest_thickness(self) -> float | None:
@@ -276,10 +276,10 @@ def frames(at: np.ndarray, kinds: list[str], stages: list[str], most: int = FRAM
 
 
 def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray:
-    """How far a process has come in each of n states, from 0 to 1, shape (n,).
+    """Return the progress of a process in each of n states, from 0 to 1, shape (n,).
 
-    By process time where it runs; else by what is driven, over its range, and how far the sheet moves, over the whole
-    way that it moves, in equal parts.
+    By process time where it runs; else by the controlled quantity, over its range, and how far the sheet moves, over
+    the whole way that it moves, in equal parts.
     """
     n = len(profiles)
     way, clock = np.zeros(n), measures.get("process_time", np.zeros(n))
@@ -310,7 +310,7 @@ class _Fields:
         self._faces = [ContactFace(path, contact) for contact in path.problem.contacts]
 
     def of(self, state: Any) -> dict[str, np.ndarray]:
-        """Of a state, shape (m,) each; collective."""
+        """Return the values of a state, shape (m,) each; collective."""
         path, points, here = self._path, self._points, {}
         if path.problem.scene.heat is not None:
             here["temperature"] = path.temperature(np.vstack(points), state).reshape(2, -1).mean(0)

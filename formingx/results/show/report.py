@@ -122,7 +122,7 @@ and WebGL: Chrome 80, Firefox 113, Safari 16.4 or later); the tables need nothin
 
 
 def _trouble(failure: Any, lead: str) -> list[str]:
-    """What a run that could not go on says: an error, or its words alone."""
+    """Return the message of a run that failed: an error, or its text alone."""
     if not failure:
         return []
     found = [f"<div class='note bad'><h2>{html.escape(lead)}The run could not go on</h2>"
@@ -132,7 +132,7 @@ def _trouble(failure: Any, lead: str) -> list[str]:
 
 
 def _behind(record: Record, units: Units) -> list[str]:
-    """What the answer rests on: stages, tools, inputs, warnings; folded: all measures, convergence."""
+    """Return the sections behind the result: stages, tools, inputs, warnings; folded: all quantities, convergence."""
     found = []
     if any(record.stages):
         found += ["<h2>Stages</h2>", _stages(record, units)]
@@ -153,7 +153,7 @@ def _behind(record: Record, units: Units) -> list[str]:
 
 
 def _warnings(record: Record, lead: str = "") -> str:
-    """What a reader should know first: two lines of each, all of it when it is opened."""
+    """Return the warnings: two lines of each, the whole text when it is opened."""
     if record.space:
         lead = f"<p class=note>{html.escape(lead)}Curves and inputs alone: {_NO_MESH}.</p>"
         return lead + "".join(map(_noted, record.all_findings()))

@@ -111,7 +111,8 @@ def plotted(file: Any, height: int = 800) -> Iterator[Any]:
 
 
 def shading(values: np.ndarray) -> dict[str, Any]:
-    """How `add_mesh` shows the array "ratio" of a surface: colours of all its values, a bar beside it, light."""
+    """Return the arguments of `add_mesh` for the array "ratio" of a surface: colours of all its values, a bar,
+    light."""
     middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), 0.01) / 2     # a flat sheet is of one colour
     bar = {"title": "thickness / original\n", "color": "black", "vertical": True, "position_x": 0.85, "position_y": 0.2,
            "height": 0.6, "width": 0.07, "title_font_size": 20, "label_font_size": 18, "fmt": "%.2f", "n_labels": 5}
