@@ -348,18 +348,18 @@ def test_a_plug_leaves_a_sheet_that_a_vacuum_holds():
 def test_trough_without_friction():
     """A strip that slides has one wall: its width over the length of the profile. Errors are of second order.
 
-    (A chord on a fillet of radius R feels p l^2/(4 R) beside its tension, which is a seventeenth of p here.)
+    (Normal to its chords the pressure would add p l^2/(4 R) on the fillet to a tension of p/17: 4 % there.)
     """
     errors, whole = [], 2 - (2 - np.pi / 2) * 0.2
     for size in (0.1, 0.05):
         path = fx.trace(trough(size, friction="none", nodes_per_step=3), until=fx.pressure(1.2), progress=False)
         wall, (x, _, z) = path.wall(), path.wall().middle.T
-        assert np.average(wall.ratio, weights=wall.area) == pytest.approx(1 / whole, rel=1e-3)
+        assert np.average(wall.ratio, weights=wall.area) == pytest.approx(1 / whole, rel=0.2 * size**2)
         errors.append([np.average(wall.ratio[there], weights=wall.area[there]) * whole - 1
                        for there in (x < 0.75, z > -0.75, (x > 0.8) & (z < -0.8))])
         assert path.counts.failures == 0 and path.counts.iterations < 250
     coarse, fine = np.abs(errors)
-    assert np.all(fine < (0.01, 0.01, 0.05)) and np.all(coarse > 2.5 * fine)
+    assert np.all(fine < (4e-3, 4e-3, 0.015)) and np.all(coarse > 2.5 * fine)
 
 
 def test_sliding_tractions_have_their_stiffness():

@@ -30,6 +30,7 @@ class StepLimits:
         behind: difference that is allowed between the pressure at the end of the step and the one that limits friction,
             over the pressure; corrections: solutions of a step, at most, that reduce it.
         inaccurate: change of the pressure, over `lag`, at which a step is taken again.
+        settling: iterations in which such friction settles, however short the step.
         weak: smallest force of which these are parts, over shear modulus, thickness and length of a sheet.
         shortest: lengths of steps (dimensionless) that are never too long for what comes into contact.
         mixed: the same for steps in which sticking points lift off while the gaps of others close.
@@ -47,6 +48,7 @@ class StepLimits:
     behind: float = 5e-3
     corrections: int = 3
     inaccurate: float = 1.4
+    settling: int = 2
     weak: float = 1e-2
     shortest: float = 1e-4
     mixed: float = 5e-4

@@ -160,6 +160,11 @@ class StepLimit:
                 return Cut("contact arriving", part)
         return None
 
+    @property
+    def settling(self) -> int:
+        """Iterations in which friction in space settles, however short the step."""
+        return LIMITS.settling if any(c.lags for c in self.present) else 0
+
     def let_go(self, new: Any) -> bool:
         """Let go of what pulls at a tool in space at a state that was found; False if nothing does."""
         return any([c.face.let_go(new.x[: self._n], new.control) for c in self.present])

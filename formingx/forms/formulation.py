@@ -58,6 +58,7 @@ class Formulation(ABC):
         elastic_supports: [(support with an energy, 1 where it is there, else 0 (`Constant`))].
         load_works: of each load of the scene its virtual work at the value that it has (UFL, rank 1, user's units).
         temperature: the `Temperature` of the body, or None.
+        faces: the faces in contact of the problem (`FaceContact`), which makes them after the forms.
         slack_at_rest: True if the body in the reference configuration has no stiffness in some direction.
     """
 
@@ -65,6 +66,7 @@ class Formulation(ABC):
 
     def __init__(self, scene: Any):
         self.scene = scene
+        self.faces: list[Any] = []
         self.length = float(max(scene.extent))
         self.stress = max(scene.shear_modulus(name) for name in scene.mesh.layers)
         self.mesh = self._make_mesh()

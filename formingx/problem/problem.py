@@ -76,6 +76,7 @@ class Problem(Histories, Units):
         self._buffer = la.vector(index_map, 1)
         self._residual = forms.compile(forms.residual)
         self.contacts = [FaceContact(forms, contact, self.assemble) for contact in scene.contacts]
+        forms.faces = self.contacts
         if scene.heat is not None:                              # after the materials, which heat it
             forms.histories.append(scene.heat.history(self))
         remembering = (contact for contact in self.contacts if contact.remembers)

@@ -290,7 +290,7 @@ class Run:
             self.problem.memory = memory
             raise
         if target is None and length == self.step.length:   # not one that contact has made shorter
-            self.step.accepted(tangents(new.history), error)
+            self.step.accepted(tangents(new.history) - (limit.settling if limit else 0), error)
         return states
 
     @property

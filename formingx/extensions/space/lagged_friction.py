@@ -100,8 +100,8 @@ class LaggedFriction(LaggedStick):
         send it to and fro over the narrow range of elastic slip.
         """
         assert old is not None
-        rows, at = np.flatnonzero(self.held(old)), x if expected is None else expected.position
-        near, zero = self._near(at[rows]), np.zeros(len(x))
+        at, zero = x if expected is None else expected.position, np.zeros(len(x))
+        rows, near = self.near(at, old)
         d, n = near.distance, near.normal
         moved = old.slip[rows] + at[rows] - old.position[rows]
         along = np.einsum("ni,ni->n", n, moved)
@@ -140,10 +140,15 @@ class LaggedFriction(LaggedStick):
             found.force = force + np.einsum("nij,nj->ni", found.stiffness, x - at)
         return found
 
+    def near(self, x: np.ndarray, old: Touch) -> tuple[np.ndarray, Near]:
+        """Return which points touch, their numbers, shape (m,), and where they stand to the tool."""
+        rows = np.flatnonzero(self.held(old))
+        return rows, self._near(x[rows])
+
     def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
         assert old is not None
-        rows, d, n = np.flatnonzero(self.held(old)), np.zeros(len(x)), np.zeros_like(x)
-        near = self._near(x[rows])
+        d, n = np.zeros(len(x)), np.zeros_like(x)
+        rows, near = self.near(x, old)
         d[rows], n[rows] = near.distance, near.normal
         return Motion(x, d, n, np.zeros(len(x)), np.zeros_like(x))
 

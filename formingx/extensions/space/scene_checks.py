@@ -95,7 +95,8 @@ def check_contact(scene: Any, contact: Any) -> None:
     if not contact.sticks and not isinstance(tool, Swept):
         raise InputError(f"{contact!r}: sliding over a tool of flat triangles is not available, as their edges stop a"
                          f" sheet: must be 'stick', or a tool made by box, revolved or extruded")
-    if contact.separates and any(material.internal or material.integral for material in scene.materials.values()):
+    relaxes = any(material.internal or material.integral for material in scene.materials.values())
+    if contact.sticks and contact.separates and relaxes:
         raise InputError(f"{contact!r}: separates = True: in space a sheet that relaxes is held where it touches, until"
                          f" a stage leaves the tool out (inactive=[...]): must be 'stick', with separates left out")
     if contact.present_area:

@@ -24,6 +24,8 @@ from dolfinx import fem
 from ...forms.formulation import Formulation
 from ...forms.membrane import FIRST_STRETCH
 from ...forms.probes import Probe
+from ...physics.loads import Pressure
+from .pressure_on_tools import PressureOnTools
 
 _REGULAR = 1e-7
 """That stiffness, over the shear modulus."""
@@ -37,10 +39,31 @@ class Surface(Formulation):
     """
 
     slack_at_rest = True
+    _on_tools: PressureOnTools | None = None
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
         """(normal at rest, the whole surface): "top" looks along +z, "bottom" along -z."""
         return ufl.as_vector([0, 0, 1.0 if name == "top" else -1.0]), self.dx(metadata={"quadrature_degree": 1})
+
+    def refresh(self) -> None:
+        super().refresh()
+        if self._on_tools is not None:
+            self._on_tools.refresh()
+
+    def _residual(self, body: Any) -> tuple[Any, Any, Any]:
+        residual, by_control, by_time = super()._residual(body)
+        pressures = [(load, value) for load, value in self.load_values if isinstance(load, Pressure)]
+        if not pressures or all(contact.sticks for contact in self.scene.contacts):
+            return residual, by_control, by_time
+        self._on_tools = PressureOnTools(self)
+        for load, value in pressures:
+            face = body.face(load.on, load.quadrature_degree)
+            area = self.scene.kinematics.area_vector(self.u, self.X, face.normal)
+            work = self._on_tools.work(value, area)
+            residual -= self._scale * work
+            if load.driven:
+                by_control -= self._scale * ufl.diff(work, self._control)
+        return residual, by_control, by_time
 
     def constraints(self, support: Any) -> list[Any]:
         return self.scene.kinematics.in_axes(support, support.constraints())

@@ -1,0 +1,62 @@
+"""Pressure on a sheet in space where it slides on a tool: along the normal of the tool.
+
+The triangles of a sheet are chords of a fillet. Pressure normal to a chord of length l has a tangential part at its
+ends where chords of different lengths meet: on a fillet of radius R it adds p l^2/(4 R) to the tension, an error of
+second order that may exceed the tension itself. The surface that the chords stand for is the tool, which is known. So
+of the force f of the pressure on a node that touches, (n . f) n acts, n being the normal of the tool there. A node
+comes to that as the tool presses on it, so that its forces do not jump where it touches.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+_FULL = 1 / 3              # pressure of the tool over that on the sheet, from which on all of it acts so
+
+
+class PressureOnTools:
+    """Virtual work that takes the tangential part away from the pressure at the nodes that slide on tools.
+
+    The normal in the forms, n + H (u - u_0), has its exact derivative by the displacement u at u_0, the present one.
+
+    Args:
+        surface: the `Surface`.
+    """
+
+    def __init__(self, surface: Any):
+        self._surface = surface
+        self._touches, self._at, self._normal, *self._hessian = (fem.Function(surface.space) for _ in range(6))
+
+    def work(self, value: Any, area: Any) -> Any:
+        """Return the virtual work (UFL) of a pressure, by the vector of the deformed area per reference area."""
+        surface, v = self._surface, self._surface.test_displacement()
+        touches, at, normal, *hessian = (ufl.split(f)[0] for f in (
+            self._touches, self._at, self._normal, *self._hessian))
+        n = normal + sum(h * (u - a) for h, u, a in zip(hessian, surface.u, at))
+        most = _FULL * abs(value)
+        share = touches[0] * ufl.conditional(ufl.lt(touches[1], most), touches[1] / most, 1)
+        tangential = ufl.inner(area, v) - ufl.inner(area, n) * ufl.inner(n, v)
+        return value * share * tangential * surface.dx(
+            metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
+
+    def refresh(self) -> None:
+        """Take the tools' normals at the present displacement; collective."""
+        surface, n = self._surface, self._surface.space.dofmap.index_map.size_local
+        fields, control = surface.w.x.array[:n], float(surface.control.value)
+        functions = (self._touches, self._normal, *self._hessian)
+        for function in functions:
+            function.x.array[:] = 0
+        self._at.x.array[:] = surface.length * surface.w.x.array
+        for face in surface.faces:
+            if face.present and not face.contact.sticks and face.touch is not None:
+                held, near = face.law.near(face.positions(fields, control), face.touch)
+                pressed = face.law.pressure(face.touch)[held]
+                touches = np.column_stack([np.ones(len(held)), pressed, np.zeros(len(held))])
+                for function, values in zip(functions, (touches, near.normal, *near.hessian.transpose(2, 0, 1))):
+                    function.x.array[face.rule.dofs[held]] = values
+        for function in functions:
+            function.x.scatter_forward()
