@@ -133,7 +133,7 @@ def _cooled(rng: random.Random) -> None:
     scene, radius, _ = _scene(rng, contact, temperature=rng.uniform(100, 200), heat=heat)
     table = _table(rng, radius * rng.uniform(0.1, 0.5) if contact else radius**3 * rng.uniform(0.2, 1.0))
     follow = {"plug": table} if contact else {fx.enclosed_volume: table}
-    stage = fx.Stage("form", amplitudes=follow, **({} if contact else {"drive": "air"}))
+    stage = fx.Stage("form", amplitudes=follow, **({} if contact else {"control": "air"}))
     _judge(lambda **options: fx.Process(scene).run([stage], progress=False, accuracy="draft", **options))
 
 

@@ -149,24 +149,28 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
     contact = {"on": ("word", "top"), "tool": ("thing", fx.tools.plane(0.3)), "friction": ("friction", "stick"),
                "penalty": optional, "ramp": optional, "nodes_per_step": ("count or None", 1),
                "separates": ("flag", True), "present_area": ("flag", False),
-               "moves": ("pair or None", None), "name": name, "points": ("points", "nodes"), "elastic_slip": positive}
-    stage = {"name": ("label", "up"), "drive": ("optional thing", "air"), "until": ("optional thing", fx.pressure(0.1)),
-             "through": ("several", ()), "without": ("several", ()), "step": ("optional thing", None),
-             "speed": optional, "duration": optional, "hold": ("optional table", None),
+               "direction": ("pair or None", None), "name": name, "points": ("points", "nodes"),
+               "elastic_slip": positive}
+    stage = {"name": ("label", "up"), "control": ("optional thing", "air"),
+             "until": ("optional thing", fx.pressure(0.1)),
+             "intermediate": ("several", ()), "inactive": ("several", ()), "step": ("optional thing", None),
+             "speed": optional, "duration": optional, "constant": ("optional table", None),
              "at_limit_point": ("optional word", None)}
     table = {"amplitudes": {"air": [(0.0, 0.0), (1.0, 0.1)]}}
-    kept = {"record": ("optional thing", None), "resume": ("flag", False), "beyond": ("flag", False)}
+    kept = {"record": ("optional thing", None), "resume": ("flag", False), "allow_inadmissible": ("flag", False)}
     process = {"stages": ("several", [fx.Stage("up", control="air", until=fx.pressure(0.1))]),
                "step": ("optional thing", None), "tolerances": ("optional thing", None),
                "max_steps": ("count or None", 200), "progress": ("flag", False), "start": ("optional thing", None),
-               "checkpoint": ("folder", None), **kept, "accuracy": ("accuracy", "standard"), "pilot": ("flag", False),
+               "checkpoint": ("folder", None), **kept, "accuracy": ("accuracy", "standard"),
+               "adapt_mesh": ("flag", False),
                "remesh": ("optional thing", None)}
     part = {"name": ("label", "plug"), "of": ("word", "top"), "within": ("pair", (0.0, 0.5)), "along": ("word", "r")}
     return [
         *materials, *boundary, *targets, *tools,
         Call("Ogden", fx.Ogden, {"mu": ("terms", (1.0,)), "alpha": ("terms", (2.0,))},
              lambda m: _scene(materials=m)),
-        Call("Symmetry", fx.Symmetry, {"on": ("word", "axis"), "normal": ("word", "r"), "mirror": ("flag", False)},
+        Call("Symmetry", fx.Symmetry,
+             {"on": ("word", "axis"), "normal": ("word", "r"), "mirror": ("flag", False), "guide": ("flag", False)},
              lambda s: _run(_scene(supports=[s, fx.Clamped("rim")]))),
         Call("PrescribedDisplacement", fx.PrescribedDisplacement,
              {"on": word, "component": ("word", "z"), "name": name},
@@ -179,7 +183,7 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
         Call("travel", fx.travel, {"value": number, "of": name}, lambda t: _staged(until=t)),
         Call("process_time", fx.process_time, {"value": number}, lambda t: _staged(until=t, **table)),
         Call("Stage", fx.Stage, stage | {"amplitudes": ("optional thing", None)}, lambda s: _processed([s])),
-        Call("Stage.follow", fx.Stage, stage | {"drive": ("optional thing", None), "until": ("optional thing", None),
+        Call("Stage.follow", fx.Stage, stage | {"control": ("optional thing", None), "until": ("optional thing", None),
                                                 "amplitudes": ("table", table["amplitudes"])},
                                                 lambda s: _processed([s])),
         Call("Process", fx.Process, {"scene": ("thing", _scene())}),
@@ -211,15 +215,16 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
                                                "settling": ("count", 40)},
              lambda t: fx.trace(_scene(), until=fx.pole_height(0.1), tolerances=t, progress=False)),
         Call("trace", fx.trace, {
-            "scene": ("thing", _scene()), "until": ("thing", fx.pole_height(0.1)), "through": ("several", ()),
+            "scene": ("thing", _scene()), "until": ("thing", fx.pole_height(0.1)), "intermediate": ("several", ()),
             "step": ("optional thing", None), "tolerances": ("optional thing", None),
             "max_steps": ("count or None", 200), "progress": ("flag", False), "start": ("optional thing", None),
-            "checkpoint": ("folder", None), **kept, "at_limit_point": ("optional word", None), "pilot": ("flag", False),
+            "checkpoint": ("folder", None), **kept, "at_limit_point": ("optional word", None),
+            "adapt_mesh": ("flag", False),
             "remesh": ("optional thing", None), "stop_at": ("optional thing", None)}),
         Call("load", fx.load, {"folder": ("file", saved), "scene": ("thing", made), "state": ("state", None)}),
         Call("solve", fx.solve, {"scene": ("thing", _scene()), "to": number, "increments": ("count", 1),
                                  "tolerances": ("optional thing", None), "record": ("optional thing", None),
-                                 "max_steps": ("count", 1000), "beyond": ("flag", False)}),
+                                 "max_steps": ("count", 1000), "allow_inadmissible": ("flag", False)}),
         *_time_and_heat(),
         Call("check", fx.check, {"scene": ("thing", _scene()), "targets": ("several", ()), "stages": ("several", ()),
                                    "units": ("thing", fx.Units())}),

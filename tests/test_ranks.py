@@ -10,7 +10,8 @@ sys.path.insert(0, "tests")
 import formingx as fx
 from conftest import treloar
 path = fx.trace(treloar((12, 2), {support}), until=fx.pole_stretch(3.0), intermediate=[fx.pole_stretch(1.5)],
-progress=False) profile = path.profile()
+                progress=False)
+profile = path.profile()
 numbers = [*path["pressure"], *path["pole_height"], *path["enclosed_volume"], *path["strain_energy"],
            *profile.thickness_ratio, *profile.arc_length, path.limit_points[0].measures["pole_stretch"]]
 fixed = fx.solve(path.problem.scene, to=0.3, increments=6).last.measures["pole_height"]
