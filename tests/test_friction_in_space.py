@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from conftest import run_json
+from test_demos import summary
 from test_space import trough
 
 import formingx as fx
@@ -208,3 +209,13 @@ def test_walls_of_a_rough_cup():
         ring = (begin <= R) & (begin + 0.1 > R)
         mean, should = (np.average(v[ring], weights=wall.area_at_rest[ring]) for v in (wall.ratio, exact))
         assert mean == pytest.approx(should, rel=0.01)
+
+
+def test_plug_tray_quick(tmp_path):
+    """Numbers are of the whole tray: as much as the sheet weighs; the half model stands near the quarter."""
+    found = summary("plug_tray", tmp_path, "--quick")
+    quarter, ratio = found["quarter_16"], found["half_over_quarter"]
+    sheet = 1e-3 * 1.05 * 1.5 * (160 * 100 - (4 - np.pi) * 20**2)
+    assert quarter["weight_g"] == pytest.approx(sheet, rel=0.01)
+    assert ratio["weight_g"] == pytest.approx(1.0, rel=1e-6) and ratio["plug_force_N"] == pytest.approx(1.0, abs=0.2)
+    assert quarter["touching"] > 0.95 and 0.5 < quarter["least_wall_mm"] < 0.9
