@@ -107,7 +107,7 @@ def _explained(call: Callable, name: str, skip: int) -> Callable:
 
 
 def _wrong(call: Callable, name: str, skip: int, args: tuple, given: dict[str, Any]) -> str | None:
-    """Return what is wrong with the arguments of a call, as text; None: the signature finds no fault."""
+    """Return the fault in the arguments of a call, as text; None: the signature finds no fault."""
     signature = inspect.signature(call)
     try:
         bound = signature.bind(*args, **given).arguments

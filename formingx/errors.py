@@ -12,10 +12,10 @@ import numpy as np
 
 
 class InputError(ValueError):
-    """Something that the user gave is not allowed: the message names it, its value and what is allowed.
+    """Something that the user gave is not allowed: the message names it, its value and the allowed values.
 
     Attributes:
-        path: of a process that refuses a stage when it reaches it, what was computed before; else None.
+        path: of a process that refuses a stage when it reaches it, the path computed before; else None.
 
     >>> fx.NeoHookean(c10=-1.0)
     Traceback (most recent call last):
@@ -29,7 +29,7 @@ class ConvergenceError(RuntimeError):
     """A run could not go on.
 
     Attributes:
-        path: what was computed up to there (`formingx.Path`), its last state converged; or None.
+        path: the path computed up to there (`formingx.Path`), its last state converged; or None.
         diagnosis: why, in numbers and words, and as a picture (`formingx.solve.diagnose.Diagnosis`); or None.
 
     >>> try:
@@ -48,7 +48,7 @@ class Interrupted(KeyboardInterrupt):
     """A run was ended by Ctrl-C; one that no script catches prints one line.
 
     Attributes:
-        path: what was computed up to there (`formingx.Path`), or None.
+        path: the path computed up to there (`formingx.Path`), or None.
     """
 
     def __init__(self, message: str, path: Any = None):
@@ -208,7 +208,7 @@ def known(kind: str, name: Any, names: Any) -> None:
 
 
 def together(comm: Any, calls: Iterable[Callable[[], Any]]) -> None:
-    """Call them; an InputError of one of them, on whatever rank, is raised on all, with one message; collective."""
+    """Call them; an InputError of one of them, on any rank, is raised on all, with one message; collective."""
     refused = None
     for call in calls:
         try:

@@ -65,7 +65,7 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
             other state is near. "stop": end there. None: "snap_through" where it can go one way only: it is time, or
             there is a history (friction); but a pressure is followed, for what an air supply makes grow is the
             volume (in contact, or with a history: as long as the volume grows).
-        resume: continue from what the checkpoint holds, which must be of this scene; if it holds nothing, begin.
+        resume: continue from the states of the checkpoint, which must be of this scene; if it holds nothing, begin.
         allow_inadmissible: go on, with a warning, where a state is none that a body can have: folded, inside a tool,
             elements inside out. (`State.verdict` says so; by default the run ends there.)
         adapt_mesh: run twice: on the scene's mesh, which may be coarse, and from the unloaded state again on
@@ -218,13 +218,14 @@ class Process:
             tolerances: when a state counts as converged; default `Tolerances()`.
             max_steps: accepted states of a stage (of a straight piece of its tables) before the run gives up; None: it
                 gives up when it comes no nearer to its target.
-            progress: show a progress bar on what takes more than two seconds (rank 0).
+            progress: show a progress bar on runs of more than two seconds (rank 0).
             start: a path of these stages to continue from, also one that `formingx.load` read, or a state of one.
             checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
             record: {name: measure} of columns of your own, see `trace`.
             accuracy: of the steps in time of a material that relaxes, "draft", "standard" or "fine" (1, 0.2, 0.03 % of
                 stress and thickness), or such an error as a number.
-            resume: continue from what the checkpoint holds, which must be of this process; if it holds nothing, begin.
+            resume: continue from the states of the checkpoint, which must be of this process; if it holds nothing,
+                begin.
             allow_inadmissible, adapt_mesh, remesh: see `trace`.
 
         Raises:
@@ -303,8 +304,8 @@ def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
         state: continue from this state (0: the start), and leave out what came after; default the last.
 
     Raises:
-        InputError: there is no checkpoint, it is damaged, or it is of another mesh or scene; the message says what
-            differs.
+        InputError: there is no checkpoint, it is damaged, or it is of another mesh or scene; the message says the
+            difference.
 
     >>> path.save("run")
     >>> again = fx.load("run", scene)

@@ -1,4 +1,4 @@
-"""Looks a scene over before it is run: what it finds is measured on the scene, and a good scene gives nothing."""
+"""Looks a scene over before it is run: its findings come from the scene, and a good scene gives nothing."""
 
 from collections.abc import Sequence
 
@@ -49,9 +49,9 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
     `InputError` of `Scene` already; "serious" here is a target that `trace` refuses.
 
     Args:
-        targets: what the run will aim at, to be looked over too.
+        targets: the targets of the run, to be looked over too.
         stages: of the process that it will be: their targets and tables.
-        units: for the numbers in what is found.
+        units: for the numbers in the findings.
         scene: or the `Path` of a run: its `findings` come first, and where another path branches off.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Checks of a run that has ended: its last state, its jumps, what its tools met."""
+"""Checks of a run that has ended: its last state, its jumps, the contacts of its tools."""
 
 from collections.abc import Iterator
 from typing import Any

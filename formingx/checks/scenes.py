@@ -60,7 +60,7 @@ def _layers(sheet: Body) -> Iterator[Finding]:
     """A thick layer that one element spans cannot show how strain varies through it.
 
     Nor can long elements how a soft one is sheared at a rim: hinged, 1000 times softer, it jumped by 66 % with elements
-    of 2.5 thicknesses, by 30 % (at the corner, which is singular) with shorter ones, whatever their number through it.
+    of 2.5 thicknesses, by 30 % (at the corner, which is singular) with shorter ones, for any number through it.
     """
     if not sheet.scene.model.solid:
         return
@@ -189,7 +189,7 @@ def _units(sheet: Body) -> Iterator[Finding]:
 def _targets(sheet: Body) -> Iterator[Finding]:
     for target in sheet.targets:
         why = unreachable(sheet.scene, target)
-        if why is not None:                                  # a stage may leave out what is in its way
+        if why is not None:                                  # a stage may leave out an item in its way
             yield Finding("serious" if sheet.scene.driven is not None else "warning", str(target), why)
         is_length = target.name.endswith(("pole_height", "travel")) or target.name.startswith("u_")
         if is_length and abs(target.value) > 20 * sheet.length:

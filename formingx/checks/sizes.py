@@ -306,7 +306,7 @@ def _gap(faces: list[tuple[Tool, np.ndarray]], moves: Any, travel: float) -> flo
 
 @register("scene")
 def _sharp_edges(body: Body) -> Found:
-    """Under a sharp edge the force depends on where nodes lie, whatever the mesh: see tests/test_check.py."""
+    """Under a sharp edge the force depends on where nodes lie, on every mesh: see tests/test_check.py."""
     for contact in body.scene.contacts:
         facets = (len(body.scene.mesh.nodes_of(contact.on)) - 1) // 2
         rows = len(body.edge) / max(2 * facets, 1)

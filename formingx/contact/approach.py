@@ -20,7 +20,7 @@ class StepLimits:
         as_good: part of a step within which a point is as good as in touch.
         beyond: how far a step goes that is to end at an arrival, over the length to there.
         near: distances, over thickness, at which a point is as good as in touch.
-        at_end: part of a step from which on what arrives, and will stick, has no friction until the next.
+        at_end: part of a step from which on points that touch, and will stick, have no friction until the next.
         slides: how far a point may slide so, over the length of face that is its own.
         nearer: part of its distance from the tool that a point may move in a step of lagged contact, beside its length
             of face.
@@ -32,7 +32,7 @@ class StepLimits:
         inaccurate: change of the pressure, over `lag`, at which a step is taken again.
         settling: iterations in which such friction settles, however short the step.
         weak: smallest force of which these are parts, over shear modulus, thickness and length of a sheet.
-        shortest: lengths of steps (dimensionless) that are never too long for what comes into contact.
+        shortest: lengths of steps (dimensionless) that are never too long for points that come into contact.
         mixed: the same for steps in which sticking points lift off while the gaps of others close.
     """
 
@@ -62,7 +62,7 @@ class Approach:
 
     Args:
         face: the contact.
-        conducts: heat flows through what touches, from the end of the step on.
+        conducts: heat flows through points in contact, from the end of the step on.
 
     Attributes:
         points: of the face, all ranks.
@@ -162,7 +162,7 @@ class Approach:
         return True
 
     def _within_lag(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
-        """A length, or as much of it as changes the pressure of lagged friction by what is allowed."""
+        """A length, or as much of it as changes the pressure of lagged friction by the tolerance."""
         if not self.lags:
             return length
         law, touch = self.face.law, self.face.touch

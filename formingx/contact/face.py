@@ -1,4 +1,5 @@
-"""Contact of one face as forces at points of it, and what they remember (a `History`). No form is compiled per tool."""
+"""Contact of one face as forces at points of it, and their history variables (a `History`). No form is compiled per
+tool."""
 
 from __future__ import annotations
 
@@ -226,7 +227,7 @@ class FaceContact:
 
     @property
     def remembers(self) -> bool:
-        """True if forces depend on what points remember."""
+        """True if the forces depend on history variables."""
         return self.law.remembers or self.contact.present_area
 
     @property

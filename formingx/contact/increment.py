@@ -10,7 +10,7 @@ from ..physics.contact_law import ContactLaw, Motion, Touch, Tractions
 
 
 class Increment:
-    """Tractions at n points from what they remember of the last accepted state, until the next one is accepted.
+    """Tractions at n points from their history variables of the last accepted state, until the next one is accepted.
 
     It is begun for each run of Newton's method ahead of a state, or to look at one. In each iteration
 
@@ -21,7 +21,7 @@ class Increment:
     take. Whoever accepts the state begins another increment.
 
     Args:
-        law: of the contact; touch: what the points remember; None without friction.
+        law: of the contact; touch: their history variables; None without friction.
         start: positions of the points at the state ahead of which Newton's method begins; None: of none.
         guessed: which begin where their forces want them, so that the law is linearised there at first, shape (n,).
     """

@@ -141,7 +141,7 @@ class StepLimit:
     def check(self, old: Any, new: Any, length: float, ends: bool = False) -> Cut | None:
         """Return the reason for which the step between two states is too long, or None.
 
-        `ends`: what comes into contact in it sticks or slides from where it touches, which a long step gets wrong.
+        `ends`: points that come into contact in it stick or slide from where they touch, which a long step gets wrong.
         """
         n, contacts = self._n, self.present
         if any([c.grew_too_much(old.x[:n], old.control, new.x[:n], new.control) for c in contacts]):
@@ -166,7 +166,7 @@ class StepLimit:
         return LIMITS.settling if any(c.lags for c in self.present) else 0
 
     def let_go(self, new: Any) -> bool:
-        """Let go of what pulls at a tool in space at a state that was found; False if nothing does."""
+        """Let go of points in tension at a tool in space at a state that was found; False if nothing does."""
         return any([c.face.let_go(new.x[: self._n], new.control) for c in self.present])
 
     def hold_late(self, new: Any, at_target: bool, sweep: int) -> bool:

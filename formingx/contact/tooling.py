@@ -40,7 +40,7 @@ class Tooling(NamedTuple):
     def names(self) -> list[str]:
         """Name of the tool of each contact; one without a name is "tool 1" and so on, by its (first) contact."""
         first: dict[Any, int] = {}
-        # what moves alike is one
+        # tools with one motion are one
         alike = [k if c.direction is None else c.direction for k, c in enumerate(self.contacts)]
         return [c.name or f"tool {first.setdefault(alike[k], k) + 1}" for k, c in enumerate(self.contacts)]
 

@@ -25,7 +25,7 @@ from ..errors import InputError, known, non_negative, positive
 
 @dataclass(frozen=True)
 class MembraneState:
-    """A membrane inflated to a pole stretch, in the units of what was given.
+    """A membrane inflated to a pole stretch, in the units of the input.
 
     Attributes:
         pressure: stress. height: of the pole, length.

@@ -28,7 +28,7 @@ from .inflation import meridional_stretch
 
 @dataclass(frozen=True)
 class PlugState:
-    """A membrane under a plug, in the units of what was given.
+    """A membrane under a plug, in the units of the input.
 
     Attributes:
         force: on the plug, stress length^2. face_stretch: in both directions under the plug.
@@ -126,7 +126,7 @@ def _pushed(slopes: Callable, ends: Callable, s: np.ndarray, y: np.ndarray, p: l
 
 @dataclass(frozen=True)
 class SlidingState:
-    """A membrane that slides over the rounded edge of a plug, in the units of what was given.
+    """A membrane that slides over the rounded edge of a plug, in the units of the input.
 
     Attributes:
         travel: of the plug, length. force: on it, stress length^2.

@@ -1,1 +1,1 @@
-"""The discrete equations of a scene: what `solve` sees."""
+"""The discrete equations of a scene: the interface of `solve`."""

@@ -37,7 +37,7 @@ class Admissible:
     state then costs some products of arrays.
 
     Args:
-        forms: a `Formulation`; its `w` is what is looked at.
+        forms: a `Formulation`; its `w` is the examined field.
 
     Attributes:
         dofs: unknowns of u_r and of u_z of this rank's own cells, shape (cells, n) each.
@@ -117,7 +117,7 @@ class Admissible:
         """True if no point lies beyond the axis, and in-plane determinants are positive where the energy looks.
 
         (Between its quadrature points an element that a sharp edge bends strongly may be inside out without harm to
-        what is computed: a coarse mesh under a plug. `least` tells.) All ranks, at the state last set; collective.
+        the solution: a coarse mesh under a plug. `least` tells.) All ranks, at the state last set; collective.
         """
         found = self.quantities()
         mine = all(bool(np.all((values if quantity == "hoop stretch" else values[:, :self._n]) > 0))

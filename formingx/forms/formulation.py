@@ -2,7 +2,7 @@
 
 Unknowns are dimensionless: displacement over `length` (the largest extent of the mesh) and pressure over `stress` (the
 largest shear modulus). The energy is divided by stress times reference volume. So a run does not depend on the
-user's units, and what `solve` sees are numbers of order one.
+user's units, and the interface of `solve` are numbers of order one.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ class Histories:
 
     forms: Any
     histories: list[History]
-    _foretold: tuple[Any, list[Any]] = None, []             # x, and what the forms' histories would remember there
+    _foretold: tuple[Any, list[Any]] = None, []             # x, and the history variables of the forms there
 
     @property
     def n_owned(self) -> int:

@@ -21,7 +21,7 @@ class History(Protocol):
     The order of calls, contacts first, then materials, the temperature last, which takes the heat that they dissipate:
 
         start                   the body is in equilibrium;
-        get, advance, put       a step is tried: what would be remembered; back to what was;
+        get, advance, put       a step is tried: the new history variables; back to what was;
         advance                 a state is accepted;
         get, put                to another accepted state, and back;
         save, load              to a file and back, on any number of ranks;
@@ -49,7 +49,7 @@ class History(Protocol):
         """A memory as JSON can hold it but for arrays, independent of ranks and the same on all of them; collective."""
 
     def load(self, data: dict[str, Any]) -> Any:
-        """The memory, own part, of what `save` gave; an InputError if it does not fit this scene."""
+        """The memory, own part, of the result of `save`; an InputError if it does not fit this scene."""
 
     def carry(self, source: Any, memory: Any, x: np.ndarray, control: float,
               there: Callable[[np.ndarray], np.ndarray]) -> Any:

@@ -24,7 +24,8 @@ class MaterialTerms:
         forms: the `Formulation`.
 
     Attributes:
-        constants: {name: coefficient}: a `Constant` for a number; for what varies a `Function` or another UFL scalar.
+        constants: {name: coefficient}: a `Constant` for a number; for a varying coefficient a `Function` or another
+            UFL scalar.
         rest_stress: stress that the energy leaves at F = I (UFL scalar).
         internal: {name: `Function` of a quadrature element} of the internal variables at the beginning of the step.
         held: likewise, of an integral over past states (`PastStates`) at the fields as they are.

@@ -20,8 +20,8 @@ class ExtendedMatrix:
     """Created once, refilled for every tangent.
 
     Args:
-        form: compiled bilinear form of K; index_map: of its space (block size 1); bcs, rows: see `hold`; what is
-            held later must be among them.
+        form: compiled bilinear form of K; index_map: of its space (block size 1); bcs, rows: see `hold`; later
+            constraints must be among them.
     """
 
     def __init__(self, form: Any, index_map: Any, bcs: list, rows: list[np.ndarray], comm: Any, symmetric: bool):

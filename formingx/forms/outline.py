@@ -21,7 +21,7 @@ class Outline:
     """The m edges of the boundary, each a parabola through its ends and its middle, the body to its left.
 
     Args:
-        forms: the `Solid`; its `w` is what is looked at.
+        forms: the `Solid`; its `w` is the examined field.
 
     Attributes:
         rest: end, other end and middle of each edge in the reference configuration, shape (m, 3, 2), length.

@@ -191,5 +191,5 @@ def _basis(element: Any, derivative: int, reference: np.ndarray) -> np.ndarray:
 
 
 def probe(problem: Any, points: Any) -> Probe:
-    """Displacement at fixed reference points (see `Probe`), whatever the body is modelled as."""
+    """Displacement at fixed reference points (see `Probe`), for every model of the body."""
     return problem.forms.probe(problem, points)

@@ -14,7 +14,7 @@ class Setting:
     Attributes:
         base, rate: one number for each thing (0 unless it can be driven), then those of the process time.
         off: numbers of the items that take no part.
-        fading: the control takes away, from 0 to 1, the forces that what has changed left without balance.
+        fading: the control takes away, from 0 to 1, the unbalanced forces of the change.
         stage, piece: number of the stage in its process, and of the piece of it that has one control.
         changed: numbers of the items that leave or come in while it fades.
         mesh: how often the mesh was made again before (`formingx.extensions.remeshing.remeshing`).
@@ -31,13 +31,13 @@ class Setting:
 
     @classmethod
     def first(cls, scene: Any) -> Setting:
-        """Everything at 0 and there; what is driven, if it is one thing, is the control."""
+        """Everything at 0 and there; the controlled quantity, if it is one thing, is the control."""
         rate = [float(scene.driven is not None and t.driven) for t in scene.items] + [0.0]
         return cls([0.0] * len(rate), rate, [])
 
     @property
     def leading(self) -> int | None:
-        """Number of what the control stands for: the time if it runs, else the one thing that is driven, or None."""
+        """Number of the controlled quantity: the time if it runs, else the one thing that is driven, or None."""
         if self.rate[-1]:
             return len(self.rate) - 1
         return next((i for i, rate in enumerate(self.rate) if rate), None)
@@ -52,7 +52,7 @@ class Setting:
         return self.base[number] + self.rate[number] * control
 
     def acting(self, number: int, control: float) -> float:
-        """The part of a load's amplitude that acts: none of one that takes no part, all once what has changed did."""
+        """The part of a load's amplitude that acts: none of one that takes no part, all once the change did."""
         there = float(number not in self.off)
         if self.fading and number in self.changed:
             there = control if there else 1 - control

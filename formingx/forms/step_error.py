@@ -1,9 +1,9 @@
 """Time integration error of the stress at the end of a step: against two steps of half the length.
 
-What materials remember is advanced once more, in two halves, along the displacements that the states before and the new
-one make likely, at the temperatures that the step has led to. The stress that this leaves at the end is compared with
-that of the step (step doubling: Hairer, Norsett and Wanner 1993, section II.4): point by point, at a given deformation,
-so nothing is solved for. Nothing need be known of a material but its step.
+The history variables of materials are advanced once more, in two halves, along the displacements that the states
+before and the new one make likely, at the temperatures that the step has led to. The stress that this leaves at the
+end is compared with that of the step (step doubling: Hairer, Norsett and Wanner 1993, section II.4): point by point,
+at a given deformation, so nothing is solved for. Nothing need be known of a material but its step.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ class StepError:
                          if one.remembers and one.equilibrium_energy(forms.elastic_F) is not None]
 
     def of(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
-        """(error of the stress at the end of a step, what is left of it after another step as long), relative.
+        """(error of the stress at the end of a step, the rest of it after another step as long), relative.
 
-        Root mean squares over the body. What is left adds up from step to step; what is forgotten does not.
+        Root mean squares over the body. The rest adds up from step to step; relaxed parts do not.
 
         Args:
             past: states before, the last of which the step begins at; its end is (x, control).
@@ -88,7 +88,7 @@ class StepError:
         self._forms.clock += time - self._problem.time
 
     def _at(self, x: np.ndarray, time: float) -> list[np.ndarray]:
-        """Stresses of the materials at the end of a step from what is remembered now to x at a time."""
+        """Stresses of the materials at the end of a step from the present history variables to x at a time."""
         self._at_time(time)
         self._problem.place(x)
         return [stress.values() for stress in self._stresses]

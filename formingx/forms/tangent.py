@@ -12,7 +12,7 @@ from .matrix import ExtendedMatrix
 
 
 class Tangent:
-    """dF/dx and dF/dcontrol of forms and what supports hold; made when first asked for: a neighbour has none.
+    """dF/dx and dF/dcontrol of forms and the constraints of supports; made when first asked for: a neighbour has none.
 
     Args:
         forms: the `Formulation`; symmetric: dF/dx is.

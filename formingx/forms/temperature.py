@@ -18,7 +18,7 @@ class Temperature:
         T: the DOLFINx `Function` (P2) of its values. Who changes it calls `take_temperature` of the `Problem`.
         before: values at an earlier time, ghosts included, or None; time, time_before: of the values and of those.
         limits: lowest and highest temperature that there can be. Next to a face that is chilled at once quadratic
-            elements overshoot: what lies beyond is cut off where temperatures are read.
+            elements overshoot: the part beyond is cut off where temperatures are read.
     """
 
     def __init__(self, given: GivenTemperature):

@@ -15,7 +15,7 @@ class Viscosity:
     """Nodal forces eta V dx by a change dx of the unknowns; none by unknowns that are held, nor on them.
 
     Args:
-        form: compiled bilinear form of V; bcs: what is held.
+        form: compiled bilinear form of V; bcs: the constraints.
     """
 
     def __init__(self, form: Any, bcs: list):

@@ -1,8 +1,8 @@
 """Constants of a material that vary over the body.
 
 A constant may be a number, a function of the reference position, called as f(R, Z) with arrays of shape (n,), a UFL
-expression of the scene's mesh (a DOLFINx `Function` is one), a `table` over the temperature, what `of_temperature`
-returns, or an object of a class made from `Varying`.
+expression of the scene's mesh (a DOLFINx `Function` is one), a `table` over the temperature, the result of
+`of_temperature`, or an object of a class made from `Varying`.
 """
 
 from abc import ABC, abstractmethod

@@ -30,11 +30,11 @@ from .homogeneous import MODES, Response, Stability
 class Material:
     """A strain energy with named constants.
 
-    Subclasses set `self.parameters` (name to number, or to what varies: see `constants`) and give `strain_energy`. The
-    constants' unit of stress is the user's own and fixes that of all pressures and stresses.
+    Subclasses set `self.parameters` (name to number, or to a varying coefficient: see `constants`) and give
+    `strain_energy`. The constants' unit of stress is the user's own and fixes that of all pressures and stresses.
 
-    A material with a history sets `self.internal` too, and gives `step_energy` and `updated`. In what they take and
-    return, `internal` is {name: UFL expression} with the values at the beginning of the step, and `time_step` the
+    A material with a history sets `self.internal` too, and gives `step_energy` and `updated`. In their arguments and
+    results, `internal` is {name: UFL expression} with the values at the beginning of the step, and `time_step` the
     process time since then (UFL scalar; 0 where no time passes, then nothing may change).
 
     Attributes:
@@ -116,7 +116,7 @@ class Material:
         return any(varying(value) is not None for value in self.parameters.values())
 
     def constants(self) -> dict[str, float | Varying]:
-        """{name: number, or what varies}."""
+        """{name: number, or a varying coefficient}."""
         return {name: value if (found := varying(value)) is None else found for name, value in self.parameters.items()}
 
     def _numbers(self) -> list[float]:
@@ -260,7 +260,7 @@ class Material:
         """Raise an InputError unless the constants are admissible: finite, with a positive stiffness in the
         reference configuration.
 
-        What is a number, of whatever type, is kept as a float.
+        What is a number, of any type, is kept as a float.
         sample: where to look at constants that vary; None: only those that do not vary are checked.
         """
         self.parameters = {name: value if varying(value) is not None else finite(f"{self}: {name}", value)
@@ -292,7 +292,7 @@ class Material:
                          f" wanted ones instead of the class")
 
     def coordinates(self) -> list[tuple[float, float, float]]:
-        """[(value, lowest, highest)]: what a fit varies. All constants within are admissible."""
+        """[(value, lowest, highest)]: the variables of a fit. All constants within are admissible."""
         return [(float(value), -math.inf, math.inf) for value in self._numbers()]
 
     def constants_at(self, coordinates: Sequence[float] | np.ndarray) -> list[float]:

@@ -24,12 +24,12 @@ class Solidification(Material):
 
     the single-integral network with birth by temperature (Green and Tobolsky, J. Chem. Phys. 14 (1946) 80, with no
     relaxation time). A stiffness that merely rises with falling temperature pulls a formed part back to where it came
-    from; what has set here keeps its shape, but for the small strain at which it bears what the base pulls with.
+    from; the solidified part here keeps its shape, but for the small strain at which it bears what the base pulls with.
     The scene needs a temperature, and `heat=Cooling(...)` for it to change.
 
     Args:
         base: any material, also one that relaxes.
-        modulus: G, the shear modulus of what has set, above 0; stress.
+        modulus: G, the shear modulus of the solidified part, above 0; stress.
         between: two temperatures; all has set at the lower, nothing at the higher, phi is linear between.
         fraction: phi(T) instead, a `table` from 1 to 0; beyond its ends phi stays as it is there.
 
@@ -76,7 +76,8 @@ class Solidification(Material):
     def internal(self) -> dict[str, Any]:  # type: ignore[override]  # read only here
         """See `Material`: those of the base; C of the last two states, A, and phi of the former, which A stands for.
 
-        What sets in a step is known when the temperature at its end is: then, at the beginning of the next, A takes it.
+        The part that solidifies in a step is known when the temperature at its end is: then, at the beginning of the
+        next, A takes it.
         """
         return {**self._base.internal, _BEFORE: IDENTITY, _LAST: IDENTITY, _GLASS: (0.0, 0.0, 0.0, 0.0),
                 _FRACTION: 0.0}
@@ -107,7 +108,8 @@ class Solidification(Material):
             + constants["G_set"] / 2 * phi * (inner(isochoric(F), IDENTITY) - 3)
 
     def step_energy(self, F, internal, time_step, **constants):
-        """See `Material`. What sets in the step is born half in the shape at its beginning, half in that at its end."""
+        """See `Material`. The part that solidifies in the step is born half in the shape at its beginning, half in
+        that at its end."""
         A, begin, end = self._begin(internal, constants)
         born = ufl.max_value(end - begin, 0) / 2
         M = plus(tuple(_left(begin, end) * a for a in A), cofactor(entries(internal[_LAST])), born)

@@ -29,7 +29,7 @@ from .tensors import IDENTITY, Entries, cofactor, determinant, deviator_squared,
 
 
 class RelaxingMaterial(Relaxing):
-    """An equilibrium energy and relaxing branches, whatever the law of the branches.
+    """An equilibrium energy and relaxing branches, for any law of the branches.
 
     The constants are those of the equilibrium energy, then mu_1, tau_1, mu_2, ... As a material without time
     (`strain_energy`, `shear_modulus`, `stress` without times) it is the instantaneous response: nothing has flowed.
@@ -76,7 +76,7 @@ class RelaxingMaterial(Relaxing):
 
     @property
     def internal(self) -> dict[str, tuple]:  # type: ignore[override]  # read only here
-        """{name: value at rest} of what the material remembers: entries (11, 22, 12, 33) of tensors."""
+        """{name: value at rest} of its history variables: entries (11, 22, 12, 33) of tensors."""
         return dict.fromkeys(self.shapes, IDENTITY)
 
     @property
@@ -158,7 +158,7 @@ class RelaxingMaterial(Relaxing):
             times: when the stretches are met, shape (n,), not falling; a step from one stretch to another at the same
                 time is put on at once, and so is the first stretch, to a body in the reference configuration. None:
                 every stretch is put on at once.
-            between: what grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
+            between: the quantity that grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
 
         Raises:
             InputError: as without times; times that fall or are not as many as the stretches.
@@ -221,7 +221,7 @@ class RelaxingMaterial(Relaxing):
             yield k, constants[f"mu_{k}"], constants[f"tau_{k}"]
 
     def _past(self, internal: dict[str, Any], time_step: Any) -> Any:
-        """Return the data of the states before that the branches of a step need, whatever their tau."""
+        """Return the data of the states before that the branches of a step need, for any tau."""
         return entries(internal["C"]) if self._remembers else None
 
     def _left(self, C: Entries, internal: dict[str, Any], time_step: Any) -> dict[str, Any]:

@@ -160,7 +160,7 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
         tooling = Tooling.of_problem(problem)
         tools = {name: [c for c, tool in zip(problem.contacts, tooling.names, strict=True) if tool == name]
                  for name in tooling.force_columns}
-        for name in sorted(tools, key=lambda tool: tools[tool][0].contact.direction is None):  # what moves comes first
+        for name in sorted(tools, key=lambda tool: tools[tool][0].contact.direction is None):  # moving tools come first
             force = _Nodal(problem, lambda c, *at: factors[c] * (resultants.force(c, *at) @ resisting(c.contact)), sum,
                            tools[name])
             found[tooling.force_columns[name]] = force

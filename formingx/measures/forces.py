@@ -1,4 +1,4 @@
-"""Forces as targets: of the body on what a run drives, a support or a tool."""
+"""Forces as targets: of the body on a controlled item, a support or a tool."""
 
 from typing import Any
 

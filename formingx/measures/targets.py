@@ -17,7 +17,7 @@ class Bound:
     """A measure of one problem: its value, and the equation measure = target for a run that aims at it.
 
     Attributes:
-        size: what counts as one of it, in the user's units: 1e-12 of that is nothing.
+        size: its unit, in the user's units: 1e-12 of that is nothing.
         smooth: True if it is a smooth function of the displacements and the control alone.
     """
 
@@ -50,7 +50,7 @@ class OfWholePart(Bound):
 class Amplitude(Bound):
     """Amplitude of an item (by its number in the scene), of the process time (-1), or of the control (None).
 
-    Of a load it is what acts: nothing of one that a stage leaves out.
+    Of a load it is the active load: nothing of one that a stage leaves out.
     """
 
     def __init__(self, problem: Any, number: int | None):

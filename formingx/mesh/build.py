@@ -221,7 +221,7 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
     Args:
         inner, outer: (R, Z) of their points, shape (n, 2), length; n is at least 2, and the same.
         elements: (between each two points and the next, through each layer): counts, or rows of n - 1 counts and of
-            what `disc` takes for its layers.
+            an argument of `disc` for its layers.
         layers: {layer name: its part of the way from `inner` to `outer`, in any unit}; default one, called `wall`.
 
     Raises:

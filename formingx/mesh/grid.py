@@ -88,7 +88,7 @@ def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
     """The distributed mesh of the grid that `make` returns; it is called, and checked, on rank 0.
 
     Raises:
-        InputError: on all ranks, what `make` raised, or what is wrong with the elements of `what`.
+        InputError: on all ranks, the error of `make`, or what is wrong with the elements of `what`.
     """
     error, shape = None, None
     if comm.rank == 0:

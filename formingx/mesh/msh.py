@@ -255,7 +255,7 @@ class _Numbers:
         return self.whole(self._take(n, f"u{self._width}"))
 
     def end(self) -> None:
-        """An InputError unless all of the section was read: what lies beyond its counts would be lost."""
+        """An InputError unless all of the section was read: the part beyond its counts would be lost."""
         left = len(self._body[self._at:].strip()) if self._binary else len(self._values) - self._at
         if left:
             raise InputError(f"{self.where}: {left} more {'bytes' if self._binary else 'numbers'} follow what its"

@@ -15,8 +15,8 @@ them grows with the pressure (Wriggers, Computational Contact Mechanics, 2006; t
 Manual, section 5.2.3). What slides dissipates. Elastic slip has no energy while N changes: slip under N1, and back
 under N2, gains at most mu (N2 - N1) g_s/2 per area, which vanishes with g_s.
 
-A tool that the body does not separate from holds what has touched it: F(d) = d + theta for such a point, of either
-sign, and max(d + theta, 0) for the others, which carries on without a jump when one arrives.
+A tool that the body does not separate from holds points that have touched it: F(d) = d + theta for such a point, of
+either sign, and max(d + theta, 0) for the others, which carries on without a jump when one arrives.
 
 Contact acts at the nodes of six-node triangles, which are the points of the Gauss-Lobatto rule on a facet (exact
 for the lumped area), or at Gauss points of the facets: history is read where it lives.
@@ -48,8 +48,8 @@ _ELASTIC_SLIP = 1e-3
 """g_s over thickness: forces hardly feel it (tests/test_compression.py), and Newton's method can still aim at it."""
 
 _SLIDES, _STICK, _HELD = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
-"""Penalty and ramp of what slides, of what sticks until pulled off, and of what never separates, where stiffer costs
-iterations."""
+"""Penalty and ramp of sliding points, of sticking points until pulled off, and of what never separates, where
+stiffer costs iterations."""
 
 _MOST_POINTS = 100
 """Gauss points on a facet."""
@@ -67,28 +67,28 @@ class Contact(Part):
             there.
         friction: "stick" (a point that touches stays where it touched), "none", or the coefficient mu of Coulomb's
             law (5.9), from 0 (none). One that depends on the temperature of the body where it touches: a `table`
-            {T: mu}, or what `of_temperature` returns; it is that of the last accepted state.
+            {T: mu}, or the result of `of_temperature`; it is that of the last accepted state.
         penalty: k over shear modulus / thickness of the sheet; default 2e5, with separates=False 2e4.
         ramp: theta over thickness of the sheet; default 1e-7 where points slide, 1e-5 where they stick or are held.
         elastic_slip: g_s over thickness of the sheet: how far a point goes under Coulomb's law before it slides.
-        separates: False: what has touched never separates (a tacky sheet, a plug that the sheet is stuck to from the
-            start); with "stick" or "none". Default True; in three dimensions, with "stick", False: it is held until
-            a stage leaves the tool out, or, with True, until it pulls (of materials that do not relax).
+        separates: False: points that have touched never separate (a tacky sheet, a plug that the sheet is stuck to
+            from the start); with "stick" or "none". Default True; in three dimensions, with "stick", False: it is
+            held until a stage leaves the tool out, or, with True, until it pulls (of materials that do not relax).
         nodes_per_step: this number of nodes are to come into contact in a step (two to an element edge); in three
-            dimensions this number of hundredths of all nodes, default 1. What sticks, slides under friction or gives
-            off heat depends on when it touched. None: of what sticks up to 5 % of the nodes, predicted one after the
-            other, each held where it arrives, and so what slides beside it; else of what slides under friction or
-            gives off heat one.
+            dimensions this number of hundredths of all nodes, default 1. Sticking points, slides under friction or
+            gives off heat depends on when it touched. None: of sticking points up to 5 % of the nodes, predicted one
+            after the other, each held where it arrives, and so sliding points beside it; else of sliding points under
+            friction or gives off heat one.
         present_area: the penalty is per area and over the wall as they are at the beginning of a step, not in the
             reference configuration: what is drawn or pressed 20 times thinner is held as well as in the reference
             configuration. Without friction. (Then a state depends, by its penetration, on the steps on the way to it.)
         points: where it acts: at the "nodes" of the face, or at this number of Gauss points of each facet, which
             separate one by
             one: smoother where a sheet slides over an edge.
-        direction: (r, z), in three dimensions (x, y, z), of the tool's motion per unit of travel: the tool is what
-            the run controls;
+        direction: (r, z), in three dimensions (x, y, z), of the tool's motion per unit of travel: the tool is the
+            control of the run;
             None: it stays.
-        name: what it is called in a process and in its columns.
+        name: its name in a process and in its columns.
 
     Raises:
         InputError: an argument that is not allowed.
@@ -163,7 +163,7 @@ class Contact(Part):
 
     @property
     def lagged(self) -> bool:
-        """True if what touches is held from the next step on (`LaggedStick`): on tools in space."""
+        """True if points in contact are held from the next step on (`LaggedStick`): on tools in space."""
         return self.tool.components == 3
 
     def shear_limit(self, pressure: np.ndarray, mu: np.ndarray | float) -> tuple[np.ndarray, np.ndarray | float]:
@@ -217,7 +217,7 @@ class Contact(Part):
 
 
 def _coefficient(name: str, friction: Any) -> Any:
-    """mu, infinite for what sticks, or a function of the temperature; an InputError for anything else."""
+    """mu, infinite for sticking points, or a function of the temperature; an InputError for anything else."""
     words = {"none": 0.0, "stick": math.inf}
     if isinstance(friction, str) and friction in words:
         return words[friction]
@@ -249,7 +249,7 @@ class Law(NormalLaw):
     by stick.
     shear_limit: (pressure, shape (n,), mu): see `Contact.shear_limit`.
 
-    pulls: what touches is held for ever.
+    pulls: points in contact are held for ever.
     """
 
     def __init__(self, tool: PlaneTool, mu: np.ndarray | float, k: np.ndarray | float, theta: float,
@@ -364,7 +364,7 @@ class Law(NormalLaw):
 
         def touch() -> Touch:
             kept = np.divide(T, s, out=zero.copy(), where=s > 0)
-            kept *= 1 + 1e-9 * np.abs(sense_now)             # what slides goes on sliding, whatever round-off says
+            kept *= 1 + 1e-9 * np.abs(sense_now)             # sliding points go on sliding, in spite of round-off
             return _touch(x, kept_at, kept)
         return Tractions(force, N, T, sense_now, stiffness, touch)
 
@@ -381,8 +381,8 @@ class Law(NormalLaw):
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
         """Derivative of the traction round the axis by the motion there, shape (n,), stress/length.
 
-        That of the normal traction, N n_r/r (r: `radius`, infinite in plane strain), and what holds a point that
-        sticks; nothing holds one that slides.
+        That of the normal traction, N n_r/r (r: `radius`, infinite in plane strain), and the stiffness of a sticking
+        point; nothing holds one that slides.
         """
         turned, near, found = super().stiffness_round(x, old, radius), self.nearest(x), self.tractions(x, old)
         if not self.has_friction:

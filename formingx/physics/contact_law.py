@@ -92,7 +92,7 @@ class Motion(NamedTuple):
 
 
 class ContactLaw(Protocol):
-    """Tractions at n points, a function of their positions x and of what they remember. (`None`: nothing.)
+    """Tractions at n points, a function of their positions x and of their history variables. (`None`: nothing.)
 
     For each increment, in this order:
 
@@ -180,7 +180,7 @@ class NormalLaw:
 
     def __init__(self, tool: PlaneTool, k: np.ndarray | float, theta: float, shift: np.ndarray | float = 0.0):
         self.tool, self.k, self.theta, self.shift = tool, k, theta, shift
-        self._near: tuple[np.ndarray, Nearest] | None = None        # points last asked for, and what was found
+        self._near: tuple[np.ndarray, Nearest] | None = None        # points last asked for, and the result
 
     def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
         raise NotImplementedError

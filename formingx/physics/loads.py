@@ -17,8 +17,8 @@ class Load(Part):
 
     Args:
         on: name of the boundary that it acts on; None: it acts in the body.
-        value: a fixed value, in the user's units; None: it is what the run controls.
-        name: what it is called in a process and in its columns.
+        value: a fixed value, in the user's units; None: it is the control of the run.
+        name: its name in a process and in its columns.
     """
 
     quantity = "load"
@@ -73,8 +73,8 @@ class Pressure(Load):
 
     Args:
         on: name of the boundary. A positive pressure pushes into the body.
-        value: a fixed pressure (stress); None: the pressure is what the run controls.
-        name: what it is called in a process and in its columns.
+        value: a fixed pressure (stress); None: the pressure is the control of the run.
+        name: its name in a process and in its columns.
 
     >>> scene.driven                                                                  # what `trace` finds the value of
     Pressure('bottom')
@@ -108,7 +108,7 @@ class Gravity(Load):
         density: of the body in the reference configuration, above 0, or {layer: density} for those that have weight:
             kg/m3 with Pa, m and s; t/mm3 with MPa, mm and s.
         value: the acceleration, length/time^2 (9.81 m/s2 or 9810 mm/s2; below 0: upward); None: the run controls it.
-        name: what it is called in a process and in its columns.
+        name: its name in a process and in its columns.
 
     >>> fx.Gravity(density=0.95e-9, value=9810.0)                                        # t/mm3, mm/s2
     Gravity(9810.0)

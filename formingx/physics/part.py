@@ -9,7 +9,7 @@ class Part:
     """A load, a support or a contact of a scene; each kind overrides what does not hold for it.
 
     Attributes:
-        name: what it is called in a process and in its columns; None: it has no name.
+        name: its name in a process and in its columns; None: it has no name.
         on: the boundary that it acts on; None: it acts on none.
         driven: True if the run controls it.
         quantity: what a run controls of it, e.g. "pressure" or "travel"; None: nothing.

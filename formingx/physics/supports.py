@@ -183,7 +183,7 @@ class PrescribedDisplacement(_OneComponent):
     Args:
         on: name of the boundary.
         component: "r" or "z".
-        name: what it is called in a process and in its columns.
+        name: its name in a process and in its columns.
 
     >>> pulled = fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=0.4),
     ...                   supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0),

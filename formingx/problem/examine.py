@@ -27,7 +27,7 @@ class Examination:
             control and the last corrections dx and dcontrol; None: no iteration failed.
 
     Attributes:
-        facts: {field of a `Diagnosis`: what was found}.
+        facts: {field of a `Diagnosis`: the result}.
     """
 
     def __init__(self, problem: Any, last: Any, attempt: Any):

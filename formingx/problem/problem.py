@@ -1,4 +1,4 @@
-"""The discrete equations of a scene, F(x, control) = 0: what `solve` sees. Everything in it is created once.
+"""The discrete equations of a scene, F(x, control) = 0: the interface of `solve`. Everything in it is created once.
 
 x holds the fields (dimensionless, see `formulation`) and, at the end of the last rank's part, one Lagrange multiplier
 for each `MeanHeld` support.
@@ -38,7 +38,8 @@ from .units import Units
 class _Stage(NamedTuple):
     """Equations of a setting, from a state on.
 
-    setting: the `Setting`; active: what is held; place, rate: of the held owned unknowns, place + rate * control, shape
+    setting: the `Setting`; active: the constraints; place, rate: of the held owned unknowns, place + rate * control,
+        shape
     (n,); means: values that the means are held at; left: forces without balance that a fading setting takes away, over
     1 - control, owned part of F, or None.
     """
@@ -409,8 +410,8 @@ class Problem(Histories, Units):
     def enter(self, setting: Setting, x: np.ndarray, control: float) -> None:
         """Take a setting: from here on F is that of the setting, and (x, control) is a state on its path.
 
-        What is held is held where x has it, now or, if it is driven, at this control; if the setting fades what is left
-        without balance, that is what makes (x, control) a state. x: locally owned entries.
+        Constrained unknowns are held where x has it, now or, if it is driven, at this control; if the setting fades
+        the unbalanced forces, that is what makes (x, control) a state. x: locally owned entries.
         """
         before = self._stage
         if before is not None and setting == before.setting:

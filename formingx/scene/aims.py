@@ -134,8 +134,8 @@ def _room(scene: Scene, contact: Any) -> tuple[float, float]:
 def _room_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
     """Volume that a tube, closed below, can sweep in its mould, up to its upper end; infinite if that is not closed.
 
-    line: its outer face in the reference configuration, from one end to the other, shape (n, 2), length. What lies
-        within keeps its volume.
+    line: its outer face in the reference configuration, from one end to the other, shape (n, 2), length. The enclosed
+        body keeps its volume.
     """
     from scipy.ndimage import label
     line = line if line[0, 1] < line[-1, 1] else line[::-1]

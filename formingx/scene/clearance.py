@@ -18,7 +18,7 @@ def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None
 
     Returns the plans to check once more when their turn comes: a travel at their beginning is not known yet.
 
-    plans: of the stages, with `stage`, `numbers` of what it drives, `tables` [(number, table)], numbers that are `off`.
+    plans: of the stages, with `stage`, `numbers` of its controls, `tables` [(number, table)], numbers that are `off`.
     stands: travels at the beginning {number: length}, default 0.
     Where a travel cannot be known before the run (a stage that ends at a pole height) its tool is left out from there.
     """

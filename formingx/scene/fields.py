@@ -24,8 +24,8 @@ def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperatu
     Args:
         field: a number; a `Table` over R; a function of arrays (R, Z), shape (n,) each; the name of a CSV file with the
             columns R, Z, T (points all around the body), or R, T or Z, T (the same along the other);
-            what `fx.heat` returned (its last state); a scalar DOLFINx Function on this mesh.
-        name: what it is called in an error.
+            the result of `fx.heat` (its last state); a scalar DOLFINx Function on this mesh.
+        name: its name in an error.
 
     Of a sheet in three dimensions it is x and y instead of R and Z.
 

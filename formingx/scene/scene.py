@@ -52,7 +52,7 @@ class Scene:
         quadrature_degree: of the energy, at most 30; default 5 (seven points), the thesis' rule; in three dimensions 1.
         thickness: of a sheet in three dimensions: a length, a function of arrays (x, y), or {layer: either of them}.
         temperature: of the body, which constants of materials may depend on: a number, a `table` over R, a function of
-            arrays (R, Z), a CSV file with columns R, Z, T, what `formingx.heat` returned, or a DOLFINx Function.
+            arrays (R, Z), a CSV file with columns R, Z, T, the result of `formingx.heat`, or a DOLFINx Function.
         heat: `Cooling(...)`: the temperature changes as time goes by.
         expansion: a `ThermalExpansion` for all layers, or {layer: `ThermalExpansion`}: what is cold is smaller.
         preformed: what the body brings from another mesh (`trace(remesh=)`).
@@ -211,7 +211,7 @@ class Scene:
                          + (f"; by name {', '.join(map(repr, names))}" if names else ""))
 
     def column(self, thing: Any) -> str:
-        """Name of the column of what can be driven: "pressure" or "travel", its name in front if there are several."""
+        """Name of the column of a controllable item: "pressure" or "travel", its name in front if there are several."""
         alone = len(self.drivable) == 1 or not thing.name
         return thing.quantity if alone else f"{thing.name}_{thing.quantity}"
 

@@ -28,7 +28,7 @@ class GivenTemperature:
     """A temperature on the scene's own mesh, quadratic in each element.
 
     Args:
-        given: what `fields.values_at` takes.
+        given: an argument of `fields.values_at`.
         mesh: of the scene.
 
     Attributes:

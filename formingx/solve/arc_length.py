@@ -48,7 +48,7 @@ class Curve:
         return float(np.sqrt(self.problem.inner(x, x) + self.control_weight * control**2))
 
     def start(self) -> State:
-        """The body at control 0, in equilibrium with whatever else acts on it, and the tangent there.
+        """The body at control 0, in equilibrium with all other loads on it, and the tangent there.
 
         Raises:
             Failure: Newton's method does not find it from the unloaded state.
@@ -150,7 +150,7 @@ class Curve:
         return self._b.array_r.copy()
 
     def guess_from_rest(self, rest: State, control: float) -> Array:
-        """A guess of the state at a control, to correct at that control: rest, with what is held moved.
+        """A guess of the state at a control, to correct at that control: rest, with the constraints moved.
 
         Where rest has no stiffness (a flat membrane) it is the state in the first direction on which F does no work.
         """
@@ -315,8 +315,8 @@ class Curve:
         return found
 
     def hold_late(self, old: State, states: list[State], targets: Sequence[tuple[Target, Measure]]) -> list[State]:
-        """The states after `old`, the first of them solved for again with what came into a tool in three dimensions
-        in the step.
+        """The states after `old`, the first of them solved for again with points that came into a tool in three
+        dimensions in the step.
 
         That is held from where it met the tool: at a target, one of (target, its measure), all points are; in any other
         state those of tools with friction, at the same control.

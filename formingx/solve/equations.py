@@ -37,7 +37,7 @@ Constraint = Callable[[PETSc.Vec, float, PETSc.Vec], tuple[float, float]]
 
 
 class Measure(Protocol):
-    """A number of every state. size: what counts as one of it, in the user's units: 1e-12 of that is nothing."""
+    """A number of every state. size: its unit, in the user's units: 1e-12 of that is nothing."""
 
     size: float
 
@@ -212,7 +212,7 @@ class Residual(Protocol):
         """out = a state near rest where dF/dx is regular, for the first direction of a path."""
 
     def motion(self, control: float) -> Array:
-        """Rest with what is held where it is at a control: the first guess from there; own part."""
+        """Unloaded state with the constraints of a control, the first guess from there; own part."""
         return np.zeros(self.x.getLocalSize())
 
 
@@ -259,7 +259,7 @@ class Histories(Protocol):
     """History variables: arguments of F besides x and control, and time.
 
     Attributes:
-        memory: what each history remembers of the last accepted state.
+        memory: the history variables of the last accepted state.
         clock: process time at control 0.
     """
 

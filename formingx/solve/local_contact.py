@@ -196,9 +196,9 @@ class _Points:
         """Motions `new`, after y, that do not cross the outer edge of the ramp at once; `behind` grows of those that
         came in.
 
-        What holds a point that sticks, k s g, falls with the slope s of the ramp from all to nothing next to its foot.
-        There a point is in equilibrium that is pulled along its tool and hardly pressed to it, and a correction from
-        either side leads far to the other.
+        The stiffness of a sticking point, k s g, falls with the slope s of the ramp from all to nothing next to its
+        foot. There a point is in equilibrium that is pulled along its tool and hardly pressed to it, and a
+        correction from either side leads far to the other.
         """
         (was, _), (now, way) = (self._all(self._each(ramps, at), (), (self._c,)) for at in (y, new))
         leaves, enters = (was > _LOCAL.least) & (now <= 0), (was <= 0) & (now > 0)

@@ -40,7 +40,7 @@ class PathFollowing:
     """Settings for cutbacks and for giving up. The length of steps is set by `StepControl`.
 
     Attributes:
-        inaccurate: errors in time, over what is allowed, at which a step is taken again.
+        inaccurate: errors in time, over the tolerance, at which a step is taken again.
         snap_through: see `SnapThrough`.
     """
 
@@ -134,7 +134,7 @@ class Run:
 
     @property
     def _aims_at_control(self) -> bool:
-        """True if what is aimed at is what the control stands for: not of a flow, which aims at a time."""
+        """True if the target is the controlled quantity: not of a flow, which aims at a time."""
         return self.aim.until.name != "process_time" or bool(self.problem.setting.rate[-1])
 
     @property
@@ -147,7 +147,7 @@ class Run:
     def _jumps_soon(self) -> bool:
         """True if the body jumps where short steps fail, not only the shortest.
 
-        Not where a pressure is followed with a history: what slips on the way counts.
+        Not where a pressure is followed with a history: slip on the way counts.
         """
         return self._limit_rule in ("snap_through", *["continue_volume"] * (not self.problem.has_history))
 
@@ -158,7 +158,7 @@ class Run:
 
     @property
     def _falls(self) -> bool:
-        """True if what is driven is taken back towards 0, as a pressure that is let off."""
+        """True if the controlled quantity is taken back towards 0, as a pressure that is let off."""
         return self.aim.of_control and abs(self.aim.until.value) < abs(self.aim.values[0])
 
     @property
@@ -337,7 +337,7 @@ class Run:
         step: the length of the last step that went well; onward: see `snap_through`.
 
         From where the body is, contact that remembers may settle at one control and not at another next to it: others
-        are tried, too. What fades is released of at once: on the way it is a load of its own, which no process has.
+        are tried, too. A fading force is removed at once: on the way it is a load of its own, which no process has.
         """
         fading, settings = self.problem.setting.fading, self.settings.snap_through
         others = (settings.ahead, settings.furthest) if length == 0 and self.problem.has_history and not fading else ()
@@ -371,7 +371,7 @@ class Run:
         return most // 5 if self._found_no_rest_near(old) else most
 
     def _check_progress(self) -> None:
-        """Stop if many states have come no nearer to the target, or what is driven has gone beyond all bounds."""
+        """Stop if many states came no nearer to the target, or the control is beyond all bounds."""
         control = self.record.last.control
         absurd = self.problem.absurd(control)
         if absurd is not None:

@@ -1,7 +1,7 @@
 """A process: stages in order, each with its own control, which go on where the one before ended.
 
-Everything is created once. A stage sets how the items of the scene follow the control (`Setting`): what it drives has
-the control as its amplitude; what else can be driven keeps the value that it has. Tables against time make the time
+Everything is created once. A stage sets how the items of the scene follow the control (`Setting`): its controls have
+the control as its amplitude; other controllable items keep the value that it has. Tables against time make the time
 the control, piece by piece between their knots. What a stage leaves out (a grip that opens, a plug that is not there
 yet) leaves forces without balance: they are taken away gradually, which is one more path to follow.
 """
@@ -32,7 +32,7 @@ _IN_TIME = StepControl(length=1e-3, smallest=1e-13)
 """Step control of a material that relaxes: the error in time soon takes over."""
 
 _HELD = replace(_IN_TIME, target=8)
-"""In contact while nothing is driven: what touches hardly moves; the error in time says how long steps may be."""
+"""In contact while nothing is driven: points in contact hardly move; the error in time says how long steps may be."""
 
 _Targets: TypeAlias = list[tuple[Target, Measure]]
 
@@ -40,7 +40,7 @@ _Targets: TypeAlias = list[tuple[Target, Measure]]
 class Execution:
     """One run of a process: from where it stands, stage by stage.
 
-    Piece 0 of a stage changes what takes part, pieces from 1 on drive; each has one `Setting`.
+    Piece 0 of a stage changes the active items, pieces from 1 on drive; each has one `Setting`.
 
     Args:
         record: where the states go. plans: of the stages. unsure: those whose tools are to be looked at again when
@@ -155,7 +155,7 @@ class Execution:
         return run.aim.open
 
     def _change(self, begun: bool) -> None:
-        """Piece 0: what takes part changes. What that leaves without balance is taken away gradually."""
+        """Piece 0: the active items change. The unbalanced forces fade gradually."""
         before, x, control = self._standing()
         start: float | None = None
         if not begun:
@@ -345,7 +345,7 @@ def next_knot(tables: list[tuple[int, Array]], now: float, end: float) -> float:
 
 
 def begin(curve: Curve) -> State:
-    """The first state of a path: the body at control 0, in equilibrium with whatever else acts on it.
+    """The first state of a path: the body at control 0, in equilibrium with all other loads on it.
 
     Fixed loads for which Newton's method finds no equilibrium from the unloaded state are brought in gradually.
 

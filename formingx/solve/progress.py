@@ -36,7 +36,7 @@ class Aim:
 
     @property
     def of_control(self) -> bool:
-        """True if what is aimed at is the control, or something that follows it."""
+        """True if the target is the control, or something that follows it."""
         return isinstance(self.measure, Amplitude)
 
     def is_open(self) -> bool:

@@ -106,7 +106,8 @@ class Record:
     def restore(self) -> int:
         """Let the problem stand at the last state, its setting taken where it began; the number of states with that.
 
-        (What is held, and what fades, is reckoned from where a setting began: elsewhere it would differ by round-off.)
+        (Constrained unknowns, and fading forces, are reckoned from where a setting began: elsewhere it would differ
+        by round-off.)
         """
         setting = self.last.setting
         states = list(itertools.takewhile(lambda s: s.setting == setting, reversed(self.segments[-1].states)))

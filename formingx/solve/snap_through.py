@@ -8,7 +8,7 @@ It reaches equilibrium in the next equilibrium. The way there is followed with v
 from one x_k to the next, the histories taken up at each. (Kelvin-Voigt damping holds waves of all lengths in proportion
 to their stiffness. Damping in proportion to the mass holds short ones least: what separates at an edge then wants 1e4
 times the viscosity that lets the body reach equilibrium.) eta falls where the body moves smoothly and grows where it
-does not; where it is 0 the body is in equilibrium. What is out of balance on the way does work that is lost.
+does not; where it is 0 the body is in equilibrium. The unbalanced force dissipates work on the way.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ class SnapThrough:
     """Criteria for snap-through, and settings of the path to the next state.
 
     eta, over the shear modulus, begins low and grows to the smallest that gives a solution: where a state follows after
-    all, only a little viscosity finds it; much would hold the body back while contact separates, and what slips
+    all, only a little viscosity finds it; much would hold the body back while contact separates, and slip
     meanwhile changes where it ends. (At the brink of release two states may be near, and which is found still
-    depends on eta.) What is lost depends on how far the body moves in a viscous solution and, with friction, where
-    it ends: both are measured in tests/test_jumps.py. Distances are dimensionless, in the mean; forces over the
-    support forces.
+    depends on eta.) The dissipated energy depends on how far the body moves in a viscous solution and, with
+    friction, where it ends: both are measured in tests/test_jumps.py. Distances are dimensionless, in the mean;
+    forces over the support forces.
 
     Attributes:
         lengths: step lengths below which a second failure triggers a snap-through, once each. The last is also that of
@@ -131,7 +131,7 @@ class _Motion:
         self._x = curve.problem.x.duplicate()
         self._pull: Array = np.zeros(len(old.x))
         self.at, self.lost, self.solved = old, 0.0, 0
-        self.rest, self.near = np.inf, settings.near_rest   # what is out of balance; little enough to look for rest
+        self.rest, self.near = np.inf, settings.near_rest   # the unbalanced forces; little enough to look for rest
         self.settles = False
         self._wait = False                                  # eta may not fall after the next solution
 
@@ -204,7 +204,7 @@ class _Motion:
         return bool(self._onward) and self.curve.work(a, b) * self._onward < 0
 
     def _lose(self, a: Array, x: Array, pull: Array) -> None:
-        """Work of what is out of balance from a to x (trapezoidal rule: half way there the chord cuts into tools).
+        """Work of the unbalanced forces from a to x (trapezoidal rule: half way there the chord cuts into tools).
 
         A force at a that has turned before x is none that the body moved by: viscous forces do no negative work.
         """
@@ -273,7 +273,7 @@ def at_limit_points(problem: Equations, falls: bool) -> str:
     Time goes one way. With a history so does the controlled quantity, for to follow a fold would be to let it go
     back; but where a pressure that is put on has its maximum it is the volume of the air that goes on growing. The
     same holds for a pressure on a body in contact, with a history or without: where contact changes a path may end.
-    `falls`: what is driven is let off.
+    `falls`: the controlled quantity is let off.
     """
     if problem.drives == "time":
         return "snap_through"
@@ -312,7 +312,7 @@ def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) ->
 
 
 def let_go(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callable[[State], State]) -> State:
-    """A new state at the same control, without what pulls at tools in three dimensions; by `jump` where the body
+    """A new state at the same control, without points in tension at tools in three dimensions; by `jump` where the body
     snaps off.
 
     Raises:

@@ -21,7 +21,7 @@ AT_LIMIT_POINT = (None, "continue", "snap_through", "stop")
 
 
 class Stage:
-    """One stage of a process: it drives one thing to a target, follows tables, or only changes what takes part.
+    """One stage of a process: it drives one thing to a target, follows tables, or only changes the active items.
 
     Args:
         name: of the stage, in the record.
@@ -32,7 +32,7 @@ class Stage:
         intermediate: more targets to hit exactly on the way; those that are not met are left out.
         inactive: what is not there during the stage, itself or its name: a support that is open, a tool that is away, a
             load that is off. A support takes hold of the body where it is when it comes back; a load comes back with
-            its value, and its column reads what acts of it: 0 while it is away.
+            its value, and its column reads the active load of it: 0 while it is away.
         amplitudes: instead of `control`: {thing: [(time, value), ...]}, piecewise linear in time, values in the
             user's units (the last one stays). A table that begins later than the stage is reached in a straight line
             from where the item stands. With `control`, instead of an item a function that makes targets, such as
@@ -166,7 +166,7 @@ class Stage:
 
 
 class Plan(NamedTuple):
-    """A stage with the items of the scene by their numbers: what it drives, [(number, table)], what is left out; and
+    """A stage with the items of the scene by their numbers: its controls, [(number, table)], its inactive items; and
     all of them as text."""
 
     stage: Stage
@@ -177,7 +177,7 @@ class Plan(NamedTuple):
 
     @property
     def in_flow(self) -> bool:
-        """True if what is driven makes a measure follow a course in time."""
+        """True if the controlled quantity makes a measure follow a course in time."""
         return bool(self.stage.flow or self.stage.constant)
 
     @property

@@ -23,10 +23,10 @@ class State:
         jump: of a "jump": {"dissipated": energy that was lost (stress length^3), "moved": how far the body moved from
             the state before, mean over its volume (length)}.
         met: the target that it hits, or None.
-        memory: what each history of the problem remembers from here on (`Problem.histories`); before: what it did while
+        memory: the history variables of the problem from here on (`Problem.histories`); before: what it did while
             the state was solved for; empty if that is not known.
-        stage: name of the stage of a process; setting: what the stage had set, as plain data (`Setting`).
-        stepping: what a run continues with: its next step, its counts and its target; empty inside a step.
+        stage: name of the stage of a process; setting: the step data of the stage, as plain data (`Setting`).
+        stepping: the data with which a run continues: its next step, its counts and its target; empty inside a step.
         time: process time.
         orientation: sign of the tangent's determinant times that of the slope: the same along a path, through limit
             points too, until another path branches off; 0 if it is not known.

@@ -59,8 +59,8 @@ class StepControl:
         self.length = min(self.length, self.largest)
 
     def accepted(self, iterations: int, error: float = 0.0) -> None:
-        """A full step converged in this number of iterations with a tangent of their own; error: in time, over what is
-        allowed."""
+        """A full step converged in this number of iterations with a tangent of their own; error: in time, over the
+        tolerance."""
         factor = min(max(self.target / max(iterations, 1), 0.5), self.growth)
         factor = min(factor, 0.9 * max(error, 1e-9) ** (-1 / 3))
         self.length = min(self.length * factor, self.largest)
@@ -97,7 +97,7 @@ class TimeError:
         self._once, self._adding_up = once * accuracy, adding_up * accuracy**1.5
 
     def of(self, states: Sequence[State], x: Array, control: float) -> float:
-        """Error of the step from the last of some states to (x, control) over what is allowed; 0: no time goes by."""
+        """Error of the step from the last of some states to (x, control) over the tolerance; 0: no time goes by."""
         time = self._problem.time_at(control)
         past = predictor.before(states, time, predictor.QUADRATIC - 1)
         end = State(x, control, x, 0.0, time=time)

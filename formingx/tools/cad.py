@@ -115,7 +115,7 @@ def _raise(error: InputError) -> list[Line | Arc]:
 
 
 def _check_references(file: str) -> None:
-    """An InputError unless a STEP file ends, and defines once whatever it refers to: else parts are left out."""
+    """An InputError unless a STEP file ends, and defines once every item that it refers to: else parts are left out."""
     text = re.sub(r"'[^']*'|/\*.*?\*/", "", Path(file).read_bytes().decode("latin-1"), flags=re.DOTALL)
     if "END-ISO-10303-21" not in text:
         raise InputError(f"tool file {file!r} cannot be read: it has no end: it was cut off")

@@ -29,7 +29,7 @@ def main(file: str, kind: str, seconds: int) -> None:
         bounds = {tag: [float(end[0]) for end in model.getParametrizationBounds(1, tag)]
                   for _, tag in model.getEntities(1)}
         out.write(json.dumps({"curves": bounds}) + "\n")
-    except Exception as error:  # noqa: BLE001  whatever a damaged file makes of the reader
+    except Exception as error:  # noqa: BLE001  any error of the reader on a damaged file
         out.write(json.dumps({"error": str(error)}) + "\n")
         return
     for line in sys.stdin:

@@ -42,7 +42,7 @@ def curves(file: str | os.PathLike, tolerance: float | None) -> dict[int, Callab
             if (entity.dxftype() in _READERS or entity.dxftype() in _NO_TOOL) and _is_seen(entity, drawing):
                 number = len(found) + 1
                 found[number] = partial(_pieces, entity, tolerance, f"tool file {file!r}: curve {number}")
-    except Exception as error:      # whatever a damaged file makes of the reader
+    except Exception as error:      # any error of the reader on a damaged file
         raise InputError(f"tool file {file!r} cannot be read: {error or type(error).__name__}") from None
     return found
 
@@ -152,7 +152,7 @@ def unit(file: str) -> str | None:
     import ezdxf
     try:
         code = ezdxf.readfile(file).header.get("$INSUNITS", 0)
-    except Exception as error:      # whatever a damaged file makes of the reader
+    except Exception as error:      # any error of the reader on a damaged file
         raise InputError(f"tool file {file!r} cannot be read: {type(error).__name__}: {error}") from None
     if code and code not in _UNITS:
         raise InputError(f"tool file {file!r}: its unit, $INSUNITS = {code!r}, is not one of"

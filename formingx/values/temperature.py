@@ -24,7 +24,7 @@ class FunctionOfTemperature:
     """f(T) of the temperature of the scene; arrays of shape (n,) go in and come out.
 
     Args:
-        function: f. words: what it is called in messages.
+        function: f. words: its name in messages.
         limits: lowest and highest temperature at which it is known; None: those of f, if it has any.
 
     Attributes:

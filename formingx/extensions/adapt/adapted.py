@@ -28,7 +28,7 @@ def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = Non
 
     A column is as long, in the reference configuration, as the strictest of its states allows, and at most 1.25
     times its neighbour; but not shorter than an eighth of that of the run, as long ones know no better: then adapt
-    again, to a run on the new mesh. What lies through the sheet stays: elements, layers and their interfaces. For
+    again, to a run on the new mesh. The subdivision through the sheet stays: elements, layers and their interfaces. For
     meshes of `disc`, `sphere`, `parison` and `from_lines`; of a `sheet` in three dimensions triangles are made
     smaller, to a quarter at the least, never larger. Collective.
 

@@ -105,7 +105,7 @@ def _turns(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.
 def _by_stress(path: Any, error: float, middles: np.ndarray) -> np.ndarray:
     """Columns that share an error of the stress, per length, as meshes of fewest elements do.
 
-    With errors C(s) h^p, p the order: h ~ C^(-2/(2 p + 1)), so that the integral of (C h^p)^2 is what is allowed.
+    With errors C(s) h^p, p the order: h ~ C^(-2/(2 p + 1)), so that the integral of (C h^p)^2 is the tolerance.
     """
     n = middles.shape[1]
     length = np.linalg.norm(np.diff(path.problem.scene.mesh.columns.place(

@@ -61,7 +61,7 @@ _SETTINGS = EventSettings()
 class GapClosure(NamedTuple):
     """A point of a face that meets the ramp of its tool; the same on all ranks.
 
-    time: arc length; place: then, shape (2,). length: of face that is its own. sticks: whatever pulls at it.
+    time: arc length; place: then, shape (2,). length: of face that is its own. sticks: under any force.
     """
 
     time: float
@@ -391,7 +391,7 @@ class ContactEventSequence:
         self._work += 1
         forces = [np.full(at.shape, np.nan) for at in piece.at]
         for given, free in zip(forces, self._free):
-            given[free] = 0.0                               # what has not arrived yet touches nothing
+            given[free] = 0.0                               # open points touch nothing
         points.spread(piece.force, forces)
         by = self._response.to_equilibrium(
             x + time * direction + piece.off[0] - points.columns @ piece.extra.ravel(),

@@ -20,7 +20,8 @@ class Search:
         spare: part by which a volume that is to be kept is aimed lower, so that round-off does not exceed it.
         kept: a volume or a minimum wall that is missed by more than this part is said.
         reached: a wanted wall is reached where it deviates by less than this part of it.
-        less: what stops a search is told if the deviation without it would be less than this part of what it is.
+        less: the reason for the end of a search is told if the deviation without it would be less than this part of
+            what it is.
         damped: Levenberg's damping over the largest singular value of the sensitivities: less effect counts as none.
         damped_measured: likewise, where a measured wall, which scatters, is fitted.
         worth: the search ends after two runs that lower the sum of squares by less than this part of it.
@@ -99,7 +100,7 @@ class Aim:
         return float(left + (0.0 if self.held is None else (run.volume / self.held - 1) ** 2))
 
     def shortfall(self, run: DesignRun) -> str:
-        """Return how far the best run is from the wanted wall, and what stops the search, or ""."""
+        """Return how far the best run is from the wanted wall, and the reason for the end of the search, or ""."""
         if self.wanted is None:
             return ""
         wall = run.wall[self.inside]

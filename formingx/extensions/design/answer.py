@@ -32,9 +32,9 @@ class Answer:
         before, best: the first and the best `DesignRun`; runs: all that were taken, in order; failed: why others made
             no path, as text; inside: which places of the wall counted, shape (k,); why: the search ended; predicted:
             the wall that the run before the best predicted for it, shape (k,), length; lack: a volume, a wall or a
-            least wall that was asked for and not reached, and what stops it, as text, or ""; wanted: the wall that
-            was asked for at the places that count, shape (m,), length, or None; measured: the `MeasuredWall` that
-            was fitted to, or None.
+            least wall that was asked for and not reached, and the reason for the end of it, as text, or ""; wanted:
+            the wall that was asked for at the places that count, shape (m,), length, or None; measured: the
+            `MeasuredWall` that was fitted to, or None.
     """
 
     before: DesignRun
@@ -88,7 +88,7 @@ class Answer:
         return [name for name, d in zip(self.before.parameters.names, abs(by).max(0) / mean) if d < _SCATTER]
 
     def attainable(self) -> float:
-        """The unevenness to which these parameters could bring the wall within their bounds, whatever the volume, as
+        """The unevenness to which these parameters could bring the wall within their bounds, for any volume, as
         the derivatives of the best run predict."""
         from scipy.optimize import lsq_linear
         p, v, (wall, by) = self.best.parameters, self.best.vector, self.best.derivative("wall")
@@ -143,7 +143,7 @@ class Answer:
 
     def report(self, file: Any = "design.html", title: str = "", *, deviations: Any = None,
                units: Units | None = None) -> FilePath:
-        """Write one HTML file: what was found, how sure it is, walls before and after, the pattern, and which parameter
+        """Write one HTML file: the result, how sure it is, walls before and after, the pattern, and which parameter
         changes the wall where (rank 0 writes); returns where it is.
 
         deviations: as of `DesignRun.spread`: the wall is drawn with its standard deviation, and a table has those of

@@ -2,10 +2,10 @@
 
 Without a history the last state depends on its own equations alone (and on where stages before it ended). With one, a
 neighbour remembers its own states. Where a node sticks depends on when it touches, which moves with the parameter: so
-where the run's node arrived, the neighbour's is moved along the run's velocity onto its own tool, whatever the step
-did. (With the steps held as they were, derivatives would be wrong by up to a factor of three.) Where a node arrives at
-the end of a step, which turns the path, the neighbour is looked at where its own does; at a target where it meets its
-own; else in the plane normal to the path of the run: it is all one.
+where the run's node arrived, the neighbour's is moved along the run's velocity onto its own tool, independently of
+the step. (With the steps held as they were, derivatives would be wrong by up to a factor of three.) Where a node
+arrives at the end of a step, which turns the path, the neighbour is looked at where its own does; at a target where
+it meets its own; else in the plane normal to the path of the run: it is all one.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class _Carrier:
             raise Failure("it did not reach its target", [])
 
     def _begin(self, state: State) -> None:
-        """The first state: the body at rest, or in equilibrium with what acts on it."""
+        """The first state: the body at rest, or in equilibrium with its loads."""
         for one in self.neighbours:
             one.x, one.control = state.x.copy(), state.control
         self._late: list[np.ndarray] = []
@@ -207,7 +207,7 @@ class _Carrier:
             timed = setting.rate[-1] and self.problem.relaxes
             hold = fixed(state.control)
             return (hold, [hold] * len(self.neighbours)) if timed else self._gaps()
-        if setting.piece == 0 and not self._single:          # what has changed has done so
+        if setting.piece == 0 and not self._single:          # the change has done so
             return fixed(1.0), [fixed(1.0)] * len(self.neighbours)
         key = (setting.stage, setting.piece)
         p = None if self._single else self._plans[setting.stage]

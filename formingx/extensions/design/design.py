@@ -67,7 +67,7 @@ class Design:
         """Run it with some values, the other parameters at their start.
 
         Raises:
-            InputError: what `build` returns is no scene with an end, or the scene is not allowed.
+            InputError: the result of `build` is no scene with an end, or the scene is not allowed.
             ConvergenceError: see `trace`.
         """
         return self._run(self.parameters.vector(values or {}))
@@ -86,7 +86,7 @@ class Design:
 
     def _run(self, vector: np.ndarray) -> DesignRun:
         scene, end = self._make(vector)
-        scene = copy.copy(scene)                             # what the script made is left as it is
+        scene = copy.copy(scene)                             # the script's scene is left as it is
         scene.one_by_one = True
         self.paths += 1
         options: dict[str, Any] = {"step": self._step, "tolerances": self._tolerances, "max_steps": self._most,

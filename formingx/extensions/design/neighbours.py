@@ -1,12 +1,12 @@
 """The neighbours of a run: the same with one parameter a little more, or less, carried along with its factors.
 
-Each neighbour is a problem of its own, made of what the user's function builds: whatever a parameter changes (nodes,
+Each neighbour is a problem of its own, made of the scene of the user's function: every change by a parameter (nodes,
 constants, tools, friction, targets, temperatures) is changed in it. At a state of the run with dF/dx = K, a neighbour
 solves its own F = 0 and its own constraint by iterations with the factors of K, which are near its own,
 
     K dx + F_c dc = -F',    c_x dx + c_c dc = -c',
 
-and whatever is measured at two neighbours has their difference over 2 dp for its derivative: of second order in dp.
+and every output quantity at two neighbours has their difference over 2 dp for its derivative: of second order in dp.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ class Neighbour:
                      kind=like.kind, time=self.problem.time_at(self.control))
 
     def residual(self, left_over: np.ndarray) -> np.ndarray:
-        """F at its state less what is left over of the run's, own part, shape (n,)."""
+        """F at its state less the residual of the run's, own part, shape (n,)."""
         self.problem.x.array_w[:] = self.x
         self.problem.residual(self.problem.x, self.control, self.F)
         self.F.array_w[:] -= left_over

@@ -85,7 +85,7 @@ class Parameters:
     """Parameters of a design, one after the other in a vector of n numbers.
 
     Args:
-        given: {name: (start, low, high), a number, or what `along` returned}.
+        given: {name: (start, low, high), a number, or the result of `along`}.
 
     Attributes:
         names: of the numbers, such as "travel" or "wall[3]"; start, low, high: shape (n,); size: what counts as one of

@@ -1,4 +1,4 @@
-"""One HTML file of a run of a design, or of what a search came to: walls, pattern, derivatives."""
+"""One HTML file of a run of a design, or of the result of a search: walls, pattern, derivatives."""
 
 import datetime
 import html

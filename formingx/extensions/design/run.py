@@ -1,4 +1,4 @@
-"""One run of a design, and the derivatives of what it came to by all parameters."""
+"""One run of a design, and the derivatives of its result by all parameters."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Effects:
 
 
 class DesignRun:
-    """A run of what the user's function makes of some values.
+    """A run of the scene of the user's function of some values.
 
     Attributes:
         vector: the numbers of the parameters, shape (n,); values: the same by name; parameters: what they are

@@ -33,7 +33,7 @@ class TimedTest(NamedTuple):
             first one, at the first of the times; if that is not 0 and the stretch is held all along, at time 0.
         stretches: shape (n,).
         stress: nominal, shape (n,); not a number where it was not measured.
-        between: what grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
+        between: the quantity that grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
 
     >>> held = fx.TimedTest("uniaxial", times=[0.0, 1.0, 5.0], stretches=[1.0, 2.0, 2.0], stress=[0.0, 1.2, 0.9])
     >>> held.between                                                        # 0 and 1 it grew at a constant rate

@@ -77,7 +77,7 @@ def coarse_layers(body: Any) -> Iterator[Finding]:
 
 @register("scene")
 def springs_back(body: Any) -> Iterator[Finding]:
-    """A modulus that rises as a stretched body cools pulls it back: it says nothing of what has set.
+    """A modulus that rises as a stretched body cools pulls it back: it says nothing of the solidified part.
 
     (A film that was drawn into a mould, its table of stiffness on the equilibrium energy, came off it again and went
     back to a third of its height.)

@@ -102,7 +102,7 @@ class Conduction:
         return np.where(self._held, self._held_at.x.array[: self._n], T)
 
     def update(self) -> None:
-        """The displacement or what touches has changed: take up where faces are and how large they are."""
+        """The displacement or the contact has changed: take up where faces are and how large they are."""
         self._factored_for = None
         for touch, area in zip(self.touches, self._areas):
             touch.area = self._assemble(area)[touch.dofs]
@@ -173,7 +173,7 @@ class Conduction:
         return self.capacity * self._sum(self._mass(change))
 
     def held_by(self, missing: np.ndarray) -> np.ndarray:
-        """Heat that each held face gave, of what is missing at the nodes (degrees of the whole body), owned part."""
+        """Heat that each held face gave, of the missing heat at the nodes (degrees of the whole body), owned part."""
         return self.capacity * np.array([self._sum(missing[dofs]) for _, dofs in self._fixed])
 
     def mass(self, change: np.ndarray) -> np.ndarray:
@@ -333,7 +333,7 @@ class Conduction:
         return array[: self._n].copy()
 
     def _body_rate(self, T: np.ndarray) -> np.ndarray:
-        """R(T) without what touches, owned part; leaves T in `T`."""
+        """R(T) without points in contact, owned part; leaves T in `T`."""
         self.T.x.array[: self._n] = T
         self.T.x.scatter_forward()
         return self._assemble(self._rate_form) + self.power
@@ -344,7 +344,7 @@ class Conduction:
         return self._assemble(self._mass_form)
 
     def _factorise(self, c: float, answers: list[Any], afresh: bool) -> None:
-        """The tangent M - c R' at the T last set, what touches included; one with the same c, unless `afresh`."""
+        """The tangent M - c R' at the T last set, points in contact included; one with the same c, unless `afresh`."""
         if self._factored_for == c and not afresh:
             return
         self._factored_for = c

@@ -256,7 +256,7 @@ class CoolingHistory:
         self._take()
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """See `History`; heat flows in the body as it is half-way, and half the step through what reaches touch, or
+        """See `History`; heat flows in the body as it is half-way, and half the step through points that touch, or
         ceases to, in it: which makes the step one of second order."""
         until = self._forms.time_at(control)
         if self._power is not None:                         # the materials have advanced

@@ -17,7 +17,7 @@ class ThermalExpansion:
 
     Args:
         linear: coefficient a of linear expansion, 1/degree: J_T = [1 + a (T - stress_free)]^3.
-        specific_volume: in place of it, v(T) in any unit, a `table` or what `of_temperature` returns:
+        specific_volume: in place of it, v(T) in any unit, a `table` or the result of `of_temperature`:
             J_T = v(T)/v(stress_free).
         stress_free: the temperature at which the mesh as it is has no stress.
 

@@ -1,8 +1,8 @@
 """An estimate of the error in three dimensions of a temperature: what a space of one degree more would change.
 
 The residual of the temperature and of its change in time, tested by cubics, drives a correction over the time that the
-run has taken: (M + t K) e = t (R(T) - M dT/dt). For what varies on a short length this is the elliptic reconstruction
-of Makridakis and Nochetto, SIAM J. Numer. Anal. 41 (2003) 1585-1594.
+run has taken: (M + t K) e = t (R(T) - M dT/dt). For a varying coefficient on a short length this is the elliptic
+reconstruction of Makridakis and Nochetto, SIAM J. Numer. Anal. 41 (2003) 1585-1594.
 """
 
 import numpy as np

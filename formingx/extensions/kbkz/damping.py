@@ -114,7 +114,7 @@ class SoskeyWinter(Damping):
 
     .. math:: h = 1/(1 + a J^{b/2}), \quad J = \alpha I_1 + (1 - \alpha) I_2 - 3
 
-    In shear J is the square of the shear strain, so h = 1/(1 + a shear^b), whatever alpha is. With b = 2 it is `PSM`
+    In shear J is the square of the shear strain, so h = 1/(1 + a shear^b), for any alpha. With b = 2 it is `PSM`
     with 1/a in place of alpha and alpha in place of beta.
 
     Args:

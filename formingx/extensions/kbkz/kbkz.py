@@ -116,7 +116,7 @@ class KBKZ(Relaxing):
             stretches: of any shape without times, (n,) with them.
             times: when the stretches are met, shape (n,), not falling; a step from one stretch to another at the same
                 time is put on at once, and so is the first stretch. None: every stretch is put on at once.
-            between: what grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
+            between: the quantity that grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
 
         Raises:
             InputError: unknown mode, a stretch that is not above 0, times that fall or are not one for each stretch.

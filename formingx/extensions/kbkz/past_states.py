@@ -20,7 +20,7 @@ from ...ranks import gathered
 
 _NOTHING = 3e-7
 """A past state that the line between its neighbours replaces to this part of the present stress is left out. (Of the
-thousand states of a fine run what is left out adds up: to 3e-4 of the stress, with 3e-6 to 4e-3.)"""
+thousand states of a fine run the omitted parts add up: to 3e-4 of the stress, with 3e-6 to 4e-3.)"""
 
 
 class Past(NamedTuple):

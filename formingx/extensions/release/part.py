@@ -1,4 +1,4 @@
-"""A part of a mesh: what is left of a sheet that is trimmed."""
+"""A part of a mesh: the rest of a trimmed sheet."""
 
 import numpy as np
 

@@ -49,7 +49,7 @@ class Worn(NamedTuple):
     def moved_in(self, x: np.ndarray, d: np.ndarray) -> np.ndarray:
         """Return the motion out of the tool of points, shape (n, 2), at distances d, length.
 
-        No point of the body lies deeper in it than what touches beside it; between two that touch as deep as they.
+        No point of the body lies deeper in it than points in contact beside it; between two that touch as deep as they.
         """
         pair, share = self._near(x)
         both = self.touches[pair]

@@ -36,7 +36,7 @@ def load(before: tuple[Problem, State], data: dict[str, Any], preformed: Callabl
 
     Args:
         before: the problem and the last state on the mesh before.
-        data: what `save` gave.
+        data: the result of `save`.
         preformed: makes the earlier deformation from its fields (`Preformed`).
     """
     scene = before[0].scene

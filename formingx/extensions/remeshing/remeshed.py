@@ -1,4 +1,4 @@
-"""A mesh of what lies inside a closed outline of curved edges, by gmsh: small elements at corners, names kept."""
+"""A mesh of the interior of a closed outline of curved edges, by gmsh: small elements at corners, names kept."""
 
 from collections.abc import Callable, Sequence
 from typing import Any

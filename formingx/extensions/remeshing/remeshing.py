@@ -1,8 +1,8 @@
 """Runs whose mesh is made again on the way: the deformed body becomes the reference, F = grad x . F_old.
 
 For blocks that are crushed: where the volume ratio J at a quadrature point leaves its range, a new mesh is made of the
-outline as it is now, and takes over what the body carries: deformation so far, pressures, what touches and with which
-pressure and friction. The state that the new mesh reaches at the same travel is one of kind "remesh".
+outline as it is now, and takes over what the body carries: deformation so far, pressures, points in contact and with
+which pressure and friction. The state that the new mesh reaches at the same travel is one of kind "remesh".
 """
 
 from __future__ import annotations
@@ -280,7 +280,7 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
     for new, (_, before, _) in zip(problem.contacts, worn, strict=True):
         take_over(new, before, x[: problem.n_owned], control)
     volume = problem.forms.volume / old.forms.volume / (1 + state.measures["mass_error"]) - 1
-    x = x if setting.fading else _balanced(problem, curve, x, control)      # else what is left over fades, too
+    x = x if setting.fading else _balanced(problem, curve, x, control)      # else the residual fades, too
     start = curve.resume(x, control)
     if start.slope * state.slope < 0:
         start.direction, start.slope, start.orientation = -start.direction, -start.slope, -start.orientation
@@ -290,7 +290,7 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
 
 
 def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> np.ndarray:
-    """The state at the same control: by Newton's method, or as what is left without balance fades."""
+    """The state at the same control: by Newton's method, or as the unbalanced forces fade."""
     first = problem.setting
     problem.x.array_w[:] = x
     try:
@@ -330,7 +330,8 @@ def _without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np
 
 
 def _outside(x: np.ndarray, names: frozenset[str], worn: list[tuple[Any, Worn, np.ndarray]]) -> np.ndarray:
-    """Points of an outline, shape (n, 2), no deeper in tools than what touched beside them: edges cut corners."""
+    """Points of an outline, shape (n, 2), no deeper in tools than points that touched beside them: edges cut
+    corners."""
     for contact, before, by in worn:
         if contact.contact.on in names:
             near = contact.contact.tool.nearest(x - by)

@@ -1,4 +1,4 @@
-"""Friction in three dimensions, and sliding without it, lagged by a step: what touches stays on the surface of its
+"""Friction in three dimensions, and sliding without it, lagged by a step: points in contact stay on the surface of its
 tool.
 
 Which points touch is lagged as in `lagged_stick`. The traction of a point that touches, per unit reference area, is
@@ -12,7 +12,8 @@ the last accepted state, changed as the tangent of the path predicts, then the p
 with it, until both agree (`StepLimits.behind`). It is 0 for a point that has touched since the last state: steps are
 short enough for the pressure to change little in each (`StepLimits.lag`).
 
-In a step a point pulls as well as it pushes, so that Newton's method meets no kink; at its end what pulls separates.
+In a step a point pulls as well as it pushes, so that Newton's method meets no kink; at its end points in tension
+separate.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from .lagged_stick import SMALL_GAP, LaggedStick
 
 _LEAST = 0.1               # pressure that limits friction, over the pressure at the last state, at least
 _MOST = 10.0               # and at most
-_SLIDES_ON = 1 + 1e-9      # kept slip of what slides, over g_s: it goes on sliding, whatever round-off says
+_SLIDES_ON = 1 + 1e-9      # kept slip of sliding points, over g_s: it goes on sliding, in spite of round-off
 
 
 class Near(NamedTuple):

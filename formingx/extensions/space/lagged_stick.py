@@ -1,4 +1,5 @@
-"""Contact in three dimensions, lagged by a step: what touches is held where it crossed the tool, from the next step on.
+"""Contact in three dimensions, lagged by a step: points in contact are held where it crossed the tool, from the next
+step on.
 
 A point whose straight way between two accepted states leads into the tool is held by an isotropic penalty, in the
 steps after, at the place where that way crossed the surface (as the user's guide of Polyflow describes of its contact).
@@ -6,10 +7,10 @@ Within a step nothing changes: the law is linear, and Newton's method meets no k
 asks the tool. The price is an error of first order in how far points move in the step in which they arrive: with 1 % of
 the points to a step, walls are within 0.1 % of those of exact stick. The tool must give its signed distance alone.
 
-What is held stays so until a stage leaves the tool out. With `separates=True` points that pull at it are released of
-at the end of each step, until none does, the control standing still; a body that snaps off reaches equilibrium by a
-jump. That is proven of elastic sheets. Of relaxing ones it is refused: slack under the plug, points separate and
-touch again at each step, and the run reaches a stop.
+Constrained unknowns stay so until a stage leaves the tool out. With `separates=True` points that pull at it are
+released of at the end of each step, until none does, the control standing still; a body that snaps off reaches
+equilibrium by a jump. That is proven of elastic sheets. Of relaxing ones it is refused: slack under the plug, points
+separate and touch again at each step, and the run reaches a stop.
 """
 
 from __future__ import annotations
@@ -96,7 +97,7 @@ class LaggedStick:
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """See `ContactLaw`; `normal` says 1 of what is held: normals are not asked for."""
+        """See `ContactLaw`; `normal` says 1 of the constraints: normals are not asked for."""
         assert old is not None
         held, zero, force = self.held(old), np.zeros(len(x)), np.zeros_like(x)
         force[held] = self.k * (x[held] - old.position[held])

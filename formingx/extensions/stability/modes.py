@@ -26,7 +26,7 @@ class Lanczos:
     Attributes:
         steps: at most, each a solve with factors that are there.
         accurate: error of an eigenvalue, relative to it, at which it ends.
-        exhausted: size of what is left of a new vector, over the largest eigenvalue of the inverse, that is round-off:
+        exhausted: size of the rest of a new vector, over the largest eigenvalue of the inverse, that is round-off:
             all modes are found.
     """
 

@@ -248,7 +248,7 @@ class SecondVariation:
     def _find_held(self, number: float, flipped: str | None) -> np.ndarray:
         """Local numbers of the unknowns that are held, ghosts too.
 
-        Round the axis what is held in r and in z is held, too: a clamped rim, a node, a face that is driven.
+        Round the axis the constraints in r and in z are held, too: a clamped rim, a node, a face that is driven.
         """
         problem, held, places = self.problem, [*self._idle], {0: [], 1: []}     # type: ignore[var-annotated]
         for i, thing in enumerate(problem.scene.items):

@@ -1,4 +1,4 @@
-"""Many runs of one script with other numbers: tables, main effects, what is best; in parallel, and to continue with.
+"""Many runs of one script with other numbers: tables, main effects, the best run; in parallel, and to continue with.
 
     def pot(depth, radius):                                  # importable: a function of a script or of a module
         ...
@@ -184,8 +184,8 @@ class Study(Sheet):
 
         Args:
             evaluations: at most this number of more runs, one after the other.
-            within: {variable: (lowest, highest)}; what is not named stays at its best. Default: all that vary, within
-                what was run.
+            within: {variable: (lowest, highest)}; a variable without a range stays at its best. Default: all that
+                vary, within the ranges of the study.
             executor: as in `study`; default: a process of its own.
 
         Raises:
@@ -271,7 +271,7 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
             its mesh on `MPI.COMM_SELF`.
         variables: {name: values}: all their combinations; or a list of {name: value}, one for each run.
         measure: {name: a function of the path that gives a number, or the name of a column, at the last state}.
-        goal: {measure: "max" or "min"}: what is best, the first before the others.
+        goal: {measure: "max" or "min"}: the best run, the first before the others.
         folder: where runs are kept as they come in; those in it are not run again.
         executor: any of `concurrent.futures`, `mpi4py.futures.MPIPoolExecutor` for one; default: processes of this
             machine. What is run in other processes must be importable: no lambda, no function inside another.

@@ -46,7 +46,7 @@ class Filling(Sheet):
 
     @property
     def pressure(self) -> np.ndarray:
-        """Values of what is driven, shape (n,)."""
+        """Values of the controlled quantity, shape (n,)."""
         return next(iter(self.control.values()))
 
     def pressure_at(self, gap: float, corner: int | None = None) -> float:

@@ -163,7 +163,7 @@ class Ledger:
         if a.setting != b.setting:                          # the same body, seen under another setting
             if self._problem.forms.elastic_supports:
                 found["change"] = self._energy_at(b) - self._energy_at(a)
-            if "bonds" in found:                            # what is left out releases what it held
+            if "bonds" in found:                            # an inactive tool releases its bonds
                 found["change"] = found.get("change", 0.0) + found["bonds"]
             return found
         straight = b.kind == "jump" or self._flows(a, b)    # no tangents of the way
@@ -237,7 +237,7 @@ class Ledger:
         return found
 
     def _nodes(self, contact: Any, fields: np.ndarray, control: float) -> np.ndarray:
-        """Owned unknowns (u_r, u_z) of its face, shape (n, 2); of what touches, where it shares the face."""
+        """Owned unknowns (u_r, u_z) of its face, shape (n, 2); of points in contact, where it shares the face."""
         problem, dofs = self._problem, contact.rule.dofs
         if contact.contact.points == "nodes" and sum(c.contact.on == contact.contact.on for c in problem.contacts) > 1:
             return dofs[contact.touching(fields, control)]

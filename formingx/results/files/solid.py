@@ -33,7 +33,7 @@ def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarra
         points = np.stack([np.stack([line[:, 0], np.full(n, y), line[:, 1]], axis=-1) for y in (0.0, width)])
     number = np.arange(len(points) * n).reshape(len(points), n)
     if axisymmetric:
-        number[:, on_axis] = number[0, on_axis]              # one point, whatever the angle
+        number[:, on_axis] = number[0, on_axis]              # one point, for any angle
     here, there = (number, np.roll(number, -1, axis=0)) if axisymmetric else (number[:1], number[1:])
     a, b, c, d = here, np.roll(here, -1, axis=1), np.roll(there, -1, axis=1), there
     triangles = np.concatenate([np.stack(three, axis=-1).reshape(-1, 3) for three in ((a, b, c), (a, c, d))])

@@ -34,7 +34,8 @@ def convergence(path: Any, axes: Any = None) -> Any:
 
 
 def main_columns(columns: list[str]) -> tuple[str, str]:
-    """(x, y) of the loading curve: what is driven over how far the body has gone, or its force over the travel."""
+    """(x, y) of the loading curve: the controlled quantity over how far the body has gone, or its force over the
+    travel."""
     travel = next((c for c in columns if c.endswith("travel")), None)
     if travel:
         own = travel.replace("travel", "force")

@@ -85,7 +85,7 @@ class Record:
 
     @property
     def control(self) -> str:
-        """The column of what is driven."""
+        """The column of the controlled quantity."""
         return next(iter(self.measures))
 
     @property

@@ -241,7 +241,7 @@ def _key_numbers(record: Record, units: Units) -> str:
 
 
 def _course_columns(record: Record) -> list[list[str]]:
-    """Columns of what is driven, and of forces, of one kind each."""
+    """Columns of the controlled quantity, and of forces, of one kind each."""
     kinds = [[c for c in record.measures if c.endswith(end)] for end in ("pressure", "travel", "displacement", "force")]
     return [columns for columns in kinds if columns]
 
