@@ -46,37 +46,35 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
     """Follow the equilibrium path from the unloaded body until a target is reached, through limit points.
 
     Args:
-        scene: with one driven load or support.
-        until: the target that ends the run, e.g. `pole_stretch(8.5)`; hit exactly.
-        intermediate: more targets to hit exactly on the way; those that are not met are left out.
+        scene: with one controlled load, support or tool.
+        until: the target that ends the run, such as `pole_stretch(8.5)`; met exactly.
+        intermediate: more targets to meet exactly on the way; targets that are not met are left out.
         step: step control; default `StepControl()`.
-        tolerances: when a state counts as converged; default `Tolerances()`.
+        tolerances: convergence criteria of a state; default `Tolerances()`.
         max_steps: accepted states before the run gives up; None: it gives up when it comes no nearer to its target.
         progress: show a progress bar on runs of more than two seconds (rank 0).
-        start: a path of this scene to continue from, also one that `formingx.load` read; it stays as it is. Its
-            steps go on as they were, unless `step` is given; targets that it has met count as met. It goes back
-            where another target lies behind (but for a pressure, which may come again ahead).
+        start: a path of this scene to continue, also one that `formingx.load` read; it is not changed. The step length
+            continues unless `step` is given. Targets that the path has met count as met. The run goes back where
+            another target lies behind its start, except for a pressure, which may return ahead.
         checkpoint: a folder to which every accepted state is written after each step, see `formingx.load`.
-        record: {name: measure} of columns of your own: a function of the `Problem`, called while it stands at the
-            state, that returns a number; or a target such as `displacement(0, at=(1, 0))`, whose measure is recorded.
-        at_limit_point: what to do at a limit point of the controlled quantity. "continue": go on along the path, on
-            which it turns back (in contact, or with a history, the body jumps where no state is left on it).
-            "snap_through": it goes on, and the body snaps to its next equilibrium, see `Path.jumps`; also where no
-            other state is near. "stop": end there. None: "snap_through" where it can go one way only: it is time, or
-            there is a history (friction); but a pressure is followed, for what an air supply makes grow is the
-            volume (in contact, or with a history: as long as the volume grows).
-        resume: continue from the states of the checkpoint, which must be of this scene; if it holds nothing, begin.
-        allow_inadmissible: go on, with a warning, where a state is none that a body can have: folded, inside a tool,
-            elements inside out. (`State.verdict` says so; by default the run ends there.)
-        adapt_mesh: run twice: on the scene's mesh, which may be coarse, and from the unloaded state again on
-            `mesh.adapted(path)`, which has columns of elements as the first run asks for. True, or arguments of
-            that, such as {"error": 0.02}. `Path.pilot` is the first run; a first run that did not reach the target
-            counts as far as it came.
-        remesh: a `Remesh`: the mesh is made again, of the body as it is, where elements are crushed; states of kind
-            "remesh", whose `jump` says the amount by which force, energy and volume changed. For solids of one
-            layer, on one rank.
-        stop_at: `unstable(modes=range(2, 9))`: end, as a result, once the body is unstable in one of these modes;
-            `Path.ended` says which.
+        record: {name: quantity} of additional columns: a function of the `Problem` at the state that returns a number,
+            or a target such as `displacement(0, at=(1, 0))`, whose quantity is recorded.
+        at_limit_point: action at a limit point of the control. "continue": continue along the path, on which the
+            control turns back; in contact, or with history variables, the body snaps through where the path has no
+            further state. "snap_through": the control continues, and the body snaps to its next equilibrium, see
+            `Path.jumps`. "stop": end there. None: "snap_through" where the control goes one way only, that is for time
+            and with history variables (friction); a pressure is continued while the enclosed volume grows, as by an air
+            supply.
+        resume: continue from the states of the checkpoint, which must be of this scene; without states, begin.
+        allow_inadmissible: continue, with a warning, at states that a body cannot have: folded, inside a tool, with
+            inverted elements. `State.verdict` tells why; by default the run ends there.
+        adapt_mesh: run twice: on the scene's mesh, which may be coarse, and again on `mesh.adapted(path)`, whose
+            columns of elements suit the first run. True, or arguments of `adapted`, such as {"error": 0.02}.
+            `Path.pilot` is the first run; it may have ended before the target.
+        remesh: a `Remesh`: a new mesh of the deformed body replaces crushed elements; the states of kind "remesh" have
+            the relative change of force, energy and volume in `jump`. For solids of one layer, on one rank.
+        stop_at: `instability(modes=range(2, 9))`: end, as a result, once the body is unstable in one of these modes;
+            `Path.ended` tells which.
 
     Raises:
         InputError: nothing is driven, a target needs something that the scene does not have or cannot be met (it is
@@ -184,13 +182,13 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
 
 
 class Process:
-    """Stages on one scene, run in order, each from where the one before ended.
+    """Stages on one scene, run in order, each from the last state of the one before.
 
-    A pressure, support or tool of the scene that can be driven (`Pressure` without value, `PrescribedDisplacement`,
-    `Contact` with `direction`) starts at 0, and stays where it is in stages that do not drive it.
+    A pressure, support or tool without a fixed value (`Pressure` without value, `PrescribedDisplacement`, `Contact`
+    with `direction`) starts at 0. It keeps its value in stages that do not control it.
 
     Args:
-        scene: with any number of things that can be driven.
+        scene: with any number of controllable items.
 
     >>> air, plug = fx.Pressure("bottom"), fx.Contact("top", fx.tools.plane(2.0), "none", direction=(0, -1))
     >>> scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(8, 1)), loads=[air], contacts=[plug],

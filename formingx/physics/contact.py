@@ -1,25 +1,30 @@
-"""Contact of a face of the body with a rigid tool: a penalty with a regularised ramp, and three laws of friction.
+r"""Contact of a face of the body with a rigid tool: penalty, regularised ramp, and three laws of friction.
 
-Song (1993), eqs. (5.7) to (5.14), per unit reference area, at a point whose signed distance to the tool is d:
+Song (1993), eqs. (5.7) to (5.14), per unit reference area, at a point of signed distance d (positive inside the tool).
+The normal traction is
 
-    normal traction      N = k F(d),  F the ramp (5.13) of half-width theta: 0 below -theta, d above theta, C1 between;
-    tangential traction  T = k F'(d) g for stick, T = mu N g/g_s but not more than mu N for Coulomb's law,
+.. math:: N = k F(d), \qquad F(d) = \begin{cases} 0 & d \le -\theta \\ (d + \theta)^2 / (4\theta) & |d| < \theta \\
+          d & d \ge \theta, \end{cases}
 
-g being the elastic slip: the tangential motion since the point touched (entered the ramp), less what has slid. Stick
-is mu = inf, frictionless mu = 0. A point that was out of touch at the last accepted state slips from where it arrives
-inside the step, which the tangent of the path predicts: taken from the end of the step, the slip would depend on its
-length. One that sticks, and that the tangent lets arrive at the very end of the step or later, is free until then.
+the tangential traction for stick and for Coulomb's law
 
-Coulomb's law is regularised so that points slide after the same small elastic slip g_s at every pressure: what holds
-them grows with the pressure (Wriggers, Computational Contact Mechanics, 2006; the elastic stick of the Abaqus Theory
-Manual, section 5.2.3). What slides dissipates. Elastic slip has no energy while N changes: slip under N1, and back
-under N2, gains at most mu (N2 - N1) g_s/2 per area, which vanishes with g_s.
+.. math:: T_{stick} = k F'(d)\, g, \qquad T_{Coulomb} = \mu N \min(|g| / g_s, 1)\, \operatorname{sign} g.
 
-A tool that the body does not separate from holds points that have touched it: F(d) = d + theta for such a point, of
-either sign, and max(d + theta, 0) for the others, which carries on without a jump when one arrives.
+The elastic slip g is the tangential motion since the point touched, less the sliding. Stick is mu = inf, frictionless
+contact mu = 0. A point that was open at the last accepted state slips from the place of its gap closure inside the
+step, which the tangent of the path predicts. A sticking point whose gap closes at the very end of the step, or later,
+is free until then.
+
+Coulomb's law is regularised: points slide after the same small elastic slip g_s at every pressure, so that their
+stiffness grows with the pressure (Wriggers, Computational Contact Mechanics, 2006; the elastic stick of the Abaqus
+Theory Manual, section 5.2.3). Sliding dissipates energy. Elastic slip has no energy while N changes: slip under N1, and
+back under N2, gains at most mu (N2 - N1) g_s/2 per area, which vanishes with g_s.
+
+For a tool that the body does not separate from, F(d) = d + theta of either sign for a point that has touched, and
+max(d + theta, 0) for the others, which is continuous when a gap closes.
 
 Contact acts at the nodes of six-node triangles, which are the points of the Gauss-Lobatto rule on a facet (exact
-for the lumped area), or at Gauss points of the facets: history is read where it lives.
+for the lumped area), or at Gauss points of the facets. History variables live at the same points.
 """
 
 from __future__ import annotations
@@ -59,35 +64,32 @@ _AT_FOOT = 1e-7
 
 
 class Contact(Part):
-    """A face of the body that a rigid tool stops.
+    """Contact of a face of the body with a rigid tool.
 
     Args:
         on: name of the boundary that faces the tool.
-        tool: a `Tool`, see `formingx.tools`; of a sheet in three dimensions `solid`, `box`, `revolved` or `extruded`
-            there.
-        friction: "stick" (a point that touches stays where it touched), "none", or the coefficient mu of Coulomb's
-            law (5.9), from 0 (none). One that depends on the temperature of the body where it touches: a `table`
-            {T: mu}, or the result of `of_temperature`; it is that of the last accepted state.
+        tool: a `Tool`, see `formingx.tools`; for a sheet in three dimensions `solid`, `box`, `revolved` or `extruded`.
+        friction: "stick" (a point stays where it touched), "none", or the coefficient mu of Coulomb's law (5.9), at
+            least 0. A coefficient that depends on the temperature of the body is a `table` {T: mu} or the result of
+            `of_temperature`; its value is that of the last accepted state.
         penalty: k over shear modulus / thickness of the sheet; default 2e5, with separates=False 2e4.
-        ramp: theta over thickness of the sheet; default 1e-7 where points slide, 1e-5 where they stick or are held.
-        elastic_slip: g_s over thickness of the sheet: how far a point goes under Coulomb's law before it slides.
-        separates: False: points that have touched never separate (a tacky sheet, a plug that the sheet is stuck to
-            from the start); with "stick" or "none". Default True; in three dimensions, with "stick", False: it is
-            held until a stage leaves the tool out, or, with True, until it pulls (of materials that do not relax).
-        nodes_per_step: this number of nodes are to come into contact in a step (two to an element edge); in three
-            dimensions this number of hundredths of all nodes, default 1. Sticking points, slides under friction or
-            gives off heat depends on when it touched. None: of sticking points up to 5 % of the nodes, predicted one
-            after the other, each held where it arrives, and so sliding points beside it; else of sliding points under
-            friction or gives off heat one.
-        present_area: the penalty is per area and over the wall as they are at the beginning of a step, not in the
-            reference configuration: what is drawn or pressed 20 times thinner is held as well as in the reference
-            configuration. Without friction. (Then a state depends, by its penetration, on the steps on the way to it.)
-        points: where it acts: at the "nodes" of the face, or at this number of Gauss points of each facet, which
-            separate one by
-            one: smoother where a sheet slides over an edge.
-        direction: (r, z), in three dimensions (x, y, z), of the tool's motion per unit of travel: the tool is the
-            control of the run;
-            None: it stays.
+        ramp: theta over thickness of the sheet; default 1e-7 where points slide, 1e-5 where they stick.
+        elastic_slip: g_s over thickness of the sheet: the elastic motion of a point before it slides.
+        separates: False: points that have touched stay in contact (a tacky sheet, a plug that the sheet sticks to from
+            the start); with "stick" or "none". The default is True. For "stick" in three dimensions it is False: a
+            point stays in contact until a stage makes the tool inactive. There True lets points in tension separate,
+            for materials that do not relax.
+        nodes_per_step: number of nodes that come into contact in one step (an element edge has two). In three
+            dimensions it is a percentage of all nodes, default 1. The results of stick, friction and heat exchange
+            depend on the time of touch. None: where points stick, up to 5 % of the nodes, whose gap closures are
+            predicted in order; the same for faces that slide beside them; elsewhere one node with friction or heat.
+        present_area: the penalty refers to the area and the wall at the beginning of a step, not to the reference
+            configuration. A sheet that is drawn 20 times thinner then penetrates as little as an undeformed one. Only
+            without friction. The penetration then depends on the steps.
+        points: "nodes" of the face, or the number of Gauss points of each facet. Gauss points separate one by one,
+            which is smoother where a sheet slides over an edge.
+        direction: motion of the tool per unit of travel, (r, z), in three dimensions (x, y, z): the travel is a control
+            of the run. None: the tool is fixed.
         name: its name in a process and in its columns.
 
     Raises:

@@ -37,25 +37,24 @@ _LARGER = 4.0
 
 
 class Scene:
-    """A body, what it is made of, how it is held and what loads it.
+    """A body with its materials, supports, loads and contacts.
 
     Args:
         mesh: from `formingx.mesh`.
         materials: {layer name: material}, or one material for all layers.
         supports: see `formingx.physics.supports`.
-        loads: see `formingx.physics.loads`. One load, support or tool may be driven (controlled by the run), several by
-            a `formingx.Process`.
-            (Contacts of one tool with several faces, of the same `direction` and name, count as one.)
-        contacts: faces of the body that rigid tools stop, see `formingx.Contact`.
-        model: how the scene is modelled: `MixedPressure()` (default) or `DisplacementPenalty()`, a solid; `Membrane()`.
+        loads: see `formingx.physics.loads`. A run controls one load, support or tool; a `formingx.Process` controls
+            several. Contacts of one tool with several faces, of the same `direction` and name, count as one.
+        contacts: contacts of faces with rigid tools, see `formingx.Contact`.
+        model: `MixedPressure()` (default) or `DisplacementPenalty()`, a solid; `Membrane()`.
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`; of a sheet in three dimensions `ThreeD()`.
         quadrature_degree: of the energy, at most 30; default 5 (seven points), the thesis' rule; in three dimensions 1.
         thickness: of a sheet in three dimensions: a length, a function of arrays (x, y), or {layer: either of them}.
         temperature: of the body, which constants of materials may depend on: a number, a `table` over R, a function of
             arrays (R, Z), a CSV file with columns R, Z, T, the result of `formingx.heat`, or a DOLFINx Function.
         heat: `Cooling(...)`: the temperature changes as time goes by.
-        expansion: a `ThermalExpansion` for all layers, or {layer: `ThermalExpansion`}: what is cold is smaller.
-        preformed: what the body brings from another mesh (`trace(remesh=)`).
+        expansion: a `ThermalExpansion` for all layers, or {layer: `ThermalExpansion`}: free strain by the temperature.
+        preformed: deformation transferred from another mesh (`trace(remesh=)`).
 
     Raises:
         InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, or whose

@@ -21,29 +21,28 @@ AT_LIMIT_POINT = (None, "continue", "snap_through", "stop")
 
 
 class Stage:
-    """One stage of a process: it drives one thing to a target, follows tables, or only changes the active items.
+    """One stage of a process: a control with its target, prescribed amplitudes, or only a change of the active items.
 
     Args:
         name: of the stage, in the record.
-        control: the load, support or contact to drive, itself or its name.
-        until: the target that ends the stage, hit exactly, from either side, e.g. `travel(6.0)` (from the reference,
-            not from here); with `amplitudes` a `process_time`, or None: the end of the tables. With a
-            `duration`, while nothing is driven: what is waited for, such as `sag(30.0)`, within that time.
-        intermediate: more targets to hit exactly on the way; those that are not met are left out.
-        inactive: what is not there during the stage, itself or its name: a support that is open, a tool that is away, a
-            load that is off. A support takes hold of the body where it is when it comes back; a load comes back with
-            its value, and its column reads the active load of it: 0 while it is away.
-        amplitudes: instead of `control`: {thing: [(time, value), ...]}, piecewise linear in time, values in the
-            user's units (the last one stays). A table that begins later than the stage is reached in a straight line
-            from where the item stands. With `control`, instead of an item a function that makes targets, such as
-            `enclosed_volume`: the controlled quantity is what makes that measure follow the table: a flow. Its
-            course may be a function of time, too; then `until` is the `process_time` of its end.
-        speed: of the controlled quantity (its unit per time), greater than 0: time goes by while it moves.
-        duration: time that the stage takes: on the way to a target of the controlled quantity, or while it stands
-            still.
-        constant: with `control` and `duration`: a target, such as `force(2.0)`: the controlled quantity deforms so
-            that it stays met. Process time is 0 at first; it runs in stages with a table, a speed or a duration;
-            others are instantaneous.
+        control: the load, support or contact whose amplitude the stage varies, itself or its name.
+        until: the target that ends the stage, met exactly, from either side, such as `travel(6.0)`. A travel counts
+            from the reference configuration. With `amplitudes` it is a `process_time`, or None: the end of the tables.
+            With a `duration` and no control it ends the wait early, such as `sag(30.0)`.
+        intermediate: more targets to meet exactly on the way; targets that are not met are left out.
+        inactive: items that are absent during the stage, themselves or their names: an open support, a tool that is
+            away, a load that is off. A support constrains the body where it is when it returns. A load returns with its
+            value; its column is 0 while it is absent.
+        amplitudes: instead of `control`: {item: [(time, value), ...]}, piecewise linear in time, values in the user's
+            units; the last value stays. A table that begins later than the stage is reached in a straight line from the
+            present value. With `control`, instead of an item, a function that makes targets, such as
+            `enclosed_volume`: then the control is adjusted so that this quantity follows the table. The table may be a
+            function of time; then `until` is the `process_time` of its end.
+        speed: of the control (its unit per time), greater than 0: process time passes while it moves.
+        duration: process time of the stage: on the way to a target of the control, or while nothing moves.
+        constant: with `control` and `duration`: a target, such as `force(2.0)`, that stays met, since the control is
+            adjusted. Process time is 0 at first. It passes in stages with a table, a speed or a duration; others are
+            instantaneous.
         step: step control of this stage; default that of the run.
         at_limit_point: see `formingx.trace`.
 
