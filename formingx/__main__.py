@@ -70,8 +70,8 @@ def _parser() -> argparse.ArgumentParser:
     watch = commands.add_parser("watch", help="show the status again and again", description="Show the status of a run"
                                 " whenever it has new states, until it ends, has had none for --patience seconds, or"
                                 " Ctrl-C.")
-    for one in (look, show, now, watch):
-        one.add_argument("folder", metavar="FOLDER", help="a checkpoint (trace(..., checkpoint=FOLDER), Path.save)")
+    for entry in (look, show, now, watch):
+        entry.add_argument("folder", metavar="FOLDER", help="a checkpoint (trace(..., checkpoint=FOLDER), Path.save)")
     show.add_argument("--out", type=Path, help="the HTML file (default: report.html in the checkpoint)")
     show.add_argument("--title", default="", help="heading of the report")
     show.add_argument("--units", metavar="LENGTH,STRESS", help="units of the script, such as mm,MPa")

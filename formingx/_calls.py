@@ -44,14 +44,14 @@ class _WrongCall(InputError, TypeError):
 
 def explain(module: types.ModuleType) -> None:
     """Explain the calls that fail of all that a module of the package exports: functions, classes and their methods."""
-    for name, thing in list(vars(module).items()):
-        if name.startswith("_") or not getattr(thing, "__module__", "").startswith(_PACKAGE):
+    for name, item in list(vars(module).items()):
+        if name.startswith("_") or not getattr(item, "__module__", "").startswith(_PACKAGE):
             continue
-        if isinstance(thing, type) and not issubclass(thing, BaseException):
-            _explain_class(thing)
-        elif isinstance(thing, types.FunctionType):
-            explained = _explained(thing, thing.__name__, skip=0)
-            setattr(sys.modules[thing.__module__], thing.__name__, explained)    # where pickle looks for it
+        if isinstance(item, type) and not issubclass(item, BaseException):
+            _explain_class(item)
+        elif isinstance(item, types.FunctionType):
+            explained = _explained(item, item.__name__, skip=0)
+            setattr(sys.modules[item.__module__], item.__name__, explained)    # where pickle looks for it
             setattr(module, name, explained)
 
 
@@ -122,9 +122,9 @@ def _wrong(call: Callable, name: str, skip: int, args: tuple, given: dict[str, A
         how, kind = signature.parameters[parameter].kind, kinds.get(parameter, Any)
         values = (value if how is inspect.Parameter.VAR_POSITIONAL else
                   value.values() if how is inspect.Parameter.VAR_KEYWORD else [value])
-        for one in values:
-            if not _is(one, kind):
-                return f"{name}: {parameter} = {_short(one)}: must be {_said(kind)}"
+        for entry in values:
+            if not _is(entry, kind):
+                return f"{name}: {parameter} = {_short(entry)}: must be {_said(kind)}"
     return None
 
 
@@ -157,9 +157,9 @@ def _is(value: Any, kind: Any) -> bool:
     if kind is np.ndarray or kind == ArrayLike:
         return _numbers(value)
     if origin in (typing.Union, types.UnionType):
-        return any(_is(value, one) for one in _either(of))
+        return any(_is(value, entry) for entry in _either(of))
     if origin is typing.Literal:
-        return any(value is one or value == one for one in of if type(value) is type(one))
+        return any(value is entry or value == entry for entry in of if type(value) is type(entry))
     if kind is float or kind is int:
         number = Real if kind is float else Integral
         return isinstance(value, number) and not isinstance(value, bool) and _numbers(value)
@@ -182,7 +182,7 @@ def _is(value: Any, kind: Any) -> bool:
     if isinstance(value, Sequence) and of:
         if origin is tuple and of[-1] is not Ellipsis:
             return len(value) == len(of) and all(map(_is, value, of))
-        return all(_is(one, of[0]) for one in value)
+        return all(_is(entry, of[0]) for entry in value)
     return True
 
 

@@ -277,7 +277,7 @@ class Process:
 
     def _look_again(self, plan: Plan, stands: Callable[[int], float]) -> None:
         """An InputError if the tools of a stage cannot move as it says, now that their travels are known."""
-        contacts = {i: stands(i) for i, thing in enumerate(self.scene.items) if thing in self.scene.contacts}
+        contacts = {i: stands(i) for i, item in enumerate(self.scene.items) if item in self.scene.contacts}
         clearance.check(self.scene, [plan], contacts)
 
     def _checked(self, stages: Any) -> list[Stage]:
@@ -313,21 +313,21 @@ def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
     return Path(read(folder, scene, state))
 
 
-def _after_pilot(who: str, adapt_mesh: Any, start: Any, resume: bool, scene: Scene, checkpoint: Any,
+def _after_pilot(caller: str, adapt_mesh: Any, start: Any, resume: bool, scene: Scene, checkpoint: Any,
                  run: Callable[[Scene, Any], Path]) -> Path:
     """The path of a run on the mesh that a first run asks for."""
     if start is not None or resume:
-        raise InputError(f"{who}: adapt_mesh={adapt_mesh!r}: a pilot run begins at rest and makes the mesh; with"
+        raise InputError(f"{caller}: adapt_mesh={adapt_mesh!r}: a pilot run begins at rest and makes the mesh; with"
                          f" start or resume"
                          f" a run goes on with the mesh that it has: give only one of them")
     if adapt_mesh is not True and not isinstance(adapt_mesh, Mapping):
-        raise InputError(f"{who}: adapt_mesh = {adapt_mesh!r}: must be True, False or arguments of mesh.adapted,"
+        raise InputError(f"{caller}: adapt_mesh = {adapt_mesh!r}: must be True, False or arguments of mesh.adapted,"
                          f" such as"
                          f" {{'error': 0.02}}")
     options = {} if adapt_mesh is True else dict(adapt_mesh)
-    meshes = adaptation(who)
+    meshes = adaptation(caller)
     for name in options:
-        known(f"{who}: adapt_mesh", name, ("share", "error"))
+        known(f"{caller}: adapt_mesh", name, ("share", "error"))
     meshes.check(scene.mesh)
     try:
         first = run(scene, None)
@@ -382,12 +382,12 @@ def _keep(path: Path, checkpoint: Any) -> None:
         path.record.on_end.append(kept.end)
 
 
-def _from_checkpoint(who: str, resume: bool, checkpoint: Any, scene: Scene, start: Any) -> Any:
+def _from_checkpoint(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: Any) -> Any:
     """Return the start of a run: `start`, or with `resume` the states of its checkpoint."""
     if not resume:
         return start
     if checkpoint is None or start is not None:
-        raise InputError(f"{who}: resume=True: give a checkpoint to go on from, and no start")
+        raise InputError(f"{caller}: resume=True: give a checkpoint to go on from, and no start")
     return load(checkpoint, scene) if holds_states(checkpoint, scene.mesh.comm) else None
 
 
@@ -428,5 +428,5 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
 
 def _end(path: Path, failure: str, found: list[Finding]) -> None:
     """Tell those who keep the run how it ended, and its findings."""
-    for told in path.record.on_end:
-        told(failure, found)
+    for listener in path.record.on_end:
+        listener(failure, found)

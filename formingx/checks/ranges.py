@@ -69,7 +69,7 @@ def weight(body: Body) -> Iterator[Finding]:
 @register("start")
 def pressures(body: Body) -> Iterator[Finding]:
     """Pressures all of which push the body away from every mould before it."""
-    acting = [one for one in _driven(body) if one[1]]
+    acting = [entry for entry in _driven(body) if entry[1]]
     found = moulds(body.scene) if acting else []
     towards = [np.sign(value) * sign_towards(contact, load) for load, value, _ in acting for contact in found]
     if max(towards, default=0.0) < 0:

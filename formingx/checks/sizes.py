@@ -79,8 +79,8 @@ class Body(Triangles):
         name, _, quantity = str(target.name).rpartition("_")
         if quantity not in ("pressure", "travel"):
             return []
-        things = [t for t in self.scene.items if t.driven and t.quantity == quantity]
-        of = next((t for t in things if name and t.name == name), drive if not name and drive in things else None)
+        items = [t for t in self.scene.items if t.driven and t.quantity == quantity]
+        of = next((t for t in items if name and t.name == name), drive if not name and drive in items else None)
         return [Aim(of, quantity, target.value, str(target))]
 
     def pressures(self) -> list[tuple[str, float]]:

@@ -33,7 +33,7 @@ def untouched(path: Any) -> Iterator[Finding]:
         start, end = (_distances(problem, state, contacts) for state in (there[0], there[-1]))
         law, tool = contacts[0].contact, contacts[0].contact.name or contacts[0].contact.on
         gaps = f"the gap was {start.min():.4g} at first and {end.min():.4g} at the end"
-        if law.direction is None and any(one.contact in before for one in contacts) and \
+        if law.direction is None and any(entry.contact in before for entry in contacts) and \
                 end.mean() > _AWAY * start.mean() + contacts[0].thickness:
             yield Finding("warning", tool, f"the body moved away from this mould: the mean distance of its face"
                           f" {law.on!r} grew from {start.mean():.4g} to {end.mean():.4g}. Does the pressure act on the"

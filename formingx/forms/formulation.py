@@ -198,7 +198,7 @@ class Formulation(ABC):
             InputError: a constant has no value at a temperature.
         """
         following: list[Any] = [*self.terms, *([self._free] if self._free else [])]
-        together(self.comm, [one.take_temperature for one in following])
+        together(self.comm, [entry.take_temperature for entry in following])
 
     def cells_of(self, layers: list[str]) -> np.ndarray:
         """The cells of `mesh` in which some layers are, this rank's own and ghosts, ascending local numbers."""
@@ -301,9 +301,9 @@ class Formulation(ABC):
         """`residual`, `control_derivative` and `time_derivative`."""
         v, control = self.test_function(), self._control
         residual = ufl.derivative(self.potential, self.w, v)
-        for one in self.terms:
-            if work := one.unsymmetric_work(self.elastic_F, lambda f: ufl.derivative(f, self.w, v)):
-                residual += self.weighted(self._scale * work, one.names)
+        for entry in self.terms:
+            if work := entry.unsymmetric_work(self.elastic_F, lambda f: ufl.derivative(f, self.w, v)):
+                residual += self.weighted(self._scale * work, entry.names)
         timed = ufl.Form([i for i in self.potential.integrals() if self.control in extract_constants(i.integrand())])
         by_time = ufl.derivative(ufl.diff(timed, control), self.w, v) if timed.integrals() else None
         terms = []

@@ -115,7 +115,7 @@ class MaterialHistory:
         """See `History`."""
         carrier = Carrier(self._forms.comm, there(source.points), self.points)
         shapes = self._terms.material.shapes
-        F = [shapes_of(one._forms, one._own, one._terms.places) for one in (source, self)] if shapes else []
+        F = [shapes_of(entry._forms, entry._own, entry._terms.places) for entry in (source, self)] if shapes else []
 
         def carried(name: str, values: np.ndarray) -> np.ndarray:
             if name not in shapes:

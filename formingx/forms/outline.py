@@ -58,14 +58,14 @@ class Outline:
         """Return a mask of the edges of a boundary of the mesh, shape (m,); collective."""
         return self._gathered(np.isin(self._facets, self._forms.scene.mesh.facets_of(boundary)))
 
-    def around(self, who: str) -> list[int]:
+    def around(self, caller: str) -> list[int]:
         """Numbers of the edges one after the other round the body; an InputError if it has holes, or several parts."""
         after = {int(a): k for k, (a, _) in enumerate(self.ends)}
         order = [0]
         while len(order) < len(self.ends):
             order.append(after[int(self.ends[order[-1], 1])])
         if len(set(order)) < len(order):
-            raise InputError(f"{who}: the body has a hole, or several parts: must be one piece without holes")
+            raise InputError(f"{caller}: the body has a hole, or several parts: must be one piece without holes")
         return order
 
     def pieces(self, edges: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:

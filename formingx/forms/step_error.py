@@ -39,11 +39,11 @@ class StepError:
         self._materials = problem.materials
         heat = len(self._materials) < len(forms.histories)
         terms = [terms for terms in forms.terms if terms.remembers or heat and terms.follows_temperature]
-        self._stresses = [_Stress(forms, one, one.step_energy) for one in terms]
-        systematic = any(one.material.of_motion or one.material.integral for one in terms)
+        self._stresses = [_Stress(forms, entry, entry.step_energy) for entry in terms]
+        systematic = any(entry.material.of_motion or entry.material.integral for entry in terms)
         self._weight = _SYSTEMATIC if systematic else 1.0
-        self._relaxed = [_Stress(forms, one, one.equilibrium_energy) for one in terms
-                         if one.remembers and one.equilibrium_energy(forms.elastic_F) is not None]
+        self._relaxed = [_Stress(forms, entry, entry.equilibrium_energy) for entry in terms
+                         if entry.remembers and entry.equilibrium_energy(forms.elastic_F) is not None]
 
     def of(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
         """(error of the stress at the end of a step, the rest of it after another step as long), relative.

@@ -28,7 +28,7 @@ class Tangent:
                                      forms.comm, symmetric)
         self._by_load, self._by_time = (form and forms.compile(form)
                                         for form in (forms.control_derivative, forms.time_derivative))
-        self._movable = [k for k, thing in enumerate(scene.items) if thing in scene.supports and thing.driven]
+        self._movable = [k for k, item in enumerate(scene.items) if item in scene.supports and item.driven]
         self._by_motion = self._lift = None
         if constraints.can_move:
             self._lift = fem.Function(forms.space)              # held unknowns move the others through the tangent

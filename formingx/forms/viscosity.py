@@ -42,5 +42,5 @@ class Viscosity:
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
-        for thing in (self._matrix, self._change, self._forces):
-            thing.destroy()
+        for item in (self._matrix, self._change, self._forces):
+            item.destroy()

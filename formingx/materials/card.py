@@ -23,15 +23,15 @@ _PART = 0.97
 def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequence[float], unit: str,
           unit_of_time: str) -> Path:
     """See `Material.report`."""
-    who, path = f"{material}: report", place("report: file", file)
+    caller, path = f"{material}: report", place("report: file", file)
     depends = [name for name, value in material.constants().items() if isinstance(value, OfTemperature)]
-    at = several(f"{who}: temperatures", temperatures, "temperatures")
+    at = several(f"{caller}: temperatures", temperatures, "temperatures")
     if depends and not at:
-        raise InputError(f"{who}: {', '.join(depends)} depend on the temperature: give temperatures=[...]")
+        raise InputError(f"{caller}: {', '.join(depends)} depend on the temperature: give temperatures=[...]")
     cases = [(f"{T:g}", material.at_temperature(T), _shift(material, T)) for T in at] if depends else [
         ("", material, 1.0)]
-    rates = [positive(f"{who}: rates", rate) for rate in several(f"{who}: rates", rates, "rates")]
-    parts = [_limits(name, one, shift, unit, unit_of_time) for name, one, shift in cases]
+    rates = [positive(f"{caller}: rates", rate) for rate in several(f"{caller}: rates", rates, "rates")]
+    parts = [_limits(name, entry, shift, unit, unit_of_time) for name, entry, shift in cases]
     picture = _picture(cases, rates if hasattr(material, "constant_rate") else [], unit, unit_of_time)
     if (tested := getattr(material, "tested", None)) is not None:
         parts.append(tested.rows())

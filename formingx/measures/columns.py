@@ -125,18 +125,18 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
     energy = scene.symmetry_factor * forms.stress * volume
     found: dict[str, Bound] = {"process_time": Amplitude(problem, -1)} if timed else {}
-    for i, thing in enumerate(scene.items):
-        if any(thing is t for t in scene.drivable):
-            found[column := scene.column(thing)] = Amplitude(problem, i)
-            if thing in scene.supports:
-                found["support_force" if column == thing.quantity else f"{thing.name}_force"] = (
-                    OfWholePart(_Reaction(problem, i), support_factor(scene, thing)))
+    for i, item in enumerate(scene.items):
+        if any(item is t for t in scene.drivable):
+            found[column := scene.column(item)] = Amplitude(problem, i)
+            if item in scene.supports:
+                found["support_force" if column == item.quantity else f"{item.name}_force"] = (
+                    OfWholePart(_Reaction(problem, i), support_factor(scene, item)))
     if "axis" in scene.mesh.boundaries:
         found["pole_height"] = bind_pole_height(problem)
         found["pole_stretch"] = bind_pole_stretch(problem)
     if any(isinstance(load, Gravity) for load in scene.loads):
         found["sag"] = Sag(problem)
-    if any(thing.quantity == "pressure" for thing in scene.drivable):
+    if any(item.quantity == "pressure" for item in scene.drivable):
         found["enclosed_volume"] = bind_volume(problem)
     change = forms.J - 1
     if forms.energy is not None:

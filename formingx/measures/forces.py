@@ -50,12 +50,12 @@ def force(value: float, *, of: str | None = None) -> Target:
         if len(moving) != 1:
             raise InputError(f"force = {value:g}: the scene has {len(moving) or 'no'} supports or tools that can be"
                              f" driven" + ", say which with of=..." * bool(moving))
-        number, thing = next(iter(moving.items()))
-        if thing in scene.contacts:
+        number, item = next(iter(moving.items()))
+        if item in scene.contacts:
             tools = [scene.items[i] for i in scene.together(number)]
             return OfWholePart(_ToolForce(problem, [c for c in problem.contacts if c.contact in tools]),
-                               tool_factor(scene, thing))
-        return OfWholePart(_SupportForce(problem, number), support_factor(scene, thing))
+                               tool_factor(scene, item))
+        return OfWholePart(_SupportForce(problem, number), support_factor(scene, item))
     return Target("force" if of is None else f"{of}_force", finite("force", value), bind)
 
 

@@ -280,30 +280,31 @@ def _layers(kind: str, thickness: Any, alone: str, coordinate: str) -> dict[str,
     return {name: _thickness(f"{kind}: thickness of {name!r}", given, coordinate) for name, given in layers.items()}
 
 
-def _thickness(who: str, given: Any, coordinate: str) -> Callable[[np.ndarray], np.ndarray]:
+def _thickness(caller: str, given: Any, coordinate: str) -> Callable[[np.ndarray], np.ndarray]:
     if not coordinate or not (callable(given) or isinstance(given, Mapping)):
-        value = positive(who, given)
+        value = positive(caller, given)
         return lambda x: np.full(len(x), value)
     if callable(given):
-        return lambda x: np.array([positive(f"{who} at {coordinate} = {v:.6g}", _called(given, v, who, coordinate))
+        return lambda x: np.array([positive(f"{caller} at {coordinate} = {v:.6g}",
+                                            _called(given, v, caller, coordinate))
                                    for v in map(float, x)])
-    points = sorted((finite(f"{who}: {coordinate}", at), positive(f"{who} at {coordinate} = {at!r}", h))
+    points = sorted((finite(f"{caller}: {coordinate}", at), positive(f"{caller} at {coordinate} = {at!r}", h))
                     for at, h in given.items())
     ends, values = np.array(points).reshape(-1, 2).T
 
     def between(x):
         near = 1e-9 * max(np.abs(x).max(), 1e-300)
         if len(ends) < 2 or x.min() < ends[0] - near or x.max() > ends[-1] + near:
-            raise InputError(f"{who} = {given!r}: must cover {coordinate} from {x.min():.6g} to {x.max():.6g}")
+            raise InputError(f"{caller} = {given!r}: must cover {coordinate} from {x.min():.6g} to {x.max():.6g}")
         return np.interp(x, ends, values)
     return between
 
 
-def _called(function: Callable, v: float, who: str, coordinate: str) -> Any:
+def _called(function: Callable, v: float, caller: str, coordinate: str) -> Any:
     try:
         return function(v)
     except Exception as error:
-        raise InputError(f"{who} at {coordinate} = {v:.6g}: the function raised {type(error).__name__}:"
+        raise InputError(f"{caller} at {coordinate} = {v:.6g}: the function raised {type(error).__name__}:"
                          f" {error}") from error
 
 

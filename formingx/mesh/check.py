@@ -49,8 +49,8 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
                          f" their nodes, and none may lie over another")
     piece = _pieces(triangles[:, :3])
     if piece.max() > 0:
-        one, other = (_show(corners[np.argmax(piece == k)].mean(0)) for k in (0, piece.max()))
-        raise InputError(f"{what}: the body is in pieces: no elements lead from {one} to {other}; bodies apart need a"
+        entry, other = (_show(corners[np.argmax(piece == k)].mean(0)) for k in (0, piece.max()))
+        raise InputError(f"{what}: the body is in pieces: no elements lead from {entry} to {other}; bodies apart need a"
                          f" scene each")
 
 

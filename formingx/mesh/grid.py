@@ -156,7 +156,7 @@ def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
     return found
 
 
-def _of_elements(edges: np.ndarray, known: dict[tuple[int, int], list[int]], who: str,
+def _of_elements(edges: np.ndarray, known: dict[tuple[int, int], list[int]], caller: str,
                  points: np.ndarray) -> list[list[int]]:
     """The edges (ends, then the middle of the element there) if they are edges of elements; [] if none is.
 
@@ -167,5 +167,5 @@ def _of_elements(edges: np.ndarray, known: dict[tuple[int, int], list[int]], who
     if found and len(found) < len(edges):
         bad = next(pair for pair in pairs if (min(pair), max(pair)) not in known)
         at = [f"({points[n, 0]:.6g}, {points[n, 1]:.6g})" if n >= 0 else "a node of no element" for n in bad]
-        raise InputError(f"{who}: its edge from {at[0]} to {at[1]} is not an edge of an element")
+        raise InputError(f"{caller}: its edge from {at[0]} to {at[1]} is not an edge of an element")
     return found

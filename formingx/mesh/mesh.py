@@ -106,15 +106,15 @@ class Mesh:
             InputError: a name that is not known or not new, no facet within, or one that is within in part only.
         """
         from dolfinx.mesh import meshtags
-        who = f"with_part({name!r}, {of!r})"
+        caller = f"with_part({name!r}, {of!r})"
         if not isinstance(name, str) or not name or name in self.boundaries:
-            raise InputError(f"{who}: name = {name!r}: must be a word that no boundary has yet; there are"
+            raise InputError(f"{caller}: name = {name!r}: must be a word that no boundary has yet; there are"
                              f" {', '.join(map(repr, self.boundaries))}")
-        known(f"{who}: boundary", of, self.boundaries)
-        known(f"{who}: along", along, ("r", "z"))
-        low, high = pair(f"{who}: within", within)
+        known(f"{caller}: boundary", of, self.boundaries)
+        known(f"{caller}: along", along, ("r", "z"))
+        low, high = pair(f"{caller}: within", within)
         if not low < high:
-            raise InputError(f"{who}: within = {within!r}: the first must be below the second")
+            raise InputError(f"{caller}: within = {within!r}: the first must be below the second")
         domain, axis = self.domain, "rz".index(along)
         comm, facets = self.comm, self.facets_of(of)
         ends = of_facets(domain, facets)[:, :2, axis]
@@ -124,11 +124,11 @@ class Mesh:
         cut = ~inside & (lowest < high - near) & (highest > low + near)
         cuts = gathered(comm, np.column_stack([lowest, highest])[cut])
         if len(cuts):
-            raise InputError(f"{who}: within = {within!r} cuts the element edge from {along} = {cuts[0, 0]:.6g} to"
+            raise InputError(f"{caller}: within = {within!r} cuts the element edge from {along} = {cuts[0, 0]:.6g} to"
                              f" {cuts[0, 1]:.6g}: both must be {along} of nodes; a disc has nodes where it is told to"
                              f" concentrate")
         if not comm.allreduce(int(inside.sum()), MPI.SUM):
-            raise InputError(f"{who}: within = {within!r}: {of!r} has nothing there; its {along} is from"
+            raise InputError(f"{caller}: within = {within!r}: {of!r} has nothing there; its {along} is from"
                              f" {comm.allreduce(lowest.min(initial=np.inf), MPI.MIN):.6g} to"
                              f" {comm.allreduce(highest.max(initial=-np.inf), MPI.MAX):.6g}")
         # a facet has one tag: those of the part get new ones, which belong to all that the old ones belonged to

@@ -25,8 +25,8 @@ class Load(Part):
 
     def __init__(self, on: str | None = None, value: float | None = None, name: str | None = None):
         self.on, self.name = on, name
-        who = f"{type(self).__name__}{'' if on is None else f'({on!r})'}"
-        self.value = None if value is None else finite(f"{who}: value", value)
+        caller = f"{type(self).__name__}{'' if on is None else f'({on!r})'}"
+        self.value = None if value is None else finite(f"{caller}: value", value)
 
     @property
     def driven(self) -> bool:
@@ -151,10 +151,10 @@ class CentrifugalLoad(Load):
         return value * _weighed(body, self.density, body.mode[0] * body.dmode[0] + body.mode[2] * body.dmode[2])
 
 
-def _density(who: str, given: Any) -> dict[str | None, float]:
+def _density(caller: str, given: Any) -> dict[str | None, float]:
     """{layer: density}; the layer None: all of them."""
     each = given if isinstance(given, Mapping) else {None: given}
-    return {layer: positive(f"{who}: density", value) for layer, value in each.items()}
+    return {layer: positive(f"{caller}: density", value) for layer, value in each.items()}
 
 
 def _weighed(body: Any, density: dict[str | None, float], integrand: Any) -> Any:

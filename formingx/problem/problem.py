@@ -435,7 +435,7 @@ class Problem(Histories, Units):
         before, self._stage = self._stage, stage
         if before is stage:
             return
-        setting, number = stage.setting, {id(thing): i for i, thing in enumerate(self.scene.items)}
+        setting, number = stage.setting, {id(item): i for i, item in enumerate(self.scene.items)}
         self.forms.set_loads(setting)
         for contact in self.contacts:
             i = number[id(contact.contact)]

@@ -33,10 +33,10 @@ class Units:
 
     def shown(self, control: float) -> tuple[str, float]:
         """Return the name of the controlled quantity and its value in the user's units."""
-        number, things = self.setting.leading, self.scene.items
+        number, items = self.setting.leading, self.scene.items
         if number is None:
             return "control", control
-        name = "process time" if number == len(things) else self.scene.column(things[number]).replace("_", " ")
+        name = "process time" if number == len(items) else self.scene.column(items[number]).replace("_", " ")
         return name, self.forms.scales[number] * self.setting.amplitude(number, control)
 
     def absurd(self, control: float) -> str | None:
@@ -46,8 +46,8 @@ class Units:
     @property
     def drives(self) -> str | None:
         """Kind of the control: "pressure", "travel", "time" or, if it is none of them, None."""
-        number, things = self.setting.leading, self.scene.items
-        return None if number is None else "time" if number == len(things) else things[number].quantity
+        number, items = self.setting.leading, self.scene.items
+        return None if number is None else "time" if number == len(items) else items[number].quantity
 
     @property
     def fixed_loads(self) -> list[str]:

@@ -31,8 +31,8 @@ def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -
         that can be.
     """
     name, value, driven = target.name, target.value, scene.driven
-    there = [thing for i, thing in enumerate(scene.items) if i not in (off or ())]
-    moulds = [thing for thing in there if thing in scene.contacts and not thing.driven]
+    there = [item for i, item in enumerate(scene.items) if i not in (off or ())]
+    moulds = [item for item in there if item in scene.contacts and not item.driven]
     if name == "pole_stretch" and scene.kinematics.axisymmetric:
         largest, material = max(((m.largest_stretch("equibiaxial"), m) for m in scene.materials.values()),
                                 key=lambda found: found[0])

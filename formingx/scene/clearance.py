@@ -22,7 +22,7 @@ def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None
     stands: travels at the beginning {number: length}, default 0.
     Where a travel cannot be known before the run (a stage that ends at a pole height) its tool is left out from there.
     """
-    tools = {i: thing for i, thing in enumerate(scene.items) if isinstance(thing, Contact)}
+    tools = {i: item for i, item in enumerate(scene.items) if isinstance(item, Contact)}
     outlines = {i: _outline(tool) for i, tool in tools.items()}
     stands, unsure = stands or dict.fromkeys(tools, 0.0), []
     for plan in plans:
@@ -54,7 +54,7 @@ def _legs(plan: Any, stands: dict[int, float]) -> Iterator[dict[int, float]]:
         yield stands | {i: end for i in plan.numbers if i in stands}
 
 
-def _check_overlap(scene: Scene, who: str, present: dict[int, Contact], outlines: dict[int, np.ndarray],
+def _check_overlap(scene: Scene, caller: str, present: dict[int, Contact], outlines: dict[int, np.ndarray],
                    where: dict[int, float]) -> None:
     near = 1e-6 * max(scene.extent)
     for i, a in present.items():
@@ -68,7 +68,7 @@ def _check_overlap(scene: Scene, who: str, present: dict[int, Contact], outlines
                 if depth[worst] > near:
                     at = ", ".join(f"{x:.6g}" for x in points[worst] + where[j] * b.way)
                     axes = ", ".join(scene.kinematics.axes).replace("r, z", "R, Z")
-                    raise InputError(f"{who}: tools overlap: {_at(a, where[i])} and {_at(b, where[j])} reach"
+                    raise InputError(f"{caller}: tools overlap: {_at(a, where[i])} and {_at(b, where[j])} reach"
                                      f" {depth[worst]:.6g} into each other at ({axes}) = ({at}); leave one out"
                                      f" with inactive=[...], or end the travel earlier")
 

@@ -172,16 +172,16 @@ class Scene:
     @property
     def drivable(self) -> list[Any]:
         """Items that can be controlled; of a tool that meets several faces its first contact."""
-        return [thing for i, thing in enumerate(self.items)
-                if thing.driven and self.together(i)[0] == i]
+        return [item for i, item in enumerate(self.items)
+                if item.driven and self.together(i)[0] == i]
 
     def together(self, number: int) -> list[int]:
         """Return the numbers of the contacts of one tool: those with the same `direction` and name."""
-        thing = self.items[number]
-        if thing.direction is None:
+        item = self.items[number]
+        if item.direction is None:
             return [number]
         return [i for i,
-                other in enumerate(self.items) if (other.direction, other.name) == (thing.direction, thing.name)]
+                other in enumerate(self.items) if (other.direction, other.name) == (item.direction, item.name)]
 
     @property
     def driven(self) -> Any:
@@ -189,30 +189,31 @@ class Scene:
         drivable = self.drivable
         return drivable[0] if len(drivable) == 1 else None
 
-    def only_driven(self, who: str) -> Any:
+    def only_driven(self, caller: str) -> Any:
         """`driven`, or an InputError unless one thing can be driven."""
         if not self.drivable:
-            raise InputError(f"{who}: nothing is driven: give one load no value, as Pressure('bottom'), or"
+            raise InputError(f"{caller}: nothing is driven: give one load no value, as Pressure('bottom'), or"
                              " add a PrescribedDisplacement support")
         if len(self.drivable) > 1:
-            raise InputError(f"{who}: {', '.join(map(repr, self.drivable))} are all driven: one control drives a run;"
+            raise InputError(f"{caller}: {', '.join(map(repr, self.drivable))} are all driven: one control drives a"
+                             f" run;"
                              f" give the others a value, or drive them in stages with formingx.Process")
         self.check_driven(self.supports)
         return self.driven
 
-    def number(self, who: str, thing: Any) -> int:
+    def number(self, caller: str, item: Any) -> int:
         """The place in `things` of a thing, given as itself or by its name; an InputError if it is not there."""
         for i, known_thing in enumerate(self.items):
-            if thing is known_thing or isinstance(thing, str) and thing == known_thing.name:
+            if item is known_thing or isinstance(item, str) and item == known_thing.name:
                 return i
         names = [t.name for t in self.items if t.name]
-        raise InputError(f"{who}: {thing!r} is not in the scene; it has {', '.join(map(repr, self.items))}"
+        raise InputError(f"{caller}: {item!r} is not in the scene; it has {', '.join(map(repr, self.items))}"
                          + (f"; by name {', '.join(map(repr, names))}" if names else ""))
 
-    def column(self, thing: Any) -> str:
+    def column(self, item: Any) -> str:
         """Name of the column of a controllable item: "pressure" or "travel", its name in front if there are several."""
-        alone = len(self.drivable) == 1 or not thing.name
-        return thing.quantity if alone else f"{thing.name}_{thing.quantity}"
+        alone = len(self.drivable) == 1 or not item.name
+        return item.quantity if alone else f"{item.name}_{item.quantity}"
 
     def check_held(self, supports: Sequence[Any], touched: bool = False) -> None:
         """Raise an InputError unless these supports hold the axis and, if no tool touches, every rigid motion."""
@@ -229,14 +230,14 @@ class Scene:
                     raise InputError(f"{mine!r}: {other!r} holds the same component of the same boundary")
 
     def _check_names(self) -> None:
-        names = [thing.name for thing in self.items if thing.name is not None]
+        names = [item.name for item in self.items if item.name is not None]
         for name in names:
             if not isinstance(name, str) or not name:
                 raise InputError(f"Scene: name = {name!r}: must be a word")
-            called = [i for i, thing in enumerate(self.items) if thing.name == name]
+            called = [i for i, item in enumerate(self.items) if item.name == name]
             if called != self.together(called[0]) and len(called) > 1:
                 raise InputError(f"Scene: two things are called {name!r}: names must differ")
-        columns = [self.column(thing) for thing in self.drivable]
+        columns = [self.column(item) for item in self.drivable]
         for column in columns:
             if columns.count(column) > 1:
                 same = [repr(t) for t in self.drivable if self.column(t) == column]
@@ -297,13 +298,13 @@ class Scene:
         return self._moduli[layer]
 
     def _check_boundaries(self) -> None:
-        for thing in self.items:
-            on = thing.on
+        for item in self.items:
+            on = item.on
             if on is None:
                 continue
-            known(f"{thing!r}: boundary", on, self.mesh.boundaries)
+            known(f"{item!r}: boundary", on, self.mesh.boundaries)
             if self.mesh.comm.allreduce(len(self.mesh.facets_of(on)), MPI.SUM) == 0:
-                raise InputError(f"{thing!r}: boundary {on!r} is empty: no facet of the mesh carries it")
+                raise InputError(f"{item!r}: boundary {on!r} is empty: no facet of the mesh carries it")
 
     def _check_contact(self, contact: Contact) -> None:
         """The body starts outside the tool, the face looks at it, and the pressure does not push away from it.
@@ -440,10 +441,10 @@ class Scene:
         return "\n".join(f"{part:{width}}  {line}" for part, line in lines.items())
 
 
-def _all_of(kind: type, name: str, things: Any, what: str) -> list[Any]:
+def _all_of(kind: type, name: str, scene_items: Any, what: str) -> list[Any]:
     """A list of things of one kind, or an InputError."""
-    things = several(f"Scene: {name}", things, what)
-    for thing in things:
-        if not isinstance(thing, kind):
-            raise InputError(f"Scene: {name}: {thing!r} is not allowed here: must be a list of {what}")
-    return things
+    scene_items = several(f"Scene: {name}", scene_items, what)
+    for item in scene_items:
+        if not isinstance(item, kind):
+            raise InputError(f"Scene: {name}: {item!r} is not allowed here: must be a list of {what}")
+    return scene_items

@@ -21,12 +21,12 @@ def summary(scene: Any) -> dict[str, str]:
     for name, material in scene.materials.items():
         lines[f"material of {name}"] = _material(material, _temperatures(scene))
     for kind in ("supports", "loads", "contacts"):
-        for k, thing in enumerate(getattr(scene, kind), 1):
-            usual = {name: p.default for name, p in signature(type(thing)).parameters.items()}
-            numbers = "".join(f", {name.replace('_', ' ')} {value!r}" for name, value in vars(thing).items()
-                              if isinstance(value, int | float) and repr(value) not in text(thing)
-                              and name not in thing.told and value != usual.get(name))
-            lines[f"{kind[:-1]} {k}"] = text(thing) + numbers + (" (driven)" if thing.driven else "")
+        for k, item in enumerate(getattr(scene, kind), 1):
+            usual = {name: p.default for name, p in signature(type(item)).parameters.items()}
+            numbers = "".join(f", {name.replace('_', ' ')} {value!r}" for name, value in vars(item).items()
+                              if isinstance(value, int | float) and repr(value) not in text(item)
+                              and name not in item.told and value != usual.get(name))
+            lines[f"{kind[:-1]} {k}"] = text(item) + numbers + (" (driven)" if item.driven else "")
     return lines | {"model": text(scene.model), "kinematics": text(scene.kinematics),
                     "quadrature degree": str(scene.quadrature_degree),
                     **({} if scene.temperature is None else {"temperature": text(scene.temperature)}),
@@ -42,10 +42,10 @@ def _temperatures(scene: Any) -> list[float]:
     return sorted({float(f"{t:.6g}") for t in found})
 
 
-def _material(thing: Any, temperatures: list[float]) -> str:
+def _material(item: Any, temperatures: list[float]) -> str:
     """`text` of a material, with values in place of functions of the temperature that have no name."""
-    found = text(thing)
-    for value in getattr(thing, "parameters", {}).values():
+    found = text(item)
+    for value in getattr(item, "parameters", {}).values():
         if isinstance(value, FunctionOfTemperature) and "<lambda>" in repr(value):
             values = []
             for T in temperatures:
@@ -55,9 +55,9 @@ def _material(thing: Any, temperatures: list[float]) -> str:
     return re.sub(r"\d+\.\d{7,}", lambda digits: f"{float(digits[0]):.6g}", found)
 
 
-def text(thing: Any) -> str:
+def text(item: Any) -> str:
     """repr without memory addresses; of an object that has none of its own, its kind and its public attributes."""
-    if type(thing).__repr__ is object.__repr__:
-        inside = ", ".join(f"{k}={v!r}" for k, v in vars(thing).items() if not k.startswith("_"))
-        return f"{type(thing).__name__}({inside})"
-    return re.sub(r" at 0x[0-9a-f]+", "", repr(thing))
+    if type(item).__repr__ is object.__repr__:
+        inside = ", ".join(f"{k}={v!r}" for k, v in vars(item).items() if not k.startswith("_"))
+        return f"{type(item).__name__}({inside})"
+    return re.sub(r" at 0x[0-9a-f]+", "", repr(item))

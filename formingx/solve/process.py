@@ -266,19 +266,19 @@ class Execution:
         return left
 
     def _check_beginning(self, tables: list[tuple[int, Array]], now: float, end: float) -> None:
-        who = self._stage.who
+        caller = self._stage.who
         if end <= now:
-            raise InputError(f"{who}: ends at time {end:g}, but the process time is {now:g} already: time cannot go"
+            raise InputError(f"{caller}: ends at time {end:g}, but the process time is {now:g} already: time cannot go"
                              f" back")
         for i, table in tables:
             name, first = self.plans[self._k].names[i], table[0]
             if first[0] < now - SAME_TIME * abs(now):
-                raise InputError(f"{who}: the table of {name} begins at time {first[0]:g}, but the process time is"
+                raise InputError(f"{caller}: the table of {name} begins at time {first[0]:g}, but the process time is"
                                  f" {now:g} already: it goes back in time")
             stands = self._stands(i)
             size = max(np.abs(table[:, 1]).max(), self.problem.scales[i])
             if first[0] <= now + SAME_TIME * abs(now) and abs(stands - first[1]) > 1e-9 * size:
-                raise InputError(f"{who}: the table of {name} begins with {first[1]:g} at time {first[0]:g}, but it"
+                raise InputError(f"{caller}: the table of {name} begins with {first[1]:g} at time {first[0]:g}, but it"
                                  f" stands at {stands:g} then")
 
 

@@ -135,8 +135,8 @@ class Record:
         state.time = problem.time_at(state.control)
         self.segments[-1].states.append(state)
         try:
-            for told in self.on_state:
-                told(state)
+            for listener in self.on_state:
+                listener(state)
             state.verdict = self.judge(state)
             if state.verdict and not self.allow_inadmissible:
                 raise Unusable(state.verdict)
@@ -152,8 +152,8 @@ class Record:
         """A step is complete: note in the last state how the run goes on from it, with more that the run knows."""
         self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value],
                               "column": self.equations.shown(0.0)[0].replace(" ", "_"), **more}
-        for told in self.on_step:
-            told()
+        for listener in self.on_step:
+            listener()
 
     def describe(self, state: State) -> str:
         """A state's main numbers in one line, without what no body has (the pole stretch of a wall not above 0)."""

@@ -222,7 +222,7 @@ class _Motion:
 
 
 def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: SnapThrough,
-                 solutions: int | None = None, told: Callable[[], None] = lambda: None, onward: float = 0.0,
+                 solutions: int | None = None, listener: Callable[[], None] = lambda: None, onward: float = 0.0,
                  passed: Sequence[State] = ()) -> State:
     """The state that the body comes to from `old` when the control goes on; of kind "jump".
 
@@ -247,7 +247,7 @@ def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: Sna
             if curve.iterations > settings.iterations:
                 log.info("no jump within %d Newton iterations of this step: shorter steps are tried", curve.iterations)
                 raise Failure(f"a jump took more than {settings.iterations} Newton iterations", [])
-            told()
+            listener()
             state = motion.end() if motion.settles else None
             if state is not None:
                 if state.slope * by < 0:

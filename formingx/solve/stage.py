@@ -63,18 +63,19 @@ class Stage:
                  constant: Target | None = None):
         if not isinstance(name, str) or not name:
             raise InputError(f"Stage: name = {name!r}: must be a word")
-        who = self.who = f"Stage {name!r}"
+        caller = self.who = f"Stage {name!r}"
         self.name, self.control, self.until = name, control, until
-        self.intermediate = several(f"{who}: intermediate", intermediate, "targets, such as pole_stretch(3)")
-        self.inactive = several(f"{who}: inactive", inactive, "things of the scene")
-        known(f"{who}: at_limit_point =", at_limit_point, AT_LIMIT_POINT)
+        self.intermediate = several(f"{caller}: intermediate", intermediate, "targets, such as pole_stretch(3)")
+        self.inactive = several(f"{caller}: inactive", inactive, "things of the scene")
+        known(f"{caller}: at_limit_point =", at_limit_point, AT_LIMIT_POINT)
         self.at_limit_point = at_limit_point
-        self.step = instance(f"{who}: step", step, StepControl | None, "a StepControl or None")
+        self.step = instance(f"{caller}: step", step, StepControl | None, "a StepControl or None")
         for target in (*([] if until is None else [until]), *self.intermediate):
-            instance(f"{who}: target", target, Target, "a target, such as pole_stretch(3)")
-        self.speed = None if speed is None else positive(f"{who}: speed", speed)
-        self.duration = None if duration is None else positive(f"{who}: duration", duration)
-        self.constant = instance(f"{who}: constant", constant, Target | None, "a target, such as force(2.0), or None")
+            instance(f"{caller}: target", target, Target, "a target, such as pole_stretch(3)")
+        self.speed = None if speed is None else positive(f"{caller}: speed", speed)
+        self.duration = None if duration is None else positive(f"{caller}: duration", duration)
+        self.constant = instance(f"{caller}: constant", constant, Target | None,
+                                 "a target, such as force(2.0), or None")
         self.flow: tuple[Any, Any] | None = None
         if control is not None and amplitudes is not None:
             self.flow = self._flow(amplitudes)
@@ -99,29 +100,33 @@ class Stage:
         return self.flow[0](float(np.max(self.flow[1][:, 1])))
 
     def _check(self, amplitudes: Any) -> None:
-        who, until = self.who, self.until
+        caller, until = self.who, self.until
         if self.constant is not None and (self.control is None
                                           or self.duration is None or until or amplitudes is not None):
-            raise InputError(f"{who}: constant = {self.constant}: give it control=..., what is adjusted to hold it, and"
+            raise InputError(f"{caller}: constant = {self.constant}: give it control=..., what is adjusted to hold"
+                             f" it, and"
                              f" duration=..., and neither until nor amplitudes")
         if amplitudes is not None and (self.speed or self.duration):
-            raise InputError(f"{who}: amplitudes has times of its own: give no speed or duration")
+            raise InputError(f"{caller}: amplitudes has times of its own: give no speed or duration")
         if self.speed and (self.control is None or self.duration):
-            raise InputError(f"{who}: speed = {self.speed:g}: of what? give it control=... and until=..., no duration")
+            raise InputError(f"{caller}: speed = {self.speed:g}: of what? give it control=... and until=..., no"
+                             f" duration")
         if self.control is not None and until is None and self.constant is None and self.flow is None:
-            raise InputError(f"{who}: drives {self.control!r} without a target: give it until=..., such as travel(3)")
+            raise InputError(f"{caller}: drives {self.control!r} without a target: give it until=..., such as"
+                             f" travel(3)")
         if self.control is not None and self.duration and until and until.name.split("_")[-1] not in _OF_CONTROL:
-            raise InputError(f"{who}: until = {until} with a duration: must be a target of what is driven; give a speed"
+            raise InputError(f"{caller}: until = {until} with a duration: must be a target of what is driven; give a"
+                             f" speed"
                              f" instead")
         if self.control is None and amplitudes is None and until is not None and self.duration is None:
-            raise InputError(f"{who}: has a target but drives nothing: give it control=..., amplitudes=..., or"
+            raise InputError(f"{caller}: has a target but drives nothing: give it control=..., amplitudes=..., or"
                              f" duration=...,"
                              f" the longest time that it is waited for")
         if self.control is None and amplitudes is None and self.duration is None and self.intermediate:
-            raise InputError(f"{who}: has targets but drives nothing: give it control=..., amplitudes=... or"
+            raise InputError(f"{caller}: has targets but drives nothing: give it control=..., amplitudes=... or"
                              f" duration=...")
         if amplitudes is not None and until is not None and until.name != "process_time":
-            raise InputError(f"{who}: until = {until}: tables are followed until a process_time, or to their end")
+            raise InputError(f"{caller}: until = {until}: tables are followed until a process_time, or to their end")
 
     def _flow(self, amplitudes: Any) -> tuple[Any, Any]:
         """(what makes targets, knots, shape (n, 2), or a function of time) of a measure that follows a course."""
@@ -147,8 +152,8 @@ class Stage:
         if not isinstance(amplitudes, Mapping) or not amplitudes:
             raise InputError(f"{self.who}: amplitudes = {amplitudes!r}: must be {{thing: [(time, value), ...]}}")
         tables = []
-        for thing, knots in amplitudes.items():
-            table = f"{self.who}: the table of {thing!r}"
+        for item, knots in amplitudes.items():
+            table = f"{self.who}: the table of {item!r}"
             rows = [several(table, row, "two numbers") for row in several(table, knots, "(time, value)")]
             if not rows or any(len(row) != 2 for row in rows):
                 raise InputError(f"{table}: must be [(time, value), ...]")
@@ -157,7 +162,7 @@ class Stage:
                 if b <= a:
                     raise InputError(f"{table} goes back in time, or stands still: {b:g} after {a:g}; times must"
                                      f" grow")
-            tables.append((thing, np.array(numbers)))
+            tables.append((item, np.array(numbers)))
         return tables
 
     def __repr__(self) -> str:
@@ -192,31 +197,31 @@ def plan(scene: Scene, stage: Stage) -> Plan:
         InputError: it drives or leaves out something that is not there, leaves the body free to move, or aims at what
             cannot be met.
     """
-    who = stage.who
-    off = sorted({i for thing in stage.inactive for i in scene.together(scene.number(f"{who}: inactive", thing))})
-    driven = [stage.control] if stage.control is not None else [thing for thing, _ in stage.tables]
-    numbers = [scene.number(who, thing) for thing in driven]
+    caller = stage.who
+    off = sorted({i for item in stage.inactive for i in scene.together(scene.number(f"{caller}: inactive", item))})
+    driven = [stage.control] if stage.control is not None else [item for item, _ in stage.tables]
+    numbers = [scene.number(caller, item) for item in driven]
     for number in numbers:
-        thing = scene.items[number]
-        if not thing.driven:
-            raise InputError(f"{who}: {thing!r} cannot be driven: a Pressure without value, a Displaced support, or"
+        item = scene.items[number]
+        if not item.driven:
+            raise InputError(f"{caller}: {item!r} cannot be driven: a Pressure without value, a Displaced support, or"
                              f" a Contact that moves can")
-        if number in off and thing.direction is None:                  # a tool may go home while it is away
-            raise InputError(f"{who}: {thing!r} is both driven and left out")
+        if number in off and item.direction is None:                  # a tool may go home while it is away
+            raise InputError(f"{caller}: {item!r} is both driven and left out")
     if len({scene.together(number)[0] for number in numbers}) < len(numbers):
-        raise InputError(f"{who}: one thing has two tables")
-    there = [thing for i, thing in enumerate(scene.items) if i not in off]
+        raise InputError(f"{caller}: one thing has two tables")
+    there = [item for i, item in enumerate(scene.items) if i not in off]
     try:
         supports = [t for t in there if t in scene.supports]
         scene.check_held(supports, any(t in there for t in scene.contacts))
         scene.check_driven(supports)
         aims.check(scene, [t for t in (stage.until, stage.constant, *stage.intermediate) if t is not None], off)
     except InputError as error:
-        raise InputError(f"{who}: {error}") from None
+        raise InputError(f"{caller}: {error}") from None
     for number, (_, table) in zip(numbers, stage.tables):
-        thing, most = scene.items[number], float(np.abs(table[:, 1]).max())
-        if (why := aims.beyond_all(scene, thing.quantity, most)) is not None:
-            raise InputError(f"{who}: the table of {thing!r} goes to {most:g}: {why}")
+        item, most = scene.items[number], float(np.abs(table[:, 1]).max())
+        if (why := aims.beyond_all(scene, item.quantity, most)) is not None:
+            raise InputError(f"{caller}: the table of {item!r} goes to {most:g}: {why}")
     tables = [(i, table) for number, (_, table) in zip(numbers, stage.tables) for i in scene.together(number)]
     return Plan(stage, scene.together(numbers[0]) if stage.control is not None else [], tables, off,
                 list(map(repr, scene.items)))

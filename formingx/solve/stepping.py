@@ -71,15 +71,16 @@ class StepControl:
         return self.length >= self.smallest
 
 
-def allowed(who: str, accuracy: str | float) -> float:
+def allowed(caller: str, accuracy: str | float) -> float:
     """The error promised by a word or a number, or an InputError."""
     if isinstance(accuracy, str):
         if accuracy not in ACCURACY:
-            raise InputError(f"{who}: accuracy = {accuracy!r}: must be one of {', '.join(map(repr, ACCURACY))}, or an"
+            raise InputError(f"{caller}: accuracy = {accuracy!r}: must be one of {', '.join(map(repr, ACCURACY))},"
+                             f" or an"
                              f" error such as 1e-4")
         return ACCURACY[accuracy]
-    if not 0 < finite(f"{who}: accuracy", accuracy) < 1:
-        raise InputError(f"{who}: accuracy = {accuracy!r}: must be between 0 and 1")
+    if not 0 < finite(f"{caller}: accuracy", accuracy) < 1:
+        raise InputError(f"{caller}: accuracy = {accuracy!r}: must be between 0 and 1")
     return float(accuracy)
 
 

@@ -358,19 +358,19 @@ def _check_fit(points: np.ndarray, radii: list[float], lengths: dict, cut: list[
 
 def _checked(piece: Line | Arc, i: int) -> Line | Arc:
     """A piece of a profile, its numbers as floats."""
-    who = f"Tool: piece {i}"
+    caller = f"Tool: piece {i}"
     if isinstance(piece, Line):
-        a, b = (np.array(pair(f"{who}: an end", p)) for p in piece)
+        a, b = (np.array(pair(f"{caller}: an end", p)) for p in piece)
         if not math.dist(a, b) > 1e-12 * max(np.abs(a).max(), np.abs(b).max()):
-            raise InputError(f"{who}: a line from {_show(a)} to {_show(b)} has no length")
+            raise InputError(f"{caller}: a line from {_show(a)} to {_show(b)} has no length")
         return Line(a, b)
     if not isinstance(piece, Arc):
-        raise InputError(f"{who} = {piece!r}: must be a Line or an Arc")
-    centre = np.array(pair(f"{who}: centre", piece.centre))
-    arc = Arc(centre, positive(f"{who}: radius", piece.radius), finite(f"{who}: start", piece.start),
-              finite(f"{who}: sweep", piece.sweep))
+        raise InputError(f"{caller} = {piece!r}: must be a Line or an Arc")
+    centre = np.array(pair(f"{caller}: centre", piece.centre))
+    arc = Arc(centre, positive(f"{caller}: radius", piece.radius), finite(f"{caller}: start", piece.start),
+              finite(f"{caller}: sweep", piece.sweep))
     if not 1e-9 < abs(arc.sweep) <= TURN * (1 + 1e-12):
-        raise InputError(f"{who}: sweep = {arc.sweep!r}: must be an angle in radians, not 0, at most a full turn")
+        raise InputError(f"{caller}: sweep = {arc.sweep!r}: must be an angle in radians, not 0, at most a full turn")
     return arc
 
 

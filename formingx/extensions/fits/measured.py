@@ -26,7 +26,7 @@ def read_tests(file: Path) -> list[tuple[str, np.ndarray]]:
         InputError: a file that cannot be read, has no rows, a header without these columns or with another unit, or a
             row that is not of this form.
     """
-    who = f"fit: data: {file}"
+    caller = f"fit: data: {file}"
     try:
         rows = records(file)
     except InputError as error:
@@ -34,31 +34,31 @@ def read_tests(file: Path) -> list[tuple[str, np.ndarray]]:
     head = rows[0][1] if rows and rows[0][1][0] not in MODES and not any(map(is_number, rows[0][1])) else None
     body = rows if head is None else rows[1:]
     if not body:
-        raise InputError(f"{who}: has no rows of test, stretch, stress")
+        raise InputError(f"{caller}: has no rows of test, stretch, stress")
     width = len(body[0][1]) if head is None else len(head)
-    columns = list(range(width)) if head is None else _columns(who, head)
-    points = [(_mode(f"{who}, line {n}", row, width, columns), _numbers(f"{who}, line {n}", row, columns))
+    columns = list(range(width)) if head is None else _columns(caller, head)
+    points = [(_mode(f"{caller}, line {n}", row, width, columns), _numbers(f"{caller}, line {n}", row, columns))
               for n, row in body]
     numbered = zip(_counted(points), points)
     return [(group[0][1][0], np.array([numbers for _, (_, numbers) in group]).T)
             for group in (list(found) for _, found in itertools.groupby(numbered, key=lambda x: x[0]))]
 
 
-def _columns(who: str, head: list[str]) -> list[int]:
+def _columns(caller: str, head: list[str]) -> list[int]:
     """Return the columns of test, stretch, stress and, if there is one, time, by their names in the first line."""
     found: dict[str, int] = {}
     for k, cell in enumerate(head):
         words, unit = name_and_unit(cell)
         name = _NAMES.get(" ".join(words.lower().replace("_", " ").split()), "")
         if name in found:
-            raise InputError(f"{who}: the first line names two columns {name!r}")
+            raise InputError(f"{caller}: the first line names two columns {name!r}")
         if name and unit is not None and unit not in _UNITS.get(name, ()):
-            raise InputError(f"{who}: column {name!r} is in {unit!r}: must be"
+            raise InputError(f"{caller}: column {name!r} is in {unit!r}: must be"
                              f" {'in one of ' + ', '.join(_UNITS[name]) if name in _UNITS else 'without a unit'}")
         found |= {name: k} if name else {}
     missing = [name for name in _ORDER[:3] if name not in found]
     if missing:
-        raise InputError(f"{who}: the first line names the columns {', '.join(map(repr, head))}: no {missing[0]!r};"
+        raise InputError(f"{caller}: the first line names the columns {', '.join(map(repr, head))}: no {missing[0]!r};"
                          f" must be test, stretch (length over first length), stress (nominal), and time if any")
     return [found[name] for name in _ORDER if name in found]
 

@@ -58,8 +58,8 @@ class _Boundary:
 
     def __init__(self, on: str, **parameters: Any):
         self.on = on
-        who = f"{type(self).__name__}({on!r})"
-        self.parameters = {name: value if isinstance(value, Table) else finite(f"{who}: {name}", value)
+        caller = f"{type(self).__name__}({on!r})"
+        self.parameters = {name: value if isinstance(value, Table) else finite(f"{caller}: {name}", value)
                            for name, value in parameters.items()}
 
     def _between(self, name: str, low: float, high: float = float("inf")) -> None:

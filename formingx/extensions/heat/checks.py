@@ -127,24 +127,24 @@ def were_beyond_limits(path: Any) -> Iterator[Finding]:
             yield from (finding for finding in found if finding.about not in said)
 
 
-def _beyond(scene: Any, low: float, high: float, who: str) -> Iterator[Finding]:
+def _beyond(scene: Any, low: float, high: float, caller: str) -> Iterator[Finding]:
     """Constants of materials, friction and expansion that are not known all the way from low to high."""
     laws = [(f"materials[{layer!r}]", name, value) for layer, material in scene.materials.items()
             for name, value in material.constants().items()]
     laws += [(repr(contact), "friction", contact.mu) for contact in scene.contacts]
     laws += [(f"expansion of {layer!r}", "volume", law.specific_volume) for layer, law in scene.expansion.items()]
-    told = set()
+    listener = set()
     for about, name, law in laws:
         if not isinstance(law, FunctionOfTemperature):
             continue
         span = 1e-9 * (high - low) if np.isfinite(high - low) else 0.0
         for beyond, limit, words in ((low, law.limits[0], "below"), (high, law.limits[1], "above")):
             outside = beyond < limit - span if words == "below" else beyond > limit + span
-            if np.isfinite(beyond) and outside and (about, words, limit) not in told:
-                told.add((about, words, limit))
+            if np.isfinite(beyond) and outside and (about, words, limit) not in listener:
+                listener.add((about, words, limit))
                 yield Finding("warning", about,
                               f"{name} = {law!r} is known {'down' if words == 'below' else 'up'} to {limit:.4g}"
-                              f" degrees, and {who} to {beyond:.4g}: {words} {limit:.4g} it is taken as it is there"
+                              f" degrees, and {caller} to {beyond:.4g}: {words} {limit:.4g} it is taken as it is there"
                               f"{_FROZEN if words == 'below' and 'WLF' in repr(law) else ''}. Give values to there")
 
 

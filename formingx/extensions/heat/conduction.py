@@ -75,9 +75,9 @@ class Conduction:
         self._factored_for: float | None = None
         self._displaced: Any = None
         self._deform()
-        one = self.constant(1.0)
-        self.volume = self._integral(one * self._weight * self._dx)
-        self.capacity = self._integral(self._stored(materials, one, one))
+        entry = self.constant(1.0)
+        self.volume = self._integral(entry * self._weight * self._dx)
+        self.capacity = self._integral(self._stored(materials, entry, entry))
         self._scale.value = 1 / self.capacity
         self.touches = [self._touch(b) for b in boundaries if isinstance(b, ContactWithTool)]
         self._fix([b for b in boundaries if isinstance(b, FixedTemperature)])
@@ -182,8 +182,8 @@ class Conduction:
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
-        for thing in (self._solver, self._matrix, self._rhs, self._out):
-            thing.destroy()
+        for item in (self._solver, self._matrix, self._rhs, self._out):
+            item.destroy()
 
     def _finish(self, T: np.ndarray, change: np.ndarray, known: list[np.ndarray], c: float,
                 answers: list[Any]) -> Stage:

@@ -96,8 +96,8 @@ class Integral:
         """(C_k^-1, shape (K, 4, n), h, dh/dI1, dh/dI2, shape (K, n)) of past states, shape (K, 4, n), at C."""
         inverse = _inverse(past)
         if self.damping is None:
-            one = np.ones((len(past), C.shape[1]))
-            return inverse, one, 0 * one, 0 * one
+            entry = np.ones((len(past), C.shape[1]))
+            return inverse, entry, 0 * entry, 0 * entry
         I1 = np.sum(_COUNT * inverse * C, axis=1)
         I2 = np.sum(_COUNT * past * _inverse(C), axis=1)
         h, h1, h2 = self.damping.derivatives(I1, I2)

@@ -122,7 +122,7 @@ class PastStates:
               there: Callable[[np.ndarray], np.ndarray]) -> Memory:
         """See `History`."""
         carrier = Carrier(self._forms.comm, there(source.points), self.points)
-        F = [shapes_of(one._forms, one._own, one._terms.places) for one in (source, self)]
+        F = [shapes_of(entry._forms, entry._own, entry._terms.places) for entry in (source, self)]
 
         def fitted(values: np.ndarray) -> np.ndarray:
             return carrier.fitted(values.T).T

@@ -12,7 +12,7 @@ from ...errors import InputError
 from ...io.stl import volume
 
 
-def apart(points: np.ndarray, triangles: np.ndarray, who: str) -> list[np.ndarray]:
+def apart(points: np.ndarray, triangles: np.ndarray, caller: str) -> list[np.ndarray]:
     """Groups of triangles: bodies whose boxes do not overlap, each with the hollows in it.
 
     Raises:
@@ -27,7 +27,8 @@ def apart(points: np.ndarray, triangles: np.ndarray, who: str) -> list[np.ndarra
         around = [i for i in full if (boxes[i, 0] <= boxes[k, 0]).all() and (boxes[k, 1] <= boxes[i, 1]).all()]
         if not around:
             at = "(" + ", ".join(f"{x:.6g}" for x in boxes[k].mean(0)) + ")"
-            raise InputError(f"{who} has a body around {at} that is inside out: its triangles look inward: turn them in"
+            raise InputError(f"{caller} has a body around {at} that is inside out: its triangles look inward: turn"
+                             f" them in"
                              f" the program that wrote the file")
         whole[around[-1]].append(bodies[k])                        # the smallest
     groups: list[list[int]] = []
@@ -77,5 +78,5 @@ def _wedges(points: np.ndarray, triangles: np.ndarray, directed: np.ndarray, edg
     return [order[k:k + 2] for k in range(0, len(order) - 1, 2)]
 
 
-def _overlap(one: np.ndarray, other: np.ndarray) -> bool:
-    return bool((one[0] <= other[1]).all() and (other[0] <= one[1]).all())
+def _overlap(entry: np.ndarray, other: np.ndarray) -> bool:
+    return bool((entry[0] <= other[1]).all() and (other[0] <= entry[1]).all())

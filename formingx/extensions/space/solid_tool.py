@@ -347,7 +347,7 @@ def _read(name: str) -> tuple[np.ndarray, np.ndarray]:
     return points, np.arange(len(points)).reshape(-1, 3)
 
 
-def _check_closed(points: np.ndarray, triangles: np.ndarray, who: str) -> None:
+def _check_closed(points: np.ndarray, triangles: np.ndarray, caller: str) -> None:
     """An InputError unless each edge has two triangles that go along it opposite ways."""
     ends = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
     edges, which, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
@@ -362,7 +362,7 @@ def _check_closed(points: np.ndarray, triangles: np.ndarray, who: str) -> None:
         if bad.any():
             x = points[edges[np.argmax(bad)]].mean(0)
             at = "(" + ", ".join(f"{v:.6g}" for v in x) + ")"
-            raise InputError(f"{who} {words.format(n=int(bad.sum()), at=at)}")
+            raise InputError(f"{caller} {words.format(n=int(bad.sum()), at=at)}")
 
 
 def _implicit(points: np.ndarray, triangles: np.ndarray) -> Any:

@@ -106,7 +106,7 @@ class ContactFace:
         return X if X.shape[1] == 3 else np.concatenate([X, X.mean(1, keepdims=True)], axis=1)      # straight edges
 
 
-def contact_of(path: Any, tool: Any, who: str) -> list[Any]:
+def contact_of(path: Any, tool: Any, caller: str) -> list[Any]:
     """The contacts (`FaceContact`) of a tool: by its name, as the `Tool` or a `Contact`; None: the only one."""
     contacts = path.problem.contacts
     found = [c for c in contacts if tool is None or tool in (c.contact.name, c.contact.on)
@@ -114,9 +114,9 @@ def contact_of(path: Any, tool: Any, who: str) -> list[Any]:
     names = ", ".join(repr(c.contact.name or c.contact.on) for c in contacts)
     if not found:
         which = "the scene has no tool" if not contacts else f"the scene has no such tool; it has {names}"
-        raise InputError(f"{who}: " + f"tool = {tool!r}: " * (tool is not None) + which)
+        raise InputError(f"{caller}: " + f"tool = {tool!r}: " * (tool is not None) + which)
     if tool is None and len({c.contact.name for c in found}) > 1:
-        raise InputError(f"{who}: the scene has several tools, name one: {names}")
+        raise InputError(f"{caller}: the scene has several tools, name one: {names}")
     return found
 
 

@@ -89,7 +89,7 @@ def filling(path: Any, contact: Any) -> Filling:
             line = fine(face.points + face.displacement(problem.x))
         gaps[n] = [distance_to_line(points + shift, line).max() for _, points in corners]
     driven = [c for c in path.columns if c.endswith("pressure")] or [
-        path.problem.scene.column(thing) for thing in path.problem.scene.drivable]
+        path.problem.scene.column(item) for item in path.problem.scene.drivable]
     return Filling([corner for corner, _ in corners], {c: path[c] for c in driven}, gaps, path.problem.comm)
 
 

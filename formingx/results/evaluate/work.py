@@ -90,8 +90,8 @@ class Ledger:
         self._energy = forms.stress * forms.volume
         self._loads = [(_called(scene, load), forms.compile(work))
                        for load, work in zip(scene.loads, forms.load_works, strict=True)]
-        self._driven = [(i, thing) for i, thing in enumerate(scene.items)
-                        if any(thing is d for d in scene.drivable) and thing not in scene.loads]
+        self._driven = [(i, item) for i, item in enumerate(scene.items)
+                        if any(item is d for d in scene.drivable) and item not in scene.loads]
         self._stored = forms.compile(forms.energy) if scene.heat is not None or forms.elastic_supports else None
         self._ends: dict[int, tuple[Any, dict[str, _Reaction]]] = {}
 
@@ -112,9 +112,9 @@ class Ledger:
         middle = self._middle(a, b) if times and a.setting == b.setting and b.kind != "jump" else None
         if middle is None:
             return whole
-        halves = [(one, other, self._between(one, other)) for one, other in ((a, middle), (middle, b))]
+        halves = [(entry, other, self._between(entry, other)) for entry, other in ((a, middle), (middle, b))]
         if abs(sum(sum(_gains(row)) for *_, row in halves) - sum(_gains(whole))) > small:
-            halves = [(one, other, self._halved(one, other, row, small, times - 1)) for one, other, row in halves]
+            halves = [(entry, other, self._halved(entry, other, row, small, times - 1)) for entry, other, row in halves]
         (*_, found), (*_, rest) = halves
         return {name: found.get(name, 0.0) + rest.get(name, 0.0) for name in {**found, **rest}}
 
@@ -217,13 +217,13 @@ class Ledger:
             change = scale * (ahead - behind)[:n] / (2 * e)
             free = change.copy()
             free[at.held] = 0                               # what supports do
-            for i, thing in self._driven:
+            for i, item in self._driven:
                 setting = at.setting
                 travel = forms.length * setting.amplitude(i, state.control)
                 by_arc = forms.length * setting.rate[i] * state.slope
                 if i in setting.off:
                     force = slope = 0.0
-                elif thing in scene.contacts:
+                elif item in scene.contacts:
                     together = [scene.items[k] for k in scene.together(i)]
                     tools = [c for c in at.present if c.contact in together]
                     force = -sum(float(resultants.force(c, fields, state.control) @ c.contact.way)
@@ -233,7 +233,7 @@ class Ledger:
                 else:
                     force = -at.reaction(i, at.x, state.control)
                     slope = self._sum(change[at.driven_unknowns(i)])
-                found[_called(scene, thing)] = _Reaction(force, slope, travel, by_arc)
+                found[_called(scene, item)] = _Reaction(force, slope, travel, by_arc)
         return found
 
     def _nodes(self, contact: Any, fields: np.ndarray, control: float) -> np.ndarray:
@@ -315,17 +315,17 @@ def _slid(law: Any, x: np.ndarray, touch: Any, end: np.ndarray) -> np.ndarray:
     return touch.slip + np.sign(np.einsum("ni,ni->n", near.tangent, motion)) * np.hypot(*motion.T)
 
 
-def _called(scene: Any, thing: Any) -> str:
+def _called(scene: Any, item: Any) -> str:
     """Return the name of an item in the energy balance."""
-    if thing in scene.contacts:
-        return Tooling(scene.contacts, 0, 1.0).names[scene.contacts.index(thing)]
-    if thing in scene.supports:
-        return thing.name or "support"
-    if any(thing is d for d in scene.drivable):
-        return scene.column(thing)
-    if thing.name is not None:
-        return f"{thing.name}_{thing.quantity}"
-    return thing.quantity if thing.on is None else f"{thing.quantity}_on_{thing.on}"
+    if item in scene.contacts:
+        return Tooling(scene.contacts, 0, 1.0).names[scene.contacts.index(item)]
+    if item in scene.supports:
+        return item.name or "support"
+    if any(item is d for d in scene.drivable):
+        return scene.column(item)
+    if item.name is not None:
+        return f"{item.name}_{item.quantity}"
+    return item.quantity if item.on is None else f"{item.quantity}_on_{item.on}"
 
 
 def work(path: Any) -> dict[str, np.ndarray]:

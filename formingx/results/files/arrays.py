@@ -15,18 +15,18 @@ def pack(data: Any) -> tuple[Any, bytes]:
     found: list[bytes] = []
     at = 0
 
-    def plain(one):
+    def plain(entry):
         nonlocal at
-        if isinstance(one, dict):
-            return {key: plain(value) for key, value in one.items()}
-        if isinstance(one, list | tuple):
-            return [plain(value) for value in one]
-        if not isinstance(one, np.ndarray):
-            return one
-        kind = {"f": "<f8", "i": "<i8", "u": "<i8", "b": "|b1"}[one.dtype.kind]
-        found.append(one.astype(kind).tobytes())
+        if isinstance(entry, dict):
+            return {key: plain(value) for key, value in entry.items()}
+        if isinstance(entry, list | tuple):
+            return [plain(value) for value in entry]
+        if not isinstance(entry, np.ndarray):
+            return entry
+        kind = {"f": "<f8", "i": "<i8", "u": "<i8", "b": "|b1"}[entry.dtype.kind]
+        found.append(entry.astype(kind).tobytes())
         here, at = at, at + len(found[-1])
-        return {_KEY: [here, kind, list(one.shape)]}
+        return {_KEY: [here, kind, list(entry.shape)]}
     return plain(data), b"".join(found)
 
 

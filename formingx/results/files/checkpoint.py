@@ -217,7 +217,7 @@ def begun(folder: Any) -> bool:
         InputError: it holds something else.
     """
     folder = place("checkpoint", folder)
-    if not folder.exists() or folder.is_dir() and all(one.suffix == ".part" for one in folder.iterdir()):
+    if not folder.exists() or folder.is_dir() and all(entry.suffix == ".part" for entry in folder.iterdir()):
         return False
     _read_json(folder / "scene.json")
     return bool(_states(folder))
@@ -248,9 +248,10 @@ def ended(folder: Any) -> dict[str, Any] | None:
     found = _read_json(file)
     rows = found.get("findings")
     if not (isinstance(found.get("failure"), str) and isinstance(rows, list) and all(
-            isinstance(one, list) and list(map(type, one)) == [str] * 4 and one[0] in SEVERITIES for one in rows)):
+            isinstance(entry,
+                       list) and list(map(type, entry)) == [str] * 4 and entry[0] in SEVERITIES for entry in rows)):
         raise InputError(f"checkpoint: {str(file)!r} is damaged: it does not say how the run ended")
-    return {"failure": found["failure"], "findings": [Finding(*one) for one in rows]}
+    return {"failure": found["failure"], "findings": [Finding(*entry) for entry in rows]}
 
 
 def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
@@ -371,25 +372,25 @@ def _name(number: int) -> str:
 
 def _states(folder: FilePath) -> list[FilePath]:
     """The complete states in order."""
-    names = (one for one in folder.iterdir() if one.name.isascii() and one.name.isdigit())
-    found = sorted(names, key=lambda one: int(one.name))
-    for k, one in enumerate(found):
-        if int(one.name) != k:
+    names = (entry for entry in folder.iterdir() if entry.name.isascii() and entry.name.isdigit())
+    found = sorted(names, key=lambda entry: int(entry.name))
+    for k, entry in enumerate(found):
+        if int(entry.name) != k:
             raise InputError(f"checkpoint {str(folder)!r} is damaged: state {k} is missing")
     return found
 
 
 def _read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
     """Return the data of a state's state.json; raise an InputError unless they are complete and unchanged."""
-    one = folder / _name(number)
-    data = _read_json(one / "state.json")
+    entry = folder / _name(number)
+    data = _read_json(entry / "state.json")
     content: dict[str, bytes] = {}
     try:
         if "x" in data:
-            content[_ARRAYS] = (one / _ARRAYS).read_bytes()
+            content[_ARRAYS] = (entry / _ARRAYS).read_bytes()
         elif checksums:
             content = {f"{name}.bp/{file.name}": file.read_bytes() for name in _FIELDS
-                       for file in sorted((one / f"{name}.bp").glob("*"))}
+                       for file in sorted((entry / f"{name}.bp").glob("*"))}
         missing = [f.name for f in fields(State) if f.name not in (*_FIELDS, "memory") and f.name not in data]
         whole = not missing and data.get("number") == number and (
             not checksums or _checksums(data, content) == data.get("checksums"))
@@ -397,7 +398,7 @@ def _read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
     except (OSError, ValueError, TypeError):
         whole, found = False, data
     if not whole:
-        raise InputError(f"checkpoint {str(one)!r} is damaged: its files are not those that were written"
+        raise InputError(f"checkpoint {str(entry)!r} is damaged: its files are not those that were written"
                          f" (load's state= picks an earlier one)")
     return found
 
@@ -429,7 +430,7 @@ def _instead(file: FilePath) -> str:
     if (folder / "study.json").exists():
         return (f"{str(folder)!r} is the folder of a study: it keeps numbers of runs, not their states; the same"
                 f" fx.study(..., folder=...) reads them, and its report() shows them")
-    inside = sorted(one.parent.name for one in folder.glob("*/scene.json"))
+    inside = sorted(entry.parent.name for entry in folder.glob("*/scene.json"))
     return f"{str(folder)!r} holds no run" + (f", but folders that do: {', '.join(inside[:5])}"
                                               f"{', ...' * (len(inside) > 5)}" if inside else "")
 

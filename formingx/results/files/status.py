@@ -65,7 +65,8 @@ class Status:
         spent = f"{self.spent:.0f} s" if self.spent >= 10 else f"{self.spent:.2g} s"
         left = self._without_pace() if self.left is None else \
             "the target is met" if self.left == 0 else f"about {self.left:.2g} s to the end of the stage"
-        limits = ", ".join(f"{why} ({n} times)" for why, n in sorted(self.limits.items(), key=lambda one: -one[1])[:3])
+        limits = ", ".join(f"{why} ({n} times)" for why,
+                           n in sorted(self.limits.items(), key=lambda entry: -entry[1])[:3])
         if self.ended is None:
             left += f"; the last state is {_words(self.age)} old"
         elif self.left != 0:

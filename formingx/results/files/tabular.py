@@ -81,12 +81,12 @@ def on_root(comm: Any, action: Callable[[], Any]) -> Any:
     return result
 
 
-def named(who: str, file: Any, *endings: str) -> Any:
+def named(caller: str, file: Any, *endings: str) -> Any:
     """A file's name as a path, or an InputError unless it ends in one of these."""
-    file = place(f"{who}: file", file)
+    file = place(f"{caller}: file", file)
     if file.suffix.lower() not in endings:
         other = {".xlsx": "to_excel", ".csv": "to_csv"}.get(file.suffix.lower())
-        raise InputError(f"{who}: file {str(file)!r}: its name must end in {' or '.join(endings)}"
+        raise InputError(f"{caller}: file {str(file)!r}: its name must end in {' or '.join(endings)}"
                          + (f"; {other} writes that" if other else ""))
     return file
 

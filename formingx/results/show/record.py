@@ -140,7 +140,7 @@ class Record:
     @property
     def limits(self) -> dict[str, int]:
         """{what made steps shorter: how often}, the most frequent first; empty where it is not known."""
-        return dict(sorted(self.counts.get("limits", {}).items(), key=lambda one: -one[1]))
+        return dict(sorted(self.counts.get("limits", {}).items(), key=lambda entry: -entry[1]))
 
     def gaps(self, states: list[int]) -> dict[str, np.ndarray]:
         """{"tool, corner": gap left in that corner of a tool that stays} in each of some states with profiles."""
@@ -167,8 +167,8 @@ class Record:
         first = int(np.argmax(errors > volume.BOUND))
         begins = f"; more than {100 * volume.BOUND:g} % from state {first} on" if first < k else ""
         where = f"state {k}, {words(self.control)} = {self.measures[self.control][k]:.5g}{begins}"
-        told = [found for found in self.findings if found.about == "volume" and "clamped" in found.text]
-        return told or volume.findings(errors[k], where)
+        listener = [found for found in self.findings if found.about == "volume" and "clamped" in found.text]
+        return listener or volume.findings(errors[k], where)
 
     def _of_verdict(self) -> list[Finding]:
         k = next((k for k, verdict in enumerate(self.verdicts) if verdict), None)
@@ -203,7 +203,7 @@ def of_path(path: Any) -> Record:
         drawn = drawn if timed else frames(progress(measures, profiles), kinds, stages)
         shown: list[dict[str, np.ndarray]] = [{} for _ in states]
         if profiles[-1] is not None:
-            fields = {id(one): _Fields(path.alone(one.states[0]), profiles[-1]) for one in path.segments}
+            fields = {id(entry): _Fields(path.alone(entry.states[0]), profiles[-1]) for entry in path.segments}
             for i, k in enumerate(drawn):
                 done(i / len(drawn))
                 shown[k] = fields[id(path.segment(states[k]))].of(states[k])
