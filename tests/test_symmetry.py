@@ -78,8 +78,24 @@ def test_contact_area_is_that_of_the_deformed_sheet(parts):
 
 def test_targets_are_those_of_the_whole_part(parts):
     value = 0.9 * parts["whole"].last.measures["enclosed_volume"]
-    found = [path.at(fx.enclosed_volume(value)).measures["pressure"] for path in parts.values()]
-    assert found == pytest.approx([found[0]] * 3, rel=1e-5)
+    found = [fx.trace(path.scene, until=fx.enclosed_volume(value), progress=False).last.measures
+             for path in parts.values()]
+    for name in ("enclosed_volume", "pressure", "mould_force"):
+        assert [one[name] for one in found] == pytest.approx([found[0][name]] * 3, rel=1e-5)
+
+
+def test_a_volume_beyond_the_room_of_a_mould_is_that_of_the_whole_part():
+    """A box 1.8 wide over a sheet 2 wide and 0.1 thick, of which a half is modelled; and a round one."""
+    rooms = []
+    for kinematics in (fx.PlaneStrain(), fx.Axisymmetric()):
+        scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1)), kinematics=kinematics,
+                         materials=fx.NeoHookean(c10=C10), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                         loads=[fx.Pressure("bottom")],
+                         contacts=[fx.Contact("top", fx.tools.cup(radius=0.9, depth=0.5, fillet=0.1).moved(z=0.1))])
+        with pytest.raises(fx.InputError, match="has room for") as error:
+            fx.trace(scene, until=fx.enclosed_volume(100.0), progress=False)
+        rooms.append(float(str(error.value).rsplit("room for ", 1)[1].split()[0].rstrip(".")))
+    assert rooms == pytest.approx([2 * (0.9 * 0.5 + 0.1), np.pi * (0.9**2 * 0.5 + 0.1)], rel=0.02)     # from below
 
 
 def block(part, driven=None, contacts=(), **scene):

@@ -57,8 +57,9 @@ def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -
             if _beyond(scene, contact, value):
                 return f"it lies inside the tool of {contact!r}"
     if name == "enclosed_volume" and driven is not None and driven.quantity == "pressure":
-        for contact in moulds:
+        for contact in moulds if scene.kinematics.components == 2 else ():
             room, wrong = _room(scene, contact)
+            room *= scene.symmetry_factor
             if value > wrong * room:
                 return f"the tool of {contact!r} has room for {room:.4g}"
     return None
