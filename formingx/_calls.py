@@ -129,7 +129,7 @@ def _wrong(call: Callable, name: str, skip: int, args: tuple, given: dict[str, A
 
 
 def _typo(signature: inspect.Signature, given: Mapping[str, Any]) -> str:
-    """The names of arguments that a function does not take, with what was meant, in words; or ""."""
+    """The names of arguments that a function does not take, with what was meant, as text; or ""."""
     kinds = {p.kind for p in signature.parameters.values()}
     unknown = [] if inspect.Parameter.VAR_KEYWORD in kinds else [n for n in given if n not in signature.parameters]
     close = {n: difflib.get_close_matches(n, [p for p in signature.parameters if p not in given], 1) for n in unknown}
@@ -200,7 +200,7 @@ def _numbers(value: Any) -> bool:
 
 
 def _said(kind: Any) -> str:
-    """An annotation in words."""
+    """An annotation as text."""
     origin, of = typing.get_origin(kind) or kind, [k for k in typing.get_args(kind) if k is not Ellipsis]
     if kind is np.ndarray or kind == ArrayLike:
         return "numbers"

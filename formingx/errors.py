@@ -118,7 +118,7 @@ def instance(name: str, value: Any, kind: Any, what: str) -> Any:
 
 def several(name: str, values: Any, what: str) -> list[Any]:
     """`values` as a list, or an InputError unless it is a list, a tuple or the like."""
-    alone = isinstance(values, str | bytes | dict) or hasattr(values, "_fields")         # a NamedTuple is one thing
+    alone = isinstance(values, str | bytes | dict) or hasattr(values, "_fields")         # a NamedTuple is one item
     if not isinstance(values, Iterable) or alone or getattr(values, "ndim", 1) == 0:
         raise InputError(f"{name} = {values!r}: must be a list of {what}")
     return list(values)

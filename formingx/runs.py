@@ -228,7 +228,7 @@ class Process:
 
         Raises:
             InputError: a stage drives or leaves out something that the scene does not have, leaves the body free to
-                move, or lets tools overlap; a target does not fit its stage; a table does not begin where its thing
+                move, or lets tools overlap; a target does not fit its stage; a table does not begin where its item
                 stands; a tool comes in where the body is; a moving tool does not meet its face within the rim.
             ConvergenceError: a target was not reached. It carries the path so far and says what to try.
             OSError: the checkpoint cannot be written; the states in it are kept.
@@ -294,7 +294,7 @@ class Process:
 
 
 def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
-    """The path in a checkpoint, to look at or to go on from: `trace(scene, until=..., start=load("run", scene))`.
+    """The path in a checkpoint, to look at or to continue from: `trace(scene, until=..., start=load("run", scene))`.
 
     Args:
         folder: what `trace(..., checkpoint=folder)` or `Path.save(folder)` wrote, on any number of ranks.
@@ -346,7 +346,7 @@ def _after_pilot(caller: str, adapt_mesh: Any, start: Any, resume: bool, scene: 
 
 
 def _check_start(state: State, stages: list[Stage], problem: Problem) -> None:
-    """An InputError unless a process of these stages can go on from the state."""
+    """An InputError unless a process of these stages can continue from the state."""
     number = state.setting.get("stage", -1)
     if len(state.x) != problem.x.getLocalSize() or not 0 <= number < len(stages):
         raise InputError("Process: start: must be a path of this process: its last state belongs to another scene or"

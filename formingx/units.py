@@ -118,7 +118,7 @@ class Units:
         return {"temperature": ""}.get(kind, getattr(self, kind) or "") if kind else ""
 
     def label(self, column: str, words: str = "") -> str:
-        """A column's name in words, with its unit: "plug force, N"."""
+        """A column's name as text, with its unit: "plug force, N"."""
         unit = self.of(column)
         return (words or column.replace("_", " ")) + (f", {unit}" if unit else "")
 

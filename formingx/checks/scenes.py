@@ -29,7 +29,7 @@ def _driven(sheet: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _edges(sheet: Body) -> Iterator[Finding]:
-    """Edges of a sheet in space that nothing holds: a flat membrane has no stiffness across them."""
+    """Edges of a sheet in three dimensions that nothing holds: a flat membrane has no stiffness across them."""
     if sheet.scene.kinematics.components == 3:
         held = {support.on for support in sheet.scene.supports}
         for name in sorted({*sheet.scene.mesh.boundaries} - {"bottom", "top"} - held):

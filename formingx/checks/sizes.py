@@ -71,7 +71,7 @@ class Body(Triangles):
                 self.aims.append(Aim(of, str(of.quantity), most, f"the table of {thing!r} in {stage.who}"))
 
     def say(self, value: float, kind: str) -> str:
-        """A number in words, with its unit: of a "pressure", a "travel" (a length) or a "force"."""
+        """A number as text, with its unit: of a "pressure", a "travel" (a length) or a "force"."""
         unit = self._units.of(kind)
         return f"{value:.4g}" + (f" {unit}" if unit else "")
 
@@ -138,7 +138,8 @@ class Pushed:
         return first_peak(blown.tube if self.tall else blown.disc)
 
     def left(self, blow_ratio: float) -> tuple[float, Peak] | None:
-        """The least pressure of the free tube behind its peak, up to a blow ratio, over that at the peak; the peak."""
+        """The smallest pressure of the free tube behind its peak, up to a blow ratio, over that at the peak; the
+        peak."""
         peak = self.peak()
         if peak is None or peak.stretch >= blow_ratio:
             return None

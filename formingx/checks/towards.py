@@ -15,7 +15,7 @@ _BEFORE = 0.5              # share of the face that must lie before a tool that 
 
 
 def moulds(scene: Scene) -> list[Contact]:
-    """Return the contacts with tools that stay, before at least half of their face at rest."""
+    """Return the contacts with tools that stay, before at least half of their face in the reference configuration."""
     return [contact for contact in scene.contacts if contact.direction is None and _is_before(scene, contact)]
 
 

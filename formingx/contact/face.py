@@ -106,7 +106,7 @@ class FaceContact:
         return (self._base + self._rate * control) * self._way
 
     def moved(self, dx: np.ndarray, step: float) -> np.ndarray:
-        """Change of `positions` by one of the unknowns (own part) and of the control, length."""
+        """Change of `positions` by one of the unknowns (locally owned entries) and of the control, length."""
         return self._length * self.displacement(dx) - self._rate * step * self._way
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
@@ -219,7 +219,7 @@ class FaceContact:
         return law
 
     def _harden(self, penalty: np.ndarray) -> None:
-        """The penalty is so many times that at rest, shape (n,)."""
+        """Return the present over the reference penalty, shape (n,)."""
         if not np.array_equal(penalty, self._penalty):
             self._penalty, self.law = penalty, self._law(penalty)
 
@@ -236,7 +236,7 @@ class FaceContact:
         return self._memory and self._memory.touch
 
     def start(self) -> None:
-        """See `History`: nothing has touched the tool yet, the body being at rest."""
+        """See `History`: nothing has touched the tool yet, the body being in the reference configuration."""
         self._start_at(self.points)
 
     def come_in(self, fields: np.ndarray, control: float) -> None:
@@ -269,7 +269,7 @@ class FaceContact:
         self._take(Memory(touch, arrived, penalty))
 
     def let_go(self, fields: np.ndarray, control: float) -> bool:
-        """Let go of points that pull at a tool in space at a state; False if there are none; collective."""
+        """Let go of points that pull at a tool in three dimensions at a state; False if there are none; collective."""
         if self._memory is None or not (self.contact.lagged and self.contact.separates):
             return False
         touch, x = self._memory.touch, self.positions(fields, control)

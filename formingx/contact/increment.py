@@ -42,7 +42,8 @@ class Increment:
         return self._last[1]
 
     def linearise(self, x: np.ndarray) -> np.ndarray:
-        """Linearise the law where the last iteration foretold; by how much its forces at x change, shape of x."""
+        """Linearise the law where the last iteration predicted; the amount by which its forces at x change, shape of
+        x."""
         plain = found = self.tractions(x)
         now = self._law.motion(x, self._touch)
         if self._before is not None:
@@ -77,7 +78,7 @@ class Increment:
         return self._now[1].force[points], self._now[1].stiffness[points]
 
     def foretold(self, by: np.ndarray) -> Tractions:
-        """The law, linearised where points come to if they move on by so much, shape (n, c), length."""
+        """Law linearised at the positions after a motion, shape (n, c), length."""
         return self.ahead(slice(None))(by)
 
     def ahead(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Tractions]:

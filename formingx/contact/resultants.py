@@ -30,7 +30,7 @@ def length(face: FaceContact, fields: np.ndarray, control: float) -> float:
 
 
 def area(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """Deformed area of the face of a sheet in space that is in touch, length^2."""
+    """Deformed area of the face of a sheet in three dimensions that is in touch, length^2."""
     return _sum(face, face.rule.lumped * face.rule.area_ratio(fields) * face.touching(fields, control))
 
 

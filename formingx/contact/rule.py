@@ -146,7 +146,8 @@ class Lobatto(Rule):
 
 
 class Vertices(Lobatto):
-    """The nodes of a sheet in space, each with its third of the triangles around it; `lengths`: the root of that."""
+    """The nodes of a sheet in three dimensions, each with its third of the triangles around it; `lengths`: the root
+    of that."""
 
     def __init__(self, surface: Any, assemble: Any):
         vectors, numbers = _displacements(surface)

@@ -25,7 +25,8 @@ class EventPrediction(Protocol):
         """
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
-        """Return the change of (x, control) at a length along the tangent by the events, own part; None: zero."""
+        """Return the change of (x, control) at a length along the tangent by the events, locally owned entries;
+        None: zero."""
 
 
 class State(Start, Protocol):
@@ -162,11 +163,12 @@ class StepLimit:
 
     @property
     def settling(self) -> int:
-        """Iterations in which friction in space settles, however short the step."""
+        """Iterations in which friction in three dimensions settles, however short the step."""
         return LIMITS.settling if any(c.lags for c in self.present) else 0
 
     def let_go(self, new: Any) -> bool:
-        """Let go of points in tension at a tool in space at a state that was found; False if nothing does."""
+        """Let go of points in tension at a tool in three dimensions at a state that was found; False if nothing
+        does."""
         return any([c.face.let_go(new.x[: self._n], new.control) for c in self.present])
 
     def hold_late(self, new: Any, at_target: bool, sweep: int) -> bool:

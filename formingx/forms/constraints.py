@@ -15,9 +15,9 @@ from ..physics.supports import Held
 
 
 class Entry(NamedTuple):
-    """Unknowns that one thing of the scene can hold.
+    """Unknowns that one item of the scene can hold.
 
-    thing: its number in `Scene.things`, -1 for unknowns that no equation holds; bc: the DirichletBC; dofs: local
+    item: its number in `Scene.things`, -1 for unknowns that no equation holds; bc: the DirichletBC; dofs: local
     numbers, ghosts too, shape (n,); driven: they follow the control.
     """
 
@@ -75,7 +75,7 @@ class Constraints:
         return any(entry.driven for entry in self.entries)
 
     def driven_by(self, thing: int) -> np.ndarray:
-        """Local numbers of the owned unknowns that a thing of the scene moves."""
+        """Local numbers of the owned unknowns that an item of the scene moves."""
         dofs = np.unique(np.concatenate([e.dofs for e in self.entries if e.thing == thing and e.driven]))
         return dofs[dofs < self._n]
 

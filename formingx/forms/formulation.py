@@ -45,8 +45,8 @@ class Formulation(ABC):
             that over `ratio_before`: det F of what a body brings from another mesh (`Preformed`).
         dx, weight: weight * dx is the element of reference volume.
         control: the `Constant` of the dimensionless control; time: process time (UFL), which follows it.
-        scales: the user's value (pressure, travel, ...) over the amplitude (`Setting`), for every thing of the scene;
-            last, 1 for the time. control_scale: that of the only driven thing, or L.
+        scales: the user's value (pressure, travel, ...) over the amplitude (`Setting`), for every item of the scene;
+            last, 1 for the time. control_scale: that of the only driven item, or L.
         terms: of each material of the scene its `MaterialTerms`.
         histories: what the forms depend on besides fields, control and time (`History`).
         potential: of a step, over stress times volume (UFL, rank 0); energy: the energy stored, likewise: the same

@@ -27,7 +27,7 @@ class Histories:
         raise NotImplementedError
 
     def look_at(self, x: np.ndarray, control: float) -> None:
-        """Put the fields of x, own part, and the control where the forms see them."""
+        """Put the fields of x, locally owned entries, and the control where the forms see them."""
         raise NotImplementedError
 
     @property
@@ -81,7 +81,7 @@ class Histories:
             history.put(remembered)
 
     def advance(self, x: np.ndarray, control: float) -> None:
-        """A state is accepted: what has a history takes it up. x: own part, shape (n,)."""
+        """A state is accepted: what has a history takes it up. x: locally owned entries, shape (n,)."""
         if self.forms.histories:
             self.look_at(x, control)
         known = self._foretold[1] if self._foretold[0] is x else []

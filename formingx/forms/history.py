@@ -9,7 +9,7 @@ import numpy as np
 
 
 class Start(Protocol):
-    """The state that a step begins at: x, own part, and the control. A `State` is one."""
+    """The state that a step begins at: x, locally owned entries, and the control. A `State` is one."""
 
     x: np.ndarray
     control: float
@@ -49,7 +49,7 @@ class History(Protocol):
         """A memory as JSON can hold it but for arrays, independent of ranks and the same on all of them; collective."""
 
     def load(self, data: dict[str, Any]) -> Any:
-        """The memory, own part, of the result of `save`; an InputError if it does not fit this scene."""
+        """The memory, locally owned entries, of the result of `save`; an InputError if it does not fit this scene."""
 
     def carry(self, source: Any, memory: Any, x: np.ndarray, control: float,
               there: Callable[[np.ndarray], np.ndarray]) -> Any:
@@ -73,4 +73,4 @@ class ConstitutiveHistory(History, Protocol):
     rate_dependent: bool
 
     def forget_motion(self) -> None:
-        """Let the body come to rest: its motion so far predicts nothing of the next step."""
+        """Let the body reach equilibrium: its motion so far predicts nothing of the next step."""

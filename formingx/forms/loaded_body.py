@@ -12,7 +12,8 @@ from ..errors import InputError, known
 
 
 class Face(NamedTuple):
-    """A boundary of the body. normal: outward, at rest (UFL); measure: reference length; weight: area per length."""
+    """A boundary of the body. normal: outward, in the reference configuration (UFL); measure: reference length;
+    weight: area per length."""
 
     normal: Any
     measure: Any
@@ -76,7 +77,8 @@ class LoadedBody:
         return form
 
     def unit(self, load: Any) -> float:
-        """The value at which the nodal forces of a load at rest add up to stress times volume over length."""
+        """The value at which the nodal forces of a load in the reference configuration add up to stress times volume
+        over length."""
         form = self._forms.compile(self.work(load, self.constant(1.0)))
         index_map = self._forms.space.dofmap.index_map
         vector = la.vector(index_map, 1)

@@ -9,10 +9,10 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Setting:
-    """amplitude = base + rate * control of every thing of a scene (`Scene.things`), dimensionless; last, process time.
+    """amplitude = base + rate * control of every item of a scene (`Scene.things`), dimensionless; last, process time.
 
     Attributes:
-        base, rate: one number for each thing (0 unless it can be driven), then those of the process time.
+        base, rate: one number for each item (0 unless it can be driven), then those of the process time.
         off: numbers of the items that take no part.
         fading: the control takes away, from 0 to 1, the unbalanced forces of the change.
         stage, piece: number of the stage in its process, and of the piece of it that has one control.
@@ -31,13 +31,13 @@ class Setting:
 
     @classmethod
     def first(cls, scene: Any) -> Setting:
-        """Everything at 0 and there; the controlled quantity, if it is one thing, is the control."""
+        """Everything at 0 and there; the controlled quantity, if it is one item, is the control."""
         rate = [float(scene.driven is not None and t.driven) for t in scene.items] + [0.0]
         return cls([0.0] * len(rate), rate, [])
 
     @property
     def leading(self) -> int | None:
-        """Number of the controlled quantity: the time if it runs, else the one thing that is driven, or None."""
+        """Number of the controlled quantity: the time if it runs, else the one item that is driven, or None."""
         if self.rate[-1]:
             return len(self.rate) - 1
         return next((i for i, rate in enumerate(self.rate) if rate), None)
@@ -59,7 +59,7 @@ class Setting:
         return there * self.amplitude(number, control)
 
     def standing(self, control: float) -> list[float]:
-        """Amplitudes at a control, of the things and the time."""
+        """Amplitudes at a control, of the items and the time."""
         return [self.amplitude(i, control) for i in range(len(self.base))]
 
     def on_next_mesh(self, before: Sequence[float], now: Sequence[float], control: float) -> tuple[Setting, float]:

@@ -94,7 +94,7 @@ class StepError:
         return [stress.values() for stress in self._stresses]
 
     def _held(self, x: np.ndarray, time: float) -> list[np.ndarray]:
-        """`_at`, of a body that has come to rest."""
+        """`_at`, of a body that has reach equilibrium."""
         for history in self._materials:
             history.forget_motion()
         return self._at(x, time)

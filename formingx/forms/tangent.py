@@ -35,7 +35,7 @@ class Tangent:
             self._by_motion = forms.compile(ufl.action(tangent, self._lift))
 
     def enter(self, active: Any, rate: list[float], anew: bool) -> None:
-        """Take a stage: the `Active` that it holds, anew if that changes, and the rates of things by the control."""
+        """Take a stage: the `Active` that it holds, anew if that changes, and the rates of items by the control."""
         if anew:
             self.matrix.hold(active.bcs, active.rows)
         if self._lift is not None:

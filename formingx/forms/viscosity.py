@@ -27,7 +27,7 @@ class Viscosity:
         self._entries = self._matrix.getValuesCSR()
 
     def forces(self, change: np.ndarray, eta: float) -> np.ndarray:
-        """eta V dx, for a change dx of the unknowns; own part of both, shape (n,)."""
+        """eta V dx, for a change dx of the unknowns; locally owned entries of both, shape (n,)."""
         found, n = np.zeros_like(change), len(self._rows)
         self._change.array_w[:] = change[:n]
         self._matrix.mult(self._change, self._forces)

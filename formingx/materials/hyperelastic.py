@@ -242,7 +242,7 @@ class Ogden(Material):
 
     @classmethod
     def guesses(cls, modulus, I1, terms):
-        """Every choice of so many exponents out of six."""
+        """Every choice of this number of exponents out of six."""
         exponents = (1.3, 2, 5, 10, -2, -5)
         n = count("fit: terms", 3 if terms is None else terms)
         if n > len(exponents):

@@ -59,7 +59,7 @@ class Inflated:
         return np.where(np.isfinite(found), found, np.inf)
 
     def _forces(self, stretches: np.ndarray) -> np.ndarray:
-        """Forces per length at rest, shape (2, n)."""
+        """Forces per length in the reference configuration, shape (2, n)."""
         each = [h * material.response.stress(stretches, constants) for material, constants, h in self._layers]
         return np.sum(each, axis=0)
 

@@ -76,7 +76,8 @@ class RelaxingMaterial(Relaxing):
 
     @property
     def internal(self) -> dict[str, tuple]:  # type: ignore[override]  # read only here
-        """{name: value at rest} of its history variables: entries (11, 22, 12, 33) of tensors."""
+        """{name: value in the reference configuration} of its history variables: entries (11, 22, 12, 33) of
+        tensors."""
         return dict.fromkeys(self.shapes, IDENTITY)
 
     @property

@@ -116,7 +116,7 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     (of the flat one), penetration (of the deepest node, length) and the force of the body on each tool: along
     its travel, positive when it resists; of a tool that stays along Z, positive when the body pushes it up. It is
     plug_force for one named "plug" (tool_1_force for one without a name), and tool_force where there is one tool. With
-    a driven support: support_force (of the body on it, along its component). Where several things can be driven each
+    a driven support: support_force (of the body on it, along its component). Where several items can be driven each
     has its column, plug_travel for one named "plug" (`Scene.column`), a support plug_force. `timed`: process_time too.
     With materials that relax: dissipated_power (stress length^3 over time), and from it, in a run, dissipated_energy
     (stress length^3); with an axis and a known equilibrium, pole_stress_ratio: the Mises stress at the pole over the

@@ -152,7 +152,8 @@ class Mesh:
                                 make=lambda ends: make(ends).with_part(*part))
 
     def nodes_of(self, boundary: str) -> np.ndarray:
-        """Coordinates of all geometry nodes of a boundary, sorted by R, then Z, shape (n, 2) (in space (n, 3))."""
+        """Coordinates of all geometry nodes of a boundary, sorted by R, then Z, shape (n, 2) (in three dimensions
+        (n, 3))."""
         domain, facets = self.domain, self.facets_of(boundary)
         nodes = np.unique(numbers_of_facets(domain, facets))
         points = gathered(self.comm, domain.geometry.x[nodes, :domain.geometry.dim])

@@ -8,11 +8,12 @@ from mpi4py import MPI
 from .. import _compat
 
 COORDINATES = 2
-"""Of a point of the body at rest: (R, Z), of a sheet in space, which is flat then, (x, y)."""
+"""Of a point of the body in the reference configuration: (R, Z), of a sheet in three dimensions, which is flat then,
+(x, y)."""
 
 
 def axes(domain: Any) -> str:
-    """Names of the two reference coordinates: "RZ" of a section, "xy" of a sheet in space."""
+    """Names of the two reference coordinates: "RZ" of a section, "xy" of a sheet in three dimensions."""
     return "RZ" if domain.geometry.dim == 2 else "xy"
 
 
@@ -22,12 +23,12 @@ def own_cells(domain: Any) -> np.ndarray:
 
 
 def of_mesh(domain: Any) -> np.ndarray:
-    """This rank's nodes at rest, shape (n, COORDINATES)."""
+    """This rank's nodes in the reference configuration, shape (n, COORDINATES)."""
     return domain.geometry.x[:, :COORDINATES]
 
 
 def span(domain: Any, comm: Any) -> np.ndarray:
-    """Lowest and highest coordinates of the nodes at rest, all ranks, shape (2, COORDINATES)."""
+    """Lowest and highest coordinates of the nodes in the reference configuration, all ranks, shape (2, COORDINATES)."""
     X = of_mesh(domain)
     return np.array([[comm.allreduce(f(X[:, i], initial=-sign * np.inf), op) for i in range(COORDINATES)]
                      for f, sign, op in ((np.min, -1, MPI.MIN), (np.max, 1, MPI.MAX))])

@@ -1,4 +1,4 @@
-"""The triangles of a mesh at rest: their sizes and shapes, and where in the body one is."""
+"""The triangles of a mesh in the reference configuration: their sizes and shapes, and where in the body one is."""
 
 from typing import Any, NamedTuple
 
@@ -28,7 +28,7 @@ class Place(NamedTuple):
 
 
 def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
-    """A point, shape (2,), in space (x, y), the same on all ranks, with the nearest boundary; collective."""
+    """A point, shape (2,), in three dimensions (x, y), the same on all ranks, with the nearest boundary; collective."""
     best, size = ("", np.inf), 0.0
     for name in mesh.boundaries:
         nodes = mesh.nodes_of(name)[:, :2]

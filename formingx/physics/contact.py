@@ -60,7 +60,7 @@ _MOST_POINTS = 100
 """Gauss points on a facet."""
 
 _AT_FOOT = 1e-7
-"""Distances from the foot of the ramp, over theta, that are as good as none."""
+"""Distances from the outer edge of the ramp, over theta, that are negligible."""
 
 
 class Contact(Part):
@@ -165,7 +165,7 @@ class Contact(Part):
 
     @property
     def lagged(self) -> bool:
-        """True if points in contact are held from the next step on (`LaggedStick`): on tools in space."""
+        """True if points in contact are held from the next step on (`LaggedStick`): on tools in three dimensions."""
         return self.tool.components == 3
 
     def shear_limit(self, pressure: np.ndarray, mu: np.ndarray | float) -> tuple[np.ndarray, np.ndarray | float]:
@@ -405,7 +405,8 @@ class Law(NormalLaw):
         stick.
         """
         near, now = self.nearest(x), self.tractions(x, old)
-        about = np.abs(near.distance / self.theta + 1.025) < 0.025 + 2 * _AT_FOOT       # a body may rest at the foot
+        # a body may rest at the outer edge of the ramp
+        about = np.abs(near.distance / self.theta + 1.025) < 0.025 + 2 * _AT_FOOT
         touching = (arrived | about) & (now.sense == 0)
         press = np.where(touching, np.maximum(-0.5 * self.theta - near.distance, 0.0), 0.0)
         if old is not None:

@@ -9,7 +9,7 @@ from .part import Part
 
 R, Z = 0, 1
 NAMES = ("r", "z", "y", "x")
-"""Of the components that supports hold, by their numbers; in space r, of what holds a rim whole, is x."""
+"""Of the components that supports hold, by their numbers; in three dimensions r, of what holds a rim whole, is x."""
 
 
 class Held(NamedTuple):
@@ -91,7 +91,7 @@ class Symmetry(_OneComponent):
 
     Args:
         on: name of the boundary.
-        normal: the component that is held: "r" or "z"; in space "x", "y" or "z".
+        normal: the component that is held: "r" or "z"; in three dimensions "x", "y" or "z".
         mirror: modes that are no image of themselves count, too, see `Path.stability`.
         guide: the part ends there and slides along a frictionless wall: results are those of the body alone.
 

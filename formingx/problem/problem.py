@@ -243,12 +243,13 @@ class Problem(Histories, Units):
         return self._forces(x.array_r[: self._n], control)
 
     def body_forces(self, x: np.ndarray, control: float) -> np.ndarray:
-        """`forces` without those of contact: what supports and tools do to the body. x: own part; shape (n,)."""
+        """`forces` without those of contact: what supports and tools do to the body. x: locally owned entries; shape
+        (n,)."""
         self.look_at(x, control)
         return self.assemble(self._residual)
 
     def look_at(self, x: np.ndarray, control: float) -> None:
-        """Put the fields of x, own part, and the control where the forms see them."""
+        """Put the fields of x, locally owned entries, and the control where the forms see them."""
         self.forms.control.value = control
         self.place(x)
 
@@ -372,7 +373,7 @@ class Problem(Histories, Units):
         return multipliers
 
     def place(self, x: np.ndarray) -> None:
-        """Put the fields of x, own part, where the forms see them."""
+        """Put the fields of x, locally owned entries, where the forms see them."""
         w = self.forms.w.x
         w.array[: self._n] = x[: self._n]
         w.scatter_forward()

@@ -61,7 +61,7 @@ class Units:
 
     @property
     def scales(self) -> Sequence[float]:
-        """The user's value over the amplitude of each thing of the scene; last, 1.0 for the time."""
+        """The user's value over the amplitude of each item of the scene; last, 1.0 for the time."""
         return self.forms.scales
 
     @property
@@ -71,5 +71,5 @@ class Units:
 
     @property
     def slack_at_rest(self) -> bool:
-        """True if the body at rest has no stiffness in some direction."""
+        """True if the body in the reference configuration has no stiffness in some direction."""
         return self.forms.slack_at_rest

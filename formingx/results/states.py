@@ -219,7 +219,7 @@ class States:
         return found
 
     def _run_to(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
-        """The state that a run would come to that goes on from `left` to the target."""
+        """The state that a run would reach that continues from `left` to the target."""
         if left.time < right.time and not left.setting["rate"][-1]:
             raise InputError(f"the path passes {target} between two of its states, in a stage that follows or holds a"
                              f" measure: none can be solved for there afterwards; run with intermediate=[...]"

@@ -27,7 +27,7 @@ def check(scene: Scene, targets: Iterable[Any], off: Collection[int] | None = No
 def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -> str | None:
     """Return the reason for which no run meets a target (its `name` and `value`), as text; None: no reason is known.
 
-    off: numbers of the items that a stage leaves out; None: a run from the unloaded state that drives the only thing
+    off: numbers of the items that a stage leaves out; None: a run from the unloaded state that drives the only item
         that can be.
     """
     name, value, driven = target.name, target.value, scene.driven

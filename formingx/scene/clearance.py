@@ -74,7 +74,7 @@ def _check_overlap(scene: Scene, caller: str, present: dict[int, Contact], outli
 
 
 def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
-    """Points along a tool's profile, shape (n, 2); of one in space some of its surface, shape (n, 3)."""
+    """Points along a tool's profile, shape (n, 2); of one in three dimensions some of its surface, shape (n, 3)."""
     points, lines = contact.tool.surface()
     if contact.tool.components == 3:
         return points[:: max(1, len(points) // _MOST)]

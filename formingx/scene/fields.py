@@ -132,6 +132,6 @@ def _inside(name: str, points: np.ndarray, axes: str, inside: np.ndarray) -> Non
 
 
 def _at(points: np.ndarray, fine: np.ndarray, axes: str) -> str:
-    """The first point that is not fine, in words."""
+    """The first point that is not fine, as text."""
     first, second = points[np.argmin(fine)]
     return f"({', '.join(axes)}) = ({first:.6g}, {second:.6g})"

@@ -33,7 +33,7 @@ _HIGHEST = 30
 
 
 _LARGER = 4.0
-"""A body so many times larger than a tool that it starts in is one in other units of length."""
+"""Ratio of sizes from which on a body that starts inside a tool is probably in another unit of length."""
 
 
 class Scene:
@@ -190,7 +190,7 @@ class Scene:
         return drivable[0] if len(drivable) == 1 else None
 
     def only_driven(self, caller: str) -> Any:
-        """`driven`, or an InputError unless one thing can be driven."""
+        """`driven`, or an InputError unless one item can be driven."""
         if not self.drivable:
             raise InputError(f"{caller}: nothing is driven: give one load no value, as Pressure('bottom'), or"
                              " add a PrescribedDisplacement support")
@@ -202,7 +202,7 @@ class Scene:
         return self.driven
 
     def number(self, caller: str, item: Any) -> int:
-        """The place in `things` of a thing, given as itself or by its name; an InputError if it is not there."""
+        """The place in `things` of an item, given as itself or by its name; an InputError if it is not there."""
         for i, known_thing in enumerate(self.items):
             if item is known_thing or isinstance(item, str) and item == known_thing.name:
                 return i
@@ -442,7 +442,7 @@ class Scene:
 
 
 def _all_of(kind: type, name: str, scene_items: Any, what: str) -> list[Any]:
-    """A list of things of one kind, or an InputError."""
+    """A list of items of one kind, or an InputError."""
     scene_items = several(f"Scene: {name}", scene_items, what)
     for item in scene_items:
         if not isinstance(item, kind):

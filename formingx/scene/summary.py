@@ -1,4 +1,4 @@
-"""A scene in words."""
+"""A scene as text."""
 
 import contextlib
 import re

@@ -16,10 +16,10 @@ from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relat
 from .state import State
 
 Predictor: TypeAlias = Callable[[float], Array | None]
-"""x at a control, own part, or None where the tangent is the better guess."""
+"""x at a control, locally owned entries, or None where the tangent is the better guess."""
 
 Bend: TypeAlias = tuple[Array, float]
-"""What a guess is off the tangent: of x, own part, and of the control."""
+"""What a guess is off the tangent: of x, locally owned entries, and of the control."""
 
 
 class Curve:
@@ -144,7 +144,7 @@ class Curve:
         return True
 
     def plane_normal(self, state: State) -> Array:
-        """Derivative by x, own part, of the plane in which steps from a state end."""
+        """Derivative by x, locally owned entries, of the plane in which steps from a state end."""
         self._a.array_w[:] = state.direction
         self.problem.metric_times(self._a, self._b)
         return self._b.array_r.copy()

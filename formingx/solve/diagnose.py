@@ -122,7 +122,7 @@ class Diagnosis:
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """The causes in words, the strongest first."""
+        """The causes as text, the strongest first."""
         return tuple(finding.text for finding in self.findings)
 
     @property

@@ -49,7 +49,7 @@ class Measure(Protocol):
 
 
 class Standing(Protocol):
-    """A state to stand at. x: own part, shape (n,); setting: plain data of a `Setting`, or empty."""
+    """A state to stand at. x: locally owned entries, shape (n,); setting: plain data of a `Setting`, or empty."""
 
     x: Array
     control: float
@@ -73,7 +73,8 @@ class Tractions(Protocol):
 
 
 class Increment(Protocol):
-    """Newton's method at n own points of a face in contact, as the iteration that was linearised last sees them."""
+    """Newton's method at n locally owned points of a face in contact, as the iteration that was linearised last sees
+    them."""
 
     @property
     def ramp(self) -> float:
@@ -91,7 +92,7 @@ class Increment(Protocol):
         """Forces and stiffnesses that `linearise` has taken, of some points, shapes (m, 2), (m, 2, 2)."""
 
     def foretold(self, by: Array) -> Tractions:
-        """The law at the points if they move on by so much, shape (n, 2), length."""
+        """Law at the points after a motion, shape (n, 2), length."""
 
     def ahead(self, points: Array | slice) -> Callable[[Array], Tractions]:
         """`foretold` of some of the points."""
@@ -105,7 +106,7 @@ class Increment(Protocol):
 
 
 class ContactFace(Protocol):
-    """A face in contact: n own points, and the increment that goes on."""
+    """A face in contact: n locally owned points, and the increment that goes on."""
 
     points: Array
 
@@ -118,7 +119,7 @@ class ContactFace(Protocol):
         """Factor of the tractions in the forces of F, shape (n,)."""
 
     def add(self, values: Array, forces: Array) -> None:
-        """Add forces at the points, shape (n, 2), to own rows of F."""
+        """Add forces at the points, shape (n, 2), to locally owned rows of F."""
 
     def leave_out(self, points: Array) -> None:
         """Some points (a mask, shape (n,)) touch nothing, until another increment begins."""
@@ -132,7 +133,7 @@ class Viscosity(Protocol):
     """Forces eta V dx of a body that moves through a viscous stress."""
 
     def forces(self, change: Array, eta: float) -> Array:
-        """eta V dx, own part, shape (n,)."""
+        """eta V dx, locally owned entries, shape (n,)."""
 
     def add_to(self, tangent: PETSc.Mat, eta: float) -> None:
         """Add eta V to a tangent."""
@@ -205,14 +206,14 @@ class Residual(Protocol):
 
     @property
     def slack_at_rest(self) -> bool:
-        """True if dF/dx is singular at rest, x = 0."""
+        """True if dF/dx is singular in the reference configuration, x = 0."""
         return False
 
     def stiff_state(self, out: PETSc.Vec) -> None:
         """out = a state near rest where dF/dx is regular, for the first direction of a path."""
 
     def motion(self, control: float) -> Array:
-        """Unloaded state with the constraints of a control, the first guess from there; own part."""
+        """Unloaded state with the constraints of a control, the first guess from there; locally owned entries."""
         return np.zeros(self.x.getLocalSize())
 
 
@@ -282,7 +283,7 @@ class Histories(Protocol):
         return False
 
     def advance(self, x: Array, control: float) -> None:
-        """A state is accepted: the histories take it up. x: own part."""
+        """A state is accepted: the histories take it up. x: locally owned entries."""
 
     def time_at(self, control: float) -> float:
         """Process time at a control."""
@@ -305,7 +306,7 @@ class Stages(Protocol):
         """Step data: amplitudes of the controls, and inactive items."""
 
     def enter(self, setting: Setting, x: Array, control: float) -> None:
-        """Take a setting, in which (x, control), own part, is a state."""
+        """Take a setting, in which (x, control), locally owned entries, is a state."""
 
     def restore(self, state: Standing) -> None:
         """Go on from an accepted state: its setting and its histories are what they were then."""
@@ -326,7 +327,7 @@ class Units(Protocol):
 
     @property
     def scales(self) -> Sequence[float]:
-        """The user's value over the amplitude of each thing that a `Setting` counts; last, 1.0 for the time."""
+        """The user's value over the amplitude of each item that a `Setting` counts; last, 1.0 for the time."""
 
     @property
     def units(self) -> tuple[float, float]:

@@ -65,7 +65,7 @@ class DirectSolver:
         self._ksp.solve(rhs, out)
 
     def solve_all(self, rhs: Array) -> Array:
-        """matrix^-1 of columns, all at once, which takes a fraction of the time; own rows, shape (n, m)."""
+        """matrix^-1 of columns, all at once, which takes a fraction of the time; locally owned rows, shape (n, m)."""
         given, found = self._dense(*rhs.shape)
         given.getDenseArray()[:] = rhs
         self._ksp.getPC().getFactorMatrix().matSolve(given, found)
@@ -92,7 +92,7 @@ class DirectSolver:
             self._ksp.getPC().getFactorMatrix().setMumpsIcntl(13, 1)
 
     def _dense(self, n: int, m: int) -> list[PETSc.Mat]:
-        """Two matrices of n own rows and m columns, the same as before if that had as many."""
+        """Two matrices of n locally owned rows and m columns, the same as before if that had as many."""
         if not self._columns or self._columns[0].getSize()[1] != m:
             self._forget()
             for _ in range(2):

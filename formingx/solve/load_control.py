@@ -46,7 +46,7 @@ class FixedControl:
         return bool(self._snes.getConvergedReason() > 0)
 
     def correction(self) -> Array:
-        """The last correction of x, own part, shape (n,)."""
+        """The last correction of x, locally owned entries, shape (n,)."""
         return np.negative(self._snes.getSolutionUpdate().array_r)
 
     def destroy(self) -> None:
@@ -87,7 +87,7 @@ class FixedControlCurve(Curve):
 
     def step(self, old: State, length: float, predictor: Predictor | None = None, behind: State | None = None,
              bend: Bend | None = None) -> State:
-        """One step to the control that the tangent foretells."""
+        """One step to the control that the tangent predicts."""
         return self._correct(old, length, "step")
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,

@@ -1,9 +1,9 @@
 """The few contact points that a step brings, or whose status (free, stick, slide) changes between iterations.
 
 An iteration of Newton's method linearises the law of contact of every point at its status of the iteration before.
-Where the statuses of points depend on each other that can cycle, and where points arrive, at the foot of their law's
-ramp, it only halves their penetration. For the few points that arrive or change their status the body is a compliance C
-(the inverse tangent, condensed to them): their motions y, to first order, satisfy
+Where the statuses of points depend on each other that can cycle, and where points arrive, at the outer edge of the
+ramp of their law's ramp, it only halves their penetration. For the few points that arrive or change their status the
+body is a compliance C (the inverse tangent, condensed to them): their motions y, to first order, satisfy
 
     y - y0 + C (f(y) - f0 - S0 y) = 0,
 
@@ -113,7 +113,8 @@ class LocalSolve:
 
 
 Update: TypeAlias = Callable[[Array, float], "Array | None"]
-"""V = dx/dcontrol or K^-1 E, own rows, shape (n, m), with change of the control, by another tangent than K."""
+"""V = dx/dcontrol or K^-1 E, locally owned rows, shape (n, m), with change of the control, by another tangent than
+K."""
 
 
 def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> Update | None:
@@ -135,7 +136,8 @@ def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> 
 
 
 def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array]) -> Array:
-    """Unit forces at own points of contacts in F, own rows, shape (n, m): point by point of all ranks."""
+    """Unit forces at locally owned points of contacts in F, locally owned rows, shape (n, m): point by point of all
+    ranks."""
     unit, components = np.zeros(problem.x.getLocalSize()), contacts[0].points.shape[1]
     own = [(c, point, way) for c, points in zip(contacts, chosen) for point in points for way in range(components)]
     units = []
@@ -197,8 +199,8 @@ class _Points:
         came in.
 
         The stiffness of a sticking point, k s g, falls with the slope s of the ramp from all to nothing next to its
-        foot. There a point is in equilibrium that is pulled along its tool and hardly pressed to it, and a
-        correction from either side leads far to the other.
+        outer edge of the ramp. There a point is in equilibrium that is pulled along its tool and hardly pressed to
+        it, and a correction from either side leads far to the other.
         """
         (was, _), (now, way) = (self._all(self._each(ramps, at), (), (self._c,)) for at in (y, new))
         leaves, enters = (was > _LOCAL.least) & (now <= 0), (was <= 0) & (now > 0)
@@ -207,7 +209,8 @@ class _Points:
         return new + ((at - now)[:, None] * way).ravel()
 
     def updated(self, V: Array, step: float, changes: list[Array]) -> Array | None:
-        """Solutions V, own rows, shape (n, m), with other stiffnesses per area of own points; None: it is singular."""
+        """Solutions V, locally owned rows, shape (n, m), with other stiffnesses per area of locally owned points;
+        None: it is singular."""
         more = self._gather(np.concatenate(changes))
         y = self._within(more, self._gather(np.array([self._moved(column, step) for column in V.T]).T))
         if y is None:

@@ -29,8 +29,8 @@ class Newton:
             cheaper to try, such as half the step.
         small: corrections (dimensionless displacement) that may grow without a sign of divergence while the active set
             changes. Iterations with a small correction that visit an active set for the first time do not count
-            against `Tolerances.settling`, up to `exempt` of them: of a slack sheet on a flat plug a hundred points let
-            go one or two at a time. (With a history, which depends on the step, a shorter step is better.)
+            against `Tolerances.settling`, up to `exempt` of them: of a slack sheet on a flat plug a hundred points
+            separate one or two at a time. (With a history, which depends on the step, a shorter step is better.)
         cycles: returns of the active set to one visited before, after which it counts as cycling (solutions took up
             to 4).
         diverged: the iteration has diverged, contact or not, where three relative corrections in a row are larger (of
@@ -284,7 +284,8 @@ class BorderedNewton:
         return True
 
     def solve_ahead(self, E: Array) -> Array | None:
-        """K^-1 E, own rows, (n, m), by the tangent made last by `tangent` or `update_ahead`; None: it is singular."""
+        """K^-1 E, locally owned rows, (n, m), by the tangent made last by `tangent` or `update_ahead`; None: it is
+        singular."""
         V = self.solver.solve_all(E)
         return self._update(V, 0.0) if self._update else V
 
@@ -393,7 +394,8 @@ class BorderedNewton:
         return step
 
     def _border(self, V: Array) -> Array:
-        """Make V = K^-1 E, own rows, shape (n, m), in place, those of the bordered system; the control's part, (m,)."""
+        """Make V = K^-1 E, locally owned rows, shape (n, m), in place, those of the bordered system; the control's
+        part, (m,)."""
         steps = -self.problem.comm.allreduce(self.gradient.array_r @ V) / self._slope
         V += np.outer(self.b.array_r, steps)
         return steps

@@ -362,7 +362,7 @@ class Run:
         return new
 
     def _found_no_rest_near(self, old: State) -> bool:
-        """True if a jump from about the control of a state, which costs most, came to rest nowhere."""
+        """True if a jump from about the control of a state, which costs most, reached rest nowhere."""
         return abs(old.control - self._no_rest_at) < self.settings.snap_through.furthest
 
     def _solutions(self, old: State) -> int:
@@ -447,4 +447,4 @@ class Run:
 
 
 class _Astray(Failure):
-    """A state was found, but not one that a step should come to: a shorter one will do better."""
+    """A state was found, but not one that a step should reach: a shorter one will do better."""

@@ -1,4 +1,4 @@
-"""States foretold from those before: in time by Lagrange's polynomial, along a smooth path by a parabola."""
+"""States predicted from those before: in time by Lagrange's polynomial, along a smooth path by a parabola."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ from .state import State
 from .stepping import SAME_TIME, StepControl
 
 _IN_TIME = StepControl(length=1e-3, smallest=1e-13)
-"""Step control of a material that relaxes: the error in time soon takes over."""
+"""Step control of a material that relaxes: the error in time soon transfers."""
 
 _HELD = replace(_IN_TIME, target=8)
 """In contact while nothing is driven: points in contact hardly move; the error in time says how long steps may be."""
@@ -89,7 +89,7 @@ class Execution:
                 break
 
     def _bind(self, plan: Plan) -> list[tuple[Target, Measure]]:
-        """The targets of a stage and their measures; where it drives one thing, or waits, the last is `until`."""
+        """The targets of a stage and their measures; where it drives one item, or waits, the last is `until`."""
         stage, moving = plan.stage, {*plan.numbers, *(i for i, _ in plan.tables)}
         rate = [float(i in moving) for i in range(len(self._still.rate) - 1)] + [float(stage.timed)]
         self.problem.enter(replace(self._still, rate=rate, off=plan.off), self._rest, 0.0)
@@ -117,7 +117,7 @@ class Execution:
         return self.problem.setting, last.x if last else self._rest, last.control if last else 0.0
 
     def _stands(self, number: int) -> float:
-        """Value of a thing now, in the user's units."""
+        """Value of an item now, in the user's units."""
         setting, _, control = self._standing()
         return setting.amplitude(number, control) * self.problem.scales[number]
 
@@ -177,14 +177,14 @@ class Execution:
         return relative(self.problem, self.curve.newton.F.norm()) > self._balanced
 
     def _drive(self, numbers: list[int], begun: bool) -> None:
-        """Piece 1: one thing is the control."""
+        """Piece 1: one item is the control."""
         before, _, control = self._standing()
         if not begun:
             control = self._enter_driving(numbers)
         self._trace(self._left_to_meet(), None if begun else control)
 
     def _enter_driving(self, numbers: list[int], clocked: bool = True) -> float:
-        """Make the amplitude of one thing the control; `clocked`: time goes by as it moves. The control now."""
+        """Make the amplitude of one item the control; `clocked`: time goes by as it moves. The control now."""
         base, rate, control = driving(self._amplitudes(), self.problem.scales, numbers, self._stage, clocked)
         self._enter(base, rate, 1, control)
         return control
@@ -199,7 +199,7 @@ class Execution:
         return [*setting.standing(control)[:-1], self.problem.time_at(control)]
 
     def _flow(self, numbers: list[int], begun: bool) -> None:
-        """Piece 1: one thing is what makes a measure follow a course in time."""
+        """Piece 1: one item is what makes a measure follow a course in time."""
         control = None if begun else self._enter_driving(numbers, clocked=False)
         target, course, times = self._course(self.problem.setting.base[-1])
         run = Flow(self.record, target.bind(self.problem), course, times, self._left_to_meet(),
@@ -299,7 +299,7 @@ def is_done(record: Record, plans: list[Plan]) -> bool:
 
 def driving(amplitudes: list[float], scales: Sequence[float], numbers: list[int], stage: Stage,
             clocked: bool = True) -> tuple[list[float], list[float], float]:
-    """(base, rate, control now) of a setting that makes the amplitude of one thing, by its numbers, the control."""
+    """(base, rate, control now) of a setting that makes the amplitude of one item, by its numbers, the control."""
     base, rate = list(amplitudes), [0.0] * len(amplitudes)
     control, scale = base[numbers[0]], scales[numbers[0]]
     for number in numbers:

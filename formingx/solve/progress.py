@@ -167,7 +167,7 @@ class Progress:
         self._gained_then = 0.0
 
     def show(self, gained: float, states: int, length: float) -> None:
-        """A step is complete: part of the way, from 0 to 1, in so many states; length: of the next step."""
+        """A step is complete: part of the way, from 0 to 1, in this number of states; length: of the next step."""
         self._gained, self._states, self._length = gained, states, length
         if not self._bar.disable:
             self._bar.n = min(max(gained, 0.0), 1.0)

@@ -149,7 +149,7 @@ class Record:
         self.counts.steps += state.kind != "start"
 
     def complete_step(self, step: StepControl, until: Target, **more: Any) -> None:
-        """A step is complete: note in the last state how the run goes on from it, with more that the run knows."""
+        """A step is complete: note in the last state how the run continues from it, with more that the run knows."""
         self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value],
                               "column": self.equations.shown(0.0)[0].replace(" ", "_"), **more}
         for listener in self.on_step:

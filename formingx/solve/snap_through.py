@@ -5,7 +5,7 @@ It reaches equilibrium in the next equilibrium. The way there is followed with v
 
     F(x) + eta V (x - x_k) = 0,   V that of a viscous stress in proportion to dF, as in a Kelvin-Voigt solid,
 
-from one x_k to the next, the histories taken up at each. (Kelvin-Voigt damping holds waves of all lengths in proportion
+from one x_k to the next, the histories updated at each. (Kelvin-Voigt damping holds waves of all lengths in proportion
 to their stiffness. Damping in proportion to the mass holds short ones least: what separates at an edge then wants 1e4
 times the viscosity that lets the body reach equilibrium.) eta falls where the body moves smoothly and grows where it
 does not; where it is 0 the body is in equilibrium. The unbalanced force dissipates work on the way.
@@ -90,16 +90,16 @@ class SnapThrough:
         return self.lengths[-1:] if limit and limit.only_sticks else self.lengths
 
     def most_of_step(self, iterations: int) -> float:
-        """Return the largest part of a step that is tried next, after so many Newton iterations of it."""
+        """Return the largest part of a step that is tried next, after this number of Newton iterations of it."""
         return 0.5 if iterations > self.iterations else 1.0
 
 
 class NoEquilibrium(Failure):
-    """A body that moved on came to rest nowhere."""
+    """A body that moved on reached rest nowhere."""
 
 
 class ViscousDrag:
-    """eta V (x - origin), own part; nothing at unknowns that are held."""
+    """eta V (x - origin), locally owned entries; nothing at unknowns that are held."""
 
     def __init__(self, viscosity: Viscosity):
         self._viscosity = viscosity
@@ -179,7 +179,8 @@ class _Motion:
         return grows or (self._settings.grows_moving if self.solved else self._settings.grows)
 
     def end(self) -> State | None:
-        """The state at rest, if there is one near; raises `Failure` if the body, without a history, rests at none."""
+        """The state in the reference configuration, if there is one near; raises `Failure` if the body, without a
+        history, rests at none."""
         try:
             with self.curve.newton.in_a_hurry(True):        # if it fails the body moves on, with viscosity
                 state = self.curve.solve(self.at.x, self.control, fixed(self.control), "jump", self.at)
@@ -224,7 +225,7 @@ class _Motion:
 def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: SnapThrough,
                  solutions: int | None = None, listener: Callable[[], None] = lambda: None, onward: float = 0.0,
                  passed: Sequence[State] = ()) -> State:
-    """The state that the body comes to from `old` when the control goes on; of kind "jump".
+    """The state that the body reaches from `old` when the control goes on; of kind "jump".
 
     Args:
         by: change of the control, dimensionless; its sign is the way that the process drives.

@@ -1,4 +1,4 @@
-"""A stage of a process as the user declares it, and by the numbers of the things of a scene."""
+"""A stage of a process as the user declares it, and by the numbers of the items of a scene."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ class Stage:
         return measure, course
 
     def _tables(self, amplitudes: Any) -> list[tuple[Any, Array]]:
-        """[(thing, knots, shape (n, 2))]."""
+        """[(item, knots, shape (n, 2))]."""
         if not isinstance(amplitudes, Mapping) or not amplitudes:
             raise InputError(f"{self.who}: amplitudes = {amplitudes!r}: must be {{thing: [(time, value), ...]}}")
         tables = []

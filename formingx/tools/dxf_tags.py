@@ -13,7 +13,7 @@ _NEEDED = {"LINE": (10, 20, 11, 21), "ARC": (10, 20, 40, 50, 51), "CIRCLE": (10,
 """{curve: group codes that it has once}."""
 _COUNTED: dict[str, dict[int, tuple[int, ...]]] = {
     "LWPOLYLINE": {90: (10, 20)}, "SPLINE": {72: (40,), 73: (10, 20), 74: (11, 21)}}
-"""{curve: {group code of a count: the codes that follow so many times}}."""
+"""{curve: {group code of a count: the codes that follow this number of times}}."""
 _LETTERING = ("ACAD_PROXY_ENTITY", "ACAD_TABLE", "ARC_DIMENSION", "ATTDEF", "ATTRIB", "CAMERA", "DGNUNDERLAY",
               "DIMENSION", "DWFUNDERLAY", "GEOPOSITIONMARKER", "HATCH", "IMAGE", "LARGE_RADIAL_DIMENSION", "LEADER",
               "LIGHT", "MPOLYGON", "MTEXT", "MULTILEADER", "OLE2FRAME", "OLEFRAME", "PDFUNDERLAY", "POINT", "SHAPE",

@@ -19,7 +19,7 @@ def amplitude(function: Callable, until: float, start: float = 0.0, *, tolerance
         tolerance: how far a straight piece may be off f, over the span of its values.
 
     Raises:
-        InputError: times in the wrong order, a value that is not finite, a function that takes over 2000 points.
+        InputError: times in the wrong order, a value that is not finite, a function that transfers 2000 points.
 
     >>> stroke = fx.amplitude(lambda t: 20 * (1 - np.cos(np.pi * t)), until=1.0)
     >>> len(stroke), stroke[0], round(stroke[-1][1], 6)

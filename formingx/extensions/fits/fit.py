@@ -179,7 +179,7 @@ def _fitted(material: Any, points: Points, terms: int | None) -> tuple[Material,
         raise InputError(f"fit: {len(measured)} points cannot fix the {n} constants of {type(guesses[0]).__name__}")
 
     def refined(guess: Material, start: Any, evaluations: int) -> tuple[float, Material, np.ndarray]:
-        """(cost, guess, coordinates) after so many evaluations; the cost is infinite where the stress is."""
+        """(cost, guess, coordinates) after this number of evaluations; the cost is infinite where the stress is."""
         low, high = np.array([bounds for _, *bounds in guess.coordinates()]).T
 
         def residual(x):

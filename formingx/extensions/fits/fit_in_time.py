@@ -146,7 +146,7 @@ class _Data:
 
 
 def _refined(data: _Data, material: RelaxingMaterial, n: int) -> tuple[RelaxingMaterial, float]:
-    """(the material with its constants and so many branches fitted, root mean square of the scaled misfit)."""
+    """(the material with its constants and this number of branches fitted, root mean square of the scaled misfit)."""
     from scipy.optimize import least_squares
     if len(data.stress) < (needed := len(material.parameters) - 2 * len(material.branches) + 2 * n):
         raise InputError(f"fit: {len(data.stress)} points cannot fix the {needed} constants of"
@@ -179,7 +179,7 @@ def _refined(data: _Data, material: RelaxingMaterial, n: int) -> tuple[RelaxingM
 
 
 def _guesses(data: _Data, material: RelaxingMaterial, n: int) -> list[RelaxingMaterial]:
-    """Starts with so many branches: the material's own, and two from the best spectrum."""
+    """Starts with this number of branches: the material's own, and two from the best spectrum."""
     from scipy.optimize import nnls
     rest = material.equilibrium
     shape = data.relaxed(rest)[:, None] / data.sizes[:, None]

@@ -19,7 +19,7 @@ _RISES = 2.0               # modulus of the coldest over the modulus of the hott
 
 
 _ALLOWED = 0.01
-"""Error of the temperature in space, over the span of temperatures, that the check tells of."""
+"""Error of the temperature in three dimensions, over the span of temperatures, that the check tells of."""
 _ONE_LAYER = 0.14
 """Error over the span of temperatures with one layer of elements, its face at another temperature at once. This and the
 next two are measured with one to eight equal layers, after a hundredth of wall^2/diffusivity: see
@@ -150,7 +150,7 @@ def _beyond(scene: Any, low: float, high: float, caller: str) -> Iterator[Findin
 
 @register("end")
 def temperature_errors(path: Any) -> Iterator[Finding]:
-    """Errors of the temperature in space, of states of the last mesh; collective."""
+    """Errors of the temperature in three dimensions, of states of the last mesh; collective."""
     for history in path.problem.histories:
         if isinstance(history, CoolingHistory):
             yield from history.findings(path.segments[-1].states)

@@ -102,7 +102,7 @@ class Conduction:
         return np.where(self._held, self._held_at.x.array[: self._n], T)
 
     def update(self) -> None:
-        """The displacement or the contact has changed: take up where faces are and how large they are."""
+        """The displacement or the contact has changed: update where faces are and how large they are."""
         self._factored_for = None
         for touch, area in zip(self.touches, self._areas):
             touch.area = self._assemble(area)[touch.dofs]

@@ -25,9 +25,9 @@ from .space_error import SpaceError
 
 _MOST_STEPS = 10_000       # of the heat equation in one of the run's
 _WARNS = 2e-3
-"""Error in space over the span of temperatures above which a run warns: what is promised of stress."""
+"""Error in three dimensions over the span of temperatures above which a run warns: what is promised of stress."""
 _LOOKS = 8
-"""States in which the error in space is estimated, beside the ends of stages."""
+"""States in which the error in three dimensions is estimated, beside the ends of stages."""
 _NEAR = 1e-2
 """Distance to a tool over the thickness of the body within which a node touches it, for heat: so thin a layer of air
 conducts as well as a contact does. (A sheet that is drawn over a flat face lifts off its middle by less.)"""

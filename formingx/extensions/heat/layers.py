@@ -20,7 +20,7 @@ _PART = 0.3
 _REACH = 7.0
 """How many times the depth at the last time heat is felt: 1 - erf(7/2) is 7e-7."""
 _SPARE = 0.2
-"""By how much of a layer more one may be thicker than that."""
+"""the amount by which of a layer more one may be thicker than that."""
 _SAMPLES = (1 - np.cos(np.pi * np.linspace(0.0, 1.0, 2001))) / 2
 
 

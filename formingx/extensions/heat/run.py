@@ -24,7 +24,7 @@ from .result import HeatRun
 from .space_error import SpaceError
 
 PROMISE = 3e-4
-"""Of the error in space, over the span of temperatures in a run."""
+"""Of the error in three dimensions, over the span of temperatures in a run."""
 _EARLY = 0.01
 """Part of the time of a run from which on temperatures are as exact as at the times of output."""
 
@@ -158,7 +158,7 @@ def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: flo
 
 
 def _look_at_space(run: HeatRun, estimate: SpaceError, tolerance: float) -> None:
-    """Estimate the error in space at the times of output, and say where it is more than is promised."""
+    """Estimate the error in three dimensions at the times of output, and say where it is more than is promised."""
     try:
         run.errors_in_space = np.array([estimate.of(run.states[k], run.times[k])
                                         for k in np.searchsorted(run.times, run.outputs)])

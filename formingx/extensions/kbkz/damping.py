@@ -9,7 +9,8 @@ import numpy as np
 from ...errors import InputError, finite, positive
 
 _NEAR = 1e-4
-"""Of the square root in Wagner's exponent: below it its slope, infinite at rest, is that at it."""
+"""Of the square root in Wagner's exponent: below it its slope, infinite in the reference configuration, is that at
+it."""
 
 
 class Damping:

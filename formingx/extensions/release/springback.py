@@ -1,4 +1,4 @@
-"""A part that is let go: out of its tools, trimmed, cooled; what it springs back, shrinks and warps."""
+"""A part that is released: out of its tools, trimmed, cooled; what it springs back, shrinks and warps."""
 
 from __future__ import annotations
 
@@ -230,7 +230,8 @@ def _trimmed(mesh: Mesh, wall: Wall, trim: Any) -> tuple[Mesh, float]:
 
 
 def _carried(source: Any, state: Any, problem: Problem) -> np.ndarray:
-    """The unknowns of the part, own part; its histories remember the same as the histories of the whole body."""
+    """The unknowns of the part, locally owned entries; its histories remember the same as the histories of the whole
+    body."""
     take_fields(source, state, problem)
     x = np.zeros(problem.x.getLocalSize())
     x[: problem.n_owned] = problem.forms.w.x.array[: problem.n_owned]

@@ -1,4 +1,4 @@
-"""Checks of membranes in space."""
+"""Checks of membranes in three dimensions."""
 
 from collections.abc import Iterator
 from typing import Any

@@ -30,7 +30,7 @@ _PULLS = 0.01
 it goes out round its edges)."""
 
 SMALL_GAP = 1e-3
-"""Such a way over theta that is as good as none."""
+"""Such a way over theta that is negligible."""
 
 
 class LaggedStick:

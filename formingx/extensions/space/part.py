@@ -1,4 +1,4 @@
-"""A formed part in space in numbers, and how far it fills a tool."""
+"""A formed part in three dimensions in numbers, and how far it fills a tool."""
 
 from __future__ import annotations
 

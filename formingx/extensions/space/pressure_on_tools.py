@@ -1,10 +1,10 @@
-"""Pressure on a sheet in space where it slides on a tool: along the normal of the tool.
+"""Pressure on a sheet in three dimensions where it slides on a tool: along the normal of the tool.
 
 The triangles of a sheet are chords of a fillet. Pressure normal to a chord of length l has a tangential part at its
 ends where chords of different lengths meet: on a fillet of radius R it adds p l^2/(4 R) to the tension, an error of
 second order that may exceed the tension itself. The surface that the chords stand for is the tool, which is known. So
 of the force f of the pressure on a node that touches, (n . f) n acts, n being the normal of the tool there. A node
-comes to that as the tool presses on it, so that its forces do not jump where it touches.
+reaches that as the tool presses on it, so that its forces do not jump where it touches.
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ def _check(name: str, function: Callable, X: np.ndarray) -> None:
 
 
 def refuse(scene: Any, heat: Any) -> None:
-    """An InputError for what is not proven in space."""
+    """An InputError for what is not proven in three dimensions."""
     if scene.model.solid:
         raise InputError(f"Scene: model = {scene.model!r}: a sheet in space is a Membrane(): solids in space are not"
                          f" available yet")

@@ -1,4 +1,4 @@
-"""Flat sheets in space, z = 0: triangles within an outline, by gmsh."""
+"""Flat sheets in three dimensions, z = 0: triangles within an outline, by gmsh."""
 
 from __future__ import annotations
 

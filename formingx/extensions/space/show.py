@@ -1,4 +1,4 @@
-"""Parts in space as pictures, solids for other programs, and a report."""
+"""Parts in three dimensions as pictures, solids for other programs, and a report."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from ...units import Units
 from .wall import wall_of
 
 _DRAWN, _FRAMES = 200_000, (10, 100)
-"""Nodes of all drawn states of a report together; and the least and the most states."""
+"""Nodes of all drawn states of a report together; and the smallest and the most states."""
 
 _LARGEST_TOOL = 20_000
 """Triangles of a tool that is drawn in a report."""

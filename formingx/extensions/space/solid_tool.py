@@ -25,7 +25,8 @@ _PER_CORNER = 24           # straight pieces of a rounded corner in `surface`
 
 
 class SolidTool:
-    """A tool in space: `signed_distance` (positive inside), `bounds`, `surface`, `moved` (by its `shift`)."""
+    """A tool in three dimensions: `signed_distance` (positive inside), `bounds`, `surface`, `moved` (by its
+    `shift`)."""
 
     components = 3
     sized = True

@@ -42,7 +42,7 @@ class Surface(Formulation):
     _on_tools: PressureOnTools | None = None
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
-        """(normal at rest, the whole surface): "top" looks along +z, "bottom" along -z."""
+        """(normal in the reference configuration, the whole surface): "top" looks along +z, "bottom" along -z."""
         return ufl.as_vector([0, 0, 1.0 if name == "top" else -1.0]), self.dx(metadata={"quadrature_degree": 1})
 
     def refresh(self) -> None:

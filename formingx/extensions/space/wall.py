@@ -1,4 +1,5 @@
-"""The wall of a part in space, triangle by triangle: where it is thin, along a cut; where a printed grid comes to."""
+"""The wall of a part in three dimensions, triangle by triangle: where it is thin, along a cut; where a printed grid
+reaches."""
 
 from __future__ import annotations
 
@@ -50,7 +51,8 @@ class WallInSpace(Sheet):
 
     @property
     def ratio(self) -> np.ndarray:
-        """The wall over the thickness at rest: rest area over area, as the volume is kept, shape (m,)."""
+        """The wall over the thickness in the reference configuration: rest area over area, as the volume is kept,
+        shape (m,)."""
         return self.area_at_rest / self.area
 
     @property
@@ -169,7 +171,8 @@ class WallInSpace(Sheet):
         return found
 
     def to_nodes(self, values: np.ndarray) -> np.ndarray:
-        """Values of triangles, shape (m,), as those of nodes, (n,): means over those around, by their areas at rest."""
+        """Values of triangles, shape (m,), as those of nodes, (n,): means over those around, by their areas in the
+        reference configuration."""
         total, weight = np.zeros(len(self.rest)), np.zeros(len(self.rest))
         np.add.at(total, self.triangles.ravel(), np.repeat(values * self.area_at_rest, 3))
         np.add.at(weight, self.triangles.ravel(), np.repeat(self.area_at_rest, 3))

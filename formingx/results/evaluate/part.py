@@ -1,4 +1,4 @@
-"""The formed part in numbers: volume, weight, area, least wall, evenness."""
+"""The formed part in numbers: volume, weight, area, minimum wall, evenness."""
 
 from __future__ import annotations
 

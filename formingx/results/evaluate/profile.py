@@ -42,12 +42,13 @@ class Profile:
 
     @property
     def reference_length(self) -> np.ndarray:
-        """Length of the middle line at rest from the axis, shape (n,), length; of a flat sheet: R."""
+        """Length of the middle line in the reference configuration from the axis, shape (n,), length; of a flat
+        sheet: R."""
         return _length_along((self.rest_bottom + self.rest_top) / 2)
 
     @property
     def original_thickness(self) -> np.ndarray:
-        """Distance of the two points at rest, shape (n,), length."""
+        """Distance of the two points in the reference configuration, shape (n,), length."""
         return np.hypot(*(self.rest_top - self.rest_bottom).T)
 
     @property

@@ -1,4 +1,4 @@
-"""Snap-through with a history: where a body comes to rest, of several places, then depends on the way there."""
+"""Snap-through with a history: where a body reaches equilibrium, of several places, then depends on the way there."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...errors import InputError
 from ...findings import Finding
 
 _WALL = 0.05
-"""Change of the wall in one jump, over the wall, above which walls behind it are doubted."""
+"""Change of the wall in one jump, over the wall, above which walls behind it are uncertain."""
 
 
 class Snap(NamedTuple):

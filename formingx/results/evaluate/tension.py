@@ -65,7 +65,8 @@ class Tension:
         return Resultant(("meridional", "hoop")[i], float(values[k, i]), (float(values[k, 2]), float(values[k, 3])))
 
     def hoop(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
-        """(points (R, Z) from the axis to the rim, (n, 2), hoop resultants by length at rest, (n,)); collective."""
+        """(points (R, Z) from the axis to the rim, (n, 2), hoop resultants by length in the reference configuration,
+        (n,)); collective."""
         values = self._values(state)
         values = values[np.argsort(values[:, 2])]
         return values[:, 2:4], values[:, 4]

@@ -164,7 +164,8 @@ class Verdict:
                 yield Depth(share[k], depth[k].max(), points[k, np.argmax(depth[k])], contact, _name(contact))
 
     def _deepest_points(self, state: State, allowed: Callable[[Any], Any]) -> Iterator[Depth]:
-        """The contact point of each tool in space that is deepest, over the tolerance (length), if it is too deep."""
+        """The contact point of each tool in three dimensions that is deepest, over the tolerance (length), if it is
+        too deep."""
         if self._problem.scene.kinematics.components < 3:
             return
         with self._problem.state_context(state) as problem:

@@ -116,7 +116,8 @@ class Walls:
 
 
 def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
-    """(layers from the bottom up, where the material lines across cross the k interfaces at rest, shape (k, n, 2))."""
+    """(layers from the bottom up, where the material lines across cross the k interfaces in the reference
+    configuration, shape (k, n, 2))."""
     if len(mesh.layers) == 1:
         return list(mesh.layers), np.zeros((0, *profile.rest_bottom.shape))
     edges = _interfaces(mesh)
@@ -136,7 +137,8 @@ def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
 
 
 def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
-    """{(layer, layer): straight pieces of the line between them at rest, shape (m, 2, 2)}; same on all ranks."""
+    """{(layer, layer): straight pieces of the line between them in the reference configuration, shape (m, 2, 2)};
+    same on all ranks."""
     domain, topology = mesh.domain, mesh.domain.topology
     topology.create_connectivity(1, 2)
     layer = np.full(len(_compat.cell_nodes(domain)), -1)
@@ -172,7 +174,8 @@ def _crossing(start: np.ndarray, across: np.ndarray, pieces: np.ndarray) -> np.n
 
 
 def _middle_of(mesh: Any, layer: str, profile: Profile) -> float:
-    """Mean distance of a layer's nodes from the middle of the bottom face at rest: which of two is the lower."""
+    """Mean distance of a layer's nodes from the middle of the bottom face in the reference configuration: which of
+    two is the lower."""
     cells = mesh.cells.find(mesh.layers[layer])
     points = gathered(mesh.comm, of_cells(mesh.domain, cells))
     return float(distance_to_line(points.reshape(-1, points.shape[-1]), profile.rest_bottom).mean())

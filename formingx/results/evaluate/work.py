@@ -27,7 +27,7 @@ from ...solve.newton import Failure
 
 _LOSSES = "friction", "jumps", "bonds"
 _GAUSS = tuple((1 + s) / 2 for s in (-(0.6**0.5), 0.0, 0.6**0.5)), (5 / 18, 8 / 18, 5 / 18)
-_FOOT = 0.06           # of half the width of the ramp: points nearer to its foot are at it
+_FOOT = 0.06           # of half the width of the ramp: points nearer to its outer edge count as at the edge
 _SMALL = 1e-5          # of the arc length of a state: half of a difference quotient
 _CLOSED = 2e-4         # of the largest energy: what a step may leave unbalanced
 _PROMISED = 5e-3       # of the largest part of a balance: what a run may leave unbalanced
@@ -119,7 +119,7 @@ class Ledger:
         return {name: found.get(name, 0.0) + rest.get(name, 0.0) for name in {**found, **rest}}
 
     def _middle(self, a: Any, b: Any) -> Any:
-        """A state about half-way between two, in time, too, come to from the first; None if none is found."""
+        """Return a state about half-way between two, also in time, solved from the first; None if there is none."""
         problem, curve, h = self._problem, self._curve, self._curve.distance(a, b)
         if not h:
             return None

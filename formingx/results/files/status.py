@@ -12,7 +12,7 @@ from ...findings import Finding, alarming
 from . import checkpoint
 
 _RECENT = 20
-"""Of so many steps the pace is taken."""
+"""Of this number of steps the pace is taken."""
 _MOVES = ("enclosed_volume", "pole_height", "contact_length", "contact_area", "strain_energy")
 _STILL = 1e-3
 """Relative change of these over the recent steps below which the body stands still."""
@@ -25,7 +25,7 @@ class Status:
     """The last complete step of a run.
 
     Attributes:
-        states: in the checkpoint. stage: its name, or "". verdict: `State.verdict`.
+        states: in the checkpoint. stage: its name, or "". admissibility check: `State.verdict`.
         target: (measure, the value that ends the stage, its value now), or None.
         spent, left: seconds that the run has worked, and about how many it takes to the end of the stage at the pace of
             its last steps; None: it came no nearer in them.

@@ -92,7 +92,7 @@ def named(caller: str, file: Any, *endings: str) -> Any:
 
 
 def reserve(file: Any, size: int) -> None:
-    """Raise an OSError unless there is room for so many bytes beside this name: ADIOS2 aborts on a full disk."""
+    """Raise an OSError unless there is room for this number of bytes beside this name: ADIOS2 aborts on a full disk."""
     with open(file, "wb") as stream:
         try:
             os.posix_fallocate(stream.fileno(), 0, size)

@@ -15,7 +15,7 @@ from .record import Record, words
 DIGITS = 5
 """Significant digits of what is drawn."""
 STATIONS = 101
-"""At most so many places along a sheet are drawn."""
+"""At most this number of places along a sheet are drawn."""
 
 
 @functools.cache
@@ -39,7 +39,7 @@ def packed(text: str) -> str:
 
 
 def data(records: list[Record], names: list[str], units: Units, more: dict[str, Any] | None = None) -> str:
-    """Everything that `report.js` draws, as JSON; more: of each run, as the "mesh" of a sheet in space."""
+    """Everything that `report.js` draws, as JSON; more: of each run, as the "mesh" of a sheet in three dimensions."""
     runs = [_run(record, name, units) | (more or {}) for record, name in zip(records, names)]
     charts = [chart for chart in (*_loading(records, names, units), *_in_time(records, names, units),
                                   _filling(records, names, units), *_walls(records, names, units)) if chart]

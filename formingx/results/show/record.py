@@ -27,7 +27,7 @@ MASS = 1e-3
 """Relative error of the mass above which a report warns."""
 
 FRAMES = 100
-"""About so many states are drawn."""
+"""About this number of states are drawn."""
 
 
 @dataclass
@@ -36,7 +36,7 @@ class Record:
 
     Attributes:
         summary: {part of the scene: one line}; versions: {program: version}; axisymmetric: else plane strain, or in
-            space.
+            three dimensions.
         kinds: of the states; stages: their names, "" in a run without; measures: {column: shape (n,)}.
         histories: of the n states, rows (residual, correction, work) of Newton's iterations.
         profiles: of the n states, each a `Profile`, or None: of no sheet, or of a state that is not drawn (`frames`).
@@ -323,7 +323,8 @@ class _Fields:
 
 
 def _nearest(table: ContactTable, points: list[np.ndarray]) -> np.ndarray:
-    """Contact pressure at the stations of a profile, of the nodes of a face near either of its faces at rest, (m,)."""
+    """Contact pressure at the stations of a profile, of the nodes of a face near either of its faces in the
+    reference configuration, (m,)."""
     from scipy.spatial import cKDTree
     tree = cKDTree(table.rest)
     away, at = zip(*(tree.query(p) for p in points))
