@@ -47,7 +47,7 @@ def test_cold_plug_quick(tmp_path):
 
 @pytest.mark.slow
 def test_cold_plug(tmp_path):
-    """What docs/cold_plug.md says of it."""
+    """Compare its walls with the table of benchmarks/NOTES.md, and their order with docs/cold_plug.md."""
     run("demos/cold_plug.py", "--out", tmp_path)
     found = json.loads((tmp_path / "summary.json").read_text())
     plugs, bases = found["plugs"], {name: n["base"] for name, n in found["factors"].items()}

@@ -12,7 +12,7 @@ from .grid import Grid, to_mesh
 from .mesh import Columns, Mesh
 
 ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
-"""Elements of a disc (along the radius, usual number through each layer): docs/choosing.md says what each promises."""
+"""Elements of a disc (along the radius, usual number through each layer): docs/accuracy.md says what each promises."""
 _TALLEST = 1.5
 """Height over width of such elements at most: the inf-sup constant of P2 + bubble / P1dg falls as triangles get slim,
 and across a thick sheet, which bends, they lock (benchmarks/thickness.py)."""
