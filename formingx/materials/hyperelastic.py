@@ -15,7 +15,9 @@ from .material import Material
 
 
 class NeoHookean(Material):
-    """W = c10 (I1 - 3). The shear modulus is 2 c10.
+    r"""Neo-Hookean material; its shear modulus is 2 c10.
+
+    .. math:: W = c_{10} (I_1 - 3)
 
     Args:
         c10: the I1 constant, stress, greater than 0.
@@ -41,7 +43,9 @@ class NeoHookean(Material):
 
 
 class MooneyRivlin(Material):
-    """W = c10 (I1 - 3) + c01 (I2 - 3), eq. (4.1) of Song (1993): c10 belongs to I1, c01 to I2.
+    r"""Mooney-Rivlin material, eq. (4.1) of Song (1993): c10 belongs to I1, c01 to I2.
+
+    .. math:: W = c_{10} (I_1 - 3) + c_{01} (I_2 - 3)
 
     Args:
         c10: the I1 constant, stress, at least 0.
@@ -75,7 +79,9 @@ class MooneyRivlin(Material):
 
 
 class Yeoh(Material):
-    """W = c10 (I1 - 3) + c20 (I1 - 3)^2 + c30 (I1 - 3)^3, Yeoh (1993). The shear modulus is 2 c10.
+    r"""Material of Yeoh (1993); its shear modulus is 2 c10.
+
+    .. math:: W = c_{10} (I_1 - 3) + c_{20} (I_1 - 3)^2 + c_{30} (I_1 - 3)^3
 
     Args:
         c10: stress, greater than 0.
@@ -118,7 +124,9 @@ class Yeoh(Material):
 
 
 class Gent(Material):
-    """W = -(mu Jm / 2) ln(1 - (I1 - 3)/Jm), Gent (1996): stress grows without bound as I1 - 3 reaches Jm.
+    r"""Material of Gent (1996): the stress grows without bound as I1 - 3 reaches Jm.
+
+    .. math:: W = -\frac{\mu J_m}{2} \ln\left(1 - \frac{I_1 - 3}{J_m}\right)
 
     Args:
         mu: shear modulus, stress, greater than 0.
@@ -153,11 +161,20 @@ class Gent(Material):
 
 
 class ArrudaBoyce(Material):
-    """The eight-chain model of Arruda and Boyce (1993): dW/dy = mu N b(y), b the inverse of L(b) = coth b - 1/b.
+    r"""Eight-chain model of Arruda and Boyce (1993).
 
-    y = sqrt(I1 / (3 N)) is the chains' stretch over the largest one. For b stands the approximation of Kroeger (2015)
-    b = (3 y - (6 y^3 + y^5 - 2 y^7)/5) / (1 - y^2), whose relative error is at most 0.28 % for every y and 0 at y = 0
-    and 1. It integrates, with s = y^2, to W = mu N (s/2 - s^2/20 - s^3/15 - ln(1 - s)), zero at s = 1/N.
+    .. math:: \frac{dW}{dy} = \mu N b(y), \qquad y = \sqrt{\frac{I_1}{3 N}},
+
+    with the inverse b of the Langevin function L(b) = coth b - 1/b; y is the stretch of the chains over the largest
+    one. The approximation of Kroeger (2015)
+
+    .. math:: b = \frac{3 y - (6 y^3 + y^5 - 2 y^7)/5}{1 - y^2}
+
+    has a relative error of at most 0.28 % for every y, and 0 at y = 0 and 1. With s = y^2 its integral is
+
+    .. math:: W = \mu N \left(\frac{s}{2} - \frac{s^2}{20} - \frac{s^3}{15} - \ln(1 - s)\right),
+
+    less its value at s = 1/N.
 
     Args:
         mu: n k T, stress, greater than 0. The shear modulus in the reference configuration is larger: mu (1 + 3/(5
@@ -198,7 +215,10 @@ class ArrudaBoyce(Material):
 
 
 class Ogden(Material):
-    """W = sum mu_k / alpha_k (l1^alpha_k + l2^alpha_k + l3^alpha_k - 3), eq. (4.3) of Song (1993).
+    r"""Material of Ogden, eq. (4.3) of Song (1993).
+
+    .. math:: W = \sum_k \frac{\mu_k}{\alpha_k}
+              \left(\lambda_1^{\alpha_k} + \lambda_2^{\alpha_k} + \lambda_3^{\alpha_k} - 3\right)
 
     Where alpha_k < 0, l1^alpha_k is written (l2 l3)^-alpha_k, and so on: the same at constant volume (alpha_k = -2 is
     I2), but finite in an element that is squeezed flat on the way to a solution. Without it Newton's method fails at

@@ -86,10 +86,12 @@ class Kinematics:
 
 
 class Axisymmetric(Kinematics):
-    """Rotational symmetry about R = 0 without twist.
+    r"""Rotational symmetry about R = 0 without twist.
 
-    F = [[1 + u_r,R, u_r,Z, 0], [u_z,R, 1 + u_z,Z, 0], [0, 0, 1 + u_r/R]]; quadrature points never lie on the
-    axis, so u_r/R needs no guard.
+    .. math:: F = \begin{bmatrix} 1 + u_{r,R} & u_{r,Z} & 0 \\ u_{z,R} & 1 + u_{z,Z} & 0 \\ 0 & 0 & 1 + u_r / R
+              \end{bmatrix}
+
+    Quadrature points never lie on the axis, so u_r/R needs no guard.
 
     >>> fx.Axisymmetric().axes, list(fx.Axisymmetric().rigid_motions())                 # what a support must stop
     (('r', 'z'), ['translation along Z'])

@@ -66,10 +66,12 @@ class Load(Part):
 
 
 class Pressure(Load):
-    """Follower pressure on a tagged boundary: it stays normal to the deformed face (Song 1993, section 3.3).
+    r"""Follower pressure on a boundary: it stays normal to the deformed face (Song 1993, section 3.3).
 
-    dW = -p integral over the deformed face of n . du, pulled back by Nanson's formula and integrated exactly; its
-    (unsymmetric) load stiffness is part of the tangent.
+    .. math:: \delta W = -p \int_{\gamma} n \cdot \delta u \, da = -p \int_{\Gamma} J F^{-T} N \cdot \delta u \, dA
+
+    Nanson's formula pulls the integral back to the reference face, where it is exact. The unsymmetric load stiffness is
+    part of the tangent.
 
     Args:
         on: name of the boundary. A positive pressure pushes into the body.
@@ -102,7 +104,9 @@ class Pressure(Load):
 
 
 class Gravity(Load):
-    """Weight along -Z: dW = -integral over the reference volume of density acceleration du_z. A dead load.
+    r"""Weight along -Z, a dead load.
+
+    .. math:: \delta W = -\int_{V} \rho \, g \, \delta u_z \, dV
 
     Args:
         density: of the body in the reference configuration, above 0, or {layer: density} for those that have weight:

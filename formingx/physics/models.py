@@ -1,9 +1,16 @@
-"""Models of a body: a solid, with the way its volume is kept, or a membrane.
+r"""Models of a body: a solid, with one of two treatments of its volume, or a membrane.
 
-Both ways of the solid are the penalty of Song (1993), eq. (3.4.1), W + (mu/eps) (I3 - 1)^2, with eps dimensionless (mu
-is the layer's shear modulus). Where it keeps the pressure as an unknown p (tension positive), the same penalty reads
-W + p (J - 1) - p^2/(2 k), k = 8 mu/eps: equal for small J - 1, and a Newton method that is far better behaved, as
-the linearised constraint carries no wrong stress k (J - 1).
+Both treatments are the penalty of Song (1993), eq. (3.4.1),
+
+.. math:: W + \frac{\mu}{\epsilon} (I_3 - 1)^2,
+
+with a dimensionless eps and the shear modulus mu of the layer. With the pressure p (tension positive) as an unknown the
+same penalty reads
+
+.. math:: W + p (J - 1) - \frac{p^2}{2 k}, \qquad k = \frac{8 \mu}{\epsilon}.
+
+Both are equal for small J - 1. The second has far better Newton convergence, since the linearised constraint carries no
+wrong stress k (J - 1).
 """
 
 from __future__ import annotations

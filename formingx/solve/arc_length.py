@@ -23,7 +23,11 @@ Bend: TypeAlias = tuple[Array, float]
 
 
 class Curve:
-    """Solves for states of a problem and knows how far apart they are.
+    r"""Solver for single states of a problem, with a metric of their distance (arc length).
+
+    .. math:: \Delta s^2 = \overline{|\Delta x|^2} + w \, \Delta\lambda^2,
+
+    with the mean squared displacement over the size of the body and the weight w of the control.
 
     Attributes:
         fixed_control: True if it cannot pass a limit point.

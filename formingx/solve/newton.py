@@ -124,10 +124,11 @@ class _ActiveSet:
 class Tolerances:
     """Convergence criteria of a state: all of these.
 
-    correction: the next correction that quadratic convergence predicts, over the norm of x (and `Newton.at_rest`).
-    residual: norm of F over the norm of the support forces.
-    iterations: at most this number of with one active set of contact; settling: and while it changes, see
-        `Newton.small`.
+    Attributes:
+        correction: the next correction that quadratic convergence predicts, over the norm of x (and `Newton.at_rest`).
+        residual: norm of F over the norm of the support forces.
+        iterations: largest number of iterations with one active set of contact.
+        settling: largest number of iterations while the active set changes, see `Newton.small`.
 
     Raises:
         InputError: a value that is not greater than 0.

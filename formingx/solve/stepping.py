@@ -22,7 +22,11 @@ SAME_TIME = 1e-12
 
 @dataclass
 class StepControl:
-    """Step length from the iterations of the last step, eq. (4.21) of Song (1993): target over actual.
+    r"""Step length from the iterations of the last step, eq. (4.21) of Song (1993).
+
+    .. math:: s_{k+1} = s_k \min\left(\max\left(\frac{n_{target}}{n_k}, \frac{1}{2}\right), growth\right)
+
+    With an estimated error e over its tolerance in time, the factor is at most 0.9 e^(-1/3).
 
     Attributes:
         length: the next step (dimensionless arc length: mean displacement over the size of the body); at most

@@ -57,8 +57,9 @@ class FunctionOfTemperature:
 
 
 class WLF:
-    """log10 aT = -c1 (T - Tr)/(c2 + T - Tr) (Williams, Landel and Ferry 1955): relaxation times at T are aT times
-    those at Tr.
+    r"""Shift factor of Williams, Landel and Ferry (1955): relaxation times at T are aT times the times at Tr.
+
+    .. math:: \log_{10} a_T = -\frac{c_1 (T - T_r)}{c_2 + T - T_r}
 
     Call it with numbers, shape (...), or a UFL expression of the temperature. It has a meaning above Tr - c2 only,
     where aT becomes infinite: in a run, a body that is colder than `limits` has the aT of 1e30 at the lower limit, with
@@ -95,7 +96,9 @@ class WLF:
 
 
 class Arrhenius:
-    """ln aT = E/R (1/T - 1/Tr), temperatures counted from absolute zero; called as `WLF`.
+    r"""Shift factor of Arrhenius, with temperatures from absolute zero; called as `WLF`.
+
+    .. math:: \ln a_T = \frac{E}{R} \left(\frac{1}{T} - \frac{1}{T_r}\right)
 
     Args:
         activation_energy: E, J/mol, above 0.

@@ -143,15 +143,21 @@ class Answer:
 
     def report(self, file: Any = "design.html", title: str = "", *, deviations: Any = None,
                units: Units | None = None) -> FilePath:
-        """Write one HTML file: the result, how sure it is, walls before and after, the pattern, and which parameter
-        changes the wall where (rank 0 writes); returns where it is.
+        """Write one HTML file: the result and its confidence, walls, the pattern, and the effects of the parameters.
 
-        deviations: as of `DesignRun.spread`: the wall is drawn with its standard deviation, and a table has those of
-            the wall, the volume, pressures and forces.
-        units: a `formingx.Units`, for the labels.
+        Args:
+            file: its name; rank 0 writes it.
+            title: heading of the file.
+            deviations: as for `DesignRun.spread`: the wall is drawn with its standard deviation; a table has the
+                standard deviations of the wall, the volume, pressures and forces.
+            units: a `formingx.Units`, for the labels.
+
+        Returns:
+            The path of the file.
 
         Raises:
-            InputError: the best run has no derivative. OSError: the file cannot be written.
+            InputError: the best run has no derivative.
+            OSError: the file cannot be written.
         """
         from .report import of_answer
         return of_answer(self, file, title, deviations, units or NONE)

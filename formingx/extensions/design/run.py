@@ -188,14 +188,21 @@ class DesignRun:
 
     def report(self, file: Any = "design.html", title: str = "", *, deviations: Any = None,
                units: Units | None = None) -> FilePath:
-        """Write one HTML file: the part, its wall, and what changes it (rank 0 writes); returns where it is.
+        """Write one HTML file: the part, its wall, and the effects of the parameters.
 
-        deviations: as of `spread`: the wall is drawn with its standard deviation, and a table has those of the wall,
-            the volume, pressures and forces.
-        units: a `formingx.Units`, for the labels.
+        Args:
+            file: its name; rank 0 writes it.
+            title: heading of the file.
+            deviations: as for `spread`: the wall is drawn with its standard deviation; a table has the standard
+                deviations of the wall, the volume, pressures and forces.
+            units: a `formingx.Units`, for the labels.
+
+        Returns:
+            The path of the file.
 
         Raises:
-            InputError: the run has no derivative. OSError: the file cannot be written.
+            InputError: the run has no derivative.
+            OSError: the file cannot be written.
         """
         from .report import of_run
         return of_run(self, file, title, deviations, units or NONE)

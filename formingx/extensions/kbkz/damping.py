@@ -42,7 +42,9 @@ class Damping:
 
 
 class PSM(Damping):
-    """h = alpha/[(alpha - 3) + beta I1 + (1 - beta) I2]: Papanastasiou, Scriven and Macosko, J. Rheol. 27 (1983) 387.
+    r"""Damping of Papanastasiou, Scriven and Macosko, J. Rheol. 27 (1983) 387.
+
+    .. math:: h = \frac{\alpha}{(\alpha - 3) + \beta I_1 + (1 - \beta) I_2}
 
     Args:
         alpha: above 0; the larger, the less is damped.
@@ -62,7 +64,9 @@ class PSM(Damping):
 
 
 class Wagner(Damping):
-    """h = exp(-beta sqrt(alpha I1 + (1 - alpha) I2 - 3)): Wagner, Rheol. Acta 15 (1976) 136 and 18 (1979) 33.
+    r"""Damping of Wagner, Rheol. Acta 15 (1976) 136 and 18 (1979) 33.
+
+    .. math:: h = \exp\left(-\beta \sqrt{\alpha I_1 + (1 - \alpha) I_2 - 3}\right)
 
     Args:
         alpha: from 0 to 1, the share of I1.
@@ -91,7 +95,9 @@ def LuoTanner(n: float, beta: float) -> Wagner:  # noqa: N802  a card's name for
 
 
 class DoubleWagner(Damping):
-    """h = f exp(-n1 s) + (1 - f) exp(-n2 s), s = sqrt(alpha I1 + (1 - alpha) I2 - 3): Osaki (1976), Laun (1978).
+    r"""Damping by two exponentials: Osaki (1976), Laun (1978).
+
+    .. math:: h = f e^{-n_1 s} + (1 - f) e^{-n_2 s}, \qquad s = \sqrt{\alpha I_1 + (1 - \alpha) I_2 - 3}
 
     Args:
         alpha, f: from 0 to 1. n1, n2: above 0.

@@ -24,19 +24,21 @@ class Part(PartNumbers):
         area: of the middle surface, length^2.
         draw_ratio: area over the area that it had in the reference configuration (areal draw ratio).
         mean_wall: volume over area, length.
-        min_wall: length; and where: reference radius, (r, z) of the middle line, height (as in `Wall`);
-            min_wall_reference: ("R", radius in the reference configuration), of a parison ("Z", height of its inner
-                face in the reference configuration).
+        min_wall: minimum wall, length.
+        min_wall_radius: reference radius there, length.
+        min_wall_at: (r, z) of the middle line there, length.
+        min_wall_height: height there (as in `Wall`), length.
+        min_wall_reference: ("R", reference radius), for a parison ("Z", reference height of its inner face).
         uniformity: minimum wall over mean wall, 1 for an even part.
         variation: standard deviation of the wall over the middle surface, over its mean: coefficient of variation.
-        weight: grams if a density in g/cm3 was given; else None: of what the material was in equilibrium, before
-            anything expanded, so that it does not change with the temperature.
+        weight: grams if a density in g/cm3 was given, else None; of the material before thermal expansion, so that it
+            does not change with the temperature.
         walls: {height: wall there}, lengths.
-        capacity: that the part holds, length^3: within its inner face, between planes across its ends (of a closed
-            bottle: all of it; of a pot: to its rim, or to the trim).
+        capacity: volume within the inner face, between planes across its ends, length^3: the whole of a closed bottle;
+            of a pot to its rim, or to the trim.
         scrap: volume beyond the trim over the volume of the whole sheet.
-        basis: what volume, area, weight and capacity are given for, as text: the whole part of which a half was
-            modelled, a unit of depth; "" of a round part.
+        basis: basis of volume, area, weight and capacity, as text: the whole part of which a half was modelled, a unit
+            of depth; "" for an axisymmetric part.
         units: of the labels.
     """
 
